@@ -1,0 +1,3 @@
+//! The `mechid` program.
+
+fn main() {}

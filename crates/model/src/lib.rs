@@ -1,0 +1,23 @@
+//! Linear mechanical systems M ẍ + C ẋ + K x = F and what is known of them in closed form.
+//!
+//! ```
+//! use mechid_model::SecondOrderSystem;
+//! use nalgebra::dmatrix;
+//!
+//! // An oil film couples the two directions: C and K need not be symmetric.
+//! let shaft = SecondOrderSystem::new(
+//!     dmatrix![14.8, 0.0; 0.0, 14.8],
+//!     dmatrix![20.0, 10.0; 10.0, 30.0],
+//!     dmatrix![40.0, 50.0; -20.0, 60.0],
+//! )?;
+//! assert_eq!(shaft.dof(), 2);
+//! # Ok::<(), mechid_model::ModelError>(())
+//! ```
+
+mod error;
+mod response;
+mod second_order;
+
+pub use error::ModelError;
+pub use response::Response;
+pub use second_order::{Matrix, SecondOrderSystem};

@@ -1,0 +1,172 @@
+//! The system every room computes with: M ẍ + C ẋ + K x = F.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+
+use crate::ModelError;
+
+/// Which of the three matrices of a [`SecondOrderSystem`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Matrix {
+    /// M, in kg.
+    Mass,
+    /// C, in N·s/m.
+    Damping,
+    /// K, in N/m.
+    Stiffness,
+}
+
+impl Matrix {
+    /// The letter of its entries: `m`, `c` or `k`.
+    pub fn letter(self) -> char {
+        match self {
+            Matrix::Mass => 'm',
+            Matrix::Damping => 'c',
+            Matrix::Stiffness => 'k',
+        }
+    }
+
+    /// SI unit of its entries (translational degrees of freedom).
+    pub fn unit(self) -> &'static str {
+        match self {
+            Matrix::Mass => "kg",
+            Matrix::Damping => "N·s/m",
+            Matrix::Stiffness => "N/m",
+        }
+    }
+}
+
+impl fmt::Display for Matrix {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Matrix::Mass => "mass",
+            Matrix::Damping => "damping",
+            Matrix::Stiffness => "stiffness",
+        })
+    }
+}
+
+/// M ẍ + C ẋ + K x = F with n degrees of freedom; M invertible, C and K of any symmetry.
+///
+/// ```text
+/// ┌ m11 … m1n ┐ ┌ ẍ1 ┐   ┌ c11 … c1n ┐ ┌ ẋ1 ┐   ┌ k11 … k1n ┐ ┌ x1 ┐   ┌ F1 ┐
+/// │  ⋮      ⋮ │ │ ⋮  │ + │  ⋮      ⋮ │ │ ⋮  │ + │  ⋮      ⋮ │ │ ⋮  │ = │ ⋮  │
+/// └ mn1 … mnn ┘ └ ẍn ┘   └ cn1 … cnn ┘ └ ẋn ┘   └ kn1 … knn ┘ └ xn ┘   └ Fn ┘
+/// ```
+///
+/// # Source
+/// Dissertation eq. (3.2.1); Bathe (1982), eq. (9.1).
+#[derive(Debug, Clone, PartialEq)]
+pub struct SecondOrderSystem {
+    mass: DMatrix<f64>,
+    damping: DMatrix<f64>,
+    stiffness: DMatrix<f64>,
+}
+
+impl SecondOrderSystem {
+    /// A system from its n×n matrices M (kg), C (N·s/m) and K (N/m).
+    ///
+    /// # Errors
+    /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
+    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades.
+    pub fn new(
+        mass: DMatrix<f64>,
+        damping: DMatrix<f64>,
+        stiffness: DMatrix<f64>,
+    ) -> Result<Self, ModelError> {
+        let dof = mass.nrows();
+        if dof == 0 {
+            return Err(ModelError::NoDof);
+        }
+        for (matrix, entries) in
+            [(Matrix::Mass, &mass), (Matrix::Damping, &damping), (Matrix::Stiffness, &stiffness)]
+        {
+            check(matrix, entries, dof)?;
+        }
+        let singular_values = mass.singular_values();
+        let reciprocal_condition = singular_values.min() / singular_values.max();
+        if reciprocal_condition.is_nan() || reciprocal_condition < 1e-15 {
+            return Err(ModelError::SingularMass { reciprocal_condition });
+        }
+        Ok(Self { mass, damping, stiffness })
+    }
+
+    /// Number of degrees of freedom n.
+    pub fn dof(&self) -> usize {
+        self.mass.nrows()
+    }
+
+    /// M, n×n, in kg.
+    pub fn mass(&self) -> &DMatrix<f64> {
+        &self.mass
+    }
+
+    /// C, n×n, in N·s/m.
+    pub fn damping(&self) -> &DMatrix<f64> {
+        &self.damping
+    }
+
+    /// K, n×n, in N/m.
+    pub fn stiffness(&self) -> &DMatrix<f64> {
+        &self.stiffness
+    }
+
+    /// One of the three, by name.
+    pub fn matrix(&self, which: Matrix) -> &DMatrix<f64> {
+        match which {
+            Matrix::Mass => &self.mass,
+            Matrix::Damping => &self.damping,
+            Matrix::Stiffness => &self.stiffness,
+        }
+    }
+}
+
+fn check(matrix: Matrix, entries: &DMatrix<f64>, dof: usize) -> Result<(), ModelError> {
+    let (rows, columns) = entries.shape();
+    if (rows, columns) != (dof, dof) {
+        return Err(ModelError::Shape { matrix, rows, columns, dof });
+    }
+    match entries.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(at) => Err(ModelError::NotFinite {
+            matrix,
+            row: at % dof + 1,
+            column: at / dof + 1,
+            value: entries[at],
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::dmatrix;
+
+    use super::*;
+
+    #[test]
+    fn bad_matrices_are_refused_with_their_numbers() {
+        let (m, c, k) = (dmatrix![2.0], dmatrix![0.1], dmatrix![8.0]);
+        assert!(SecondOrderSystem::new(m.clone(), c.clone(), k.clone()).is_ok());
+        assert_eq!(
+            SecondOrderSystem::new(m.clone(), DMatrix::zeros(1, 2), k.clone()),
+            Err(ModelError::Shape { matrix: Matrix::Damping, rows: 1, columns: 2, dof: 1 })
+        );
+        assert!(matches!(
+            SecondOrderSystem::new(m, c, dmatrix![f64::NAN]),
+            Err(ModelError::NotFinite { matrix: Matrix::Stiffness, row: 1, column: 1, .. })
+        ));
+        let z = DMatrix::zeros(2, 2);
+        assert_eq!(
+            SecondOrderSystem::new(dmatrix![1.0, 1.0; 1.0, 1.0], z.clone(), z)
+                .map(|_| ())
+                .unwrap_err()
+                .to_string()
+                .split(" (")
+                .next(),
+            Some("the mass matrix is singular")
+        );
+        let e = DMatrix::zeros(0, 0);
+        assert_eq!(SecondOrderSystem::new(e.clone(), e.clone(), e), Err(ModelError::NoDof));
+    }
+}

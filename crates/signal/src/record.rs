@@ -1,0 +1,206 @@
+//! Sampled signals on one time axis.
+
+use nalgebra::{DMatrix, DVectorView};
+
+use crate::{Sampling, SignalError};
+
+/// Samples × channels on one uniform time axis; a channel is a contiguous column.
+///
+/// Every value is finite: a record that exists can be computed with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    sampling: Sampling,
+    data: DMatrix<f64>,
+}
+
+impl Record {
+    /// A record from a matrix of `sampling.len()` rows and one column per channel.
+    ///
+    /// # Errors
+    /// [`SignalError::Length`] if the rows do not match the sampling,
+    /// [`SignalError::NotFinite`] at the first NaN or infinity.
+    pub fn new(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
+        if data.nrows() != sampling.len() {
+            return Err(SignalError::Length {
+                channel: 0,
+                got: data.nrows(),
+                expected: sampling.len(),
+            });
+        }
+        if let Some(at) = data.iter().position(|v| !v.is_finite()) {
+            let (channel, sample) = (at / data.nrows(), at % data.nrows());
+            return Err(SignalError::NotFinite { sample, channel, value: data[(sample, channel)] });
+        }
+        Ok(Self { sampling, data })
+    }
+
+    /// A record of one channel.
+    ///
+    /// # Errors
+    /// As [`Record::new`].
+    pub fn from_channel(sampling: Sampling, channel: Vec<f64>) -> Result<Self, SignalError> {
+        let len = channel.len();
+        Self::new(sampling, DMatrix::from_vec(len, 1, channel))
+    }
+
+    /// A record from its channels, all as long as the sampling.
+    ///
+    /// # Errors
+    /// As [`Record::new`], naming the channel of the wrong length.
+    pub fn from_channels(
+        sampling: Sampling,
+        channels: &[impl AsRef<[f64]>],
+    ) -> Result<Self, SignalError> {
+        for (channel, data) in channels.iter().enumerate() {
+            let got = data.as_ref().len();
+            if got != sampling.len() {
+                return Err(SignalError::Length { channel, got, expected: sampling.len() });
+            }
+        }
+        let data = DMatrix::from_fn(sampling.len(), channels.len(), |k, c| channels[c].as_ref()[k]);
+        Self::new(sampling, data)
+    }
+
+    /// The time axis.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// Number of samples.
+    #[allow(clippy::len_without_is_empty, reason = "never empty")]
+    pub fn len(&self) -> usize {
+        self.sampling.len()
+    }
+
+    /// Number of channels.
+    pub fn channels(&self) -> usize {
+        self.data.ncols()
+    }
+
+    /// The samples of one channel, counted from 0.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn channel(&self, channel: usize) -> &[f64] {
+        let n = self.len();
+        &self.data.as_slice()[channel * n..(channel + 1) * n]
+    }
+
+    /// The samples of one channel as a vector view.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn column(&self, channel: usize) -> DVectorView<'_, f64> {
+        self.data.column(channel)
+    }
+
+    /// All samples: `len()` rows, `channels()` columns.
+    pub fn data(&self) -> &DMatrix<f64> {
+        &self.data
+    }
+
+    /// The samples, leaving the time axis behind.
+    pub fn into_data(self) -> DMatrix<f64> {
+        self.data
+    }
+
+    /// Samples `start .. start + len`, the first of them at t = 0 again.
+    ///
+    /// # Errors
+    /// [`SignalError::Window`] if they do not all exist, [`SignalError::Empty`] if `len` is 0.
+    pub fn window(&self, start: usize, len: usize) -> Result<Self, SignalError> {
+        let sampling = self.sampling.with_len(len)?;
+        let end = start.saturating_add(len);
+        if end > self.len() {
+            return Err(SignalError::Window { start, end, len: self.len() });
+        }
+        Ok(Self { sampling, data: self.data.rows(start, len).into_owned() })
+    }
+
+    /// The same record with the mean of every channel taken away.
+    pub fn without_mean(&self) -> Self {
+        let mut data = self.data.clone();
+        for mut column in data.column_iter_mut() {
+            let mean = column.mean();
+            column.add_scalar_mut(-mean);
+        }
+        Self { sampling: self.sampling, data }
+    }
+
+    /// The mean over consecutive periods of `period` samples; a last, incomplete one is left out.
+    ///
+    /// # Errors
+    /// [`SignalError::Window`] if the record is shorter than one period,
+    /// [`SignalError::Empty`] if `period` is 0.
+    pub fn period_mean(&self, period: usize) -> Result<Self, SignalError> {
+        let mut mean = self.window(0, period)?;
+        let periods = self.len() / period;
+        for p in 1..periods {
+            mean.data += self.data.rows(p * period, period);
+        }
+        mean.data /= periods as f64;
+        Ok(mean)
+    }
+
+    /// An error if `other` lies on another time axis (steps may differ by rounding only).
+    ///
+    /// # Errors
+    /// [`SignalError::SamplingMismatch`].
+    pub fn check_same_sampling(&self, other: &Self) -> Result<(), SignalError> {
+        let (left, right) = (self.sampling, other.sampling);
+        let same_dt = (left.dt() - right.dt()).abs() <= 1e-9 * left.dt();
+        if left.len() == right.len() && same_dt {
+            return Ok(());
+        }
+        Err(SignalError::SamplingMismatch {
+            left_len: left.len(),
+            left_dt: left.dt(),
+            right_len: right.len(),
+            right_dt: right.dt(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_channels() -> Record {
+        let s = Sampling::new(0.1, 4).unwrap();
+        Record::from_channels(s, &[[1.0, 2.0, 3.0, 6.0], [0.0, 1.0, 0.0, -1.0]]).unwrap()
+    }
+
+    #[test]
+    fn channels_are_contiguous_columns() {
+        let r = two_channels();
+        assert_eq!((r.len(), r.channels()), (4, 2));
+        assert_eq!(r.channel(1), [0.0, 1.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn windows_means_and_periods() {
+        let r = two_channels();
+        assert_eq!(r.window(1, 2).unwrap().channel(0), [2.0, 3.0]);
+        assert_eq!(r.window(3, 2), Err(SignalError::Window { start: 3, end: 5, len: 4 }));
+        assert_eq!(r.without_mean().channel(0), [-2.0, -1.0, 0.0, 3.0]);
+        assert_eq!(r.period_mean(2).unwrap().channel(0), [2.0, 4.0]);
+        assert_eq!(r.period_mean(3).unwrap().channel(0), [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn bad_data_are_refused_with_their_place() {
+        let s = Sampling::new(0.1, 2).unwrap();
+        let e = Record::from_channels(s, &[vec![1.0, 2.0], vec![1.0]]).unwrap_err();
+        assert_eq!(e, SignalError::Length { channel: 1, got: 1, expected: 2 });
+        let e = Record::from_channels(s, &[[1.0, 2.0], [0.0, f64::INFINITY]]).unwrap_err();
+        assert_eq!(e, SignalError::NotFinite { sample: 1, channel: 1, value: f64::INFINITY });
+    }
+
+    #[test]
+    fn time_axes_are_compared() {
+        let r = two_channels();
+        let other = r.window(0, 3).unwrap();
+        assert!(r.check_same_sampling(&r).is_ok());
+        assert!(r.check_same_sampling(&other).is_err());
+    }
+}
