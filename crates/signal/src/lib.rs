@@ -16,11 +16,18 @@
 //! ```
 
 mod error;
+pub mod lines;
+mod multisine;
+pub mod noise;
+pub mod phases;
 mod record;
 mod sampling;
 pub mod spectrum;
 
 pub use error::SignalError;
+pub use multisine::Multisine;
+pub use noise::NoiseLevel;
+pub use phases::Phases;
 pub use record::Record;
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;

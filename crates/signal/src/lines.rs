@@ -1,0 +1,102 @@
+//! Sets of lines a multisine may excite.
+//!
+//! Each function returns rising line numbers up to and including `last`; none of them contains
+//! DC. A set that comes out empty is refused by [`Multisine::new`](crate::Multisine::new).
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::Sampling;
+
+/// Every line 1, 2, 3, … `last`.
+pub fn all(last: usize) -> Vec<usize> {
+    (1..=last).collect()
+}
+
+/// Every line strictly between DC and Nyquist of a period, the set of the dissertation's tables.
+pub fn full(sampling: Sampling) -> Vec<usize> {
+    all((sampling.len() - 1) / 2)
+}
+
+/// Odd lines 1, 3, 5, …: the even ones show even non-linearities, the signal is half-wave
+/// antisymmetric.
+pub fn odd(last: usize) -> Vec<usize> {
+    (1..=last).step_by(2).collect()
+}
+
+/// Odd-odd lines 1, 5, 9, …: the odd lines between them show odd non-linearities.
+pub fn odd_odd(last: usize) -> Vec<usize> {
+    (1..=last).step_by(4).collect()
+}
+
+/// Special odd lines 1, 3, 9, 11, 17, 19, …: two of every four odd lines.
+///
+/// # Source
+/// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on detection
+/// lines for non-linear distortions.
+pub fn special_odd(last: usize) -> Vec<usize> {
+    odd(last).into_iter().filter(|n| matches!(n % 8, 1 | 3)).collect()
+}
+
+/// Odd lines with one left out at random of every `group` consecutive ones, as detection lines
+/// for odd non-linearities; `group` below 2 leaves none out.
+///
+/// # Source
+/// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on random
+/// harmonic grids.
+pub fn random_odd(last: usize, group: usize, seed: u64) -> Vec<usize> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let lines = odd(last);
+    if group < 2 {
+        return lines;
+    }
+    let mut kept = Vec::with_capacity(lines.len());
+    for chunk in lines.chunks(group) {
+        let out = rng.random_range(0..group);
+        kept.extend(chunk.iter().enumerate().filter(|(k, _)| *k != out).map(|(_, n)| *n));
+    }
+    kept
+}
+
+/// The lines of a period that lie between two frequencies in Hz, ends included, DC excluded.
+pub fn band(sampling: Sampling, low_hz: f64, high_hz: f64) -> Vec<usize> {
+    let spacing = sampling.line_spacing_hz();
+    // A line meant to lie on an end must not be lost to rounding.
+    let slack = 1e-9 * spacing;
+    (1..(sampling.len() - 1) / 2 + 1)
+        .filter(|n| {
+            let f = *n as f64 * spacing;
+            f >= low_hz - slack && f <= high_hz + slack
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_by_hand() {
+        assert_eq!(all(3), [1, 2, 3]);
+        assert_eq!(odd(8), [1, 3, 5, 7]);
+        assert_eq!(odd_odd(13), [1, 5, 9, 13]);
+        assert_eq!(special_odd(20), [1, 3, 9, 11, 17, 19]);
+        let s = Sampling::new(0.1, 20).unwrap(); // lines every 0.5 Hz
+        assert_eq!(full(s), all(9));
+        assert_eq!(full(Sampling::new(0.1, 21).unwrap()), all(10));
+        assert_eq!(band(s, 1.0, 2.5), [2, 3, 4, 5]);
+        assert_eq!(band(s, 0.0, f64::INFINITY), all(9));
+        assert!(band(s, 1.1, 1.2).is_empty());
+    }
+
+    #[test]
+    fn random_odd_leaves_one_of_each_group_out() {
+        let kept = random_odd(79, 4, 3);
+        assert_eq!(kept.len(), 30);
+        for group in odd(79).chunks(4) {
+            assert_eq!(group.iter().filter(|n| kept.contains(n)).count(), 3);
+        }
+        assert_ne!(kept, random_odd(79, 4, 4));
+        assert_eq!(random_odd(9, 1, 3), odd(9));
+    }
+}

@@ -1,0 +1,224 @@
+//! Sums of harmonically related cosines.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::error::{not_negative, positive};
+use crate::phases::gcd;
+use crate::{Phases, Record, Sampling, SignalError, Spectrum};
+
+/// A periodic signal F(t) = Σ A_n cos(n ω0 t + φ_n), known exactly at any t.
+///
+/// The fundamental ω0 is not part of it: the same multisine serves every period.
+///
+/// ```
+/// use mechid_signal::{Multisine, Phases, Sampling, lines};
+///
+/// // The excitation of the dissertation: every line strictly between DC and Nyquist.
+/// let sampling = Sampling::new(0.01, 256)?;
+/// let force = Multisine::flat(lines::full(sampling), 50.0, Phases::SchroederBinary)?;
+/// let record = force.sample(sampling)?;
+/// let exact = force.value(0.01 * 3.0, sampling.omega0());
+/// assert!((record.channel(0)[3] - exact).abs() < 1e-10);
+/// assert!(force.crest_factor()? < 2.2);
+/// # Ok::<(), mechid_signal::SignalError>(())
+/// ```
+///
+/// # Source
+/// Dissertation eq. (4.3.2), with its amplitude and subscript restored.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Multisine {
+    lines: Vec<usize>,
+    amplitudes: Vec<f64>,
+    phases: Vec<f64>,
+}
+
+impl Multisine {
+    /// The highest line supported; it bounds the memory a crest factor may take.
+    pub const MAX_LINE: usize = 1 << 24;
+
+    /// Samples per Nyquist interval at which [`peak`](Self::peak) and
+    /// [`crest_factor`](Self::crest_factor) look at the signal.
+    pub const OVERSAMPLING: usize = 16;
+
+    /// A multisine of the given lines (rising, from 1) and amplitudes (one per line).
+    ///
+    /// # Errors
+    /// [`SignalError::NoLines`], [`SignalError::Line`] for DC or a line above
+    /// [`MAX_LINE`](Self::MAX_LINE), [`SignalError::LineOrder`], [`SignalError::PerLine`] if the
+    /// lists differ in length, [`SignalError::Negative`] for an amplitude below zero or not
+    /// finite, [`SignalError::Infinite`] for a given phase that is not finite.
+    pub fn new(
+        lines: Vec<usize>,
+        amplitudes: Vec<f64>,
+        phases: Phases,
+    ) -> Result<Self, SignalError> {
+        if lines.is_empty() {
+            return Err(SignalError::NoLines);
+        }
+        let allowed = 1..=Self::MAX_LINE;
+        if let Some(&line) = lines.iter().find(|n| !allowed.contains(n)) {
+            return Err(SignalError::Line { line, highest: Self::MAX_LINE });
+        }
+        if let Some(w) = lines.windows(2).find(|w| w[1] <= w[0]) {
+            return Err(SignalError::LineOrder { previous: w[0], line: w[1] });
+        }
+        let (count, got) = (lines.len(), amplitudes.len());
+        if got != count {
+            return Err(SignalError::PerLine { what: "amplitudes", lines: count, got });
+        }
+        for a in &amplitudes {
+            not_negative("amplitude", *a)?;
+        }
+        let phases = phases.of(&lines, &amplitudes)?;
+        Ok(Self { lines, amplitudes, phases })
+    }
+
+    /// A multisine with the same amplitude on every line.
+    ///
+    /// # Errors
+    /// As [`Multisine::new`].
+    pub fn flat(
+        lines: impl IntoIterator<Item = usize>,
+        amplitude: f64,
+        phases: Phases,
+    ) -> Result<Self, SignalError> {
+        let lines: Vec<usize> = lines.into_iter().collect();
+        let amplitudes = vec![amplitude; lines.len()];
+        Self::new(lines, amplitudes, phases)
+    }
+
+    /// The multisine of a measured period: its lines between DC and Nyquist, exactly.
+    ///
+    /// # Errors
+    /// As [`Multisine::new`]: a period of one or two samples has no such lines.
+    ///
+    /// # Panics
+    /// If the spectrum has no such channel.
+    pub fn from_spectrum(spectrum: &Spectrum, channel: usize) -> Result<Self, SignalError> {
+        let lines = crate::lines::full(spectrum.sampling());
+        let (amplitudes, phases) =
+            lines.iter().map(|n| spectrum.line(*n, channel).to_polar()).unzip();
+        Self::new(lines, amplitudes, Phases::Given(phases))
+    }
+
+    /// The lines, rising.
+    pub fn lines(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// The amplitude of each line.
+    pub fn amplitudes(&self) -> &[f64] {
+        &self.amplitudes
+    }
+
+    /// The phase of each line, in rad.
+    pub fn phases(&self) -> &[f64] {
+        &self.phases
+    }
+
+    /// The same lines and amplitudes with other phases.
+    ///
+    /// # Errors
+    /// [`SignalError::PerLine`] or [`SignalError::Infinite`] for bad [`Phases::Given`].
+    pub fn with_phases(mut self, phases: Phases) -> Result<Self, SignalError> {
+        self.phases = phases.of(&self.lines, &self.amplitudes)?;
+        Ok(self)
+    }
+
+    /// The same shape, scaled to an RMS value.
+    ///
+    /// # Errors
+    /// [`SignalError::Negative`] for an impossible `rms`, [`SignalError::Silent`] if all
+    /// amplitudes are zero.
+    pub fn with_rms(self, rms: f64) -> Result<Self, SignalError> {
+        not_negative("RMS value", rms)?;
+        let now = self.rms();
+        self.scaled(rms, now)
+    }
+
+    /// The same shape, scaled to a largest absolute value, as [`peak`](Self::peak) finds it.
+    ///
+    /// # Errors
+    /// [`SignalError::Negative`] for an impossible `peak`, [`SignalError::Silent`] if all
+    /// amplitudes are zero.
+    pub fn with_peak(self, peak: f64) -> Result<Self, SignalError> {
+        not_negative("peak value", peak)?;
+        let now = self.peak();
+        self.scaled(peak, now)
+    }
+
+    fn scaled(mut self, wanted: f64, now: f64) -> Result<Self, SignalError> {
+        positive("present level", now).map_err(|_| SignalError::Silent { channel: 0 })?;
+        self.amplitudes.iter_mut().for_each(|a| *a *= wanted / now);
+        Ok(self)
+    }
+
+    /// The exact value at `t` seconds for a fundamental of `omega0` rad/s.
+    pub fn value(&self, t: f64, omega0: f64) -> f64 {
+        // Whole periods are taken off first: n·ω0·t would lose digits at large t.
+        let turn = (omega0 * t / TAU).fract() * TAU;
+        let terms = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
+        terms.map(|((&n, a), phase)| a * (n as f64 * turn + phase).cos()).sum()
+    }
+
+    /// One period: the lines stand at multiples of `sampling.omega0()`.
+    ///
+    /// # Errors
+    /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate.
+    pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
+        Ok(self.spectrum(sampling)?.to_record())
+    }
+
+    /// The complex amplitudes A_n exp(i φ_n) as the spectrum of one period.
+    ///
+    /// # Errors
+    /// As [`Multisine::sample`].
+    pub fn spectrum(&self, sampling: Sampling) -> Result<Spectrum, SignalError> {
+        let line = self.lines[self.lines.len() - 1];
+        if 2 * line >= sampling.len() {
+            return Err(SignalError::Nyquist { line, len: sampling.len() });
+        }
+        let mut values = DMatrix::zeros(sampling.lines(), 1);
+        for ((n, a), phase) in self.lines.iter().zip(&self.amplitudes).zip(&self.phases) {
+            values[(*n, 0)] = Complex::from_polar(*a, *phase);
+        }
+        Ok(Spectrum::from_lines(sampling, values))
+    }
+
+    /// Root mean square over a period, √(Σ A_n² / 2).
+    pub fn rms(&self) -> f64 {
+        (0.5 * self.amplitudes.iter().map(|a| a * a).sum::<f64>()).sqrt()
+    }
+
+    /// Largest absolute value over a period, seen at
+    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times the Nyquist rate or more.
+    pub fn peak(&self) -> f64 {
+        self.fine_period().iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+    }
+
+    /// Peak over RMS; 1 is a square wave, √2 a sine.
+    ///
+    /// # Errors
+    /// [`SignalError::Silent`] if all amplitudes are zero.
+    pub fn crest_factor(&self) -> Result<f64, SignalError> {
+        let rms = self.rms();
+        positive("RMS value", rms).map_err(|_| SignalError::Silent { channel: 0 })?;
+        Ok(self.peak() / rms)
+    }
+
+    /// One period on a fine grid.
+    fn fine_period(&self) -> Vec<f64> {
+        // Lines 10, 20, 30 have the waveform of lines 1, 2, 3: look at the shortest period only.
+        let common = self.lines.iter().fold(0, |d, n| gcd(d, *n));
+        let lines: Vec<usize> = self.lines.iter().map(|n| n / common).collect();
+        let last = lines[lines.len() - 1];
+        let len = (2 * (last + 1) * Self::OVERSAMPLING).next_power_of_two();
+        let reduced =
+            Self { lines, amplitudes: self.amplitudes.clone(), phases: self.phases.clone() };
+        let sampling = Sampling::new(1.0, len).expect("a positive step and length");
+        let record = reduced.sample(sampling).expect("far below Nyquist");
+        record.channel(0).to_vec()
+    }
+}
