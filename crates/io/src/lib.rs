@@ -1,1 +1,30 @@
-//! Under construction.
+//! Measured records and system descriptions, in and out of files.
+//!
+//! Rigs write tables of many dialects: quoted headers, a trailing comma on every line, columns that
+//! are empty but for their first row, semicolons with decimal commas. A [`Table`] reads them all,
+//! and says file, line and column of what it cannot read.
+//!
+//! ```
+//! use mechid_io::{Table, TimeAxis};
+//!
+//! let text = "\"time\";\"force [N]\";\"x\";\n0,0;1,5;0,002;\n0,5;-1,5;0,004;\n1,0;1,5;0,002;\n";
+//! let table = Table::parse("bench.csv", text.as_bytes())?;
+//! let record = table.record(&TimeAxis::Column("time"), &["force [N]", "3"])?;
+//! assert_eq!(record.sampling().dt(), 0.5);
+//! assert_eq!(record.channel(0), [1.5, -1.5, 1.5]);
+//! assert_eq!(record.channel(1), [0.002, 0.004, 0.002]);
+//! # Ok::<(), mechid_io::IoError>(())
+//! ```
+
+mod csv_text;
+mod error;
+mod output;
+mod rows;
+mod table;
+mod time_axis;
+
+pub use csv_text::csv_text;
+pub use error::IoError;
+pub use output::{OutputFile, write_all};
+pub use table::Table;
+pub use time_axis::TimeAxis;

@@ -1,0 +1,50 @@
+//! The subcommands, one file each.
+//!
+//! To add one: a file with an arguments struct (`#[derive(clap::Args)]`, help texts with units and
+//! an example) and a method `run(&self) -> Result<Outcome, CliError>`; then a variant of
+//! [`Command`] and its two arms below. Errors of a library crate get a variant of
+//! [`CliError`](crate::error::CliError).
+
+mod info;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::CliError;
+use crate::options::ReportArgs;
+use crate::outcome::Outcome;
+
+/// From a measured force and response to the machine behind it.
+#[derive(Debug, Parser)]
+#[command(
+    name = "mechid",
+    version,
+    about,
+    max_term_width = 100,
+    after_help = "Numbers are in SI units. Columns are chosen by header name or by number, counted from 1.\n\
+                  Every failure prints one message, writes no file, and exits with code 2."
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    Info(info::InfoArgs),
+}
+
+impl Command {
+    /// What the command found; nothing is printed or written yet.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        match self {
+            Command::Info(args) => args.run(),
+        }
+    }
+
+    /// How the user wants to be told.
+    pub fn report(&self) -> &ReportArgs {
+        match self {
+            Command::Info(args) => &args.report,
+        }
+    }
+}

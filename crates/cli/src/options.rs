@@ -1,0 +1,149 @@
+//! Options that several subcommands share.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mechid::io::{Table, TimeAxis};
+use mechid::signal::Record;
+
+use crate::error::CliError;
+
+/// How to tell the result.
+#[derive(Debug, Default, Args)]
+pub struct ReportArgs {
+    /// Print the report as JSON, for programs
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Print nothing on success
+    #[arg(long, short, help_heading = "Output", conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+/// Where to draw the result.
+#[derive(Debug, Default, Args)]
+#[allow(dead_code, reason = "for the subcommands that draw")]
+pub struct PlotArgs {
+    /// Draw the result into this file; its ending, .svg or .png, says how
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = plot_file, help_heading = "Output")]
+    pub plot: Option<PathBuf>,
+}
+
+fn plot_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("svg" | "png") => Ok(path),
+        _ => Err("the file name must end in .svg or .png".into()),
+    }
+}
+
+/// Which record, and which part of it.
+#[derive(Debug, Args)]
+pub struct RecordArgs {
+    /// The record: a table with one row per sample
+    ///
+    /// Delimiter (comma, semicolon, tab, blanks) and header are found by themselves; lines starting
+    /// with # are left out.
+    #[arg(value_name = "RECORD.csv")]
+    pub record: PathBuf,
+    /// Time column, in s: header name or number, counted from 1 [default: time, time_s or t]
+    #[arg(long, value_name = "COLUMN", help_heading = "Time and window")]
+    pub time: Option<String>,
+    /// Samples per second, in Hz, where there is no time column
+    #[arg(
+        long,
+        value_name = "HZ",
+        conflicts_with = "time",
+        allow_negative_numbers = true,
+        help_heading = "Time and window"
+    )]
+    pub sample_rate: Option<f64>,
+    /// First sample of the window, counted from 1
+    #[arg(long, value_name = "SAMPLE", default_value_t = 1, value_parser = at_least_one,
+          help_heading = "Time and window")]
+    pub start: usize,
+    /// Samples in one period [default: all samples from --start on]
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one, help_heading = "Time and window")]
+    pub period: Option<usize>,
+    /// Whole periods in the window [default: as many as there are]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "period",
+          help_heading = "Time and window")]
+    pub periods: Option<usize>,
+    /// What to take away from every channel first: the mean of the whole record, not only of the
+    /// window
+    #[arg(long, value_name = "WHAT", value_enum, help_heading = "Time and window")]
+    pub detrend: Option<Detrend>,
+}
+
+/// What to take away from a channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Detrend {
+    /// Nothing
+    None,
+    /// The mean of the whole record
+    Mean,
+}
+
+fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("counted from 1".into()),
+        Ok(n) => Ok(n),
+        Err(e) => Err(format!("a whole number is needed: {e}")),
+    }
+}
+
+/// Names by which a time column is known without being told.
+const TIME_COLUMNS: [&str; 4] = ["time", "Time", "time_s", "t"];
+
+impl RecordArgs {
+    /// The file as a table.
+    pub fn table(&self) -> Result<Table, CliError> {
+        Ok(Table::read(&self.record)?)
+    }
+
+    /// The time axis asked for, or the time column found by its name.
+    pub fn time_axis(&self, table: &Table) -> Option<TimeAxis<'_>> {
+        match (self.sample_rate, &self.time) {
+            (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
+            (None, Some(column)) => Some(TimeAxis::Column(column)),
+            (None, None) => TIME_COLUMNS
+                .into_iter()
+                .find(|name| table.names().iter().any(|n| n == name))
+                .map(TimeAxis::Column),
+        }
+    }
+
+    /// The columns `wanted` as the channels of a record: whole, then detrended, then windowed to
+    /// `periods` periods.
+    #[allow(dead_code, reason = "for the subcommands that compute")]
+    pub fn window(&self, table: &Table, wanted: &[impl AsRef<str>]) -> Result<Record, CliError> {
+        let time = self.time_axis(table).ok_or_else(|| CliError::NoTimeAxis {
+            file: table.file().into(),
+            available: table.available(),
+        })?;
+        let mut record = table.record(&time, wanted)?;
+        if self.detrend == Some(Detrend::Mean) {
+            record = record.without_mean();
+        }
+        let (start, len) = self.span(table)?;
+        record.window(start, len).map_err(|_| self.outside(table, len))
+    }
+
+    /// First sample, counted from 0, and number of samples of the window.
+    pub fn span(&self, table: &Table) -> Result<(usize, usize), CliError> {
+        let start = self.start - 1;
+        let left = table.len().saturating_sub(start);
+        let period = self.period.unwrap_or(left);
+        let periods = self.periods.unwrap_or(left.checked_div(period).unwrap_or(0)).max(1);
+        let len = period.max(1).saturating_mul(periods);
+        if len > left { Err(self.outside(table, len)) } else { Ok((start, len)) }
+    }
+
+    fn outside(&self, table: &Table, len: usize) -> CliError {
+        CliError::Window {
+            file: table.file().into(),
+            first: self.start,
+            last: self.start.saturating_add(len - 1),
+            len: table.len(),
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! What can be wrong with a file.
+
+use mechid_signal::SignalError;
+
+/// A file that cannot be read or written; every message names the file and the place in it.
+///
+/// Lines and columns are counted from 1; lines as a text editor counts them.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum IoError {
+    /// The file cannot be read.
+    #[error("cannot read {file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file cannot be written; nothing was left behind.
+    #[error("cannot write {file}: {source}")]
+    Write {
+        /// The file.
+        file: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The file has a text encoding this reader does not know.
+    #[error("{file} is UTF-16 text; save it as UTF-8 (in a spreadsheet: \"CSV UTF-8\")")]
+    Encoding {
+        /// The file.
+        file: String,
+    },
+    /// The file has no line of numbers.
+    #[error("{file} holds no data: {found}")]
+    Empty {
+        /// The file.
+        file: String,
+        /// What was found instead.
+        found: &'static str,
+    },
+    /// A line has more or fewer fields than the first one.
+    #[error("{file}, line {line}: {got} fields where the first line has {expected}")]
+    Ragged {
+        /// The file.
+        file: String,
+        /// Line of the file.
+        line: u64,
+        /// Fields on that line.
+        got: usize,
+        /// Fields on the first line.
+        expected: usize,
+    },
+    /// There is no such column.
+    #[error("{file} has no column \"{wanted}\"; its columns are {available}")]
+    MissingColumn {
+        /// The file.
+        file: String,
+        /// What was asked for.
+        wanted: String,
+        /// Numbers and names of the columns there are.
+        available: String,
+    },
+    /// Several columns bear the name asked for.
+    #[error(
+        "{file} has several columns \"{wanted}\"; choose one by its number: its columns are {available}"
+    )]
+    AmbiguousColumn {
+        /// The file.
+        file: String,
+        /// What was asked for.
+        wanted: String,
+        /// Numbers and names of the columns there are.
+        available: String,
+    },
+    /// One column was asked for twice.
+    #[error(
+        "column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}"
+    )]
+    DuplicateColumn {
+        /// The file.
+        file: String,
+        /// Number of the column.
+        column: usize,
+        /// First way it was asked for.
+        first: String,
+        /// Second way it was asked for.
+        second: String,
+        /// Numbers and names of the columns there are.
+        available: String,
+    },
+    /// Text stands where a number is needed.
+    #[error("{file}, line {line}, column {column}: \"{text}\" is not a number")]
+    NotANumber {
+        /// The file.
+        file: String,
+        /// Line of the file.
+        line: u64,
+        /// Number and name of the column.
+        column: String,
+        /// What stands there.
+        text: String,
+    },
+    /// An empty field stands where a number is needed.
+    #[error("{file}, line {line}, column {column}: the field is empty, a number is needed")]
+    EmptyField {
+        /// The file.
+        file: String,
+        /// Line of the file.
+        line: u64,
+        /// Number and name of the column.
+        column: String,
+    },
+    /// A sample is NaN or infinite.
+    #[error("{file}, line {line}, column {column}: {value} is not a finite number")]
+    NotFinite {
+        /// The file.
+        file: String,
+        /// Line of the file.
+        line: u64,
+        /// Number and name of the column.
+        column: String,
+        /// The value found.
+        value: f64,
+    },
+    /// The instants of the time column are not equally spaced.
+    #[error(
+        "{file}: the time steps are not uniform: {step} s up to line {line}, where the usual step is \
+         {usual} s (resample the record, or give the sample rate instead of the time column if the \
+         times are only rounded)"
+    )]
+    NonUniformTime {
+        /// The file.
+        file: String,
+        /// Line at which the worst step ends.
+        line: u64,
+        /// The worst step, in seconds.
+        step: f64,
+        /// The median step, in seconds.
+        usual: f64,
+    },
+    /// One sample has no time step.
+    #[error("{file} holds a single sample: a time column needs two to tell the time step")]
+    SingleSample {
+        /// The file.
+        file: String,
+    },
+    /// The sampling rate is not usable.
+    #[error("the sample rate must be a positive finite number of Hz, got {rate_hz}")]
+    SampleRate {
+        /// The rate given, in Hz.
+        rate_hz: f64,
+    },
+    /// The numbers do not make a record.
+    #[error("{file}: {source}")]
+    Signal {
+        /// The file.
+        file: String,
+        /// What is wrong with them.
+        source: SignalError,
+    },
+}
