@@ -1,1 +1,62 @@
-//! Under construction.
+//! The force that drove a known machine, from its measured response.
+//!
+//! | Function | Needs | Use it when |
+//! |---|---|---|
+//! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
+//! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
+//! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
+//!
+//! ```
+//! use mechid_force::{Measurement, NoiseLevel, Quantity, frequency_domain, relative_error};
+//! use mechid_model::SecondOrderSystem;
+//! use mechid_signal::{Record, Sampling, Spectrum};
+//! use nalgebra::{Complex, DMatrix, dmatrix, dvector};
+//!
+//! // A rotor in two coupled directions; a force on the second one only, lines 1, 3 and 8.
+//! let rotor = SecondOrderSystem::new(
+//!     dmatrix![14.8, 0.0; 0.0, 14.8],
+//!     dmatrix![20.0, 10.0; 10.0, 30.0],
+//!     dmatrix![40.0, 50.0; -20.0, 60.0],
+//! )?;
+//! let (period, lines) = (Sampling::new(0.05, 256)?, [1, 3, 8]);
+//! let (mut force, mut motion) = (DMatrix::zeros(129, 2), DMatrix::zeros(129, 2));
+//! for n in lines {
+//!     let omega = n as f64 * period.omega0();
+//!     let stiffness = DMatrix::from_fn(2, 2, |i, j| Complex::new(
+//!         rotor.stiffness()[(i, j)] - omega * omega * rotor.mass()[(i, j)],
+//!         omega * rotor.damping()[(i, j)],
+//!     ));
+//!     let load = dvector![Complex::ZERO, Complex::new(100.0, 0.0)];
+//!     force.set_row(n, &load.transpose());
+//!     motion.set_row(n, &stiffness.lu().solve(&load).unwrap().transpose());
+//! }
+//! let force = Spectrum::from_lines(period, force).to_record();
+//! let displacement = Spectrum::from_lines(period, motion).to_record();
+//!
+//! // Only the displacement of the first direction is measured: it tells the force all the same.
+//! let measured = Measurement::of_all(
+//!     Quantity::Displacement,
+//!     Record::from_channel(period, displacement.channel(0).to_vec())?,
+//! );
+//! let found = frequency_domain(&rotor, &measured, &[1], &lines, &NoiseLevel::Unknown)?;
+//! assert!(relative_error(found.record(), &force)? < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod continuous;
+mod discretised;
+mod error;
+mod frequency_domain;
+mod identified;
+mod measurement;
+mod measures;
+mod transfer;
+mod transition;
+
+pub use continuous::continuous;
+pub use discretised::{Discretisation, Ends, discretised};
+pub use error::ForceError;
+pub use frequency_domain::{MIN_OUTSIDE_LINES, NoiseLevel, frequency_domain, inner_lines};
+pub use identified::IdentifiedForce;
+pub use measurement::{Channel, Measurement, Quantity};
+pub use measures::{channel_errors, line_errors, relative_error, spectrum_ratio, spurious_ratio};

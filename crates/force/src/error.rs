@@ -1,0 +1,165 @@
+//! What can keep a force from being reconstructed.
+
+use mechid_model::ModelError;
+use mechid_signal::SignalError;
+
+/// A force that cannot be reconstructed; every variant carries the offending numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ForceError {
+    /// System and response differ in size.
+    #[error(
+        "the system has {system} degrees of freedom, the response has {response} channels: \
+         give one channel per degree of freedom, or name the measured ones in a `Measurement`"
+    )]
+    Dof {
+        /// Degrees of freedom of the system.
+        system: usize,
+        /// Channels of the response.
+        response: usize,
+    },
+    /// The response is shorter than the method needs.
+    #[error("{samples} samples are too few: this method needs {needed}; give a longer response")]
+    TooShort {
+        /// Samples given.
+        samples: usize,
+        /// Fewest samples that will do.
+        needed: usize,
+    },
+    /// A record and its list of channels differ in size.
+    #[error("the record has {record} channels, {described} are described")]
+    ChannelCount {
+        /// Channels of the record.
+        record: usize,
+        /// Channels described.
+        described: usize,
+    },
+    /// A degree of freedom that the system does not have.
+    #[error("degree of freedom {dof} (counted from 0) of a system of {dofs}")]
+    NoSuchDof {
+        /// The one asked for, counted from 0.
+        dof: usize,
+        /// How many there are.
+        dofs: usize,
+    },
+    /// The same thing was named twice.
+    #[error("{what} {index} is named twice")]
+    Repeated {
+        /// `"forced degree of freedom"`, `"line"` …
+        what: &'static str,
+        /// The index named twice, counted from 0.
+        index: usize,
+    },
+    /// Nothing is forced, so nothing is to be found.
+    #[error("no forced degree of freedom was named")]
+    NoForcedDof,
+    /// More unknown forces than measured channels.
+    #[error(
+        "{forces} unknown forces cannot be told apart with {measurements} measured channels: \
+         measure more degrees of freedom, or name fewer forced ones"
+    )]
+    MoreForcesThanMeasurements {
+        /// Unknown forces.
+        forces: usize,
+        /// Measured channels.
+        measurements: usize,
+    },
+    /// A Taylor order outside 1 … 8.
+    #[error("Taylor order {order}: choose 1 (Euler) to 8, or the exact form")]
+    TaylorOrder {
+        /// The order asked for.
+        order: usize,
+    },
+    /// At this step the end of a step does not tell the force during it.
+    #[error(
+        "the time step {dt} s is too long for the machine: the force during a step leaves no \
+         trace at its end (reciprocal condition {reciprocal_condition:.1e}); sample faster"
+    )]
+    StepTooLong {
+        /// The time step, in seconds.
+        dt: f64,
+        /// Smallest over largest singular value of the input matrix.
+        reciprocal_condition: f64,
+    },
+    /// No line was chosen.
+    #[error("no spectral line was chosen")]
+    NoLines,
+    /// A line that the spectrum does not have.
+    #[error("line {line} was asked for, the spectrum ends at line {last}")]
+    NoSuchLine {
+        /// The line asked for.
+        line: usize,
+        /// The last line there is.
+        last: usize,
+    },
+    /// The measured channels do not show a force at this line.
+    #[error(
+        "at line {line} (ω = {omega:.6} rad/s) the machine transmits nothing of the force on \
+         degree of freedom {dof} (counted from 0) to the measured channels (reciprocal \
+         condition {reciprocal_condition:.1e}): leave the line out, measure another degree of \
+         freedom or quantity, or name fewer forces"
+    )]
+    NotTransmitted {
+        /// The line.
+        line: usize,
+        /// Its angular frequency, in rad/s.
+        omega: f64,
+        /// The forced degree of freedom most affected, counted from 0.
+        dof: usize,
+        /// Smallest over largest singular value of the transfer matrix at this line.
+        reciprocal_condition: f64,
+    },
+    /// The dynamic stiffness is singular: no periodic response exists at this line.
+    #[error(
+        "at line {line} (ω = {omega:.6} rad/s) the dynamic stiffness is singular: an undamped \
+         resonance has no periodic response; leave the line out"
+    )]
+    Resonance {
+        /// The line.
+        line: usize,
+        /// Its angular frequency, in rad/s.
+        omega: f64,
+    },
+    /// Too few lines are left to measure the noise on.
+    #[error(
+        "the noise level is to be measured outside the chosen lines, but only {outside} are left \
+         of the {needed} needed: choose fewer lines, give a longer period, or state the level"
+    )]
+    TooFewOutsideLines {
+        /// Lines not chosen.
+        outside: usize,
+        /// Fewest that will do.
+        needed: usize,
+    },
+    /// A number that must be positive and finite is not.
+    #[error("{what} must be positive and finite, got {value}")]
+    NotPositive {
+        /// What the number is.
+        what: &'static str,
+        /// The value found.
+        value: f64,
+    },
+    /// Two force records have different numbers of channels.
+    #[error("the forces compared have {estimate} and {truth} channels")]
+    Compared {
+        /// Channels of the estimate.
+        estimate: usize,
+        /// Channels of the force it is compared with.
+        truth: usize,
+    },
+    /// A ratio to a force that is not there.
+    #[error("the force compared with is zero at line {line}: leave the line out")]
+    NoForceAtLine {
+        /// The line.
+        line: usize,
+    },
+    /// A ratio to a force that is not there.
+    #[error("the force compared with is zero on every channel")]
+    NoForce,
+    /// The model is not usable.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A signal is not usable.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+}

@@ -1,0 +1,141 @@
+//! What was measured, and where.
+
+use std::fmt;
+
+use mechid_model::Response;
+use mechid_signal::{Record, Sampling};
+use nalgebra::{Complex, DMatrix};
+
+use crate::ForceError;
+
+/// What a sensor measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Quantity {
+    /// x, in m.
+    Displacement,
+    /// ẋ, in m/s.
+    Velocity,
+    /// ẍ, in m/s².
+    Acceleration,
+}
+
+impl Quantity {
+    /// (iω)^d, with d the number of derivatives: displacement to this quantity at ω.
+    pub(crate) fn derivative(self, omega: f64) -> Complex<f64> {
+        match self {
+            Quantity::Displacement => Complex::new(1.0, 0.0),
+            Quantity::Velocity => Complex::new(0.0, omega),
+            Quantity::Acceleration => Complex::new(-omega * omega, 0.0),
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Quantity::Displacement => "displacement",
+            Quantity::Velocity => "velocity",
+            Quantity::Acceleration => "acceleration",
+        })
+    }
+}
+
+/// One measured channel: a quantity at a degree of freedom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Channel {
+    /// Degree of freedom, counted from 0.
+    pub dof: usize,
+    /// What was measured there.
+    pub quantity: Quantity,
+}
+
+/// A measured record and what each of its channels is.
+///
+/// Any mixture will do: displacement of one degree of freedom only, accelerations of all, both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measurement {
+    record: Record,
+    channels: Vec<Channel>,
+}
+
+impl Measurement {
+    /// A measurement from its record and the description of each channel.
+    ///
+    /// # Errors
+    /// [`ForceError::ChannelCount`] if the numbers of channels differ.
+    pub fn new(record: Record, channels: Vec<Channel>) -> Result<Self, ForceError> {
+        if record.channels() != channels.len() {
+            return Err(ForceError::ChannelCount {
+                record: record.channels(),
+                described: channels.len(),
+            });
+        }
+        Ok(Self { record, channels })
+    }
+
+    /// The same quantity on every channel, channel c at degree of freedom c.
+    pub fn of_all(quantity: Quantity, record: Record) -> Self {
+        let channels = (0..record.channels()).map(|dof| Channel { dof, quantity }).collect();
+        Self { record, channels }
+    }
+
+    /// Displacement, velocity and acceleration of every degree of freedom.
+    pub fn of_response(response: &Response) -> Self {
+        let dof = response.dof();
+        let parts = [
+            (Quantity::Displacement, response.displacement()),
+            (Quantity::Velocity, response.velocity()),
+            (Quantity::Acceleration, response.acceleration()),
+        ];
+        let data = DMatrix::from_fn(response.sampling().len(), 3 * dof, |k, c| {
+            parts[c / dof].1.data()[(k, c % dof)]
+        });
+        let record =
+            Record::new(response.sampling(), data).expect("records of a response are finite");
+        let channels =
+            (0..3 * dof).map(|c| Channel { dof: c % dof, quantity: parts[c / dof].0 }).collect();
+        Self { record, channels }
+    }
+
+    /// The measured samples × channels.
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// What each channel is.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// The time axis.
+    pub fn sampling(&self) -> Sampling {
+        self.record.sampling()
+    }
+
+    /// An error unless the forces at `forced` can be sought from these channels.
+    pub(crate) fn check(&self, dofs: usize, forced: &[usize]) -> Result<(), ForceError> {
+        let named = self.channels.iter().map(|c| c.dof).chain(forced.iter().copied());
+        if let Some(dof) = named.into_iter().find(|dof| *dof >= dofs) {
+            return Err(ForceError::NoSuchDof { dof, dofs });
+        }
+        if forced.is_empty() {
+            return Err(ForceError::NoForcedDof);
+        }
+        if let Some(index) = first_repeated(forced) {
+            return Err(ForceError::Repeated { what: "forced degree of freedom", index });
+        }
+        if forced.len() > self.channels.len() {
+            return Err(ForceError::MoreForcesThanMeasurements {
+                forces: forced.len(),
+                measurements: self.channels.len(),
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The first index that was already there.
+pub(crate) fn first_repeated(indices: &[usize]) -> Option<usize> {
+    let mut seen = std::collections::HashSet::new();
+    indices.iter().copied().find(|index| !seen.insert(*index))
+}

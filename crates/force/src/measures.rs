@@ -1,0 +1,118 @@
+//! How far a reconstructed force is from the one it is compared with.
+
+use mechid_signal::{Record, Spectrum};
+
+use crate::ForceError;
+
+/// ‖F̂ − F‖ / ‖F‖ over all samples and channels.
+///
+/// # Errors
+/// [`ForceError::Compared`], [`ForceError::Signal`] if the records do not match,
+/// [`ForceError::NoForce`] if F is zero.
+pub fn relative_error(estimate: &Record, truth: &Record) -> Result<f64, ForceError> {
+    check_records(estimate, truth)?;
+    let norm = truth.data().norm();
+    if norm == 0.0 {
+        return Err(ForceError::NoForce);
+    }
+    Ok((estimate.data() - truth.data()).norm() / norm)
+}
+
+/// ‖F̂ − F‖ / ‖F‖ of each channel; `None` for channels on which no force acts.
+///
+/// # Errors
+/// As [`relative_error`], but for [`ForceError::NoForce`].
+pub fn channel_errors(estimate: &Record, truth: &Record) -> Result<Vec<Option<f64>>, ForceError> {
+    check_records(estimate, truth)?;
+    let channels = estimate.data().column_iter().zip(truth.data().column_iter());
+    Ok(channels
+        .map(|(e, t)| Some(t.norm()).filter(|norm| *norm > 0.0).map(|norm| (e - t).norm() / norm))
+        .collect())
+}
+
+/// |F̂_n − F_n| / |F_n| at each of the lines, for one channel.
+///
+/// # Errors
+/// [`ForceError::NoForceAtLine`] where F_n is zero; [`ForceError::NoSuchLine`],
+/// [`ForceError::NoSuchDof`], [`ForceError::Compared`].
+pub fn line_errors(
+    estimate: &Spectrum,
+    truth: &Spectrum,
+    channel: usize,
+    lines: &[usize],
+) -> Result<Vec<f64>, ForceError> {
+    ratios(estimate, truth, channel, channel, lines, |e, t| (e - t).norm())
+}
+
+/// |F̂_n| / |F_n| at each of the lines, for one channel: 1 is perfect.
+///
+/// # Errors
+/// As [`line_errors`].
+pub fn spectrum_ratio(
+    estimate: &Spectrum,
+    truth: &Spectrum,
+    channel: usize,
+    lines: &[usize],
+) -> Result<Vec<f64>, ForceError> {
+    ratios(estimate, truth, channel, channel, lines, |e, _| e.norm())
+}
+
+/// |F̂_n| on a channel where no force acts, over |F_n| on one where it does: 0 is perfect.
+///
+/// # Errors
+/// As [`line_errors`].
+pub fn spurious_ratio(
+    estimate: &Spectrum,
+    truth: &Spectrum,
+    unforced: usize,
+    forced: usize,
+    lines: &[usize],
+) -> Result<Vec<f64>, ForceError> {
+    ratios(estimate, truth, unforced, forced, lines, |e, _| e.norm())
+}
+
+type Line = nalgebra::Complex<f64>;
+
+fn ratios(
+    estimate: &Spectrum,
+    truth: &Spectrum,
+    channel: usize,
+    reference: usize,
+    lines: &[usize],
+    numerator: impl Fn(Line, Line) -> f64,
+) -> Result<Vec<f64>, ForceError> {
+    if estimate.channels() != truth.channels() {
+        return Err(ForceError::Compared {
+            estimate: estimate.channels(),
+            truth: truth.channels(),
+        });
+    }
+    let dofs = truth.channels();
+    if let Some(dof) = [channel, reference].into_iter().find(|c| *c >= dofs) {
+        return Err(ForceError::NoSuchDof { dof, dofs });
+    }
+    let last = estimate.len().min(truth.len()) - 1;
+    lines
+        .iter()
+        .map(|&line| {
+            if line > last {
+                return Err(ForceError::NoSuchLine { line, last });
+            }
+            let norm = truth.line(line, reference).norm();
+            if norm == 0.0 {
+                return Err(ForceError::NoForceAtLine { line });
+            }
+            Ok(numerator(estimate.line(line, channel), truth.line(line, reference)) / norm)
+        })
+        .collect()
+}
+
+fn check_records(estimate: &Record, truth: &Record) -> Result<(), ForceError> {
+    if estimate.channels() != truth.channels() {
+        return Err(ForceError::Compared {
+            estimate: estimate.channels(),
+            truth: truth.channels(),
+        });
+    }
+    Ok(estimate.check_same_sampling(truth)?)
+}

@@ -1,0 +1,191 @@
+//! The discretised equation against responses in closed form.
+
+mod common;
+
+use common::{Oscillator, mixed, response};
+use mechid_force::{Discretisation, Ends, ForceError, channel_errors, discretised, relative_error};
+use mechid_model::SecondOrderSystem;
+use mechid_signal::{Record, Sampling};
+use nalgebra::dmatrix;
+
+const MACHINE: Oscillator = Oscillator { m: 10.0, c: 180.0, k: 5000.0 };
+
+fn machine() -> SecondOrderSystem {
+    SecondOrderSystem::new(dmatrix![10.0], dmatrix![180.0], dmatrix![5000.0]).unwrap()
+}
+
+/// A force with content up to the third of the record's lines, not periodic in it.
+fn wobble(t: f64) -> f64 {
+    40.0 * (7.0 * t).sin() + 25.0 * (19.3 * t + 0.4).cos() - 10.0
+}
+
+fn samples(dt: f64, len: usize) -> (Sampling, Vec<f64>) {
+    let sampling = Sampling::new(dt, len).unwrap();
+    (sampling, sampling.times().map(wobble).collect())
+}
+
+fn as_record(sampling: Sampling, force: &[f64]) -> Record {
+    Record::from_channel(sampling, force.to_vec()).unwrap()
+}
+
+/// Rounding of the state, 1e-16 relative, times M/Δt: below 1e-10 of the force at these steps.
+const ROUNDING: f64 = 1e-10;
+
+#[test]
+fn the_exact_held_form_returns_the_held_force() {
+    for (dt, len) in [(0.001, 3000), (0.02, 300), (0.2, 40)] {
+        let (sampling, force) = samples(dt, len);
+        let (x, v) = MACHINE.run((0.01, -0.3), &force, dt, false);
+        let found = discretised(
+            &machine(),
+            &response(sampling, x, v),
+            Discretisation::ExactHeld,
+            Ends::Open,
+        )
+        .unwrap();
+        let truth = as_record(sampling, &force).window(0, len - 1).unwrap();
+        let error = relative_error(found.record(), &truth).unwrap();
+        assert!(error < ROUNDING, "dt {dt}: {error:.1e}");
+    }
+}
+
+#[test]
+fn the_exact_linear_form_returns_the_linear_force() {
+    // The displacement rows enter with 6M/Δt²: ten times the step, a hundred times the digits.
+    for (dt, len, tolerance) in [(0.002, 1500, 1e-8), (0.02, 300, ROUNDING), (0.1, 40, ROUNDING)] {
+        let (sampling, force) = samples(dt, len);
+        let (x, v) = MACHINE.run((0.01, -0.3), &force, dt, true);
+        // The last step leads to a sample that is not there: it is not used.
+        let found = discretised(
+            &machine(),
+            &response(sampling, x, v),
+            Discretisation::ExactLinear,
+            Ends::Open,
+        )
+        .unwrap();
+        let error = relative_error(found.record(), &as_record(sampling, &force)).unwrap();
+        assert!(error < tolerance, "dt {dt}: {error:.1e}");
+    }
+}
+
+#[test]
+fn a_whole_period_wraps_around() {
+    // e^(−ζ ωn T) is e^−50 over this period: the second one is the steady state to rounding.
+    let len = 256;
+    let sampling = Sampling::new(20.0 * std::f64::consts::TAU / (len as f64 * 22.36), len).unwrap();
+    let (dt, w) = (sampling.dt(), sampling.omega0());
+    let period: Vec<f64> = sampling
+        .times()
+        .map(|t| (1..100).map(|n| (w * n as f64 * t + (n * n) as f64).cos()).sum())
+        .collect();
+    let twice = [period.clone(), period.clone()].concat();
+    for (linear, form) in [(false, Discretisation::ExactHeld), (true, Discretisation::ExactLinear)]
+    {
+        let (x, v) = MACHINE.run((0.0, 0.0), &twice, dt, linear);
+        let steady = response(sampling, x[len..].to_vec(), v[len..].to_vec());
+        let found = discretised(&machine(), &steady, form, Ends::Periodic).unwrap();
+        assert_eq!(found.record().len(), len);
+        let error = relative_error(found.record(), &as_record(sampling, &period)).unwrap();
+        assert!(error < ROUNDING, "{form:?}: {error:.1e}");
+    }
+}
+
+#[test]
+fn coupled_machines_with_full_matrices_are_told_apart() {
+    let machine = mixed();
+    let (sampling, first) = samples(0.03, 200);
+    let second: Vec<f64> = sampling.times().map(|t| 8.0 * (5.0 * t).cos() + t).collect();
+    for (linear, form) in [(false, Discretisation::ExactHeld), (true, Discretisation::ExactLinear)]
+    {
+        let (force, motion) = machine.run([&first, &second], 0.03, linear);
+        let found = discretised(&machine.system(), &motion, form, Ends::Open).unwrap();
+        let len = found.record().len();
+        let errors = channel_errors(found.record(), &force.window(0, len).unwrap()).unwrap();
+        assert!(errors.iter().all(|e| e.unwrap() < ROUNDING), "{form:?}: {errors:?}");
+    }
+}
+
+#[test]
+fn taylor_forms_converge_at_their_order() {
+    for order in 1..=8 {
+        // Short enough for the leading term, long enough for order 8 to stay above rounding.
+        let errors: Vec<f64> = [0.02, 0.01]
+            .iter()
+            .map(|&dt| {
+                let (sampling, force) = samples(dt, (2.4 / dt) as usize);
+                let (x, v) = MACHINE.run((0.0, 0.0), &force, dt, false);
+                let motion = response(sampling, x, v);
+                let form = Discretisation::Taylor(order);
+                let found = discretised(&machine(), &motion, form, Ends::Open).unwrap();
+                let truth = as_record(sampling, &force).window(0, sampling.len() - 1).unwrap();
+                relative_error(found.record(), &truth).unwrap()
+            })
+            .collect();
+        let observed = (errors[0] / errors[1]).log2();
+        // The next term is ωn Δt / (p + 2) of the leading one, at most a third at these steps.
+        assert!((observed - order as f64).abs() < 0.4, "order {order}: {observed:.2} {errors:?}");
+    }
+}
+
+#[test]
+fn euler_is_the_first_taylor_form_and_the_printed_equation() {
+    let (sampling, force) = samples(0.01, 100);
+    let (x, v) = MACHINE.run((0.0, 0.0), &force, 0.01, false);
+    let motion = response(sampling, x.clone(), v.clone());
+    let euler = discretised(&machine(), &motion, Discretisation::Euler, Ends::Open).unwrap();
+    let taylor = discretised(&machine(), &motion, Discretisation::Taylor(1), Ends::Open).unwrap();
+    assert_eq!(euler, taylor);
+    for (k, f) in euler.record().channel(0).iter().enumerate() {
+        let printed = 10.0 / 0.01 * (v[k + 1] - v[k]) + 180.0 * v[k] + 5000.0 * x[k];
+        assert!((f - printed).abs() < 1e-9, "sample {k}: {f} {printed}");
+    }
+}
+
+#[test]
+fn eulers_dispersion_is_its_transfer_ratio() {
+    // On a band-limited motion x = e^(iωt) the printed equation returns
+    // M iω(e^(iωΔt) − 1)/Δt + C iω + K where −ω²M + iωC + K acts.
+    let sampling = Sampling::new(0.01, 128).unwrap();
+    for line in [1, 9, 40, 63] {
+        let omega = line as f64 * sampling.omega0();
+        let x = sampling.times().map(|t| (omega * t).cos()).collect();
+        let v = sampling.times().map(|t| -omega * (omega * t).sin()).collect();
+        let motion = response(sampling, x, v);
+        let found =
+            discretised(&machine(), &motion, Discretisation::Euler, Ends::Periodic).unwrap();
+        let i_omega = nalgebra::Complex::new(0.0, omega);
+        let forward = ((i_omega * 0.01).exp() - 1.0) / 0.01;
+        let expected = i_omega * forward * 10.0 + i_omega * 180.0 + 5000.0;
+        let line_error = (found.spectrum().line(line, 0) - expected).norm() / expected.norm();
+        assert!(line_error < 1e-10, "line {line}: {line_error:.1e}");
+    }
+}
+
+#[test]
+fn bad_input_is_refused_with_its_numbers() {
+    let one = response(Sampling::new(0.1, 1).unwrap(), vec![1.0], vec![0.0]);
+    let held = Discretisation::ExactHeld;
+    assert_eq!(
+        discretised(&machine(), &one, held, Ends::Open),
+        Err(ForceError::TooShort { samples: 1, needed: 2 })
+    );
+    let motion = response(Sampling::new(0.1, 3).unwrap(), vec![0.0; 3], vec![0.0; 3]);
+    for order in [0, 9] {
+        assert_eq!(
+            discretised(&machine(), &motion, Discretisation::Taylor(order), Ends::Open),
+            Err(ForceError::TaylorOrder { order })
+        );
+    }
+    assert_eq!(
+        discretised(&mixed().system(), &motion, held, Ends::Open),
+        Err(ForceError::Dof { system: 2, response: 1 })
+    );
+    // Undamped, one step per whole period: a held force moves nothing.
+    let undamped = SecondOrderSystem::new(dmatrix![1.0], dmatrix![0.0], dmatrix![1.0]).unwrap();
+    let sampling = Sampling::new(std::f64::consts::TAU, 3).unwrap();
+    let motion = response(sampling, vec![0.0; 3], vec![0.0; 3]);
+    assert!(matches!(
+        discretised(&undamped, &motion, held, Ends::Open),
+        Err(ForceError::StepTooLong { reciprocal_condition, .. }) if reciprocal_condition < 1e-12
+    ));
+}
