@@ -1,5 +1,6 @@
 //! What can be wrong with a file.
 
+use mechid_model::ModelError;
 use mechid_signal::SignalError;
 
 /// A file that cannot be read or written; every message names the file and the place in it.
@@ -157,5 +158,53 @@ pub enum IoError {
         file: String,
         /// What is wrong with them.
         source: SignalError,
+    },
+    /// The text is no description of an experiment.
+    #[error("{file}: {source}")]
+    Json {
+        /// The file.
+        file: String,
+        /// What is wrong, with line and column.
+        source: serde_json::Error,
+    },
+    /// The description of an experiment contradicts itself.
+    #[error("{file}: {what}")]
+    Description {
+        /// The file.
+        file: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// The matrices make no system.
+    #[error("{file}: {source}")]
+    Model {
+        /// The file.
+        file: String,
+        /// What is wrong with them.
+        source: ModelError,
+    },
+    /// A text is no choice of spectral lines.
+    #[error(
+        "\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
+         1:2:335 (first:step:last) separated by commas"
+    )]
+    LineSpec {
+        /// What was written.
+        lines: String,
+    },
+    /// A spectral line does not exist in a period.
+    #[error(
+        "lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
+         frequency of a period of {len} samples"
+    )]
+    LineOutside {
+        /// What was written.
+        lines: String,
+        /// The line in question.
+        line: usize,
+        /// The last line there is.
+        highest: usize,
+        /// Samples in the period.
+        len: usize,
     },
 }

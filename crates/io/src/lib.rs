@@ -18,13 +18,18 @@
 
 mod csv_text;
 mod error;
+mod experiment;
+mod line_spec;
 mod output;
 mod rows;
+mod system;
 mod table;
 mod time_axis;
 
 pub use csv_text::csv_text;
 pub use error::IoError;
+pub use experiment::{Experiment, Level, MiddleLoad, Noise, ResponseKind, SchemeChoice};
+pub use line_spec::LineSpec;
 pub use output::{OutputFile, write_all};
 pub use table::Table;
 pub use time_axis::TimeAxis;

@@ -28,20 +28,20 @@ const COMMENT: u8 = b'#';
 const SAMPLE_LINES: usize = 8;
 
 /// The delimiter of a text: the first of semicolon, tab and comma that stands outside quotes on
-/// every one of the first lines (a decimal comma may stand between semicolons or tabs, so comma
-/// comes last), otherwise blanks.
+/// most of the first lines (a decimal comma may stand between semicolons or tabs, so comma comes
+/// last), otherwise blanks.
 pub(crate) fn detect_delimiter(text: &[u8]) -> Delimiter {
     let sample: Vec<&[u8]> = text
         .split(|b| *b == b'\n')
-        .map(<[u8]>::trim_ascii_start)
-        .filter(|line| !line.trim_ascii().is_empty() && line[0] != COMMENT)
+        .filter(|line| line.trim_ascii().first().is_some_and(|first| *first != COMMENT))
         .take(SAMPLE_LINES)
         .collect();
-    let everywhere =
-        |byte: u8| !sample.is_empty() && sample.iter().all(|l| outside_quotes(l, byte));
+    let usual = |byte: u8| {
+        2 * sample.iter().filter(|line| outside_quotes(line, byte)).count() > sample.len()
+    };
     [b';', b'\t', b',']
         .into_iter()
-        .find(|byte| everywhere(*byte))
+        .find(|byte| usual(*byte))
         .map_or(Delimiter::Blanks, Delimiter::Byte)
 }
 
@@ -77,10 +77,20 @@ fn delimited(file: &str, text: &[u8], delimiter: u8) -> Result<Vec<Row>, IoError
     for fields in reader.byte_records() {
         let fields = fields
             .map_err(|e| IoError::Read { file: file.into(), source: std::io::Error::other(e) })?;
-        let line = fields.position().map_or(0, csv::Position::line);
+        let line = fields.position().map_or(0, |at| line_of_content(text, at));
         rows.push(Row { line, fields });
     }
     Ok(rows)
+}
+
+/// The line on which a row starts: the reader tells where it began to look for one, before the empty
+/// lines and the comments it skips.
+fn line_of_content(text: &[u8], at: &csv::Position) -> u64 {
+    let start = usize::try_from(at.byte()).unwrap_or(text.len()).min(text.len());
+    let skipped = text[start..]
+        .split(|b| *b == b'\n')
+        .take_while(|line| line.first().is_none_or(|first| *first == COMMENT) || *line == b"\r");
+    at.line() + skipped.count() as u64
 }
 
 fn blanks(text: &[u8]) -> Vec<Row> {

@@ -10,8 +10,8 @@ use crate::{IoError, TimeAxis};
 
 /// The rows of a delimited text file; columns become numbers when they are asked for.
 ///
-/// - The delimiter (comma, semicolon, tab, blanks) is found by itself; between semicolons, tabs or
-///   blanks a decimal comma is understood.
+/// - The delimiter (comma, semicolon, tab, blanks) is found by itself; between semicolons or tabs a
+///   decimal comma is understood.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
 ///   numbers only.
 /// - A column is chosen by its name, or by its number counted from 1.

@@ -1,0 +1,116 @@
+//! The system of an experiment, in any of the ways people state it.
+
+use std::fmt;
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::DMatrix;
+use serde::de::{Deserializer, SeqAccess, Visitor};
+use serde::{Deserialize, de};
+
+use crate::IoError;
+
+/// M with C and K, or (one degree of freedom) the mass with natural frequency and damping ratio.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SystemDescription {
+    mass: Entries,
+    damping: Option<Entries>,
+    stiffness: Option<Entries>,
+    natural_frequency_hz: Option<f64>,
+    damping_ratio: Option<f64>,
+}
+
+impl SystemDescription {
+    pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {
+        let wrong = |what: &str| IoError::Description { file: file.into(), what: what.into() };
+        let mass = self.mass.matrix();
+        let modal = (self.natural_frequency_hz, self.damping_ratio);
+        let (damping, stiffness) = match (&self.damping, &self.stiffness, modal) {
+            (Some(damping), Some(stiffness), (None, None)) => {
+                (damping.matrix(), stiffness.matrix())
+            }
+            (None, None, (Some(frequency_hz), Some(ratio))) => {
+                let Entries::Number(m) = self.mass else {
+                    return Err(wrong(
+                        "natural_frequency_hz and damping_ratio describe one degree of freedom: \
+                         the mass must be a single number",
+                    ));
+                };
+                let omega = std::f64::consts::TAU * frequency_hz;
+                let scalar = |value| DMatrix::from_element(1, 1, value);
+                (scalar(2.0 * ratio * omega * m), scalar(m * omega * omega))
+            }
+            _ => {
+                return Err(wrong(
+                    "the system needs mass, damping and stiffness, or mass, natural_frequency_hz \
+                     and damping_ratio",
+                ));
+            }
+        };
+        SecondOrderSystem::new(mass, damping, stiffness)
+            .map_err(|source| IoError::Model { file: file.into(), source })
+    }
+}
+
+/// A number, or a matrix as a list of rows of equal length.
+#[derive(Debug, Clone, PartialEq)]
+enum Entries {
+    Number(f64),
+    Rows(Vec<Vec<f64>>),
+}
+
+impl Entries {
+    fn matrix(&self) -> DMatrix<f64> {
+        match self {
+            Entries::Number(value) => DMatrix::from_element(1, 1, *value),
+            Entries::Rows(rows) => {
+                let columns = rows.first().map_or(0, Vec::len);
+                DMatrix::from_fn(rows.len(), columns, |r, c| rows[r][c])
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for Entries {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct EntriesVisitor;
+
+        impl<'de> Visitor<'de> for EntriesVisitor {
+            type Value = Entries;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number, or a matrix as a list of rows")
+            }
+
+            fn visit_f64<E: de::Error>(self, value: f64) -> Result<Entries, E> {
+                Ok(Entries::Number(value))
+            }
+
+            fn visit_i64<E: de::Error>(self, value: i64) -> Result<Entries, E> {
+                Ok(Entries::Number(value as f64))
+            }
+
+            fn visit_u64<E: de::Error>(self, value: u64) -> Result<Entries, E> {
+                Ok(Entries::Number(value as f64))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Entries, A::Error> {
+                let mut rows: Vec<Vec<f64>> = Vec::new();
+                while let Some(row) = seq.next_element::<Vec<f64>>()? {
+                    if let Some(first) = rows.first().filter(|first| first.len() != row.len()) {
+                        return Err(de::Error::custom(format_args!(
+                            "row {} of a matrix has {} entries, the first has {}",
+                            rows.len() + 1,
+                            row.len(),
+                            first.len()
+                        )));
+                    }
+                    rows.push(row);
+                }
+                Ok(Entries::Rows(rows))
+            }
+        }
+
+        deserializer.deserialize_any(EntriesVisitor)
+    }
+}

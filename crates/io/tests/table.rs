@@ -1,0 +1,201 @@
+//! Tables in every dialect, and what is said about those that are wrong.
+
+use mechid_io::{IoError, Table, TimeAxis, csv_text};
+use mechid_signal::Sampling;
+use proptest::prelude::*;
+
+fn table(text: &str) -> Table {
+    Table::parse("a.csv", text.as_bytes()).unwrap()
+}
+
+fn refused(text: &str) -> String {
+    Table::parse("a.csv", text.as_bytes()).unwrap_err().to_string()
+}
+
+const RATE: TimeAxis<'_> = TimeAxis::RateHz(100.0);
+
+#[test]
+fn dialects_agree() {
+    for (text, what) in [
+        ("t,f\n0,1.5\n1,-2\n", "comma"),
+        ("\u{feff}\"t\",\"f\",\r\n0, 1.5,\r\n1,-2,\r\n", "byte order mark, quotes, trailing comma"),
+        ("t;f\n0;1,5\n1;-2,0\n", "semicolon, decimal comma"),
+        ("t\tf\n0\t1.5\n1\t-2\n", "tab"),
+        ("  t    f\n  0  1.50\n  1  -2e0\n\n\n", "blanks, empty lines at the end"),
+        ("# rig 4\nt,f\n\n0,1.5\n# pause\n1,-2\n", "comments and empty lines"),
+        ("t,f\n0,1.5\n1,-2\n,\n,\n", "empty rows at the end"),
+        ("t,f,note\n0,1.5,start\n1,-2,\"end, of it\"\n", "a column of text that nobody asks for"),
+        ("t,f,\n0,1.5\n1,-2,\n", "a trailing comma on some lines only"),
+    ] {
+        let table = table(text);
+        let record = table.record(&TimeAxis::Column("t"), &["f"]).expect(what);
+        assert_eq!(record.channel(0), [1.5, -2.0], "{what}");
+        assert_eq!(record.sampling().dt(), 1.0, "{what}");
+    }
+}
+
+#[test]
+fn columns_by_number_without_header() {
+    let t = table("0.0,1\n0.5,2\n");
+    assert_eq!((t.len(), t.width()), (2, 2));
+    let record = t.record(&TimeAxis::Column("1"), &["2"]).unwrap();
+    assert_eq!((record.channel(0), record.sampling().dt()), ([1.0, 2.0].as_slice(), 0.5));
+}
+
+#[test]
+fn a_name_that_is_a_number_wins_over_the_number() {
+    let t = table("2,x\n5,6\n");
+    assert_eq!(t.column("2").unwrap(), [5.0]);
+    let t = table("x,1\n5,6\n");
+    assert_eq!(t.column("1").unwrap(), [6.0]);
+}
+
+/// The shape of the measured benchmark record: empty leading columns, a trailing comma.
+#[test]
+fn leading_columns_with_one_value() {
+    let t = table("\"Ovld2\",\"Ovld1\",\"V1\",\"V2\",\n0,0,0.5,1,\n,,-0.5,2,\n");
+    let record = t.record(&RATE, &["V1", "4"]).unwrap();
+    assert_eq!(
+        (record.channel(0), record.channel(1)),
+        ([0.5, -0.5].as_slice(), [1.0, 2.0].as_slice())
+    );
+    assert_eq!(t.available(), "1 \"Ovld2\", 2 \"Ovld1\", 3 \"V1\", 4 \"V2\"");
+    let e = t.column("Ovld2").unwrap_err();
+    assert!(matches!(e, IoError::EmptyField { line: 3, .. }), "{e}");
+}
+
+#[test]
+fn missing_and_duplicate_columns_list_those_there_are() {
+    let t = table("t,f,f\n0,1,2\n1,1,2\n");
+    assert_eq!(
+        t.column("x").unwrap_err().to_string(),
+        "a.csv has no column \"x\"; its columns are 1 \"t\", 2 \"f\", 3 \"f\""
+    );
+    for number in ["0", "4", "-1", ""] {
+        assert!(matches!(t.column(number), Err(IoError::MissingColumn { .. })), "{number}");
+    }
+    let e = t.column("f").unwrap_err();
+    assert!(matches!(e, IoError::AmbiguousColumn { .. }), "{e}");
+    assert!(e.to_string().contains("3 \"f\""), "{e}");
+    let e = t.record(&TimeAxis::Column("t"), &["2", "3", "2"]).unwrap_err();
+    assert!(matches!(e, IoError::DuplicateColumn { column: 2, .. }), "{e}");
+    let e = t.record(&TimeAxis::Column("t"), &["1"]).unwrap_err();
+    assert!(matches!(e, IoError::DuplicateColumn { column: 1, .. }), "{e}");
+}
+
+#[test]
+fn bad_fields_are_named_with_line_and_column() {
+    for (field, message) in [
+        ("abc", "a.csv, line 4, column 2 \"f\": \"abc\" is not a number"),
+        ("1.2.3", "a.csv, line 4, column 2 \"f\": \"1.2.3\" is not a number"),
+        ("", "a.csv, line 4, column 2 \"f\": the field is empty, a number is needed"),
+        ("NaN", "a.csv, line 4, column 2 \"f\": NaN is not a finite number"),
+        ("-inf", "a.csv, line 4, column 2 \"f\": -inf is not a finite number"),
+        ("1e999", "a.csv, line 4, column 2 \"f\": inf is not a finite number"),
+    ] {
+        let t = table(&format!("t,f\n0,1\n# a comment counts as a line\n1,{field}\n2,2\n"));
+        assert_eq!(t.column("f").unwrap_err().to_string(), message);
+    }
+    // Without a semicolon between fields a comma is no decimal comma.
+    assert!(table("t;f\n0;1\n1;2,5,5\n").column("f").is_err());
+}
+
+#[test]
+fn ragged_rows_are_named() {
+    assert_eq!(refused("t,f\n0,1\n1\n2,3\n"), "a.csv, line 3: 1 fields where the first line has 2");
+    assert_eq!(refused("t,f\n0,1\n1,2,3\n"), "a.csv, line 3: 3 fields where the first line has 2");
+    assert_eq!(refused("1 2\n3 4\n5\n"), "a.csv, line 3: 1 fields where the first line has 2");
+}
+
+#[test]
+fn files_without_data_are_refused() {
+    assert_eq!(refused(""), "a.csv holds no data: it is empty");
+    assert_eq!(refused("\n\n# only a comment\n"), "a.csv holds no data: it is empty");
+    assert_eq!(refused("t,f\n"), "a.csv holds no data: there is a header and nothing below it");
+    let utf16 = b"\xff\xfet\0,\0f\0";
+    assert!(matches!(Table::parse("a.csv", utf16), Err(IoError::Encoding { .. })));
+    assert!(matches!(Table::read("no/such.csv"), Err(IoError::Read { .. })));
+}
+
+#[test]
+fn uneven_time_is_refused_with_its_worst_step() {
+    let of = |times: &[f64]| {
+        let rows: String = times.iter().map(|t| format!("{t},1\n")).collect();
+        table(&format!("t,f\n{rows}")).record(&TimeAxis::Column("t"), &["f"])
+    };
+    let record = of(&[5.0, 5.1, 5.2, 5.3]).unwrap();
+    assert!((record.sampling().dt() - 0.1).abs() < 1e-12, "rounding of 5.3 − 5");
+    // The mean step stays right however the printed times are rounded.
+    assert!((of(&[0.0, 0.333, 0.667, 1.0]).unwrap().sampling().dt() - 1.0 / 3.0).abs() < 1e-12);
+    let e = of(&[0.0, 1.0, 2.0, 3.5, 4.75]).unwrap_err();
+    assert!(
+        e.to_string().starts_with(
+            "a.csv: the time steps are not uniform: 1.5 s up to line 5, where the usual step is 1.25 s"
+        ),
+        "{e}"
+    );
+    for times in
+        [&[0.0, 1.0, 0.5, 1.5][..], &[0.0, 0.0, 0.0], &[2.0, 1.0, 0.0], &[-1.7e308, 1.7e308]]
+    {
+        let e = of(times).unwrap_err();
+        assert!(matches!(e, IoError::NonUniformTime { .. }), "{times:?}: {e}");
+    }
+    assert!(matches!(of(&[1.0]), Err(IoError::SingleSample { .. })));
+    for rate in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-320] {
+        let e = table("f\n1\n2\n").record(&TimeAxis::RateHz(rate), &["f"]).unwrap_err();
+        assert!(matches!(e, IoError::SampleRate { .. }), "{rate}");
+    }
+}
+
+/// Text that looks like a table more often than random bytes do.
+fn tables() -> impl Strategy<Value = String> {
+    let field = prop_oneof![
+        Just(String::new()),
+        any::<f64>().prop_map(|v| v.to_string()),
+        "[a-z\"# ]{0,4}",
+        "-?[0-9]{1,3}[.,]?[0-9]{0,2}",
+    ];
+    let line = prop::collection::vec(field, 0..5);
+    (prop::collection::vec(line, 0..8), prop::sample::select(vec![",", ";", "\t", " ", ", "]))
+        .prop_map(|(lines, d)| lines.iter().map(|l| l.join(d)).collect::<Vec<_>>().join("\n"))
+}
+
+fn use_all(table: &Table) {
+    let columns: Vec<String> = (1..=table.width()).map(|c| c.to_string()).collect();
+    for column in columns.iter().chain(table.names()) {
+        let _ = table.column(column).map_err(|e| e.to_string());
+        let _ = table.record(&TimeAxis::Column(column), &columns).map_err(|e| e.to_string());
+        let _ = table.record(&RATE, &[column]).map_err(|e| e.to_string());
+    }
+    let _ = table.available();
+}
+
+proptest! {
+    #[test]
+    fn no_bytes_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        if let Ok(table) = Table::parse("a.csv", &bytes) {
+            use_all(&table);
+        }
+    }
+
+    #[test]
+    fn no_table_panics(text in tables()) {
+        if let Ok(table) = Table::parse("a.csv", text.as_bytes()) {
+            use_all(&table);
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_bit_for_bit(
+        values in prop::collection::vec(prop::num::f64::NORMAL | prop::num::f64::ZERO, 2..40),
+        name in "[a-z][a-z ,;\"]{0,6}[a-z]",
+    ) {
+        let sampling = Sampling::new(1e-3, values.len()).unwrap();
+        let text = csv_text(sampling, &[(name.clone(), &values)]);
+        let table = Table::parse("a.csv", text.as_bytes()).unwrap();
+        let record = table.record(&TimeAxis::Column("1"), &[&name]).unwrap();
+        for (back, value) in record.channel(0).iter().zip(&values) {
+            prop_assert_eq!(back.to_bits(), value.to_bits());
+        }
+    }
+}
