@@ -15,6 +15,7 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 
+pub mod crest;
 mod error;
 pub mod lines;
 mod multisine;
@@ -24,6 +25,7 @@ mod record;
 mod sampling;
 pub mod spectrum;
 
+pub use crest::CrestSearch;
 pub use error::SignalError;
 pub use multisine::Multisine;
 pub use noise::NoiseLevel;

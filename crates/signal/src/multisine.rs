@@ -38,8 +38,8 @@ impl Multisine {
     /// The highest line supported; it bounds the memory a crest factor may take.
     pub const MAX_LINE: usize = 1 << 24;
 
-    /// Samples per Nyquist interval at which [`peak`](Self::peak) and
-    /// [`crest_factor`](Self::crest_factor) look at the signal.
+    /// Samples per Nyquist interval from which [`peak`](Self::peak) and
+    /// [`crest_factor`](Self::crest_factor) are found.
     pub const OVERSAMPLING: usize = 16;
 
     /// A multisine of the given lines (rising, from 1) and amplitudes (one per line).
@@ -193,9 +193,13 @@ impl Multisine {
     }
 
     /// Largest absolute value over a period, seen at
-    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times the Nyquist rate or more.
+    /// [`OVERSAMPLING`](Self::OVERSAMPLING) times the Nyquist rate or more and between those
+    /// instants on the parabola through three of them.
     pub fn peak(&self) -> f64 {
-        self.fine_period().iter().fold(0.0_f64, |m, v| m.max(v.abs()))
+        let x = self.fine_period();
+        let n = x.len();
+        let highest = |k: usize| parabola_top(x[(k + n - 1) % n], x[k], x[(k + 1) % n]);
+        (0..n).map(highest).fold(0.0, f64::max)
     }
 
     /// Peak over RMS; 1 is a square wave, √2 a sine.
@@ -221,4 +225,15 @@ impl Multisine {
         let record = reduced.sample(sampling).expect("far below Nyquist");
         record.channel(0).to_vec()
     }
+}
+
+/// Largest |value| near the middle one of three equidistant samples: the top of their parabola
+/// if the middle one stands out, the middle one itself otherwise.
+fn parabola_top(before: f64, middle: f64, after: f64) -> f64 {
+    let bend = before - 2.0 * middle + after;
+    let stands_out = (middle - before) * (middle - after) >= 0.0 && bend * middle < 0.0;
+    if !stands_out {
+        return middle.abs();
+    }
+    (middle - (after - before).powi(2) / (8.0 * bend)).abs()
 }
