@@ -1,1 +1,35 @@
-//! Under construction.
+//! Stiffness, damping and mass from measured forces and motions, with honest uncertainties.
+//!
+//! ```
+//! use mechid_estimate::{EquationOfMotion, Unknowns};
+//! use nalgebra::{DMatrix, dmatrix};
+//!
+//! // 2 ẍ + 0.3 ẋ + 8 x = F at five instants, the force read to a tenth of a newton.
+//! let a = dmatrix![1.0; 0.0; 2.0; -1.0; 3.0];
+//! let v = dmatrix![0.0; 1.0; 1.0; -2.0; 1.0];
+//! let x = dmatrix![1.0; -1.0; 0.5; 1.5; 2.0];
+//! let force: DMatrix<f64> = 2.0 * &a + 0.3 * &v + 8.0 * &x;
+//! let read = force.map(|f| (10.0 * f).round() / 10.0);
+//!
+//! let mut rows = EquationOfMotion::new(1);
+//! rows.push_rows(a.as_view(), v.as_view(), x.as_view(), read.as_view())?;
+//! let found = rows.solve(&Unknowns::unknown_mass(1)?)?;
+//!
+//! let stiffness = found.parameter("k")?;
+//! let [low, high] = stiffness.interval(0.95)?;
+//! assert!(low < 8.0 && 8.0 < high && high - low < 1.0);
+//! # Ok::<(), mechid_estimate::EstimateError>(())
+//! ```
+
+mod equation_of_motion;
+mod error;
+mod estimate;
+mod least_squares;
+mod triangular;
+mod unknowns;
+
+pub use equation_of_motion::EquationOfMotion;
+pub use error::EstimateError;
+pub use estimate::{Estimate, Estimated, Undetermined};
+pub use least_squares::{Direction, LeastSquares, Solution};
+pub use unknowns::{Parameter, Unknowns};

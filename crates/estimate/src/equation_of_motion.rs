@@ -1,0 +1,251 @@
+//! M ẍ + C ẋ + K x = F fitted row by row: the common core of the linear estimators.
+
+use mechid_model::Matrix;
+use nalgebra::{DMatrix, DMatrixView, DVector};
+
+use crate::estimate::Findings;
+use crate::least_squares::{Solution, finite, size, solve_compressed};
+use crate::triangular::TriangularFactor;
+use crate::{Estimate, EstimateError, Parameter, Undetermined, Unknowns};
+
+/// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
+///
+/// A row is one instant, or the real or imaginary part of one spectral line (then the
+/// "acceleration" is −ω²X and the "velocity" iωX). All motions and forces are reduced to one
+/// small triangle, so memory does not grow with the data, and the same rows can be solved for
+/// several sets of [`Unknowns`].
+///
+/// ```
+/// use mechid_estimate::{EquationOfMotion, Unknowns};
+/// use nalgebra::{DMatrix, dmatrix};
+///
+/// // 2 ẍ + 0.3 ẋ + 8 x = F at three instants.
+/// let (a, v, x) = (dmatrix![1.0; 0.0; 2.0], dmatrix![0.0; 1.0; 1.0], dmatrix![1.0; -1.0; 0.5]);
+/// let force: DMatrix<f64> = 2.0 * &a + 0.3 * &v + 8.0 * &x;
+/// let mut rows = EquationOfMotion::new(1);
+/// rows.push_rows(a.as_view(), v.as_view(), x.as_view(), force.as_view())?;
+/// let found = rows.solve(&Unknowns::unknown_mass(1)?)?;
+/// assert!((found.stiffness()[(0, 0)] - 8.0).abs() < 1e-12);
+/// # Ok::<(), mechid_estimate::EstimateError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct EquationOfMotion {
+    dof: usize,
+    /// Of the columns \[ẍ | ẋ | x | F\].
+    factor: TriangularFactor,
+}
+
+/// The unknown columns of an equation of motion: which matrix, which degree of freedom.
+type Columns = Vec<(Matrix, usize)>;
+
+/// Equations of motion (rows of M, C, K) that have the same unknown columns.
+struct Group {
+    equations: Vec<usize>,
+    columns: Columns,
+    solution: Solution,
+}
+
+impl EquationOfMotion {
+    /// No rows yet, `dof` degrees of freedom.
+    pub fn new(dof: usize) -> Self {
+        Self { dof, factor: TriangularFactor::new(4 * dof) }
+    }
+
+    /// Rows seen so far.
+    pub fn rows(&self) -> usize {
+        self.factor.rows()
+    }
+
+    /// Adds rows: accelerations (m/s²), velocities (m/s), displacements (m) and forces (N),
+    /// each rows × degrees of freedom.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] and [`EstimateError::NotFinite`]; then nothing is added.
+    pub fn push_rows(
+        &mut self,
+        acceleration: DMatrixView<'_, f64>,
+        velocity: DMatrixView<'_, f64>,
+        displacement: DMatrixView<'_, f64>,
+        force: DMatrixView<'_, f64>,
+    ) -> Result<(), EstimateError> {
+        let parts = [
+            ("channels of the acceleration", "acceleration", acceleration),
+            ("channels of the velocity", "velocity", velocity),
+            ("channels of the displacement", "displacement", displacement),
+            ("channels of the force", "force", force),
+        ];
+        for (channels, what, part) in parts {
+            size(channels, self.dof, part.ncols())?;
+            size("rows", displacement.nrows(), part.nrows())?;
+            finite(what, part)?;
+        }
+        self.factor.push(&[acceleration, velocity, displacement, force]);
+        Ok(())
+    }
+
+    /// Adds everything `other` has seen, as from another record.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if it has another number of degrees of freedom.
+    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
+        size("degrees of freedom", self.dof, other.dof)?;
+        self.factor.merge(&other.factor);
+        Ok(())
+    }
+
+    /// Least squares for the free entries of M, C and K, one equation of motion after another.
+    ///
+    /// Parameters the data do not excite are reported in [`Estimate::undetermined`];
+    /// the others are as they should be.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if `unknowns` has another number of degrees of freedom,
+    /// [`EstimateError::NothingUnknown`], [`EstimateError::TooFewRows`],
+    /// [`EstimateError::OnlyRatios`] if an equation has neither force nor known entry.
+    ///
+    /// # Source
+    /// Dissertation eqs. (4.4.1)–(4.4.6), (4.6.12), (4.6.31).
+    pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, EstimateError> {
+        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        let free = unknowns.free();
+        if free.is_empty() {
+            return Err(EstimateError::NothingUnknown);
+        }
+        let groups = self.groups(unknowns, &free)?;
+        let places: Vec<Place<'_>> =
+            free.iter().map(|parameter| Place::of(parameter, &groups)).collect();
+        let values = places.iter().map(|p| p.group.solution.coefficients[(p.row, p.target)]);
+        let mut residual_nrmse = vec![0.0; self.dof];
+        for group in &groups {
+            for (equation, nrmse) in group.equations.iter().zip(&group.solution.residual_nrmse) {
+                residual_nrmse[*equation] = *nrmse;
+            }
+        }
+        Ok(Estimate::new(Findings {
+            values: values.collect(),
+            covariance: covariance(&places),
+            degrees_of_freedom: minimum(&groups),
+            residual_nrmse,
+            condition: groups.iter().map(|g| g.solution.condition).fold(1.0, f64::max),
+            undetermined: groups.iter().flat_map(|g| g.undetermined(&free)).collect(),
+            unknowns: unknowns.clone(),
+        }))
+    }
+
+    fn groups(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<Vec<Group>, EstimateError> {
+        let mut shared: Vec<(Columns, Vec<usize>)> = Vec::new();
+        for equation in 0..self.dof {
+            let own = free.iter().filter(|p| p.row() == equation);
+            let columns: Columns = own.map(|p| (p.matrix(), p.column())).collect();
+            match shared.iter_mut().find(|(same, _)| *same == columns) {
+                _ if columns.is_empty() => {}
+                Some((_, equations)) => equations.push(equation),
+                None => shared.push((columns, vec![equation])),
+            }
+        }
+        let solve = |(columns, equations)| self.group(unknowns, columns, equations);
+        shared.into_iter().map(solve).collect()
+    }
+
+    fn group(
+        &self,
+        unknowns: &Unknowns,
+        columns: Columns,
+        equations: Vec<usize>,
+    ) -> Result<Group, EstimateError> {
+        let r = self.factor.r();
+        let regressors: Vec<_> = columns
+            .iter()
+            .map(|(matrix, column)| r.column(self.column(*matrix, *column)))
+            .collect();
+        let mut targets = Vec::new();
+        for equation in &equations {
+            let target = self.target(unknowns, *equation);
+            if target.norm() == 0.0 {
+                return Err(only_ratios(unknowns, *equation));
+            }
+            targets.push(target);
+        }
+        let (regressors, targets) =
+            (DMatrix::from_columns(&regressors), DMatrix::from_columns(&targets));
+        let solution = solve_compressed(regressors.as_view(), targets.as_view(), self.rows())?;
+        Ok(Group { equations, columns, solution })
+    }
+
+    /// The force of one equation less what its known entries account for.
+    fn target(&self, unknowns: &Unknowns, equation: usize) -> DVector<f64> {
+        let r = self.factor.r();
+        let mut target = r.column(3 * self.dof + equation).into_owned();
+        for matrix in crate::unknowns::MATRICES {
+            for column in 0..self.dof {
+                if let Some(value) = unknowns.fixed(matrix, equation, column) {
+                    target.axpy(-value, &r.column(self.column(matrix, column)), 1.0);
+                }
+            }
+        }
+        target
+    }
+
+    fn column(&self, matrix: Matrix, dof: usize) -> usize {
+        matrix as usize * self.dof + dof
+    }
+}
+
+/// Where a free parameter stands among the solutions.
+struct Place<'a> {
+    group: &'a Group,
+    row: usize,
+    target: usize,
+}
+
+impl<'a> Place<'a> {
+    fn of(parameter: &Parameter, groups: &'a [Group]) -> Self {
+        let at = |group: &'a Group| {
+            let target = group.equations.iter().position(|e| *e == parameter.row())?;
+            let column = (parameter.matrix(), parameter.column());
+            let row = group.columns.iter().position(|c| *c == column)?;
+            Some(Self { group, row, target })
+        };
+        groups.iter().find_map(at).expect("every free parameter is in a group")
+    }
+}
+
+/// Cov(θ_p, θ_q) = S_ij · h_p·h_q, with S the residual covariance between the equations i and j
+/// of the two parameters and h the rows of the pseudo-inverses.
+fn covariance(places: &[Place<'_>]) -> DMatrix<f64> {
+    DMatrix::from_fn(places.len(), places.len(), |p, q| {
+        let (p, q) = (&places[p], &places[q]);
+        let (left, right) = (&p.group.solution, &q.group.solution);
+        let spare = left.degrees_of_freedom as f64 * right.degrees_of_freedom as f64;
+        let residual = left.residuals.column(p.target).dot(&right.residuals.column(q.target));
+        let variance = if spare > 0.0 { residual / spare.sqrt() } else { f64::INFINITY };
+        variance * left.inverse.row(p.row).dot(&right.inverse.row(q.row))
+    })
+}
+
+fn minimum(groups: &[Group]) -> usize {
+    groups.iter().map(|g| g.solution.degrees_of_freedom).min().unwrap_or(0)
+}
+
+impl Group {
+    fn undetermined(&self, free: &[Parameter]) -> Vec<Undetermined> {
+        let mut found = Vec::new();
+        for direction in &self.solution.undetermined {
+            for equation in &self.equations {
+                let own: Vec<&Parameter> = free.iter().filter(|p| p.row() == *equation).collect();
+                let involved = direction.involved.iter().enumerate().filter(|(_, i)| **i);
+                found.push(Undetermined {
+                    relative_singular_value: direction.relative_singular_value,
+                    terms: involved.map(|(at, _)| (*own[at], direction.combination[at])).collect(),
+                });
+            }
+        }
+        found
+    }
+}
+
+fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
+    let own = unknowns.free().into_iter().filter(|p| p.row() == equation);
+    let parameters: Vec<String> = own.map(|p| p.to_string()).collect();
+    EstimateError::OnlyRatios { dof: equation + 1, parameters: parameters.join(", ") }
+}

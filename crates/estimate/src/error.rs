@@ -1,0 +1,118 @@
+//! What can go wrong in an identification.
+
+use mechid_model::Matrix;
+
+/// An identification that cannot be done; every variant carries the offending numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum EstimateError {
+    /// A known matrix is not of the size of the problem.
+    #[error("the known {matrix} matrix is {rows}×{columns}, expected {dof}×{dof}")]
+    Shape {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// Degrees of freedom expected.
+        dof: usize,
+    },
+    /// A value said to be known is NaN or infinite.
+    #[error("{parameter} is said to be known, but as {value}, which is not a finite number")]
+    FixedValue {
+        /// Name of the parameter.
+        parameter: String,
+        /// The value given.
+        value: f64,
+    },
+    /// There is no such entry.
+    #[error("{matrix} has no entry ({row}, {column}): the problem has {dof} degrees of freedom")]
+    NoSuchEntry {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Row, counted from 1.
+        row: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// A problem needs at least one degree of freedom.
+    #[error("an identification needs at least one degree of freedom")]
+    NoDof,
+    /// Every entry is already known.
+    #[error("there is nothing to estimate: every entry of M, C and K is known")]
+    NothingUnknown,
+    /// No parameter has that name.
+    #[error("no unknown parameter is called \"{name}\"; the unknowns are {known}")]
+    NoSuchParameter {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// Fewer equations than unknowns.
+    #[error(
+        "{rows} equations do not determine {unknowns} unknowns: use a longer record or fewer unknowns"
+    )]
+    TooFewRows {
+        /// Equations (rows) given.
+        rows: usize,
+        /// Unknowns per right-hand side.
+        unknowns: usize,
+    },
+    /// A block of data has the wrong number of channels, lines or samples.
+    #[error("{what}: expected {expected}, got {got}")]
+    Size {
+        /// What was counted, such as `"channels of the force"`.
+        what: &'static str,
+        /// Number expected.
+        expected: usize,
+        /// Number found.
+        got: usize,
+    },
+    /// A value among the data is NaN or infinite.
+    #[error("row {row}, column {column} of the {what} is {value}, not a finite number")]
+    NotFinite {
+        /// Which data.
+        what: &'static str,
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// An equation of motion without force and without known entry fixes ratios only.
+    #[error(
+        "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \
+         its equation of motion fixes their ratios only; give one of the masses, or apply a force there"
+    )]
+    OnlyRatios {
+        /// Degree of freedom, counted from 1.
+        dof: usize,
+        /// Names of the parameters of that equation.
+        parameters: String,
+    },
+    /// The data leave some parameters undetermined, and all of them are needed.
+    #[error("the data do not determine {parameters}: {directions}")]
+    Undetermined {
+        /// Names of the parameters concerned.
+        parameters: String,
+        /// The combinations of parameters on which the data say nothing.
+        directions: String,
+    },
+    /// A confidence level outside (0, 1).
+    #[error("a confidence level lies between 0 and 1, got {level}")]
+    Level {
+        /// The level given.
+        level: f64,
+    },
+    /// The identified matrices do not make a system.
+    #[error(transparent)]
+    Model(#[from] mechid_model::ModelError),
+    /// A record is not usable.
+    #[error(transparent)]
+    Signal(#[from] mechid_signal::SignalError),
+}

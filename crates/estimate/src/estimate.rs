@@ -1,0 +1,239 @@
+//! What an identification found, and how well.
+
+use std::fmt;
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use crate::{EstimateError, Parameter, Unknowns};
+
+/// M̂, Ĉ, K̂ with the covariance of what was estimated.
+///
+/// The standard errors assume a model that is right and regressors that are exact: they describe
+/// the scatter between repeated experiments, not the bias of an estimator.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    unknowns: Unknowns,
+    parameters: Vec<Parameter>,
+    values: Vec<f64>,
+    covariance: DMatrix<f64>,
+    degrees_of_freedom: usize,
+    residual_nrmse: Vec<f64>,
+    condition: f64,
+    undetermined: Vec<Undetermined>,
+}
+
+/// What an estimator hands over to make an [`Estimate`]; values in the order of `unknowns.free()`.
+pub(crate) struct Findings {
+    pub(crate) unknowns: Unknowns,
+    pub(crate) values: Vec<f64>,
+    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) degrees_of_freedom: usize,
+    pub(crate) residual_nrmse: Vec<f64>,
+    pub(crate) condition: f64,
+    pub(crate) undetermined: Vec<Undetermined>,
+}
+
+/// One estimated entry of M, C or K.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimated {
+    /// Which entry.
+    pub parameter: Parameter,
+    /// Its value in kg, N·s/m or N/m; NaN if the data do not determine it.
+    pub value: f64,
+    /// Its standard error, in the same unit; infinite if the data do not determine it.
+    pub standard_error: f64,
+    /// Degrees of freedom of the residual variance behind the standard error.
+    pub degrees_of_freedom: usize,
+}
+
+/// A combination of parameters on which the data say nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Undetermined {
+    /// How strongly the data excite it, relative to the best determined combination.
+    pub relative_singular_value: f64,
+    /// The parameters and how much of each (any multiple of all of them may be added).
+    pub terms: Vec<(Parameter, f64)>,
+}
+
+impl Estimate {
+    pub(crate) fn new(mut found: Findings) -> Self {
+        let parameters = found.unknowns.free();
+        for undetermined in &found.undetermined {
+            for (parameter, _) in &undetermined.terms {
+                let Some(at) = parameters.iter().position(|p| p == parameter) else { continue };
+                found.values[at] = f64::NAN;
+                found.covariance.row_mut(at).fill(f64::NAN);
+                found.covariance.column_mut(at).fill(f64::NAN);
+                found.covariance[(at, at)] = f64::INFINITY;
+            }
+        }
+        Self {
+            unknowns: found.unknowns,
+            parameters,
+            values: found.values,
+            covariance: found.covariance,
+            degrees_of_freedom: found.degrees_of_freedom,
+            residual_nrmse: found.residual_nrmse,
+            condition: found.condition,
+            undetermined: found.undetermined,
+        }
+    }
+
+    /// What was free and what was known.
+    pub fn unknowns(&self) -> &Unknowns {
+        &self.unknowns
+    }
+
+    /// Degrees of freedom of the machine, n.
+    pub fn dof(&self) -> usize {
+        self.unknowns.dof()
+    }
+
+    /// Every estimated entry, in the order of [`Unknowns::free`].
+    pub fn parameters(&self) -> impl ExactSizeIterator<Item = Estimated> + '_ {
+        self.parameters.iter().enumerate().map(|(at, parameter)| Estimated {
+            parameter: *parameter,
+            value: self.values[at],
+            standard_error: self.covariance[(at, at)].sqrt(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        })
+    }
+
+    /// One estimated entry by its name, such as `"k12"`.
+    ///
+    /// # Errors
+    /// [`EstimateError::NoSuchParameter`] if it is not among the unknowns.
+    pub fn parameter(&self, name: &str) -> Result<Estimated, EstimateError> {
+        self.parameters().find(|found| found.parameter.to_string() == name).ok_or_else(|| {
+            let known: Vec<String> = self.parameters.iter().map(Parameter::to_string).collect();
+            EstimateError::NoSuchParameter { name: name.to_owned(), known: known.join(", ") }
+        })
+    }
+
+    /// Covariance of the estimated entries, in the order of [`Unknowns::free`].
+    ///
+    /// An undetermined parameter has an infinite variance and NaN covariances.
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// M̂, in kg: the known entries and the estimated ones.
+    pub fn mass(&self) -> DMatrix<f64> {
+        let [mass, _, _] = self.unknowns.assemble(&self.values);
+        mass
+    }
+
+    /// Ĉ, in N·s/m.
+    pub fn damping(&self) -> DMatrix<f64> {
+        let [_, damping, _] = self.unknowns.assemble(&self.values);
+        damping
+    }
+
+    /// K̂, in N/m.
+    pub fn stiffness(&self) -> DMatrix<f64> {
+        let [_, _, stiffness] = self.unknowns.assemble(&self.values);
+        stiffness
+    }
+
+    /// The identified machine.
+    ///
+    /// # Errors
+    /// [`EstimateError::Undetermined`] if the data leave any entry open,
+    /// [`EstimateError::Model`] if M̂ is singular.
+    pub fn system(&self) -> Result<SecondOrderSystem, EstimateError> {
+        if !self.undetermined.is_empty() {
+            let open = self.parameters().filter(|p| p.value.is_nan());
+            let names: Vec<String> = open.map(|p| p.parameter.to_string()).collect();
+            let directions: Vec<String> =
+                self.undetermined.iter().map(Undetermined::to_string).collect();
+            return Err(EstimateError::Undetermined {
+                parameters: names.join(", "),
+                directions: directions.join("; "),
+            });
+        }
+        let [mass, damping, stiffness] = self.unknowns.assemble(&self.values);
+        Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
+    }
+
+    /// Equations minus unknowns, of the equation of motion that has the fewest to spare.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.degrees_of_freedom
+    }
+
+    /// √(Σe² / Σb²), residual over right-hand side, of each fitted equation.
+    pub fn residual_nrmse(&self) -> &[f64] {
+        &self.residual_nrmse
+    }
+
+    /// Condition number of the regressors with columns of unit length.
+    pub fn condition(&self) -> f64 {
+        self.condition
+    }
+
+    /// The combinations of parameters on which the data say nothing; empty when all is well.
+    pub fn undetermined(&self) -> &[Undetermined] {
+        &self.undetermined
+    }
+}
+
+impl Estimated {
+    /// The confidence interval [low, high] at `level` (0.95 for 95 %), by Student's t.
+    ///
+    /// # Errors
+    /// [`EstimateError::Level`] unless 0 < level < 1.
+    pub fn interval(&self, level: f64) -> Result<[f64; 2], EstimateError> {
+        if !(level > 0.0 && level < 1.0) {
+            return Err(EstimateError::Level { level });
+        }
+        if !self.standard_error.is_finite() || self.degrees_of_freedom == 0 {
+            return Ok([f64::NEG_INFINITY, f64::INFINITY]);
+        }
+        let t = StudentsT::new(0.0, 1.0, self.degrees_of_freedom as f64)
+            .expect("positive degrees of freedom")
+            .inverse_cdf(0.5 + 0.5 * level);
+        Ok([self.value - t * self.standard_error, self.value + t * self.standard_error])
+    }
+}
+
+impl fmt::Display for Estimated {
+    /// `k12 = 1.234560e7 ± 3.2e4 N/m`, the number after ± being one standard error.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (parameter, unit) = (self.parameter, self.parameter.matrix().unit());
+        if self.value.is_nan() {
+            return write!(f, "{parameter} is not determined by the data");
+        }
+        write!(f, "{parameter} = {:.6e} ± {:.1e} {unit}", self.value, self.standard_error)
+    }
+}
+
+impl fmt::Display for Undetermined {
+    /// `k12 − 0.500·c12`: the combination that may be added freely.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (at, (parameter, weight)) in self.terms.iter().enumerate() {
+            let size = weight.abs();
+            match (at, *weight < 0.0) {
+                (0, false) => {}
+                (0, true) => f.write_str("−")?,
+                (_, false) => f.write_str(" + ")?,
+                (_, true) => f.write_str(" − ")?,
+            }
+            if (size - 1.0).abs() < 1e-9 {
+                write!(f, "{parameter}")?;
+            } else if (1e-2..1e4).contains(&size) {
+                write!(f, "{size:.3}·{parameter}")?;
+            } else {
+                write!(f, "{size:.3e}·{parameter}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Estimate {
+    /// One parameter a line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.parameters().try_for_each(|parameter| writeln!(f, "{parameter}"))
+    }
+}

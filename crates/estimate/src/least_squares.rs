@@ -1,0 +1,264 @@
+//! Linear least squares from row blocks, with everything one must know about the answer.
+
+use nalgebra::{DMatrix, DMatrixView, DVector};
+
+use crate::EstimateError;
+use crate::triangular::TriangularFactor;
+
+/// Relative singular value below which a direction counts as not determined by the data:
+/// a hundred times the rounding of a regressor matrix whose columns have unit length.
+const RANK_TOLERANCE: f64 = 100.0 * f64::EPSILON;
+
+/// Share of a parameter in an undetermined direction from which it counts as undetermined.
+const SHARE_TOLERANCE: f64 = 1e-6;
+
+/// Overdetermined linear equations A θ ≈ B gathered block by block; memory does not grow with rows.
+///
+/// ```
+/// use mechid_estimate::LeastSquares;
+/// use nalgebra::DMatrix;
+///
+/// // A straight line 2 + 3 t through a million points, a thousand at a time.
+/// let mut line = LeastSquares::new(2, 1);
+/// for block in 0..1000 {
+///     let t = |row: usize| (1000 * block + row) as f64 * 1e-6;
+///     let regressors = DMatrix::from_fn(1000, 2, |row, column| t(row).powi(column as i32));
+///     let targets = DMatrix::from_fn(1000, 1, |row, _| 2.0 + 3.0 * t(row));
+///     line.push_rows(regressors.as_view(), targets.as_view())?;
+/// }
+/// let solution = line.solve()?;
+/// assert!((solution.coefficients[(1, 0)] - 3.0).abs() < 1e-12);
+/// # Ok::<(), mechid_estimate::EstimateError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct LeastSquares {
+    unknowns: usize,
+    targets: usize,
+    factor: TriangularFactor,
+}
+
+/// The least-squares answer of one set of regressors for one or several right-hand sides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Solution {
+    /// θ: unknowns × right-hand sides. Entries that are not determined are NaN.
+    pub coefficients: DMatrix<f64>,
+    /// (AᵀA)⁻¹: unknowns × unknowns, over the determined directions. The covariance of
+    /// coefficients (i, a) and (j, b) is `unscaled_covariance[(i, j)] · residual_covariance[(a, b)]`.
+    pub unscaled_covariance: DMatrix<f64>,
+    /// EᵀE / (rows − unknowns): right-hand sides × right-hand sides; infinite without excess rows.
+    pub residual_covariance: DMatrix<f64>,
+    /// √(Σe² / Σb²) of each right-hand side.
+    pub residual_nrmse: Vec<f64>,
+    /// Rows minus determined directions.
+    pub degrees_of_freedom: usize,
+    /// Largest over smallest singular value of A with its columns scaled to unit length.
+    pub condition: f64,
+    /// The combinations of unknowns on which the data say nothing.
+    pub undetermined: Vec<Direction>,
+    /// A⁺ acting on the triangular factor's rows.
+    pub(crate) inverse: DMatrix<f64>,
+    /// Residuals of the triangular factor's rows.
+    pub(crate) residuals: DMatrix<f64>,
+}
+
+/// A combination of unknowns that can be added to a solution without changing the fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Direction {
+    /// Singular value of the scaled regressors along it, relative to the largest.
+    pub relative_singular_value: f64,
+    /// One entry per unknown, the one that counts most (in scaled columns) being 1.
+    pub combination: DVector<f64>,
+    /// Which of the unknowns take part.
+    pub involved: Vec<bool>,
+}
+
+impl LeastSquares {
+    /// No rows yet; `unknowns` columns of A and `targets` columns of B.
+    pub fn new(unknowns: usize, targets: usize) -> Self {
+        Self { unknowns, targets, factor: TriangularFactor::new(unknowns + targets) }
+    }
+
+    /// Rows seen so far.
+    pub fn rows(&self) -> usize {
+        self.factor.rows()
+    }
+
+    /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] and [`EstimateError::NotFinite`]; then nothing is added.
+    pub fn push_rows(
+        &mut self,
+        regressors: DMatrixView<'_, f64>,
+        targets: DMatrixView<'_, f64>,
+    ) -> Result<(), EstimateError> {
+        size("columns of the regressors", self.unknowns, regressors.ncols())?;
+        size("columns of the right-hand side", self.targets, targets.ncols())?;
+        size("rows of the right-hand side", regressors.nrows(), targets.nrows())?;
+        finite("regressors", regressors)?;
+        finite("right-hand side", targets)?;
+        self.factor.push(&[regressors, targets]);
+        Ok(())
+    }
+
+    /// Adds everything `other` has seen, as from another record.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if it has other numbers of unknowns or right-hand sides.
+    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
+        size("columns of the regressors", self.unknowns, other.unknowns)?;
+        size("columns of the right-hand side", self.targets, other.targets)?;
+        self.factor.merge(&other.factor);
+        Ok(())
+    }
+
+    /// The least-squares solution of all rows so far; more rows may follow.
+    ///
+    /// Columns are scaled to unit length, the triangle is solved by QR, and by a truncated
+    /// singular value decomposition where it is rank-deficient.
+    ///
+    /// # Errors
+    /// [`EstimateError::TooFewRows`].
+    ///
+    /// # Source
+    /// Björck, *Numerical Methods for Least Squares Problems* (1996), chapters 1–2;
+    /// Dissertation eqs. (4.4.1)–(4.4.6), there by normal equations.
+    pub fn solve(&self) -> Result<Solution, EstimateError> {
+        let r = self.factor.r();
+        let regressors = r.columns(0, self.unknowns);
+        let targets = r.columns(self.unknowns, self.targets);
+        solve_compressed(regressors, targets, self.rows())
+    }
+}
+
+/// Least squares on rows that stand for `rows` original ones with the same Gram matrices.
+pub(crate) fn solve_compressed(
+    regressors: DMatrixView<'_, f64>,
+    targets: DMatrixView<'_, f64>,
+    rows: usize,
+) -> Result<Solution, EstimateError> {
+    let unknowns = regressors.ncols();
+    if rows < unknowns {
+        return Err(EstimateError::TooFewRows { rows, unknowns });
+    }
+    let scaled = Scaled::new(regressors);
+    let undetermined = scaled.undetermined();
+    let inverse = scaled.pseudo_inverse(undetermined.len());
+    let mut coefficients = &inverse * targets;
+    let residuals = targets - regressors * &coefficients;
+    let degrees_of_freedom = rows - (unknowns - undetermined.len());
+    let residual_covariance =
+        residuals.tr_mul(&residuals).map(|square| square / degrees_of_freedom as f64);
+    let ratio = |(e, b): (f64, f64)| if e == 0.0 { 0.0 } else { e / b };
+    let norms = residuals.column_iter().zip(targets.column_iter());
+    let residual_nrmse = norms.map(|(e, b)| ratio((e.norm(), b.norm()))).collect();
+    for direction in &undetermined {
+        for (row, involved) in direction.involved.iter().enumerate() {
+            if *involved {
+                coefficients.row_mut(row).fill(f64::NAN);
+            }
+        }
+    }
+    Ok(Solution {
+        coefficients,
+        unscaled_covariance: &inverse * inverse.transpose(),
+        residual_covariance: match degrees_of_freedom {
+            0 => DMatrix::from_element(targets.ncols(), targets.ncols(), f64::INFINITY),
+            _ => residual_covariance,
+        },
+        residual_nrmse,
+        degrees_of_freedom,
+        condition: scaled.condition(),
+        undetermined,
+        inverse,
+        residuals,
+    })
+}
+
+/// A regressor matrix with columns of unit length, factored.
+struct Scaled {
+    lengths: DVector<f64>,
+    q: DMatrix<f64>,
+    r: DMatrix<f64>,
+    singular_values: DVector<f64>,
+    u: DMatrix<f64>,
+    v_t: DMatrix<f64>,
+}
+
+impl Scaled {
+    fn new(regressors: DMatrixView<'_, f64>) -> Self {
+        let mut scaled = regressors.into_owned();
+        let lengths = DVector::from_iterator(
+            scaled.ncols(),
+            scaled.column_iter().map(|c| c.norm()).map(|l| if l > 0.0 { l } else { 1.0 }),
+        );
+        for (mut column, length) in scaled.column_iter_mut().zip(lengths.iter()) {
+            column.unscale_mut(*length);
+        }
+        let qr = scaled.qr();
+        let (q, r) = qr.unpack();
+        let svd = r.clone().svd(true, true);
+        let u = svd.u.expect("asked for");
+        let v_t = svd.v_t.expect("asked for");
+        Self { lengths, q, r, singular_values: svd.singular_values, u, v_t }
+    }
+
+    fn relative(&self, at: usize) -> f64 {
+        let largest = self.singular_values.max();
+        if largest > 0.0 { self.singular_values[at] / largest } else { 0.0 }
+    }
+
+    fn condition(&self) -> f64 {
+        let ratios = (0..self.singular_values.len()).map(|at| self.relative(at));
+        1.0 / ratios.fold(1.0, f64::min)
+    }
+
+    fn undetermined(&self) -> Vec<Direction> {
+        let count = self.singular_values.len();
+        let tolerance = RANK_TOLERANCE * count as f64;
+        let lost = (0..count).filter(|at| self.relative(*at) <= tolerance);
+        lost.map(|at| {
+            let scaled = self.v_t.row(at).transpose();
+            // Rounding must not decide which of two equals is called 1.
+            let main = scaled.iter().position(|v| v.abs() > 0.999 * scaled.amax()).unwrap_or(0);
+            let involved = scaled.iter().map(|v| v.abs() > SHARE_TOLERANCE).collect();
+            let mut combination = scaled.component_div(&self.lengths);
+            combination.unscale_mut(combination[main]);
+            Direction { relative_singular_value: self.relative(at), combination, involved }
+        })
+        .collect()
+    }
+
+    /// unknowns × rows; of the determined part only, when `lost` directions are not.
+    fn pseudo_inverse(&self, lost: usize) -> DMatrix<f64> {
+        let mut inverse = if lost == 0 {
+            self.r.solve_upper_triangular(&self.q.transpose()).expect("full rank")
+        } else {
+            let tolerance = RANK_TOLERANCE * self.singular_values.len() as f64;
+            let mut weighted = self.v_t.transpose();
+            for (at, mut column) in weighted.column_iter_mut().enumerate() {
+                let kept = self.relative(at) > tolerance;
+                column *= if kept { 1.0 / self.singular_values[at] } else { 0.0 };
+            }
+            weighted * self.u.transpose() * self.q.transpose()
+        };
+        for (mut row, length) in inverse.row_iter_mut().zip(self.lengths.iter()) {
+            row.unscale_mut(*length);
+        }
+        inverse
+    }
+}
+
+pub(crate) fn size(what: &'static str, expected: usize, got: usize) -> Result<(), EstimateError> {
+    if expected == got { Ok(()) } else { Err(EstimateError::Size { what, expected, got }) }
+}
+
+pub(crate) fn finite(what: &'static str, data: DMatrixView<'_, f64>) -> Result<(), EstimateError> {
+    for (column, values) in data.column_iter().enumerate() {
+        if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+            let value = values[row];
+            return Err(EstimateError::NotFinite { what, row, column, value });
+        }
+    }
+    Ok(())
+}
