@@ -1,5 +1,7 @@
 //! What can be wrong with a signal.
 
+use crate::Sampling;
+
 /// A signal that cannot be made or used; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -118,6 +120,66 @@ pub enum SignalError {
         /// The value given.
         value: f64,
     },
+    /// A frequency at or above half the sampling rate cannot be sampled.
+    #[error("{frequency_hz} Hz is not below half the sampling rate, {nyquist_hz} Hz")]
+    AboveNyquist {
+        /// The frequency, in Hz.
+        frequency_hz: f64,
+        /// Half the sampling rate, in Hz.
+        nyquist_hz: f64,
+    },
+    /// A band must have its lower end at or above zero and below its upper end.
+    #[error("a band from {low_hz} Hz to {high_hz} Hz is none")]
+    Band {
+        /// Lower end, in Hz.
+        low_hz: f64,
+        /// Upper end, in Hz.
+        high_hz: f64,
+    },
+    /// No spectral line lies in the band.
+    #[error("no line lies between {low_hz} Hz and {high_hz} Hz, they stand every {spacing_hz} Hz")]
+    EmptyBand {
+        /// Lower end, in Hz.
+        low_hz: f64,
+        /// Upper end, in Hz.
+        high_hz: f64,
+        /// Spacing of the lines, in Hz.
+        spacing_hz: f64,
+    },
+    /// A quantity lies outside the range it may have.
+    #[error("{what} must be between {low} and {high}, got {value}")]
+    Range {
+        /// The quantity.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// Least value allowed.
+        low: f64,
+        /// Greatest value allowed.
+        high: f64,
+    },
+    /// Too few samples or lines for what was asked.
+    #[error("{what} needs at least {least}, got {got}")]
+    TooFew {
+        /// What was asked, and what it needs.
+        what: &'static str,
+        /// How many it needs.
+        least: usize,
+        /// How many there are.
+        got: usize,
+    },
+    /// Several inputs must excite the same lines.
+    #[error("input {input} has other lines than input 0")]
+    DifferentLines {
+        /// The input, counted from 0.
+        input: usize,
+    },
+    /// A Hadamard matrix of this order is not available.
+    #[error("no Hadamard matrix of order {order}: take a power of two, or the DFT matrix")]
+    HadamardOrder {
+        /// The order asked for.
+        order: usize,
+    },
     /// A signal that is zero throughout has no crest factor, no signal-to-noise ratio, no band.
     #[error("channel {channel} is zero throughout")]
     Silent {
@@ -140,6 +202,36 @@ pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, SignalErro
         return Ok(value);
     }
     Err(SignalError::NotPositive { what, value })
+}
+
+/// `value`, if it lies between `low` and `high`, ends included.
+pub(crate) fn within(
+    what: &'static str,
+    value: f64,
+    low: f64,
+    high: f64,
+) -> Result<f64, SignalError> {
+    if value >= low && value <= high {
+        return Ok(value);
+    }
+    Err(SignalError::Range { what, value, low, high })
+}
+
+/// A frequency in Hz, if it lies below half the sampling rate.
+pub(crate) fn below_nyquist(frequency_hz: f64, sampling: Sampling) -> Result<f64, SignalError> {
+    let nyquist_hz = sampling.nyquist_hz();
+    if frequency_hz < nyquist_hz {
+        return Ok(frequency_hz);
+    }
+    Err(SignalError::AboveNyquist { frequency_hz, nyquist_hz })
+}
+
+/// A band in Hz, if 0 ≤ low < high, both finite.
+pub(crate) fn band(low_hz: f64, high_hz: f64) -> Result<(f64, f64), SignalError> {
+    if low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite() {
+        return Ok((low_hz, high_hz));
+    }
+    Err(SignalError::Band { low_hz, high_hz })
 }
 
 /// `value`, if it is finite.

@@ -17,6 +17,7 @@
 
 pub mod crest;
 mod error;
+pub mod excitation;
 pub mod lines;
 mod multisine;
 pub mod noise;

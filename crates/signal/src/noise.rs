@@ -8,8 +8,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::error::{finite, not_negative};
-use crate::{Record, Sampling, SignalError};
+use crate::error::{finite, not_negative, positive};
+use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// How strong a disturbance is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -38,6 +38,24 @@ impl NoiseLevel {
     }
 }
 
+/// How the power of a disturbance is spread over frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Colour {
+    /// Evenly up to Nyquist; samples are independent.
+    White,
+    /// Power density proportional to 1/f^`exponent`: 1 is pink, 2 brown (a drift), −2 violet (a
+    /// differentiated signal). The lowest frequency is half a cycle per record.
+    PowerLaw {
+        /// Exponent of the fall.
+        exponent: f64,
+    },
+    /// First-order low-pass (Gauss–Markov): an autocorrelation of exp(−2π f_c |τ|), exactly.
+    LowPass {
+        /// Corner frequency f_c, in Hz.
+        corner_hz: f64,
+    },
+}
+
 /// White Gaussian noise of a given standard deviation, independent between channels.
 ///
 /// # Errors
@@ -48,11 +66,34 @@ pub fn white(
     standard_deviation: f64,
     seed: u64,
 ) -> Result<Record, SignalError> {
+    coloured(sampling, channels, standard_deviation, Colour::White, seed)
+}
+
+/// Gaussian noise of a given standard deviation and colour, independent between channels.
+///
+/// The deviation is that of the process: a single record scatters about it, the more the fewer
+/// independent values it holds.
+///
+/// # Errors
+/// [`SignalError::Negative`] for the deviation, [`SignalError::Infinite`] for the exponent,
+/// [`SignalError::NotPositive`] for the corner frequency.
+pub fn coloured(
+    sampling: Sampling,
+    channels: usize,
+    standard_deviation: f64,
+    colour: Colour,
+    seed: u64,
+) -> Result<Record, SignalError> {
     not_negative("standard deviation", standard_deviation)?;
     let mut data = DMatrix::zeros(sampling.len(), channels);
     for (channel, mut column) in data.column_iter_mut().enumerate() {
-        let mut rng = stream(seed, channel);
-        column.apply(|v| *v = standard_deviation * standard_normal(&mut rng));
+        let rng = &mut stream(seed, channel);
+        let noise = match colour {
+            Colour::White => white_channel(sampling, 1.0, rng),
+            Colour::PowerLaw { exponent } => power_law(sampling, exponent, rng)?,
+            Colour::LowPass { corner_hz } => low_pass(sampling, corner_hz, rng)?,
+        };
+        column.iter_mut().zip(noise).for_each(|(v, x)| *v = standard_deviation * x);
     }
     Record::new(sampling, data)
 }
@@ -72,7 +113,20 @@ pub fn white(
 /// [`SignalError::Negative`] or [`SignalError::Infinite`] for an impossible level,
 /// [`SignalError::Silent`] if the level is relative to a channel that is zero throughout.
 pub fn add_white(record: &Record, level: NoiseLevel, seed: u64) -> Result<Record, SignalError> {
-    let unit = white(record.sampling(), record.channels(), 1.0, seed)?;
+    add(record, level, Colour::White, seed)
+}
+
+/// The record with Gaussian noise of a given colour added to every channel.
+///
+/// # Errors
+/// As [`add_white`] and [`coloured`].
+pub fn add(
+    record: &Record,
+    level: NoiseLevel,
+    colour: Colour,
+    seed: u64,
+) -> Result<Record, SignalError> {
+    let unit = coloured(record.sampling(), record.channels(), 1.0, colour, seed)?;
     let mut data = record.data().clone();
     for (channel, mut column) in data.column_iter_mut().enumerate() {
         column.axpy(level.deviation(record, channel)?, &unit.column(channel), 1.0);
@@ -80,16 +134,64 @@ pub fn add_white(record: &Record, level: NoiseLevel, seed: u64) -> Result<Record
     Record::new(record.sampling(), data)
 }
 
+/// White noise shaped in frequency, from a period twice as long: noise does not close on itself
+/// at the ends of a record.
+fn power_law(
+    sampling: Sampling,
+    exponent: f64,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<f64>, SignalError> {
+    finite("exponent", exponent)?;
+    let twice = sampling.with_len(sampling.len().saturating_mul(2))?;
+    let white = Record::from_channel(twice, white_channel(twice, 1.0, rng))?;
+    let spectrum = Spectrum::of(&white);
+    let gain = |n: usize| if n == 0 { 0.0 } else { (n as f64).powf(-0.5 * exponent) };
+    // The period is even: all lines but DC and Nyquist count twice.
+    let nyquist = twice.len() / 2;
+    let power = 2.0 * (1..nyquist).map(|n| gain(n).powi(2)).sum::<f64>() + gain(nyquist).powi(2);
+    let scale = (twice.len() as f64 / power).sqrt();
+    let mut lines = spectrum.lines().clone();
+    for (n, mut row) in lines.row_iter_mut().enumerate() {
+        row *= nalgebra::Complex::from(scale * gain(n));
+    }
+    let shaped = Spectrum::from_lines(twice, lines).to_record();
+    Ok(shaped.channel(0)[..sampling.len()].to_vec())
+}
+
+/// The stationary first-order process, stepped exactly.
+fn low_pass(
+    sampling: Sampling,
+    corner_hz: f64,
+    rng: &mut ChaCha8Rng,
+) -> Result<Vec<f64>, SignalError> {
+    positive("corner frequency in Hz", corner_hz)?;
+    let rate = std::f64::consts::TAU * corner_hz * sampling.dt();
+    let (keep, renew) = ((-rate).exp(), (-(-2.0 * rate).exp_m1()).sqrt());
+    let mut noise = white_channel(sampling, 1.0, rng);
+    for k in 1..noise.len() {
+        noise[k] = keep * noise[k - 1] + renew * noise[k];
+    }
+    Ok(noise)
+}
+
+/// Independent draws of one channel.
+pub(crate) fn white_channel(
+    sampling: Sampling,
+    standard_deviation: f64,
+    rng: &mut ChaCha8Rng,
+) -> Vec<f64> {
+    let draw = |_| {
+        let unit: f64 = StandardNormal.sample(rng);
+        standard_deviation * unit
+    };
+    (0..sampling.len()).map(draw).collect()
+}
+
 /// The generator of one channel.
 pub(crate) fn stream(seed: u64, channel: usize) -> ChaCha8Rng {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(channel as u64);
     rng
-}
-
-/// One draw with mean 0 and variance 1.
-pub(crate) fn standard_normal(rng: &mut ChaCha8Rng) -> f64 {
-    StandardNormal.sample(rng)
 }
 
 #[cfg(test)]
@@ -135,5 +237,62 @@ mod tests {
         assert_eq!(silent, Err(SignalError::Silent { channel: 1 }));
         assert!(add_white(&r, NoiseLevel::StandardDeviation(-1.0), 0).is_err());
         assert!(add_white(&r, NoiseLevel::SnrDb(f64::NAN), 0).is_err());
+    }
+
+    /// Mean over many records of E(x_k x_{k+lag}), in units of the variance asked for.
+    fn correlation(colour: Colour, lag: usize) -> f64 {
+        let r = coloured(axis(64), 4000, 3.0, colour, 8).unwrap();
+        let product = |c: usize| r.channel(c)[20] * r.channel(c)[20 + lag];
+        (0..r.channels()).map(product).sum::<f64>() / (r.channels() as f64 * 9.0)
+    }
+
+    #[test]
+    fn every_colour_has_the_stated_deviation() {
+        let colours = [
+            Colour::White,
+            Colour::PowerLaw { exponent: 1.0 },
+            Colour::PowerLaw { exponent: 2.0 },
+            Colour::PowerLaw { exponent: -2.0 },
+            Colour::LowPass { corner_hz: 2.0 },
+        ];
+        for colour in colours {
+            // 4000 records: the mean square scatters by √(2/4000) = 2.2 %.
+            let power = correlation(colour, 0);
+            assert!((power - 1.0).abs() < 4.0 * 0.0224, "{colour:?}: {power}");
+        }
+    }
+
+    #[test]
+    fn low_pass_noise_forgets_exponentially() {
+        for lag in [1, 5, 10] {
+            let got = correlation(Colour::LowPass { corner_hz: 2.0 }, lag);
+            let expected = (-std::f64::consts::TAU * 2.0 * 0.01 * lag as f64).exp();
+            assert!((got - expected).abs() < 4.0 * 0.0224, "lag {lag}: {got}, {expected}");
+        }
+    }
+
+    #[test]
+    fn power_laws_fall_as_stated() {
+        for exponent in [0.0, 1.0, 2.0] {
+            let r = coloured(axis(4096), 40, 1.0, Colour::PowerLaw { exponent }, 2).unwrap();
+            let spectrum = Spectrum::of(&r.without_mean());
+            // Power of two octave bands three octaves apart, far from both ends.
+            let power = |from: usize| {
+                let lines = spectrum.lines().rows(from, from);
+                lines.iter().map(|z| z.norm_sqr()).sum::<f64>()
+            };
+            let fall = (power(64) / power(512)).log2() / 3.0;
+            // An octave band of density 1/f^a carries 2^(1 − a) times the power of the next
+            // lower one. 40 · 64 lines: each band scatters by 2 %; a slope of 2 leaks a little
+            // because the record is not a period.
+            assert!((fall - (exponent - 1.0)).abs() < 0.06, "{exponent}: {fall}");
+        }
+    }
+
+    #[test]
+    fn impossible_colours_are_refused() {
+        let noise = |colour| coloured(axis(8), 1, 1.0, colour, 0);
+        assert!(noise(Colour::PowerLaw { exponent: f64::NAN }).is_err());
+        assert!(noise(Colour::LowPass { corner_hz: 0.0 }).is_err());
     }
 }

@@ -61,6 +61,14 @@ impl Record {
         Self::new(sampling, data)
     }
 
+    /// A record of one channel from its value at each instant, in seconds.
+    ///
+    /// # Errors
+    /// [`SignalError::NotFinite`] at the first NaN or infinity.
+    pub fn from_fn(sampling: Sampling, value: impl FnMut(f64) -> f64) -> Result<Self, SignalError> {
+        Self::from_channel(sampling, sampling.times().map(value).collect())
+    }
+
     /// The time axis.
     pub fn sampling(&self) -> Sampling {
         self.sampling
@@ -142,6 +150,18 @@ impl Record {
         Ok(mean)
     }
 
+    /// The record, `periods` times one after the other.
+    ///
+    /// # Errors
+    /// [`SignalError::Empty`] if `periods` is 0.
+    pub fn repeated(&self, periods: usize) -> Result<Self, SignalError> {
+        let sampling = self.sampling.with_len(self.len().saturating_mul(periods))?;
+        let len = self.len();
+        let data =
+            DMatrix::from_fn(sampling.len(), self.channels(), |k, c| self.data[(k % len, c)]);
+        Ok(Self { sampling, data })
+    }
+
     /// An error if `other` lies on another time axis (steps may differ by rounding only).
     ///
     /// # Errors
@@ -185,6 +205,17 @@ mod tests {
         assert_eq!(r.without_mean().channel(0), [-2.0, -1.0, 0.0, 3.0]);
         assert_eq!(r.period_mean(2).unwrap().channel(0), [2.0, 4.0]);
         assert_eq!(r.period_mean(3).unwrap().channel(0), [1.0, 2.0, 3.0]);
+    }
+
+    #[test]
+    fn repetition_and_its_mean() {
+        let r = two_channels();
+        let thrice = r.repeated(3).unwrap();
+        assert_eq!((thrice.len(), thrice.channel(1)[9]), (12, 1.0));
+        assert_eq!(thrice.period_mean(4).unwrap(), r);
+        assert_eq!(r.repeated(0), Err(SignalError::Empty));
+        let ramp = Record::from_fn(r.sampling(), |t| 10.0 * t).unwrap();
+        assert_eq!(ramp.channel(0)[2], 2.0);
     }
 
     #[test]

@@ -1,0 +1,116 @@
+//! Hammer blows.
+
+use std::f64::consts::PI;
+
+use crate::error::{finite, not_negative, positive};
+use crate::{Record, Sampling, SignalError};
+
+/// An ideal blow of given momentum, in the unit of the signal times seconds: N·s for a force.
+///
+/// Sampled, it is one sample of momentum / Δt, the one nearest to its instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impulse {
+    momentum: f64,
+    at: f64,
+}
+
+impl Impulse {
+    /// A blow of `momentum` at `at` seconds.
+    ///
+    /// # Errors
+    /// [`SignalError::Infinite`] for the momentum, [`SignalError::Negative`] for the instant.
+    pub fn new(momentum: f64, at: f64) -> Result<Self, SignalError> {
+        finite("momentum", momentum)?;
+        not_negative("instant", at)?;
+        Ok(Self { momentum, at })
+    }
+
+    /// The sampled blow.
+    ///
+    /// # Errors
+    /// [`SignalError::Range`] if its instant lies beyond the last sample.
+    pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
+        let nearest = (self.at / sampling.dt()).round();
+        let last = sampling.len() - 1;
+        if nearest > last as f64 {
+            let high = sampling.time(last);
+            return Err(SignalError::Range { what: "instant", value: self.at, low: 0.0, high });
+        }
+        let mut force = vec![0.0; sampling.len()];
+        force[nearest as usize] = self.momentum / sampling.dt();
+        Record::from_channel(sampling, force)
+    }
+}
+
+/// A blow in the shape of half a sine, as an instrumented hammer gives it:
+/// F(t) = F_max sin(π (t − t_0) / d) for t_0 ≤ t ≤ t_0 + d, zero elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HalfSine {
+    peak: f64,
+    start: f64,
+    duration: f64,
+}
+
+impl HalfSine {
+    /// A blow of given peak, start and duration in seconds.
+    ///
+    /// # Errors
+    /// [`SignalError::Negative`] for the peak or the start, [`SignalError::NotPositive`] for the
+    /// duration.
+    pub fn new(peak: f64, start: f64, duration: f64) -> Result<Self, SignalError> {
+        not_negative("peak", peak)?;
+        not_negative("start", start)?;
+        positive("duration", duration)?;
+        Ok(Self { peak, start, duration })
+    }
+
+    /// Its momentum ∫ F dt = 2 F_max d / π.
+    pub fn momentum(&self) -> f64 {
+        2.0 * self.peak * self.duration / PI
+    }
+
+    /// The exact value at `t` seconds.
+    pub fn value(&self, t: f64) -> f64 {
+        let passed = (t - self.start) / self.duration;
+        if (0.0..=1.0).contains(&passed) { self.peak * (PI * passed).sin() } else { 0.0 }
+    }
+
+    /// The sampled blow; what lies beyond the last sample is cut off.
+    ///
+    /// # Errors
+    /// None for a blow that exists; the signature is that of all excitations.
+    pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
+        Record::from_fn(sampling, |t| self.value(t))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_impulse_keeps_its_momentum_at_any_rate() {
+        for dt in [0.1, 0.01, 0.003] {
+            let s = Sampling::new(dt, 400).unwrap();
+            let r = Impulse::new(3.0, 0.5).unwrap().sample(s).unwrap();
+            assert!((r.column(0).sum() * dt - 3.0).abs() < 1e-12);
+            let at = r.column(0).argmax().0 as f64 * dt;
+            assert!((at - 0.5).abs() <= 0.5 * dt);
+        }
+        let late = Impulse::new(3.0, 0.5).unwrap().sample(Sampling::new(0.1, 5).unwrap());
+        assert!(matches!(late, Err(SignalError::Range { value: 0.5, .. })));
+    }
+
+    #[test]
+    fn half_sine_by_hand() {
+        let blow = HalfSine::new(10.0, 0.1, 0.2).unwrap();
+        for (t, expected) in [(0.05, 0.0), (0.1, 0.0), (0.2, 10.0), (0.4, 0.0)] {
+            assert!((blow.value(t) - expected).abs() < 1e-13, "t = {t}");
+        }
+        // The rectangle rule errs by (π/n)²/12 for n samples under the arch, n = 2000.
+        let r = blow.sample(Sampling::new(1e-4, 5000).unwrap()).unwrap();
+        assert!((r.column(0).sum() * 1e-4 / blow.momentum() - 1.0).abs() < 3e-7);
+        assert!(HalfSine::new(-1.0, 0.0, 1.0).is_err());
+        assert!(HalfSine::new(1.0, 0.0, 0.0).is_err());
+    }
+}
