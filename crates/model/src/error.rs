@@ -49,7 +49,74 @@ pub enum ModelError {
         /// Channels of the displacement.
         expected: usize,
     },
+    /// A scalar parameter is out of range.
+    #[error("the {name} must be {requirement}, got {value}")]
+    Parameter {
+        /// What it is called.
+        name: &'static str,
+        /// What it should be.
+        requirement: &'static str,
+        /// What was given.
+        value: f64,
+    },
+    /// Displacement and velocity of a state, or a state and a system, do not fit.
+    #[error("the state has {got} entries for {dof} degrees of freedom")]
+    StateLength {
+        /// Entries found.
+        got: usize,
+        /// Degrees of freedom expected.
+        dof: usize,
+    },
+    /// An initial displacement or velocity is NaN or infinite.
+    #[error("the initial {quantity} of degree of freedom {dof} is {value}, not a finite number")]
+    StateNotFinite {
+        /// `"displacement"` or `"velocity"`.
+        quantity: &'static str,
+        /// Degree of freedom, counted from 1.
+        dof: usize,
+        /// The value found.
+        value: f64,
+    },
+    /// A force record does not have one channel per degree of freedom.
+    #[error("the force has {got} channels for {dof} degrees of freedom")]
+    ForceChannels {
+        /// Channels found.
+        got: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// The dynamic stiffness cannot be inverted: an undamped resonance.
+    #[error(
+        "the dynamic stiffness is singular at {omega} rad/s \
+         (reciprocal condition about {reciprocal_condition:.1e}): an undamped resonance"
+    )]
+    SingularDynamicStiffness {
+        /// Angular frequency, in rad/s.
+        omega: f64,
+        /// 1 / ((‖K‖ + ω²‖M‖ + ω‖C‖) ‖D⁻¹‖) in the 1-norm; 0 if a pivot vanished.
+        reciprocal_condition: f64,
+    },
+    /// The eigenvalue or singular value iteration did not converge.
+    #[error("the modes of a system with {dof} degrees of freedom did not converge")]
+    ModesNotConverged {
+        /// Degrees of freedom.
+        dof: usize,
+    },
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+}
+
+/// `value` must be finite and satisfy `holds`, or it is named in an error.
+pub(crate) fn require(
+    name: &'static str,
+    value: f64,
+    requirement: &'static str,
+    holds: bool,
+) -> Result<(), ModelError> {
+    if holds && value.is_finite() {
+        Ok(())
+    } else {
+        Err(ModelError::Parameter { name, requirement, value })
+    }
 }

@@ -15,9 +15,20 @@
 //! ```
 
 mod error;
+mod frequency_response;
+mod initial_state;
+mod journal_bearing;
+mod modes;
 mod response;
+mod sampling_rule;
+mod sdof;
 mod second_order;
 
 pub use error::ModelError;
+pub use initial_state::InitialState;
+pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
+pub use modes::Mode;
 pub use response::Response;
+pub use sampling_rule::npi_sampling;
+pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};

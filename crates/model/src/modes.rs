@@ -1,0 +1,263 @@
+//! Eigenvalues and complex mode shapes of a system with any damping.
+
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
+use nalgebra::{Complex, DMatrix, DVector, SVD, Schur};
+
+use crate::{ModelError, SecondOrderSystem};
+
+/// Eigenvalues closer than this, relative to their modulus, count as one repeated eigenvalue:
+/// about √ε, what rounding makes of a defective pair.
+const REPEATED: f64 = 1e-7;
+
+/// A free motion x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
+///
+/// # Source
+/// Meirovitch (1975); Dissertation, Appendix E.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mode {
+    eigenvalue: Complex<f64>,
+    shape: DVector<Complex<f64>>,
+}
+
+impl Mode {
+    /// λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
+    pub fn eigenvalue(&self) -> Complex<f64> {
+        self.eigenvalue
+    }
+
+    /// φ, one entry per degree of freedom, scaled so that its largest entry is 1.
+    pub fn shape(&self) -> &DVector<Complex<f64>> {
+        &self.shape
+    }
+
+    /// Natural frequency |λ|, in rad/s.
+    pub fn natural_frequency(&self) -> f64 {
+        self.eigenvalue.norm()
+    }
+
+    /// Damped frequency Im λ, in rad/s; 0 for a mode that does not oscillate.
+    pub fn damped_frequency(&self) -> f64 {
+        self.eigenvalue.im
+    }
+
+    /// Damped frequency Im λ / 2π, in Hz.
+    pub fn damped_frequency_hz(&self) -> f64 {
+        self.eigenvalue.im / std::f64::consts::TAU
+    }
+
+    /// Damping ratio −Re λ / |λ|: negative if unstable, ±1 for a real eigenvalue, 0 for a zero one.
+    pub fn damping_ratio(&self) -> f64 {
+        match self.natural_frequency() {
+            0.0 => 0.0,
+            modulus => -self.eigenvalue.re / modulus,
+        }
+    }
+
+    /// Whether the eigenvalue has an imaginary part.
+    pub fn oscillates(&self) -> bool {
+        self.eigenvalue.im > 0.0
+    }
+}
+
+impl SecondOrderSystem {
+    /// A of the first-order form ż = A z + [0; M⁻¹] F with z = [x; ẋ], 2n×2n.
+    ///
+    /// ```text
+    /// A = ┌    0        I   ┐
+    ///     └ −M⁻¹K    −M⁻¹C  ┘
+    /// ```
+    ///
+    /// # Source
+    /// Dissertation eqs. (4.5.8) and (4.5.26), there in the order x, ẋ, y, ẏ.
+    pub fn state_matrix(&self) -> DMatrix<f64> {
+        let n = self.dof();
+        let mass = self.mass().clone().lu();
+        let solve = |b: &DMatrix<f64>| mass.solve(b).expect("the constructor checked M");
+        let mut a = DMatrix::zeros(2 * n, 2 * n);
+        a.view_mut((0, n), (n, n)).fill_with_identity();
+        a.view_mut((n, 0), (n, n)).copy_from(&-solve(self.stiffness()));
+        a.view_mut((n, n), (n, n)).copy_from(&-solve(self.damping()));
+        a
+    }
+
+    /// All 2n eigenvalues (rad/s), by modulus, of a conjugate pair the one with Im λ > 0 first.
+    ///
+    /// # Errors
+    /// [`ModelError::ModesNotConverged`] if the QR iteration does not converge.
+    pub fn eigenvalues(&self) -> Result<Vec<Complex<f64>>, ModelError> {
+        let mut a = self.state_matrix();
+        // Displacements and velocities differ by a factor ω: balance before iterating.
+        balance_parlett_reinsch(&mut a);
+        let iterations = 100 * a.nrows();
+        let schur = Schur::try_new(a, f64::EPSILON, iterations)
+            .ok_or(ModelError::ModesNotConverged { dof: self.dof() })?;
+        let mut eigenvalues = quasi_triangular_eigenvalues(&schur.unpack().1);
+        eigenvalues.sort_by(|p, q| {
+            p.norm().total_cmp(&q.norm()).then(p.re.total_cmp(&q.re)).then(q.im.total_cmp(&p.im))
+        });
+        Ok(eigenvalues)
+    }
+
+    /// The modes by rising natural frequency: one for each conjugate pair, one for each real eigenvalue.
+    ///
+    /// The n degrees of freedom have n modes if all of them oscillate, up to 2n otherwise.
+    /// A repeated eigenvalue with as many independent shapes gives orthonormal directions of
+    /// their space (each then scaled); if it has fewer (it is defective, like critical
+    /// damping) a shape is given more than once.
+    ///
+    /// # Errors
+    /// [`ModelError::ModesNotConverged`] if an iteration does not converge.
+    pub fn modes(&self) -> Result<Vec<Mode>, ModelError> {
+        let eigenvalues = self.eigenvalues()?;
+        let mut modes: Vec<Mode> = Vec::with_capacity(self.dof());
+        for eigenvalue in eigenvalues.into_iter().filter(|l| l.im >= 0.0) {
+            let twins = modes
+                .iter()
+                .filter(|m| (m.eigenvalue - eigenvalue).norm() <= REPEATED * eigenvalue.norm())
+                .count();
+            modes.push(Mode { eigenvalue, shape: self.shape(eigenvalue, twins)? });
+        }
+        Ok(modes)
+    }
+
+    /// The null vector of λ²M + λC + K; for the `twins`-th copy of a repeated λ the next
+    /// independent one, if there is one.
+    fn shape(
+        &self,
+        eigenvalue: Complex<f64>,
+        twins: usize,
+    ) -> Result<DVector<Complex<f64>>, ModelError> {
+        let (m, c, k) = (self.mass(), self.damping(), self.stiffness());
+        let l = eigenvalue;
+        let pencil = m.map(|v| l * l * v) + c.map(|v| l * v) + k.map(Complex::from);
+        let size = m.norm() * l.norm_sqr() + c.norm() * l.norm() + k.norm();
+        let svd = SVD::try_new(pencil, false, true, f64::EPSILON, 1000 * self.dof())
+            .ok_or(ModelError::ModesNotConverged { dof: self.dof() })?;
+        let last = self.dof() - 1;
+        let vanishes = |from_last: usize| {
+            from_last <= last && svd.singular_values[last - from_last] <= 10.0 * REPEATED * size
+        };
+        let row = last - if vanishes(twins) { twins } else { 0 };
+        let rows = svd.v_t.as_ref().expect("asked for");
+        let shape = rows.row(row).adjoint();
+        let largest = shape[shape.icamax()];
+        Ok(shape / largest)
+    }
+}
+
+/// Eigenvalues of a real quasi-triangular matrix: its diagonal blocks of size 1 and 2.
+///
+/// A block of size 2 that rounding left with real eigenvalues is solved as such.
+fn quasi_triangular_eigenvalues(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    let mut eigenvalues = Vec::with_capacity(t.nrows());
+    while eigenvalues.len() < t.nrows() {
+        let i = eigenvalues.len();
+        if i + 1 == t.nrows() || t[(i + 1, i)] == 0.0 {
+            eigenvalues.push(Complex::from(t[(i, i)]));
+            continue;
+        }
+        let mean = 0.5 * (t[(i, i)] + t[(i + 1, i + 1)]);
+        let half_gap = 0.5 * (t[(i, i)] - t[(i + 1, i + 1)]);
+        let discriminant = half_gap * half_gap + t[(i, i + 1)] * t[(i + 1, i)];
+        let root = discriminant.abs().sqrt();
+        if discriminant < 0.0 {
+            eigenvalues.extend([Complex::new(mean, root), Complex::new(mean, -root)]);
+        } else {
+            eigenvalues.extend([Complex::from(mean + root), Complex::from(mean - root)]);
+        }
+    }
+    eigenvalues
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::dmatrix;
+
+    use super::*;
+
+    fn system(m: DMatrix<f64>, c: DMatrix<f64>, k: DMatrix<f64>) -> SecondOrderSystem {
+        SecondOrderSystem::new(m, c, k).unwrap()
+    }
+
+    /// ‖(λ²M + λC + K) φ‖ relative to the size of its terms.
+    fn residual(s: &SecondOrderSystem, mode: &Mode) -> f64 {
+        let l = mode.eigenvalue();
+        let terms = [(s.mass(), l * l), (s.damping(), l), (s.stiffness(), Complex::from(1.0))];
+        let size: f64 = terms.iter().map(|(a, z)| a.norm() * z.norm()).sum();
+        let sum: DVector<Complex<f64>> =
+            terms.iter().map(|(a, z)| a.map(|v| z * v) * mode.shape()).sum();
+        sum.norm() / (size * mode.shape().norm())
+    }
+
+    #[test]
+    fn state_matrix_by_hand() {
+        let s = system(
+            dmatrix![2.0, 0.0; 0.0, 4.0],
+            dmatrix![1.0, 2.0; 3.0, 4.0],
+            dmatrix![8.0, -2.0; 6.0, 12.0],
+        );
+        let expected = dmatrix![
+            0.0, 0.0, 1.0, 0.0;
+            0.0, 0.0, 0.0, 1.0;
+            -4.0, 1.0, -0.5, -1.0;
+            -1.5, -3.0, -0.75, -1.0
+        ];
+        assert_eq!(s.state_matrix(), expected);
+    }
+
+    #[test]
+    fn undamped_chain_by_hand() {
+        // Two equal masses, three equal springs: ω = 1 in phase, √3 in opposition.
+        let s =
+            system(DMatrix::identity(2, 2), DMatrix::zeros(2, 2), dmatrix![2.0, -1.0; -1.0, 2.0]);
+        let modes = s.modes().unwrap();
+        for (mode, (omega, ratio)) in modes.iter().zip([(1.0, 1.0), (3f64.sqrt(), -1.0)]) {
+            assert!((mode.eigenvalue() - Complex::new(0.0, omega)).norm() < 1e-14);
+            assert!(mode.damping_ratio().abs() < 1e-14);
+            assert!((mode.shape()[1] / mode.shape()[0] - ratio).norm() < 1e-14);
+            assert!(mode.oscillates());
+        }
+    }
+
+    #[test]
+    fn real_eigenvalues_are_modes_of_their_own() {
+        // s² + 5 s + 4.
+        let modes = system(dmatrix![1.0], dmatrix![5.0], dmatrix![4.0]).modes().unwrap();
+        let found: Vec<f64> = modes.iter().map(|m| m.eigenvalue().re).collect();
+        assert!((found[0] + 1.0).abs() < 1e-14 && (found[1] + 4.0).abs() < 1e-14, "{found:?}");
+        assert!(modes.iter().all(|m| !m.oscillates() && m.damping_ratio() == 1.0));
+    }
+
+    #[test]
+    fn a_repeated_eigenvalue_has_independent_shapes() {
+        // A symmetric rotor: the same oscillator in both directions, mixed by a rotation.
+        let (c, s) = (0.6, 0.8);
+        let turn = dmatrix![c, -s, 0.0; s, c, 0.0; 0.0, 0.0, 1.0];
+        let turned = |d: [f64; 3]| {
+            &turn * DMatrix::from_diagonal(&DVector::from_row_slice(&d)) * turn.transpose()
+        };
+        let s = system(DMatrix::identity(3, 3), turned([0.2, 0.2, 0.3]), turned([4.0, 4.0, 9.0]));
+        let modes = s.modes().unwrap();
+        assert_eq!(modes.len(), 3);
+        let twins = DMatrix::from_columns(&[modes[0].shape().clone(), modes[1].shape().clone()]);
+        assert!(twins.svd(false, false).singular_values.min() > 0.5);
+        assert!(modes.iter().all(|m| residual(&s, m) < 1e-13));
+    }
+
+    #[test]
+    fn a_defective_eigenvalue_repeats_its_shape() {
+        // Critical damping, s² + 4 s + 4: double root −2; rounding moves it by about √ε.
+        let modes = system(dmatrix![1.0], dmatrix![4.0], dmatrix![4.0]).modes().unwrap();
+        for mode in &modes {
+            assert!((mode.eigenvalue() + 2.0).norm() < 1e-7, "{mode:?}");
+            assert_eq!(mode.shape()[0], Complex::from(1.0));
+        }
+    }
+
+    #[test]
+    fn a_free_body_has_zero_eigenvalues() {
+        let s = system(dmatrix![1.0], dmatrix![0.0], dmatrix![0.0]);
+        let modes = s.modes().unwrap();
+        assert!(modes.iter().all(|m| m.natural_frequency() == 0.0 && m.damping_ratio() == 0.0));
+    }
+}
