@@ -1,1 +1,31 @@
-//! Under construction.
+//! Named systems with known answers, and exact responses to judge everything else by.
+//!
+//! Nothing here is borrowed from an integrator or an estimator: a sampled force is answered
+//! through the matrix exponential or through the receptance, see [`exact`].
+//!
+//! ```
+//! use mechid_problems::{dissertation_sdof, exact_zoh_periodic};
+//! use mechid_signal::{Record, Sampling};
+//!
+//! // A square wave, slow against the oscillator: it settles at F/k on every half.
+//! let sampling = Sampling::new(0.01, 400)?;
+//! let force = (0..400).map(|k| if k < 200 { 50.0 } else { -50.0 }).collect();
+//! let force = Record::from_channel(sampling, force)?;
+//! let response = exact_zoh_periodic(&dissertation_sdof().system(), &force)?;
+//! assert!((response.displacement().channel(0)[199] - 50.0 / 5000.0).abs() < 1e-8);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+pub mod exact;
+mod named;
+mod random;
+mod transition;
+
+pub use error::ProblemError;
+pub use exact::{
+    exact_foh, exact_foh_periodic, exact_harmonic, exact_harmonic_periodic, exact_zoh,
+    exact_zoh_periodic,
+};
+pub use named::{dissertation_bearing, dissertation_sdof, steffen_rade};
+pub use random::random_stable;

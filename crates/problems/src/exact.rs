@@ -1,0 +1,189 @@
+//! Responses to a sampled force without discretisation error: the judges of everything else.
+//!
+//! A sampled force is a motion only once it is said what happens between the samples:
+//!
+//! | Functions | Between the samples the force is |
+//! |---|---|
+//! | [`exact_zoh`], [`exact_zoh_periodic`] | held at the sample on the left (as a converter does) |
+//! | [`exact_foh`], [`exact_foh_periodic`] | on the straight line from sample to sample |
+//! | [`exact_harmonic`], [`exact_harmonic_periodic`] | the sum of its spectral lines up to Nyquist |
+//!
+//! The periodic ones give the motion that repeats with the period `len · dt` of the force,
+//! the others start from a given state. x, ẋ and ẍ belong to the same instants. A held
+//! force jumps at every sample and the acceleration with it: ẍ is the limit from the right,
+//! under the force that begins there.
+
+use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::ProblemError;
+use crate::transition::{Between, Transition};
+
+/// Response from `start` to a force held between samples (samples × dof, in N).
+///
+/// # Errors
+/// [`ProblemError::Model`] if force or state do not fit the system,
+/// [`ProblemError::Signal`] if an unstable motion overflows.
+pub fn exact_zoh(
+    system: &SecondOrderSystem,
+    force: &Record,
+    start: &InitialState,
+) -> Result<Response, ProblemError> {
+    from_start(system, force, start, Between::Held)
+}
+
+/// Response from `start` to a force linear between samples (samples × dof, in N).
+///
+/// # Errors
+/// As [`exact_zoh`].
+pub fn exact_foh(
+    system: &SecondOrderSystem,
+    force: &Record,
+    start: &InitialState,
+) -> Result<Response, ProblemError> {
+    from_start(system, force, start, Between::Linear)
+}
+
+/// The periodic motion under a force held between samples, one period (samples × dof, in N).
+///
+/// # Errors
+/// [`ProblemError::NoPeriodicMotion`] if there is none or more than one, else as [`exact_zoh`].
+pub fn exact_zoh_periodic(
+    system: &SecondOrderSystem,
+    force: &Record,
+) -> Result<Response, ProblemError> {
+    periodic(system, force, Between::Held)
+}
+
+/// The periodic motion under a force linear between samples, one period (samples × dof, in N).
+///
+/// # Errors
+/// As [`exact_zoh_periodic`].
+pub fn exact_foh_periodic(
+    system: &SecondOrderSystem,
+    force: &Record,
+) -> Result<Response, ProblemError> {
+    periodic(system, force, Between::Linear)
+}
+
+/// The periodic motion under the band-limited force through the samples of one period:
+/// each line n of the response is receptance at n·ω0 times line n of the force.
+///
+/// At Nyquist (even length) the samples show only the cosine of the force; that is what acts.
+///
+/// # Errors
+/// [`ProblemError::Model`] if the force does not fit or a line of the period (driven or not)
+/// stands on an undamped resonance.
+pub fn exact_harmonic_periodic(
+    system: &SecondOrderSystem,
+    force: &Record,
+) -> Result<Response, ProblemError> {
+    let got = force.channels();
+    if got != system.dof() {
+        return Err(ModelError::ForceChannels { got, dof: system.dof() }.into());
+    }
+    let forces = Spectrum::of(force);
+    let mut lines = [(); 3].map(|()| DMatrix::zeros(forces.len(), got));
+    for n in 0..forces.len() {
+        let omega = forces.omega(n);
+        let x = system.receptance(omega)? * forces.lines().row(n).transpose();
+        let i_omega = Complex::new(0.0, omega);
+        for (power, quantity) in lines.iter_mut().enumerate() {
+            quantity.set_row(n, &x.map(|z| z * i_omega.powi(power as i32)).transpose());
+        }
+    }
+    let [x, v, a] = lines.map(|l| Spectrum::from_lines(force.sampling(), l).to_record());
+    Ok(Response::new(x, v, a)?)
+}
+
+/// Response from `start` to the band-limited force: the periodic motion and the free decay of
+/// the difference between `start` and it.
+///
+/// # Errors
+/// As [`exact_harmonic_periodic`] and [`exact_zoh`].
+pub fn exact_harmonic(
+    system: &SecondOrderSystem,
+    force: &Record,
+    start: &InitialState,
+) -> Result<Response, ProblemError> {
+    start.check_dof(system.dof())?;
+    let steady = exact_harmonic_periodic(system, force)?;
+    let first = |r: &Record| r.data().row(0).transpose();
+    let gap = InitialState::new(
+        start.displacement() - first(steady.displacement()),
+        start.velocity() - first(steady.velocity()),
+    )?;
+    let no_force = Record::new(force.sampling(), DMatrix::zeros(force.len(), force.channels()))?;
+    let free = exact_zoh(system, &no_force, &gap)?;
+    let sum = |p: &Record, q: &Record| Record::new(p.sampling(), p.data() + q.data());
+    Ok(Response::new(
+        sum(steady.displacement(), free.displacement())?,
+        sum(steady.velocity(), free.velocity())?,
+        sum(steady.acceleration(), free.acceleration())?,
+    )?)
+}
+
+fn from_start(
+    system: &SecondOrderSystem,
+    force: &Record,
+    start: &InitialState,
+    between: Between,
+) -> Result<Response, ProblemError> {
+    start.check_dof(system.dof())?;
+    let transition = Transition::new(system, force.sampling().dt(), between);
+    transition.check(force.channels())?;
+    let state = transition.state(start.displacement(), start.velocity());
+    Ok(run(&transition, force, state)?.0)
+}
+
+fn periodic(
+    system: &SecondOrderSystem,
+    force: &Record,
+    between: Between,
+) -> Result<Response, ProblemError> {
+    let transition = Transition::new(system, force.sampling().dt(), between);
+    transition.check(force.channels())?;
+    // z(T) = Φᴺ z(0) + s, and s is where rest leads to: (I − Φᴺ) z(0) = s.
+    let size = 2 * system.dof();
+    let (_, from_rest) = run(&transition, force, DVector::zeros(size))?;
+    let over_period = transition.phi.pow(u32::try_from(force.len()).expect("fits in memory"));
+    let growth = over_period.norm();
+    let closing = DMatrix::identity(size, size) - over_period;
+    let mut reciprocal_condition = 0.0;
+    // An unstable system may overflow over the period; singular values of that do not exist.
+    if growth.is_finite() {
+        // Not the condition of I − Φᴺ: without damping it may vanish as a whole.
+        reciprocal_condition = closing.singular_values().min() / (1.0 + growth);
+    }
+    // N products of matrices leave rounding of about N ε in Φᴺ.
+    let resolved = reciprocal_condition > 4.0 * f64::EPSILON * force.len() as f64;
+    let start = if resolved { closing.lu().solve(&from_rest) } else { None };
+    let start = start.ok_or(ProblemError::NoPeriodicMotion {
+        period: force.sampling().duration(),
+        reciprocal_condition,
+    })?;
+    Ok(run(&transition, force, start)?.0)
+}
+
+/// The motion at every sample, and the state one step after the last, under the first force again.
+fn run(
+    transition: &Transition,
+    force: &Record,
+    mut state: DVector<f64>,
+) -> Result<(Response, DVector<f64>), ProblemError> {
+    let forces = force.data().transpose();
+    let samples = force.len();
+    let mut motion = [(); 3].map(|()| DMatrix::zeros(forces.nrows(), samples));
+    for k in 0..samples {
+        let left = forces.column(k).into_owned();
+        let right = forces.column((k + 1) % samples).into_owned();
+        for (quantity, values) in motion.iter_mut().zip(transition.motion(&state, &left)) {
+            quantity.set_column(k, &values);
+        }
+        state = transition.step(&state, &left, &right);
+    }
+    let record = |quantity: &DMatrix<f64>| Record::new(force.sampling(), quantity.transpose());
+    let [x, v, a] = &motion;
+    Ok((Response::new(record(x)?, record(v)?, record(a)?)?, state))
+}
