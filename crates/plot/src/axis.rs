@@ -1,0 +1,122 @@
+//! Axes: what they show, in which unit, how they are divided.
+
+/// Division of an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// Equal distances are equal differences.
+    #[default]
+    Linear,
+    /// Equal distances are equal ratios.
+    Log10,
+}
+
+impl Scale {
+    /// The position on a ruler of this scale, up to a factor and an offset.
+    pub(crate) fn forward(self, value: f64) -> f64 {
+        match self {
+            Scale::Linear => value,
+            Scale::Log10 => value.log10(),
+        }
+    }
+
+    pub(crate) fn can_show(self, value: f64) -> bool {
+        value.is_finite() && (self == Scale::Linear || value > 0.0)
+    }
+}
+
+/// One axis of a panel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    pub(crate) label: String,
+    pub(crate) unit: String,
+    pub(crate) scale: Scale,
+    pub(crate) range: Option<(f64, f64)>,
+    pub(crate) step: Option<f64>,
+}
+
+impl Axis {
+    /// A linear axis for the quantity `label` in `unit`; an empty unit stands for a pure number.
+    pub fn linear(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Axis {
+            label: label.into(),
+            unit: unit.into(),
+            scale: Scale::Linear,
+            range: None,
+            step: None,
+        }
+    }
+
+    /// A logarithmic axis for the quantity `label` in `unit`.
+    pub fn log10(label: impl Into<String>, unit: impl Into<String>) -> Self {
+        Axis { scale: Scale::Log10, ..Axis::linear(label, unit) }
+    }
+
+    /// Shows `low` to `high` instead of all points; what lies outside is cut off.
+    #[must_use]
+    pub fn range(mut self, low: f64, high: f64) -> Self {
+        self.range = Some((low, high));
+        self
+    }
+
+    /// Labels multiples of `step` on a linear axis, such as 45 for a phase in degrees.
+    /// A step that would give more than forty labels is not followed.
+    #[must_use]
+    pub fn step(mut self, step: f64) -> Self {
+        self.step = Some(step);
+        self
+    }
+
+    /// `label (unit)`, or the label alone for a pure number.
+    pub(crate) fn caption(&self) -> String {
+        match (self.label.is_empty(), self.unit.is_empty()) {
+            (_, true) => self.label.clone(),
+            (true, false) => format!("({})", self.unit),
+            (false, false) => format!("{} ({})", self.label, self.unit),
+        }
+    }
+}
+
+/// Maps values to pixels along one axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Mapping {
+    scale: Scale,
+    origin: f64,
+    slope: f64,
+    pixel: f64,
+}
+
+impl Mapping {
+    /// `low` falls on `pixels.0` and `high` on `pixels.1`.
+    pub(crate) fn new(scale: Scale, (low, high): (f64, f64), pixels: (f64, f64)) -> Self {
+        let origin = scale.forward(low);
+        let slope = (pixels.1 - pixels.0) / (scale.forward(high) - origin);
+        Mapping { scale, origin, slope, pixel: pixels.0 }
+    }
+
+    pub(crate) fn pixel(&self, value: f64) -> f64 {
+        self.pixel + (self.scale.forward(value) - self.origin) * self.slope
+    }
+}
+
+/// The range that shows everything from `low` to `high`, with `margin` of it to spare on both sides.
+pub(crate) fn padded(scale: Scale, low: f64, high: f64, margin: f64) -> (f64, f64) {
+    match scale {
+        Scale::Linear => {
+            // A constant curve still needs a scale to lie in: ± 5 % of its value, or ± 1 about zero.
+            let flat = 1e-12 * low.abs().max(high.abs());
+            let pad = if high - low > flat {
+                (high - low) * margin
+            } else if low == 0.0 && high == 0.0 {
+                1.0
+            } else {
+                0.05 * low.abs().max(high.abs())
+            };
+            (low - pad, high + pad)
+        }
+        Scale::Log10 => {
+            let ratio = high / low;
+            let factor = if ratio > 1.0 + 1e-9 { ratio.powf(margin) } else { 2.0 };
+            (low / factor, high * factor)
+        }
+    }
+}

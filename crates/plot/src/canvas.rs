@@ -1,0 +1,324 @@
+//! A sheet of SVG: the few shapes figures and sketches are made of.
+
+use std::fmt::Write as _;
+
+use crate::style::{Color, Dash};
+use crate::text::{FAMILY, Level, SCRIPT_SIZE, Weight, runs};
+
+/// A point on the sheet, px, from the top left corner.
+pub type Point = (f64, f64);
+
+/// Stroke of a shape.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stroke {
+    /// Colour.
+    pub color: Color,
+    /// Width, px.
+    pub width: f64,
+    /// Pattern.
+    pub dash: Dash,
+}
+
+impl Stroke {
+    /// A solid stroke.
+    pub const fn solid(color: Color, width: f64) -> Self {
+        Stroke { color, width, dash: Dash::Solid }
+    }
+}
+
+/// Which end of a text lies at its point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Anchor {
+    /// The text starts there.
+    Start,
+    /// The text is centred there.
+    #[default]
+    Middle,
+    /// The text ends there.
+    End,
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TextStyle {
+    /// Font size, px.
+    pub size: f64,
+    /// Weight.
+    pub weight: Weight,
+    /// Slanted, as variables are set.
+    pub italic: bool,
+    /// Colour.
+    pub color: Color,
+    /// Which end lies at the point.
+    pub anchor: Anchor,
+    /// Turned a quarter to the left, to be read from the right.
+    pub vertical: bool,
+}
+
+impl TextStyle {
+    /// Dark, upright, centred text.
+    pub const fn new(size: f64) -> Self {
+        TextStyle {
+            size,
+            weight: Weight::Regular,
+            italic: false,
+            color: Color::DARK,
+            anchor: Anchor::Middle,
+            vertical: false,
+        }
+    }
+
+    /// The same with another anchor.
+    pub const fn anchored(mut self, anchor: Anchor) -> Self {
+        self.anchor = anchor;
+        self
+    }
+
+    /// The same in another colour.
+    pub const fn colored(mut self, color: Color) -> Self {
+        self.color = color;
+        self
+    }
+
+    /// The same in bold.
+    pub const fn bold(mut self) -> Self {
+        self.weight = Weight::Bold;
+        self
+    }
+
+    /// The same in italics.
+    pub const fn italic(mut self) -> Self {
+        self.italic = true;
+        self
+    }
+}
+
+/// An SVG document in the making.
+///
+/// Coordinates are written with two decimals, so the same drawing is the same text on every machine.
+///
+/// ```
+/// use mechid_plot::{Canvas, Color, Stroke, TextStyle};
+///
+/// let mut sheet = Canvas::new(200.0, 80.0);
+/// sheet.rect((20.0, 20.0), (160.0, 40.0), Some(Color::WHITE), Some(Stroke::solid(Color::BLACK, 1.0)));
+/// sheet.text((100.0, 45.0), "M < 10 kg", &TextStyle::new(14.0));
+/// let svg = sheet.finish("A box");
+/// assert!(svg.contains("M &lt; 10 kg"));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Canvas {
+    width: f64,
+    height: f64,
+    body: String,
+    clips: usize,
+}
+
+impl Canvas {
+    /// An empty white sheet, px.
+    pub fn new(width: f64, height: f64) -> Self {
+        let mut sheet = Canvas { width, height, body: String::new(), clips: 0 };
+        sheet.rect((0.0, 0.0), (width, height), Some(Color::WHITE), None);
+        sheet
+    }
+
+    /// A straight line.
+    pub fn line(&mut self, from: Point, to: Point, stroke: Stroke) {
+        self.path(
+            &format!("M{} {}L{} {}", num(from.0), num(from.1), num(to.0), num(to.1)),
+            None,
+            Some(stroke),
+        );
+    }
+
+    /// A chain of straight lines.
+    pub fn polyline(&mut self, points: &[Point], stroke: Stroke) {
+        self.path(&chain(points), None, Some(stroke));
+    }
+
+    /// A closed chain of straight lines.
+    pub fn polygon(&mut self, points: &[Point], fill: Option<Color>, stroke: Option<Stroke>) {
+        self.path(&(chain(points) + "Z"), fill, stroke);
+    }
+
+    /// A rectangle from its top left corner and its size.
+    pub fn rect(
+        &mut self,
+        corner: Point,
+        size: Point,
+        fill: Option<Color>,
+        stroke: Option<Stroke>,
+    ) {
+        let (x, y, w, h) = (num(corner.0), num(corner.1), num(size.0), num(size.1));
+        let paint = paint(fill, stroke);
+        let _ = writeln!(self.body, r#"<rect x="{x}" y="{y}" width="{w}" height="{h}"{paint}/>"#);
+    }
+
+    /// A circle.
+    pub fn circle(
+        &mut self,
+        center: Point,
+        radius: f64,
+        fill: Option<Color>,
+        stroke: Option<Stroke>,
+    ) {
+        let (x, y, r) = (num(center.0), num(center.1), num(radius));
+        let paint = paint(fill, stroke);
+        let _ = writeln!(self.body, r#"<circle cx="{x}" cy="{y}" r="{r}"{paint}/>"#);
+    }
+
+    /// A path in SVG's path language.
+    pub fn path(&mut self, data: &str, fill: Option<Color>, stroke: Option<Stroke>) {
+        let paint = paint(fill, stroke);
+        let _ = writeln!(self.body, r#"<path d="{data}"{paint}/>"#);
+    }
+
+    /// A line of text with its baseline at the point; `^{…}` is raised and `_{…}` lowered, as in `10^{−3}` and `K_{xx}`.
+    pub fn text(&mut self, at: Point, text: &str, style: &TextStyle) {
+        let (x, y) = (num(at.0), num(at.1));
+        let anchor = match style.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        let _ = write!(
+            self.body,
+            r#"<text x="{x}" y="{y}" font-size="{}" text-anchor="{anchor}" fill="{}""#,
+            num(style.size),
+            style.color.0
+        );
+        if style.weight == Weight::Bold {
+            self.body.push_str(r#" font-weight="bold""#);
+        }
+        if style.italic {
+            self.body.push_str(r#" font-style="italic""#);
+        }
+        if style.vertical {
+            let _ = write!(self.body, r#" transform="rotate(-90 {x} {y})""#);
+        }
+        let _ = writeln!(self.body, ">{}</text>", spans(text, style.size));
+    }
+
+    /// Opens a group with a class and a name a viewer shows as a tool tip.
+    pub fn open_group(&mut self, class: &str, name: &str) {
+        let _ = writeln!(
+            self.body,
+            r#"<g class="{}"><title>{}</title>"#,
+            escape(class),
+            escape(&unmarked(name))
+        );
+    }
+
+    /// Opens a group that is drawn with the given opacity, from 0 to 1.
+    pub fn open_faded(&mut self, opacity: f64) {
+        let _ = writeln!(self.body, r#"<g opacity="{}">"#, num(opacity));
+    }
+
+    /// Opens a group of which only the part inside a rectangle shows.
+    pub fn open_clip(&mut self, corner: Point, size: Point) {
+        let id = self.clips;
+        self.clips += 1;
+        let (x, y, w, h) = (num(corner.0), num(corner.1), num(size.0), num(size.1));
+        let _ = writeln!(
+            self.body,
+            r#"<clipPath id="clip{id}"><rect x="{x}" y="{y}" width="{w}" height="{h}"/></clipPath><g clip-path="url(#clip{id})">"#
+        );
+    }
+
+    /// Closes the group opened last.
+    pub fn close_group(&mut self) {
+        self.body.push_str("</g>\n");
+    }
+
+    /// The document, with a title for readers who do not see it.
+    pub fn finish(self, title: &str) -> String {
+        let (w, h) = (num(self.width), num(self.height));
+        format!(
+            r#"<svg xmlns="http://www.w3.org/2000/svg" width="{w}" height="{h}" viewBox="0 0 {w} {h}" font-family="{FAMILY}" role="img"><title>{}</title>
+{}</svg>
+"#,
+            escape(&unmarked(title)),
+            self.body
+        )
+    }
+}
+
+fn chain(points: &[Point]) -> String {
+    let mut data = String::with_capacity(points.len() * 14);
+    for (index, point) in points.iter().enumerate() {
+        data.push(if index == 0 { 'M' } else { 'L' });
+        let _ = write!(data, "{} {}", num(point.0), num(point.1));
+    }
+    data
+}
+
+fn paint(fill: Option<Color>, stroke: Option<Stroke>) -> String {
+    let mut out = format!(r#" fill="{}""#, fill.map_or("none", |color| color.0));
+    if let Some(stroke) = stroke {
+        let _ = write!(
+            out,
+            r#" stroke="{}" stroke-width="{}" stroke-linejoin="round""#,
+            stroke.color.0,
+            num(stroke.width)
+        );
+        if let Some(array) = stroke.dash.array(stroke.width) {
+            let parts: Vec<String> = array.into_iter().map(num).collect();
+            let _ = write!(out, r#" stroke-dasharray="{}""#, parts.join(" "));
+        }
+    }
+    out
+}
+
+/// The runs of a text, raised and lowered by steps every viewer knows.
+fn spans(text: &str, size: f64) -> String {
+    let mut out = String::new();
+    let mut height = 0.0;
+    for (level, run) in runs(text) {
+        let target = match level {
+            Level::Base => 0.0,
+            Level::Raised => 0.36 * size,
+            Level::Lowered => -0.22 * size,
+        };
+        if level == Level::Base && height == 0.0 {
+            out.push_str(&escape(run));
+            continue;
+        }
+        let dy = num(height - target);
+        let small = if level == Level::Base {
+            String::new()
+        } else {
+            format!(r#" font-size="{}""#, num(SCRIPT_SIZE * size))
+        };
+        let _ = write!(out, r#"<tspan dy="{dy}"{small}>{}</tspan>"#, escape(run));
+        height = target;
+    }
+    out
+}
+
+/// A coordinate with at most two decimals: a hundredth of a pixel is finer than any print.
+fn num(value: f64) -> String {
+    let rounded = (value * 100.0).round() / 100.0;
+    // Adding zero turns −0 into 0, which Display would write as "-0".
+    format!("{}", rounded + 0.0)
+}
+
+/// The text without its marks, for titles that know no runs.
+fn unmarked(text: &str) -> String {
+    runs(text).into_iter().map(|(_, run)| run).collect()
+}
+
+fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            // XML 1.0 has no way to write the other control characters.
+            control if control.is_control() => out.push(' '),
+            other => out.push(other),
+        }
+    }
+    out
+}

@@ -1,0 +1,154 @@
+//! The figures this project draws most often.
+
+use crate::axis::Axis;
+use crate::curve::{Curve, Reference};
+use crate::figure::Figure;
+use crate::panel::Panel;
+use crate::style::{Color, Dash};
+
+/// A quantity with its unit, such as ("Force", "N").
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Quantity<'a> {
+    /// Name, as it stands on an axis.
+    pub name: &'a str,
+    /// Unit; empty for a pure number.
+    pub unit: &'a str,
+}
+
+impl<'a> Quantity<'a> {
+    /// A quantity.
+    pub const fn new(name: &'a str, unit: &'a str) -> Self {
+        Quantity { name, unit }
+    }
+}
+
+/// One curve of a chart: abscissae and ordinates of equal length under a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Series<'a> {
+    /// Legend label.
+    pub name: &'a str,
+    /// Abscissae.
+    pub x: &'a [f64],
+    /// Ordinates.
+    pub y: &'a [f64],
+}
+
+impl<'a> Series<'a> {
+    /// A series.
+    pub const fn new(name: &'a str, x: &'a [f64], y: &'a [f64]) -> Self {
+        Series { name, x, y }
+    }
+}
+
+/// A record against time (s) above its line spectrum (amplitudes against frequency, Hz).
+pub fn time_and_spectrum(
+    title: &str,
+    quantity: Quantity<'_>,
+    record: Series<'_>,
+    spectrum: Series<'_>,
+) -> Figure {
+    let time = Panel::new(Axis::linear("Time", "s"), Axis::linear(quantity.name, quantity.unit))
+        .curve(Curve::line("", record.x, record.y).width(1.2));
+    let amplitude = Axis::linear(format!("{} amplitude", quantity.name), quantity.unit);
+    let frequency = Panel::new(Axis::linear("Frequency", "Hz"), amplitude)
+        .curve(Curve::stems("", spectrum.x, spectrum.y).color(Color::VERMILION));
+    Figure::new(title).panel(time).panel(frequency)
+}
+
+/// One frequency response: magnitude and phase on the same frequencies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrequencyResponse<'a> {
+    /// Legend label.
+    pub name: &'a str,
+    /// Frequencies, in the unit the chart is told; positive.
+    pub frequency: &'a [f64],
+    /// Magnitudes, positive.
+    pub magnitude: &'a [f64],
+    /// Phases, degrees.
+    pub phase_deg: &'a [f64],
+}
+
+/// Bode plot: measured points under fitted lines, magnitude (logarithmic) above phase (degrees).
+///
+/// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`; the fits may lie on a finer grid than the measurement.
+pub fn bode(
+    title: &str,
+    frequency: Axis,
+    magnitude: Quantity<'_>,
+    measured: &[FrequencyResponse<'_>],
+    fitted: &[FrequencyResponse<'_>],
+) -> Figure {
+    let mut above = Panel::new(frequency.clone(), Axis::log10(magnitude.name, magnitude.unit));
+    let mut below = Panel::new(frequency, Axis::linear("Phase", "°").step(45.0));
+    for (slot, response) in measured.iter().enumerate() {
+        // One measurement is the reference everything is held against: black.
+        let color =
+            if measured.len() == 1 { Color::GREY } else { Color::CYCLE[slot % Color::CYCLE.len()] };
+        let points = |label: &str, y: &[f64]| {
+            Curve::points(label, response.frequency, y).slot(slot).color(color)
+        };
+        above = above.curve(points(response.name, response.magnitude));
+        below = below.curve(points("", response.phase_deg));
+    }
+    for (index, response) in fitted.iter().enumerate() {
+        let slot = if measured.len() == fitted.len() { index } else { index + measured.len() };
+        let color = if measured.len() == 1 {
+            Color::CYCLE[(index + 1) % Color::CYCLE.len()]
+        } else {
+            Color::CYCLE[slot % Color::CYCLE.len()]
+        };
+        let line = |label: &str, y: &[f64]| {
+            Curve::line(label, response.frequency, y).slot(slot).dash(Dash::Solid).color(color)
+        };
+        above = above.curve(line(response.name, response.magnitude));
+        below = below.curve(line("", response.phase_deg));
+    }
+    Figure::new(title).panel(above).panel(below).share_x()
+}
+
+/// Estimates of one coefficient against a swept setting, one marked line for each method, with the true value.
+///
+/// The k-th method always has the k-th look, so several sweeps can be laid side by side.
+pub fn sweep_panel(
+    setting: Axis,
+    coefficient: Quantity<'_>,
+    methods: &[Series<'_>],
+    truth: Option<f64>,
+) -> Panel {
+    let mut panel = Panel::new(setting, Axis::linear(coefficient.name, coefficient.unit));
+    for (slot, method) in methods.iter().enumerate() {
+        panel = panel.curve(Curve::marked_line(method.name, method.x, method.y).slot(slot));
+    }
+    match truth {
+        Some(value) => panel.reference(Reference::horizontal("true value", value)),
+        None => panel,
+    }
+}
+
+/// A figure of one [`sweep_panel`].
+pub fn sweep(
+    title: &str,
+    setting: Axis,
+    coefficient: Quantity<'_>,
+    methods: &[Series<'_>],
+    truth: Option<f64>,
+) -> Figure {
+    Figure::new(title).panel(sweep_panel(setting, coefficient, methods, truth))
+}
+
+/// Spectral radius of time-stepping schemes against the step, with the limit of stability.
+///
+/// Abscissae are Δt/T, the step over the natural period, all positive; ordinates are spectral radii.
+pub fn stability(title: &str, schemes: &[Series<'_>]) -> Figure {
+    let mut panel = Panel::new(
+        Axis::log10("Step over natural period Δt/T", ""),
+        Axis::linear("Spectral radius ρ", ""),
+    )
+    .reference(Reference::horizontal("limit of stability", 1.0));
+    for scheme in schemes {
+        panel = panel.curve(Curve::line(scheme.name, scheme.x, scheme.y));
+    }
+    // An unstable scheme leaves the chart through its roof; what happens below the limit is what is compared.
+    panel.y = panel.y.range(0.0, 1.6);
+    Figure::new(title).panel(panel)
+}

@@ -1,0 +1,265 @@
+//! Puts a laid-out figure on a sheet.
+
+use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
+use crate::curve::{Curve, Kind};
+use crate::figure::Figure;
+use crate::layout::{Layout, PanelLayout, Place, TICK};
+use crate::legend;
+use crate::panel::Panel;
+use crate::style::{Color, Marker, Resolved};
+use crate::trace;
+
+/// Size of captions and legends, px.
+pub(crate) const LABEL_SIZE: f64 = 13.0;
+/// Size of tick labels, px.
+pub(crate) const TICK_SIZE: f64 = 11.5;
+const TITLE_SIZE: f64 = 15.0;
+const PANEL_TITLE_SIZE: f64 = 13.0;
+/// Part of the font size from the baseline to the middle of a digit.
+const MIDDLE: f64 = 0.36;
+
+const GRID: Stroke = Stroke::solid(Color("#e0e0e0"), 0.8);
+const FINE_GRID: Stroke = Stroke::solid(Color("#f1f1f1"), 0.7);
+const FRAME: Stroke = Stroke::solid(Color::DARK, 0.9);
+
+pub(crate) fn figure(figure: &Figure, layout: &Layout, sheet: &mut Canvas) {
+    if !figure.title.is_empty() {
+        sheet.text((layout.size.0 / 2.0, 24.0), &figure.title, &TextStyle::new(TITLE_SIZE).bold());
+    }
+    let edge = 10.0;
+    legend::draw_strip(sheet, &layout.strip, (edge, layout.strip_top), layout.size.0 - 2.0 * edge);
+    for (content, place) in figure.panels.iter().zip(&layout.panels) {
+        panel(content, place, sheet);
+    }
+}
+
+fn panel(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
+    sheet.open_group("panel", &panel.title);
+    grid(layout, sheet);
+    sheet.open_clip(layout.corner, layout.size);
+    references(panel, layout, sheet);
+    let styles = panel.styles();
+    // Bands lie under all lines, whatever their order.
+    let (bands, lines): (Vec<_>, Vec<_>) =
+        panel.curves.iter().zip(styles).partition(|(curve, _)| curve.kind == Kind::Band);
+    for (curve, style) in bands.into_iter().chain(lines) {
+        sheet.open_group("curve", &curve.label);
+        draw_curve(panel, layout, curve, style, sheet);
+        sheet.close_group();
+    }
+    sheet.close_group();
+    sheet.rect(layout.corner, layout.size, None, Some(FRAME));
+    axes(panel, layout, sheet);
+    match layout.place {
+        Place::Nowhere => {}
+        Place::Inside(at) => legend::draw_box(sheet, &layout.entries, at),
+        Place::Above => {
+            let width = layout.size.0;
+            let top = layout.corner.1 - legend::strip_height(&layout.entries, width);
+            legend::draw_strip(sheet, &layout.entries, (layout.corner.0, top), width);
+        }
+    }
+    sheet.close_group();
+}
+
+fn grid(layout: &PanelLayout, sheet: &mut Canvas) {
+    let ((left, top), (width, height)) = (layout.corner, layout.size);
+    let across = |y: f64| ((left, y), (left + width, y));
+    let down = |x: f64| ((x, top), (x, top + height));
+    let (x, y) = (layout.maps.x, layout.maps.y);
+    let lines = |values: &mut dyn Iterator<Item = f64>,
+                 stroke: Stroke,
+                 vertical: bool,
+                 sheet: &mut Canvas| {
+        for value in values {
+            let (from, to) = if vertical { down(x.pixel(value)) } else { across(y.pixel(value)) };
+            sheet.line(from, to, stroke);
+        }
+    };
+    lines(&mut layout.x_ticks.minor.iter().copied(), FINE_GRID, true, sheet);
+    lines(&mut layout.y_ticks.minor.iter().copied(), FINE_GRID, false, sheet);
+    lines(&mut layout.x_ticks.major.iter().map(|tick| tick.0), GRID, true, sheet);
+    lines(&mut layout.y_ticks.major.iter().map(|tick| tick.0), GRID, false, sheet);
+}
+
+fn references(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
+    let ((left, top), (width, height)) = (layout.corner, layout.size);
+    for reference in &panel.references {
+        sheet.open_group("reference", &reference.label);
+        let stroke = legend::reference_stroke(reference);
+        if reference.horizontal {
+            let y = layout.maps.y.pixel(reference.value);
+            sheet.line((left, y), (left + width, y), stroke);
+        } else {
+            let x = layout.maps.x.pixel(reference.value);
+            sheet.line((x, top), (x, top + height), stroke);
+        }
+        sheet.close_group();
+    }
+}
+
+fn draw_curve(
+    panel: &Panel,
+    layout: &PanelLayout,
+    curve: &Curve,
+    style: Resolved,
+    sheet: &mut Canvas,
+) {
+    let points = trace::map(layout.maps, &curve.x, &curve.y);
+    let stroke = Stroke { color: style.color, width: style.width, dash: style.dash };
+    if curve.kind == Kind::Band {
+        let width = layout.size.0;
+        let mut edge = trace::thin_out(trace::map(layout.maps, &curve.x, &curve.upper), width);
+        edge.reverse();
+        let points = trace::thin_out(points, width);
+        sheet.open_faded(BAND_OPACITY);
+        sheet.polygon(&[points, edge].concat(), Some(style.color), None);
+        sheet.close_group();
+        return;
+    }
+    if curve.kind == Kind::Stems {
+        let base = trace::stem_base(layout.maps, panel.y.scale, layout.y_range);
+        // Hundreds of stems would run into one block.
+        let width = (layout.size.0 / points.len() as f64 * 0.5).clamp(0.5, 1.3);
+        for &(x, y) in &points {
+            sheet.line((x, base), (x, y), Stroke::solid(style.color, width));
+        }
+    }
+    if curve.has_markers() {
+        let radius = marker_radius(layout.size.0, points.len());
+        for &point in &points {
+            marker(sheet, style.marker, point, radius, style.color);
+        }
+    }
+    if curve.has_line() {
+        let line =
+            if curve.kind == Kind::Line { trace::thin_out(points, layout.size.0) } else { points };
+        sheet.polyline(&line, stroke);
+    }
+}
+
+const BAND_OPACITY: f64 = 0.22;
+
+/// Markers shrink before they run into one another.
+fn marker_radius(width: f64, count: usize) -> f64 {
+    (0.45 * width / count as f64).clamp(1.4, 3.6)
+}
+
+/// Draws a marker whose extent is about `radius` on each side.
+pub(crate) fn marker(sheet: &mut Canvas, marker: Marker, (x, y): Point, radius: f64, color: Color) {
+    let r = radius;
+    let open = Some(Stroke::solid(color, 0.45 * r));
+    match marker {
+        Marker::Circle => sheet.circle((x, y), r, Some(color), None),
+        Marker::Square => {
+            sheet.rect((x - 0.88 * r, y - 0.88 * r), (1.76 * r, 1.76 * r), Some(color), None)
+        }
+        Marker::Diamond => {
+            sheet.polygon(
+                &[(x, y - 1.3 * r), (x + 1.3 * r, y), (x, y + 1.3 * r), (x - 1.3 * r, y)],
+                Some(color),
+                None,
+            );
+        }
+        Marker::Triangle => {
+            sheet.polygon(
+                &[(x, y - 1.3 * r), (x + 1.15 * r, y + 0.8 * r), (x - 1.15 * r, y + 0.8 * r)],
+                Some(color),
+                None,
+            );
+        }
+        Marker::TriangleDown => {
+            sheet.polygon(
+                &[(x, y + 1.3 * r), (x + 1.15 * r, y - 0.8 * r), (x - 1.15 * r, y - 0.8 * r)],
+                Some(color),
+                None,
+            );
+        }
+        Marker::Cross | Marker::Plus => {
+            let (a, b) = if marker == Marker::Cross { (r, r) } else { (1.3 * r, 0.0) };
+            let path = format!(
+                "M{:.2} {:.2}L{:.2} {:.2}M{:.2} {:.2}L{:.2} {:.2}",
+                x - a,
+                y - b,
+                x + a,
+                y + b,
+                x - b,
+                y + a,
+                x + b,
+                y - a
+            );
+            sheet.path(&path, None, open);
+        }
+    }
+}
+
+/// Sample of a curve in a legend: `length` px from `at` to the right.
+pub(crate) fn sample(sheet: &mut Canvas, kind: Kind, style: Resolved, at: Point, length: f64) {
+    let middle = (at.0 + length / 2.0, at.1);
+    match kind {
+        Kind::Band => {
+            sheet.open_faded(BAND_OPACITY);
+            sheet.rect((at.0, at.1 - 5.0), (length, 10.0), Some(style.color), None);
+            sheet.close_group();
+        }
+        Kind::Stems => sheet.line(
+            (middle.0, at.1 + 6.0),
+            (middle.0, at.1 - 3.0),
+            Stroke::solid(style.color, 1.3),
+        ),
+        Kind::Line | Kind::MarkedLine => {
+            let stroke = Stroke { color: style.color, width: style.width, dash: style.dash };
+            sheet.line(at, (at.0 + length, at.1), stroke);
+        }
+        Kind::Points => {}
+    }
+    match kind {
+        Kind::MarkedLine | Kind::Points => marker(sheet, style.marker, middle, 3.4, style.color),
+        Kind::Stems => marker(sheet, style.marker, (middle.0, at.1 - 3.0), 2.6, style.color),
+        Kind::Line | Kind::Band => {}
+    }
+}
+
+fn axes(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
+    let ((left, top), (width, height)) = (layout.corner, layout.size);
+    let (right, bottom) = (left + width, top + height);
+    let small = TextStyle::new(TICK_SIZE);
+    let end = small.anchored(Anchor::End);
+    for (value, label) in &layout.x_ticks.major {
+        let x = layout.maps.x.pixel(*value);
+        sheet.line((x, bottom), (x, bottom + TICK), FRAME);
+        if layout.labels_x {
+            sheet.text((x, bottom + TICK + 3.0 + TICK_SIZE), label, &small);
+        }
+    }
+    for (value, label) in &layout.y_ticks.major {
+        let y = layout.maps.y.pixel(*value);
+        sheet.line((left - TICK, y), (left, y), FRAME);
+        sheet.text((left - TICK - 4.0, y + MIDDLE * TICK_SIZE), label, &end);
+    }
+    let caption = TextStyle::new(LABEL_SIZE);
+    if layout.labels_x {
+        let y = bottom + TICK + TICK_SIZE + 7.0 + LABEL_SIZE + 2.0;
+        sheet.text((left + width / 2.0, y), &panel.x.caption(), &caption);
+        if let Some(factor) = &layout.x_ticks.factor {
+            sheet.text((right, y), factor, &end);
+        }
+    }
+    if let Some(factor) = &layout.y_ticks.factor {
+        sheet.text((left - TICK, top - 6.0), factor, &small.anchored(Anchor::Start));
+    }
+    let vertical = TextStyle { vertical: true, ..caption };
+    sheet.text((layout.y_caption, top + height / 2.0), &panel.y.caption(), &vertical);
+    if !panel.title.is_empty() {
+        let above = if layout.place == Place::Above {
+            legend::strip_height(&layout.entries, width)
+        } else {
+            0.0
+        };
+        sheet.text(
+            (left + width / 2.0, top - above - 8.0),
+            &panel.title,
+            &TextStyle::new(PANEL_TITLE_SIZE).bold(),
+        );
+    }
+}

@@ -1,0 +1,133 @@
+//! Figures: titled grids of panels, and what becomes of them.
+
+use std::path::Path;
+
+use crate::bitmap;
+use crate::canvas::Canvas;
+use crate::curve::Curve;
+use crate::draw;
+use crate::error::PlotError;
+use crate::layout::Layout;
+use crate::panel::{Legend, Panel};
+use crate::save;
+
+/// A titled grid of panels, filled row by row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    pub(crate) title: String,
+    pub(crate) panels: Vec<Panel>,
+    pub(crate) columns: usize,
+    pub(crate) share_x: bool,
+    pub(crate) shared_legend: bool,
+    pub(crate) size: Option<(f64, f64)>,
+}
+
+impl Figure {
+    /// A figure without panels yet; an empty title takes no room.
+    pub fn new(title: impl Into<String>) -> Self {
+        Figure {
+            title: title.into(),
+            panels: Vec::new(),
+            columns: 1,
+            share_x: false,
+            shared_legend: false,
+            size: None,
+        }
+    }
+
+    /// Adds a panel.
+    #[must_use]
+    pub fn panel(mut self, panel: Panel) -> Self {
+        self.panels.push(panel);
+        self
+    }
+
+    /// Stands the panels in this many columns instead of one.
+    #[must_use]
+    pub fn columns(mut self, columns: usize) -> Self {
+        self.columns = columns.max(1);
+        self
+    }
+
+    /// Gives the panels of a column one abscissa, labelled under the lowest.
+    #[must_use]
+    pub fn share_x(mut self) -> Self {
+        self.share_x = true;
+        self
+    }
+
+    /// One legend above all panels instead of one in each.
+    /// It shows each label once, with the look it has where it first occurs.
+    #[must_use]
+    pub fn shared_legend(mut self) -> Self {
+        self.shared_legend = true;
+        self
+    }
+
+    /// Makes the whole figure this large, px, instead of what suits its panels.
+    #[must_use]
+    pub fn size(mut self, width: f64, height: f64) -> Self {
+        self.size = Some((width, height));
+        self
+    }
+
+    /// Title of the figure.
+    pub fn name(&self) -> &str {
+        &self.title
+    }
+
+    /// The curves of each panel in order, for writing the drawn numbers to a table.
+    pub fn data(&self) -> impl Iterator<Item = &[Curve]> {
+        self.panels.iter().map(|panel| panel.curves.as_slice())
+    }
+
+    /// The figure as an SVG document.
+    ///
+    /// # Errors
+    /// A panel or a curve without points, coordinates an axis cannot show, or a size without room to draw in.
+    pub fn to_svg(&self) -> Result<String, PlotError> {
+        self.validate()?;
+        let layout = Layout::new(self)?;
+        let mut sheet = Canvas::new(layout.size.0, layout.size.1);
+        draw::figure(self, &layout, &mut sheet);
+        Ok(sheet.finish(&self.title))
+    }
+
+    /// The figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`], and a scale that leads to an empty or an overlarge bitmap.
+    pub fn to_png(&self, scale: f64) -> Result<Vec<u8>, PlotError> {
+        bitmap::svg_to_png(&self.to_svg()?, scale)
+    }
+
+    /// Saves the figure as SVG or, at two pixels per px, as PNG, as the ending of `path` says.
+    ///
+    /// The file appears whole or not at all: it is written beside its place and then renamed.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`], another ending than `.svg` or `.png`, and what the file system refuses.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
+        // The ending is judged before the work of drawing.
+        let format = save::Format::of(path.as_ref())?;
+        save::write(path.as_ref(), format, &self.to_svg()?)
+    }
+
+    fn validate(&self) -> Result<(), PlotError> {
+        if self.panels.is_empty() {
+            return Err(PlotError::NoPanels { figure: self.title.clone() });
+        }
+        for (panel, content) in self.panels.iter().enumerate() {
+            if content.curves.is_empty() {
+                return Err(PlotError::NoCurves { figure: self.title.clone(), panel });
+            }
+            content.validate()?;
+        }
+        Ok(())
+    }
+
+    /// Legend of a panel once the shared legend is allowed for.
+    pub(crate) fn legend_of(&self, panel: &Panel) -> Legend {
+        if self.shared_legend { Legend::Hidden } else { panel.legend }
+    }
+}

@@ -1,0 +1,163 @@
+//! Legends: what stands in them and where they hide nothing.
+
+use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
+use crate::curve::{Kind, Reference};
+use crate::draw::{self, LABEL_SIZE};
+use crate::panel::Panel;
+use crate::style::{Color, Resolved};
+use crate::text::{Weight, text_width};
+
+const ROW: f64 = 18.0;
+const SAMPLE: f64 = 36.0;
+const GAP: f64 = 7.0;
+const BETWEEN: f64 = 20.0;
+const PADDING: f64 = 7.0;
+const TEXT: f64 = LABEL_SIZE - 1.0;
+
+/// What an entry shows beside its label.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Sample {
+    Curve(Kind, Resolved),
+    Line(Stroke),
+}
+
+/// One label with its sample.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Entry {
+    label: String,
+    sample: Sample,
+}
+
+impl Entry {
+    fn width(&self) -> f64 {
+        SAMPLE + GAP + text_width(&self.label, TEXT, Weight::Regular)
+    }
+
+    fn draw(&self, sheet: &mut Canvas, (x, y): Point) {
+        match self.sample {
+            Sample::Curve(kind, style) => draw::sample(sheet, kind, style, (x, y), SAMPLE),
+            Sample::Line(stroke) => sheet.line((x, y), (x + SAMPLE, y), stroke),
+        }
+        let style = TextStyle::new(TEXT).anchored(Anchor::Start);
+        sheet.text((x + SAMPLE + GAP, y + 0.36 * TEXT), &self.label, &style);
+    }
+}
+
+/// Entries of a panel: its labelled curves, then its labelled reference lines.
+pub(crate) fn entries(panel: &Panel) -> Vec<Entry> {
+    let curves = panel.curves.iter().zip(panel.styles()).map(|(curve, style)| Entry {
+        label: curve.label.clone(),
+        sample: Sample::Curve(curve.kind, style),
+    });
+    let references = panel.references.iter().map(|reference| Entry {
+        label: reference.label.clone(),
+        sample: Sample::Line(reference_stroke(reference)),
+    });
+    curves.chain(references).filter(|entry| !entry.label.is_empty()).collect()
+}
+
+/// Entries of several panels, each label once.
+pub(crate) fn union<'a>(panels: impl Iterator<Item = &'a Panel>) -> Vec<Entry> {
+    let mut all: Vec<Entry> = Vec::new();
+    for entry in panels.flat_map(entries) {
+        if !all.iter().any(|known| known.label == entry.label) {
+            all.push(entry);
+        }
+    }
+    all
+}
+
+pub(crate) fn reference_stroke(reference: &Reference) -> Stroke {
+    Stroke { color: reference.color, width: 1.1, dash: reference.dash }
+}
+
+/// Size of a legend that stands inside a panel, one entry under the other.
+pub(crate) fn box_size(entries: &[Entry]) -> Point {
+    let widest = entries.iter().map(Entry::width).fold(0.0, f64::max);
+    (widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
+}
+
+/// The corner, inside the frame from `corner` of `size`, at which a box of `legend` hides none of `drawn`.
+pub(crate) fn free_place(
+    corner: Point,
+    size: Point,
+    legend: Point,
+    drawn: &[Point],
+) -> Option<Point> {
+    const INSET: f64 = 9.0;
+    const CLEARANCE: f64 = 6.0;
+    let (free_x, free_y) = (size.0 - legend.0 - 2.0 * INSET, size.1 - legend.1 - 2.0 * INSET);
+    if free_x < 0.0 || free_y < 0.0 {
+        return None;
+    }
+    // Corners first, right before left as readers expect, then the middles of the sides.
+    let places = [
+        (1.0, 0.0),
+        (0.0, 0.0),
+        (1.0, 1.0),
+        (0.0, 1.0),
+        (1.0, 0.5),
+        (0.0, 0.5),
+        (0.5, 0.0),
+        (0.5, 1.0),
+    ];
+    places
+        .into_iter()
+        .map(|(across, down)| {
+            (corner.0 + INSET + across * free_x, corner.1 + INSET + down * free_y)
+        })
+        .find(|(left, top)| {
+            let columns = left - CLEARANCE..=left + legend.0 + CLEARANCE;
+            let rows = top - CLEARANCE..=top + legend.1 + CLEARANCE;
+            !drawn.iter().any(|(x, y)| columns.contains(x) && rows.contains(y))
+        })
+}
+
+/// Draws a legend inside a panel.
+pub(crate) fn draw_box(sheet: &mut Canvas, entries: &[Entry], (x, y): Point) {
+    let edge = Stroke::solid(Color("#c8c8c8"), 0.7);
+    sheet.rect((x, y), box_size(entries), Some(Color::WHITE), Some(edge));
+    for (row, entry) in entries.iter().enumerate() {
+        entry.draw(sheet, (x + PADDING, y + PADDING - 2.0 + ROW * (row as f64 + 0.5)));
+    }
+}
+
+/// Entries in as many rows as `width` asks for, by index.
+fn rows(entries: &[Entry], width: f64) -> Vec<std::ops::Range<usize>> {
+    let mut rows: Vec<std::ops::Range<usize>> = Vec::new();
+    let mut used = f64::INFINITY;
+    for (index, entry) in entries.iter().enumerate() {
+        let more = BETWEEN + entry.width();
+        match rows.last_mut() {
+            Some(row) if used + more <= width => {
+                row.end = index + 1;
+                used += more;
+            }
+            _ => {
+                rows.push(index..index + 1);
+                used = entry.width();
+            }
+        }
+    }
+    rows
+}
+
+/// Height of a legend that stands above what it explains.
+pub(crate) fn strip_height(entries: &[Entry], width: f64) -> f64 {
+    let rows = rows(entries, width).len();
+    if rows == 0 { 0.0 } else { ROW * rows as f64 + 6.0 }
+}
+
+/// Draws a legend in centred rows from the top left corner `at`.
+pub(crate) fn draw_strip(sheet: &mut Canvas, entries: &[Entry], at: Point, width: f64) {
+    for (row, range) in rows(entries, width).into_iter().enumerate() {
+        let members = &entries[range];
+        let total: f64 =
+            members.iter().map(Entry::width).sum::<f64>() + BETWEEN * (members.len() - 1) as f64;
+        let mut x = at.0 + (width - total) / 2.0;
+        for entry in members {
+            entry.draw(sheet, (x, at.1 + ROW * (row as f64 + 0.5)));
+            x += entry.width() + BETWEEN;
+        }
+    }
+}

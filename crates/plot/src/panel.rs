@@ -1,0 +1,191 @@
+//! Panels: a pair of axes with what is drawn in them.
+
+use crate::axis::{Axis, Scale, padded};
+use crate::curve::{Curve, Kind, Reference};
+use crate::error::PlotError;
+use crate::style::Resolved;
+
+/// Where the legend of a panel stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Legend {
+    /// Inside where it hides nothing; above the panel if there is no such place.
+    #[default]
+    Auto,
+    /// Above the panel.
+    Above,
+    /// Nowhere.
+    Hidden,
+}
+
+/// A pair of axes with curves and reference lines.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    pub(crate) title: String,
+    pub(crate) x: Axis,
+    pub(crate) y: Axis,
+    pub(crate) curves: Vec<Curve>,
+    pub(crate) references: Vec<Reference>,
+    pub(crate) legend: Legend,
+}
+
+impl Panel {
+    /// An empty panel.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Panel {
+            title: String::new(),
+            x,
+            y,
+            curves: Vec::new(),
+            references: Vec::new(),
+            legend: Legend::Auto,
+        }
+    }
+
+    /// Writes a title above the panel.
+    #[must_use]
+    pub fn title(mut self, title: impl Into<String>) -> Self {
+        self.title = title.into();
+        self
+    }
+
+    /// Adds a curve.
+    #[must_use]
+    pub fn curve(mut self, curve: Curve) -> Self {
+        self.curves.push(curve);
+        self
+    }
+
+    /// Adds curves.
+    #[must_use]
+    pub fn curves(mut self, curves: impl IntoIterator<Item = Curve>) -> Self {
+        self.curves.extend(curves);
+        self
+    }
+
+    /// Adds a reference line. It is drawn under the curves, and the axis always reaches it.
+    #[must_use]
+    pub fn reference(mut self, reference: Reference) -> Self {
+        self.references.push(reference);
+        self
+    }
+
+    /// Places the legend.
+    #[must_use]
+    pub fn legend(mut self, legend: Legend) -> Self {
+        self.legend = legend;
+        self
+    }
+
+    /// Style of each curve, in order.
+    pub(crate) fn styles(&self) -> Vec<Resolved> {
+        let mut next = 0;
+        let slot = |curve: &Curve| {
+            curve.slot.unwrap_or_else(|| {
+                let own = next;
+                // A band takes the look of the line that follows it.
+                next += usize::from(curve.kind != Kind::Band);
+                own
+            })
+        };
+        let slots: Vec<usize> = self.curves.iter().map(slot).collect();
+        self.curves.iter().zip(slots).map(|(curve, slot)| curve.style.resolve(slot)).collect()
+    }
+
+    /// Checks every coordinate against what its axis can show.
+    pub(crate) fn validate(&self) -> Result<(), PlotError> {
+        for axis in [&self.x, &self.y] {
+            if let Some((low, high)) = axis.range
+                && !(axis.scale.can_show(low)
+                    && axis.scale.can_show(high)
+                    && low < high
+                    && (high - low).is_finite())
+            {
+                return Err(PlotError::Range { axis: axis.caption(), low, high });
+            }
+        }
+        for curve in &self.curves {
+            self.validate_curve(curve)?;
+        }
+        for reference in &self.references {
+            let axis = if reference.horizontal { &self.y } else { &self.x };
+            if !axis.scale.can_show(reference.value) {
+                return Err(PlotError::Reference {
+                    label: reference.label.clone(),
+                    value: reference.value,
+                });
+            }
+        }
+        Ok(())
+    }
+
+    fn validate_curve(&self, curve: &Curve) -> Result<(), PlotError> {
+        let upper_len = if curve.kind == Kind::Band { curve.upper.len() } else { curve.y.len() };
+        if curve.x.len() != curve.y.len() || upper_len != curve.y.len() {
+            return Err(PlotError::LengthMismatch {
+                curve: curve.label.clone(),
+                x_len: curve.x.len(),
+                y_len: if curve.x.len() == curve.y.len() { upper_len } else { curve.y.len() },
+            });
+        }
+        if curve.x.is_empty() {
+            return Err(PlotError::EmptyCurve { curve: curve.label.clone() });
+        }
+        let xs = curve.x.iter().enumerate().map(|(index, &value)| ('x', index, value));
+        let ys =
+            curve.ordinates().enumerate().map(|(index, value)| ('y', index % curve.x.len(), value));
+        for (coordinate, index, value) in xs.chain(ys) {
+            let scale = if coordinate == 'x' { self.x.scale } else { self.y.scale };
+            let name = curve.label.clone();
+            if !value.is_finite() {
+                return Err(PlotError::NonFinite { curve: name, coordinate, index, value });
+            }
+            if !scale.can_show(value) {
+                return Err(PlotError::NotPositive { curve: name, coordinate, index, value });
+            }
+        }
+        Ok(())
+    }
+
+    /// Smallest and largest abscissa of the curves and reference lines.
+    pub(crate) fn x_extent(&self) -> (f64, f64) {
+        let references =
+            self.references.iter().filter(|line| !line.horizontal).map(|line| line.value);
+        extent(self.curves.iter().flat_map(|curve| curve.x.iter().copied()).chain(references))
+    }
+
+    /// The abscissae the panel shows when all points lie in `extent`.
+    pub(crate) fn x_range(&self, extent: (f64, f64)) -> (f64, f64) {
+        // Lines run from edge to edge; a marker or a stem needs room to stand.
+        let margin = if self.curves.iter().any(Curve::has_markers) { 0.03 } else { 0.0 };
+        self.x.range.unwrap_or_else(|| {
+            let (low, high) = padded(self.x.scale, extent.0, extent.1, margin);
+            // Positive times and frequencies do not get an axis with negative ones.
+            (if extent.0 > 0.0 { low.max(0.0) } else { low }, high)
+        })
+    }
+
+    /// The ordinates the panel shows.
+    pub(crate) fn y_range(&self) -> (f64, f64) {
+        if let Some(range) = self.y.range {
+            return range;
+        }
+        let references =
+            self.references.iter().filter(|line| line.horizontal).map(|line| line.value);
+        let (low, high) = extent(self.curves.iter().flat_map(Curve::ordinates).chain(references));
+        let from_zero = self.y.scale == Scale::Linear
+            && self.curves.iter().any(|curve| curve.kind == Kind::Stems);
+        if from_zero {
+            let (low, high) = padded(Scale::Linear, low.min(0.0), high.max(0.0), 0.06);
+            // Stems that all rise stand on the frame.
+            let rising = !self.curves.iter().flat_map(Curve::ordinates).any(|value| value < 0.0);
+            return (if rising { 0.0 } else { low }, high);
+        }
+        padded(self.y.scale, low, high, 0.06)
+    }
+}
+
+fn extent(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
+}

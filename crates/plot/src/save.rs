@@ -1,0 +1,63 @@
+//! Files that appear whole or not at all.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use crate::bitmap::svg_to_png;
+use crate::error::PlotError;
+
+/// Pixels of a saved bitmap for each px of the drawing.
+const SAVED_SCALE: f64 = 2.0;
+
+/// What a file name asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Format {
+    Svg,
+    Png,
+}
+
+impl Format {
+    pub(crate) fn of(path: &Path) -> Result<Self, PlotError> {
+        let ending = path.extension().map(|ending| ending.to_ascii_lowercase());
+        match ending.as_deref().and_then(|ending| ending.to_str()) {
+            Some("svg") => Ok(Format::Svg),
+            Some("png") => Ok(Format::Png),
+            _ => Err(PlotError::Extension { path: path.to_owned() }),
+        }
+    }
+}
+
+/// Saves an SVG document as it is or, at two pixels per px, as PNG, as the ending of `path` says.
+///
+/// # Errors
+/// Another ending than `.svg` or `.png`, a document that is not SVG, and what the file system refuses.
+pub fn save_svg(path: impl AsRef<Path>, svg: &str) -> Result<(), PlotError> {
+    write(path.as_ref(), Format::of(path.as_ref())?, svg)
+}
+
+pub(crate) fn write(path: &Path, format: Format, svg: &str) -> Result<(), PlotError> {
+    let bytes = match format {
+        Format::Svg => svg.as_bytes().to_vec(),
+        Format::Png => svg_to_png(svg, SAVED_SCALE)?,
+    };
+    replace(path, &bytes).map_err(|source| PlotError::Write { path: path.to_owned(), source })
+}
+
+/// Writes beside the target and renames, so that no reader meets half a file.
+fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let folder = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    // A temporary file is private by default; a figure gets the rights of any other new file.
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder.tempfile_in(folder)?;
+    file.write_all(bytes)?;
+    file.persist(path).map_err(|error| error.error)?;
+    Ok(())
+}

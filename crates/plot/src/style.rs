@@ -1,0 +1,128 @@
+//! Colours, dashes and markers that stay apart for colour-blind readers and in grey print.
+
+/// A colour of the drawing, written the way SVG writes it (`#rrggbb`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Color(pub &'static str);
+
+impl Color {
+    /// Blue of the Okabe–Ito palette.
+    pub const BLUE: Color = Color("#0072b2");
+    /// Vermilion of the Okabe–Ito palette.
+    pub const VERMILION: Color = Color("#d55e00");
+    /// Bluish green of the Okabe–Ito palette.
+    pub const GREEN: Color = Color("#009e73");
+    /// Reddish purple of the Okabe–Ito palette.
+    pub const PURPLE: Color = Color("#cc79a7");
+    /// Orange of the Okabe–Ito palette.
+    pub const ORANGE: Color = Color("#e69f00");
+    /// Sky blue of the Okabe–Ito palette.
+    pub const SKY: Color = Color("#56b4e9");
+    /// Black: the truth, the reference, the measurement.
+    pub const BLACK: Color = Color("#000000");
+    /// Dark grey: frames and tick labels.
+    pub const DARK: Color = Color("#333333");
+    /// Middle grey: what stays in the background.
+    pub const GREY: Color = Color("#808080");
+    /// White: the paper.
+    pub const WHITE: Color = Color("#ffffff");
+
+    /// Curve colours in the order they are handed out. The palette's yellow is left out: it vanishes on white paper.
+    ///
+    /// # Source
+    /// M. Okabe and K. Ito, *Color Universal Design* (2008).
+    pub const CYCLE: [Color; 6] =
+        [Color::BLUE, Color::VERMILION, Color::GREEN, Color::PURPLE, Color::ORANGE, Color::SKY];
+}
+
+/// Line pattern.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Dash {
+    /// ────
+    #[default]
+    Solid,
+    /// ─ ─ ─
+    Dashed,
+    /// · · · ·
+    Dotted,
+    /// ─ · ─ ·
+    DashDot,
+    /// ── ── with long strokes
+    LongDash,
+}
+
+impl Dash {
+    const CYCLE: [Dash; 5] =
+        [Dash::Solid, Dash::Dashed, Dash::DashDot, Dash::LongDash, Dash::Dotted];
+
+    /// The SVG dash array for a stroke of the given width, px; `None` for a solid line.
+    pub(crate) fn array(self, width: f64) -> Option<Vec<f64>> {
+        let pattern: &[f64] = match self {
+            Dash::Solid => return None,
+            Dash::Dashed => &[4.0, 2.6],
+            Dash::Dotted => &[1.2, 2.0],
+            Dash::DashDot => &[5.0, 2.2, 1.2, 2.2],
+            Dash::LongDash => &[8.0, 2.6],
+        };
+        Some(pattern.iter().map(|part| part * width).collect())
+    }
+}
+
+/// Shape drawn at each point of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Marker {
+    /// ●
+    Circle,
+    /// ■
+    Square,
+    /// ▲
+    Triangle,
+    /// ◆
+    Diamond,
+    /// ▼
+    TriangleDown,
+    /// ×
+    Cross,
+    /// +
+    Plus,
+}
+
+impl Marker {
+    const CYCLE: [Marker; 6] = [
+        Marker::Circle,
+        Marker::Square,
+        Marker::Triangle,
+        Marker::Diamond,
+        Marker::TriangleDown,
+        Marker::Cross,
+    ];
+}
+
+/// How one curve looks: what is left `None` follows the curve's place in its panel.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Style {
+    pub(crate) color: Option<Color>,
+    pub(crate) dash: Option<Dash>,
+    pub(crate) marker: Option<Marker>,
+    pub(crate) width: Option<f64>,
+}
+
+/// A style with nothing left open.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Resolved {
+    pub(crate) color: Color,
+    pub(crate) dash: Dash,
+    pub(crate) marker: Marker,
+    pub(crate) width: f64,
+}
+
+impl Style {
+    /// The style of the curve handed out as number `slot`.
+    pub(crate) fn resolve(self, slot: usize) -> Resolved {
+        Resolved {
+            color: self.color.unwrap_or(Color::CYCLE[slot % Color::CYCLE.len()]),
+            dash: self.dash.unwrap_or(Dash::CYCLE[slot % Dash::CYCLE.len()]),
+            marker: self.marker.unwrap_or(Marker::CYCLE[slot % Marker::CYCLE.len()]),
+            width: self.width.unwrap_or(1.7),
+        }
+    }
+}

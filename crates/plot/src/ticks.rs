@@ -1,0 +1,193 @@
+//! Where ticks lie and what they say.
+
+use crate::axis::Scale;
+
+/// Ticks of one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Ticks {
+    /// Labelled positions.
+    pub(crate) major: Vec<(f64, String)>,
+    /// Positions without a label.
+    pub(crate) minor: Vec<f64>,
+    /// Common factor of the labels, such as `×10⁻³`.
+    pub(crate) factor: Option<String>,
+}
+
+/// Ticks on `low..=high`, about `wanted` of them; `step` fixes the distance on a linear axis.
+pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
+    match scale {
+        Scale::Linear => linear(low, high, wanted, step),
+        Scale::Log10 => logarithmic(low, high, wanted),
+    }
+}
+
+fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
+    // A step that would crowd the axis is not a step the caller can have meant.
+    let step = step
+        .filter(|step| *step > 0.0 && (high - low) / step <= 40.0)
+        .unwrap_or_else(|| nice_step((high - low) / wanted));
+    let exponent = common_exponent(low.abs().max(high.abs()));
+    let unit = 10f64.powi(exponent);
+    let decimals = decimals(step / unit);
+    let first = (low / step - 1e-9).ceil();
+    let last = (high / step + 1e-9).floor();
+    let count = (last - first).max(-1.0) as usize + 1;
+    let major = (0..count.min(200))
+        .map(|index| {
+            let value = (first + index as f64) * step;
+            (value, plain(value / unit, decimals))
+        })
+        .collect();
+    let factor = (exponent != 0).then(|| format!("×{}", power(exponent)));
+    Ticks { major, minor: Vec::new(), factor }
+}
+
+/// The least of 1, 2, 5 × 10ⁿ that is not below `rough`.
+fn nice_step(rough: f64) -> f64 {
+    let decade = 10f64.powf(rough.log10().floor());
+    let mantissa = rough / decade;
+    let nice = [1.0, 2.0, 5.0].into_iter().find(|nice| mantissa <= nice * (1.0 + 1e-9));
+    decade * nice.unwrap_or(10.0)
+}
+
+/// Engineering exponent taken out of labels that would otherwise be long: a multiple of three.
+fn common_exponent(largest: f64) -> i32 {
+    let exponent = largest.log10().floor();
+    if largest == 0.0 || (-2.0..5.0).contains(&exponent) {
+        0
+    } else {
+        3 * (exponent / 3.0).floor() as i32
+    }
+}
+
+/// Decimals that write every multiple of `step` exactly (steps have at most two digits), at most twelve.
+fn decimals(step: f64) -> usize {
+    (0..12)
+        .find(|&digits| {
+            let scaled = step * 10f64.powi(digits);
+            (scaled - scaled.round()).abs() < 1e-6 * scaled
+        })
+        .unwrap_or(12) as usize
+}
+
+fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
+    let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
+    let inside = |value: f64| value >= low * (1.0 - 1e-9) && value <= high * (1.0 + 1e-9);
+    let decades: Vec<i32> = (first..=last).filter(|&n| inside(10f64.powi(n))).collect();
+    if decades.len() < 2 {
+        return short_logarithmic(low, high, wanted, &inside, first..=last);
+    }
+    let stride = (decades.len() as f64 / wanted).ceil().max(1.0) as i32;
+    let words = decades.iter().all(|n| (-2..=3).contains(n));
+    let label = |n: i32| {
+        if words { plain(10f64.powi(n), (-n).max(0) as usize) } else { power(n) }
+    };
+    let (mut major, mut minor) = (Vec::new(), Vec::new());
+    for &n in &decades {
+        if n.rem_euclid(stride) == 0 {
+            major.push((10f64.powi(n), label(n)));
+        } else {
+            minor.push(10f64.powi(n));
+        }
+    }
+    if stride == 1 {
+        minor.extend(
+            subdivisions(first..=last, &[2, 3, 4, 5, 6, 7, 8, 9]).filter(|value| inside(*value)),
+        );
+    }
+    Ticks { major, minor, factor: None }
+}
+
+/// Less than a decade between labelled powers: label 1, 2, 5 inside the decade, or a linear choice when that is too few.
+fn short_logarithmic(
+    low: f64,
+    high: f64,
+    wanted: f64,
+    inside: &dyn Fn(f64) -> bool,
+    decades: std::ops::RangeInclusive<i32>,
+) -> Ticks {
+    let labelled: Vec<f64> =
+        subdivisions(decades.clone(), &[1, 2, 5]).filter(|value| inside(*value)).collect();
+    if labelled.len() < 3 {
+        return linear(low, high, wanted, None);
+    }
+    let exponent = common_exponent(high);
+    let unit = 10f64.powi(exponent);
+    let major = labelled
+        .into_iter()
+        .map(|value| {
+            let scaled = value / unit;
+            (value, plain(scaled, (-(scaled * (1.0 + 1e-9)).log10().floor()).max(0.0) as usize))
+        })
+        .collect();
+    let minor = subdivisions(decades, &[3, 4, 6, 7, 8, 9]).filter(|value| inside(*value)).collect();
+    Ticks { major, minor, factor: (exponent != 0).then(|| format!("×{}", power(exponent))) }
+}
+
+fn subdivisions(
+    decades: std::ops::RangeInclusive<i32>,
+    digits: &[i32],
+) -> impl Iterator<Item = f64> + use<'_> {
+    decades.flat_map(move |n| digits.iter().map(move |&digit| f64::from(digit) * 10f64.powi(n)))
+}
+
+/// A decimal number with a true minus sign.
+fn plain(value: f64, decimals: usize) -> String {
+    let text = format!("{:.decimals$}", value.abs());
+    let is_zero = text.bytes().all(|byte| byte == b'0' || byte == b'.');
+    if value < 0.0 && !is_zero { format!("−{text}") } else { text }
+}
+
+/// A power of ten, marked up for [`Canvas::text`](crate::Canvas::text).
+fn power(exponent: i32) -> String {
+    let sign = if exponent < 0 { "−" } else { "" };
+    format!("10^{{{sign}{}}}", exponent.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(ticks: &Ticks) -> Vec<&str> {
+        ticks.major.iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn linear_labels_are_round_and_short() {
+        assert_eq!(
+            labels(&linear(0.0, 1.0, 5.0, None)),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(
+            labels(&linear(-180.0, 0.0, 5.0, Some(45.0))),
+            ["−180", "−135", "−90", "−45", "0"]
+        );
+        assert_eq!(
+            labels(&linear(1.9, 4.1, 11.0, None)),
+            ["2.0", "2.2", "2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6", "3.8", "4.0"]
+        );
+        let small = linear(-2.1e-4, 2.1e-4, 4.0, None);
+        assert_eq!(labels(&small), ["−200", "0", "200"]);
+        assert_eq!(small.factor.as_deref(), Some("×10^{−6}"));
+        let large = linear(0.0, 2.0e6, 4.0, None);
+        assert_eq!(
+            (labels(&large), large.factor.as_deref()),
+            (vec!["0.0", "0.5", "1.0", "1.5", "2.0"], Some("×10^{6}"))
+        );
+    }
+
+    #[test]
+    fn logarithmic_labels_are_decades_or_one_two_five() {
+        assert_eq!(labels(&logarithmic(0.05, 200.0, 6.0)), ["0.1", "1", "10", "100"]);
+        assert_eq!(
+            labels(&logarithmic(1e-6, 1e-3, 6.0)),
+            ["10^{−6}", "10^{−5}", "10^{−4}", "10^{−3}"]
+        );
+        assert_eq!(
+            labels(&logarithmic(1e-12, 1.0, 5.0)),
+            ["10^{−12}", "10^{−9}", "10^{−6}", "10^{−3}", "10^{0}"]
+        );
+        assert_eq!(labels(&logarithmic(1.5, 60.0, 6.0)), ["2", "5", "10", "20", "50"]);
+        assert_eq!(labels(&logarithmic(5.1, 5.9, 5.0)), ["5.2", "5.4", "5.6", "5.8"]);
+    }
+}
