@@ -19,6 +19,8 @@ pub mod crest;
 mod error;
 pub mod excitation;
 pub mod lines;
+pub mod measures;
+pub mod multi_input;
 mod multisine;
 pub mod noise;
 pub mod phases;

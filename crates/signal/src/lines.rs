@@ -6,7 +6,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::Sampling;
+use crate::{Sampling, SignalError};
 
 /// Every line 1, 2, 3, … `last`.
 pub fn all(last: usize) -> Vec<usize> {
@@ -71,6 +71,22 @@ pub fn band(sampling: Sampling, low_hz: f64, high_hz: f64) -> Vec<usize> {
         .collect()
 }
 
+/// Lines dealt out in turn to several inputs, so that one experiment tells the inputs apart.
+///
+/// # Errors
+/// [`SignalError::TooFew`] if there are no inputs, or fewer lines than inputs.
+pub fn interleaved(lines: &[usize], inputs: usize) -> Result<Vec<Vec<usize>>, SignalError> {
+    if inputs == 0 {
+        return Err(SignalError::TooFew { what: "dealing out lines to inputs", least: 1, got: 0 });
+    }
+    if lines.len() < inputs {
+        let got = lines.len();
+        return Err(SignalError::TooFew { what: "one line per input", least: inputs, got });
+    }
+    let of = |k: usize| lines.iter().skip(k).step_by(inputs).copied().collect();
+    Ok((0..inputs).map(of).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,6 +103,14 @@ mod tests {
         assert_eq!(band(s, 1.0, 2.5), [2, 3, 4, 5]);
         assert_eq!(band(s, 0.0, f64::INFINITY), all(9));
         assert!(band(s, 1.1, 1.2).is_empty());
+    }
+
+    #[test]
+    fn interleaved_lines_are_dealt_out_once() {
+        let dealt = interleaved(&odd(13), 3).unwrap();
+        assert_eq!(dealt, [vec![1, 7, 13], vec![3, 9], vec![5, 11]]);
+        assert!(matches!(interleaved(&[1], 2), Err(SignalError::TooFew { least: 2, got: 1, .. })));
+        assert!(interleaved(&[1], 0).is_err());
     }
 
     #[test]

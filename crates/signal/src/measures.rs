@@ -1,0 +1,219 @@
+//! Numbers to choose an excitation by.
+//!
+//! ```
+//! use mechid_signal::{Multisine, Phases, Sampling, Spectrum, measures};
+//!
+//! let sampling = Sampling::new(0.01, 256)?; // lines every 0.39 Hz
+//! let force = Multisine::flat(1..=127, 50.0, Phases::Schroeder)?.sample(sampling)?;
+//! let spectrum = Spectrum::of(&force);
+//! assert!(measures::crest_factor(&force, 0)? < 1.8);
+//! assert!(measures::spectral_flatness(&spectrum, 0, 1..128)? > 1.0 - 1e-12);
+//! // 127 lines and their mirror images: enough for 254 parameters.
+//! assert_eq!(measures::persistent_excitation_order(&spectrum, 0, 1e-9)?, 254);
+//! let band = measures::effective_band(&spectrum, 0, 20.0)?;
+//! assert!((band.high_hz - 127.0 / 2.56).abs() < 1e-9);
+//! # Ok::<(), mechid_signal::SignalError>(())
+//! ```
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::error::{not_negative, within};
+use crate::{Record, Sampling, SignalError, Spectrum};
+
+/// Root mean square; 0 for no samples.
+pub fn rms(samples: &[f64]) -> f64 {
+    let sum: f64 = samples.iter().map(|x| x * x).sum();
+    if samples.is_empty() { 0.0 } else { (sum / samples.len() as f64).sqrt() }
+}
+
+/// Largest absolute value; 0 for no samples.
+pub fn peak(samples: &[f64]) -> f64 {
+    samples.iter().fold(0.0, |m, x| m.max(x.abs()))
+}
+
+/// Peak over RMS of the samples: 1 for a two-level signal, √2 for a sine.
+///
+/// The samples alone are looked at; what a multisine does between them is in
+/// [`Multisine::crest_factor`](crate::Multisine::crest_factor).
+///
+/// # Errors
+/// [`SignalError::Silent`] if the channel is zero throughout.
+///
+/// # Panics
+/// If there is no such channel.
+pub fn crest_factor(record: &Record, channel: usize) -> Result<f64, SignalError> {
+    let samples = record.channel(channel);
+    let peak = peak(samples);
+    if peak == 0.0 {
+        return Err(SignalError::Silent { channel });
+    }
+    Ok(peak / rms(samples))
+}
+
+/// Half the range over √2 times the RMS about the mean, 1 for a sine: Schroeder's relative peak
+/// factor.
+///
+/// # Errors
+/// [`SignalError::Silent`] if the channel is constant.
+///
+/// # Panics
+/// If there is no such channel.
+///
+/// # Source
+/// Schroeder (1970), *Synthesis of low-peak-factor signals and binary sequences with low
+/// autocorrelation*, IEEE Trans. Inf. Theory 16, 85–89.
+pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, SignalError> {
+    let column = record.column(channel);
+    let range = column.max() - column.min();
+    if range == 0.0 {
+        return Err(SignalError::Silent { channel });
+    }
+    let centred: Vec<f64> = column.iter().map(|x| x - column.mean()).collect();
+    Ok(0.5 * range / (std::f64::consts::SQRT_2 * rms(&centred)))
+}
+
+/// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for the lags k = 0 … N − 1.
+///
+/// # Source
+/// Dissertation eq. (4.3.1) with cyclic indices.
+pub fn circular_autocorrelation(x: &[f64]) -> Vec<f64> {
+    correlate(x, x.len())
+}
+
+/// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for the lags k = 0 … N − 1.
+///
+/// # Source
+/// Dissertation eq. (4.3.1), the sum ending with the sequence.
+pub fn aperiodic_autocorrelation(x: &[f64]) -> Vec<f64> {
+    // Zeros behind the sequence keep its end from meeting its beginning.
+    correlate(x, 2 * x.len())
+}
+
+/// The first N lags of the correlation of a sequence padded to `period`, over N.
+fn correlate(x: &[f64], period: usize) -> Vec<f64> {
+    let Ok(sampling) = Sampling::new(1.0, period) else {
+        return Vec::new();
+    };
+    let mut padded = DMatrix::zeros(period, 1);
+    padded.as_mut_slice()[..x.len()].copy_from_slice(x);
+    let Ok(record) = Record::new(sampling, padded) else {
+        // What is not finite correlates to nothing finite.
+        return vec![f64::NAN; x.len()];
+    };
+    // With one-sided amplitudes X_n the correlation has the lines |X_n|²/2, but |X_n|² where a
+    // line is its own mirror image.
+    let mut lines = Spectrum::of(&record).lines().clone();
+    for (n, line) in lines.iter_mut().enumerate() {
+        let half = if n == 0 || 2 * n == period { 1.0 } else { 0.5 };
+        *line = Complex::from(half * line.norm_sqr());
+    }
+    let correlation = Spectrum::from_lines(sampling, lines).to_record();
+    let scale = period as f64 / x.len() as f64;
+    correlation.channel(0)[..x.len()].iter().map(|a| scale * a).collect()
+}
+
+/// Geometric over arithmetic mean of the power of some lines: 1 if all are equal, 0 if one is
+/// missing.
+///
+/// # Errors
+/// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line the spectrum
+/// has not, [`SignalError::Silent`] if none of them carries power.
+///
+/// # Panics
+/// If there is no such channel.
+pub fn spectral_flatness(
+    spectrum: &Spectrum,
+    channel: usize,
+    lines: impl IntoIterator<Item = usize>,
+) -> Result<f64, SignalError> {
+    let highest = (spectrum.len() - 1) as f64;
+    let mut power = Vec::new();
+    for n in lines {
+        within("line", n as f64, 0.0, highest)?;
+        power.push(spectrum.line(n, channel).norm_sqr());
+    }
+    if power.is_empty() {
+        return Err(SignalError::NoLines);
+    }
+    let mean = power.iter().sum::<f64>() / power.len() as f64;
+    if mean == 0.0 {
+        return Err(SignalError::Silent { channel });
+    }
+    // The logarithm of each share, not of a product that would underflow.
+    let log = power.iter().map(|p| (p / mean).ln()).sum::<f64>() / power.len() as f64;
+    Ok(log.exp())
+}
+
+/// The order of persistent excitation of a periodic signal: how many parameters it can tell
+/// apart. Each line between DC and Nyquist counts twice, DC and Nyquist once.
+///
+/// Lines weaker than `floor` times the strongest count as absent.
+///
+/// # Errors
+/// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power.
+///
+/// # Panics
+/// If there is no such channel.
+///
+/// # Source
+/// Ljung, *System Identification: Theory for the User*, section on persistence of excitation: the
+/// order is the number of points of the two-sided spectrum that are not zero.
+pub fn persistent_excitation_order(
+    spectrum: &Spectrum,
+    channel: usize,
+    floor: f64,
+) -> Result<usize, SignalError> {
+    not_negative("floor", floor)?;
+    let threshold = floor * strongest(spectrum, channel)?;
+    let period = spectrum.sampling().len();
+    let count = |n: usize| match spectrum.line(n, channel).norm() {
+        a if a == 0.0 || a < threshold => 0,
+        _ if n == 0 || 2 * n == period => 1,
+        _ => 2,
+    };
+    Ok((0..spectrum.len()).map(count).sum())
+}
+
+/// A range of frequencies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    /// Lowest frequency, in Hz.
+    pub low_hz: f64,
+    /// Highest frequency, in Hz.
+    pub high_hz: f64,
+}
+
+/// From the first to the last line within `drop_db` of the strongest, DC left out of both.
+///
+/// # Errors
+/// [`SignalError::Negative`] for the drop, [`SignalError::Silent`] for a signal without power
+/// above DC.
+///
+/// # Panics
+/// If there is no such channel.
+pub fn effective_band(
+    spectrum: &Spectrum,
+    channel: usize,
+    drop_db: f64,
+) -> Result<Band, SignalError> {
+    not_negative("drop in dB", drop_db)?;
+    let amplitude = |n: usize| spectrum.line(n, channel).norm();
+    let strongest = (1..spectrum.len()).map(amplitude).fold(0.0, f64::max);
+    let threshold = strongest * 10f64.powf(-drop_db / 20.0);
+    let mut inside = (1..spectrum.len()).filter(|n| amplitude(*n) >= threshold);
+    let (true, Some(first)) = (strongest > 0.0, inside.next()) else {
+        return Err(SignalError::Silent { channel });
+    };
+    let last = inside.next_back().unwrap_or(first);
+    let hz = |n| spectrum.frequency_hz(n);
+    Ok(Band { low_hz: hz(first), high_hz: hz(last) })
+}
+
+/// The largest amplitude of a channel, not zero.
+fn strongest(spectrum: &Spectrum, channel: usize) -> Result<f64, SignalError> {
+    let amplitude = |n: usize| spectrum.line(n, channel).norm();
+    match (0..spectrum.len()).map(amplitude).fold(0.0, f64::max) {
+        0.0 => Err(SignalError::Silent { channel }),
+        a => Ok(a),
+    }
+}
