@@ -109,6 +109,101 @@ pub enum EstimateError {
         /// The level given.
         level: f64,
     },
+    /// No spectral line was chosen, or none of them carries force.
+    #[error("no spectral line carries force: choose lines the excitation drives")]
+    NoExcitedLine,
+    /// A chosen line does not exist or carries no phase.
+    #[error(
+        "line {line} cannot be used: lines 1 to {last} of this record have amplitude and phase"
+    )]
+    LineOutOfRange {
+        /// The line asked for.
+        line: usize,
+        /// The last usable line, just below half the sampling rate.
+        last: usize,
+    },
+    /// A frequency is not positive and finite.
+    #[error("a frequency of {value} rad/s cannot be used: it must be positive and finite")]
+    Frequency {
+        /// The frequency, in rad/s.
+        value: f64,
+    },
+    /// Two experiments measured different quantities.
+    #[error("one experiment measured {left}, the other {right}")]
+    MixedMotion {
+        /// Quantity of the first.
+        left: crate::frequency_domain::Motion,
+        /// Quantity of the second.
+        right: crate::frequency_domain::Motion,
+    },
+    /// Two sets of spectral lines that must be the same are not.
+    #[error("row {row}: {left} rad/s against {right} rad/s; both must hold the same frequencies")]
+    FrequencyMismatch {
+        /// First row that differs, counted from 0.
+        row: usize,
+        /// Frequency in the first set, in rad/s.
+        left: f64,
+        /// Frequency in the second, in rad/s.
+        right: f64,
+    },
+    /// A ratio or covariance needs more averages than there are.
+    #[error("{got} averages cannot tell signal from noise, at least {needed} are needed")]
+    TooFewAverages {
+        /// Averages there are.
+        got: usize,
+        /// Averages needed.
+        needed: usize,
+    },
+    /// The forces do not determine a frequency response at a line.
+    #[error(
+        "the forces at {frequency_hz} Hz do not act independently (reciprocal condition {reciprocal_condition:.1e}): \
+         leave the line out, or make experiments with different forces"
+    )]
+    DependentForces {
+        /// Where, in Hz.
+        frequency_hz: f64,
+        /// Smallest over largest eigenvalue of the scaled force cross-spectrum.
+        reciprocal_condition: f64,
+    },
+    /// A noise variance is negative or not finite.
+    #[error("noise variance {column} of row {row} is {value}: it must be finite and not negative")]
+    NoiseVariance {
+        /// Row, counted from 0.
+        row: usize,
+        /// Channel, counted from 0, displacements first, then forces.
+        column: usize,
+        /// The value given.
+        value: f64,
+    },
+    /// The noise covariance of a line cannot be inverted.
+    #[error(
+        "the noise covariance at {frequency_hz} Hz is singular: a displacement without noise, or fewer \
+         periods than degrees of freedom; pool it over more lines"
+    )]
+    SingularNoise {
+        /// Where, in Hz.
+        frequency_hz: f64,
+    },
+    /// A search did not end at a minimum.
+    #[error("no convergence within {steps} steps: the model may not describe these data")]
+    NotConverged {
+        /// Steps taken.
+        steps: usize,
+    },
+    /// A coherence outside (0, 1].
+    #[error("a coherence lies above 0 and at most at 1, got {value}")]
+    Coherence {
+        /// The value given.
+        value: f64,
+    },
+    /// The motion has nothing in common with the force.
+    #[error(
+        "the motion at {frequency_hz} Hz has nothing in common with the force: H2 does not exist there"
+    )]
+    IncoherentMotion {
+        /// Where, in Hz.
+        frequency_hz: f64,
+    },
     /// The identified matrices do not make a system.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),

@@ -143,6 +143,16 @@ impl Estimate {
     /// [`EstimateError::Undetermined`] if the data leave any entry open,
     /// [`EstimateError::Model`] if M̂ is singular.
     pub fn system(&self) -> Result<SecondOrderSystem, EstimateError> {
+        self.check_determined()?;
+        let [mass, damping, stiffness] = self.unknowns.assemble(&self.values);
+        Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
+    }
+
+    /// An error that names what the data leave open, if they do.
+    ///
+    /// # Errors
+    /// [`EstimateError::Undetermined`].
+    pub(crate) fn check_determined(&self) -> Result<(), EstimateError> {
         if !self.undetermined.is_empty() {
             let open = self.parameters().filter(|p| p.value.is_nan());
             let names: Vec<String> = open.map(|p| p.parameter.to_string()).collect();
@@ -153,8 +163,7 @@ impl Estimate {
                 directions: directions.join("; "),
             });
         }
-        let [mass, damping, stiffness] = self.unknowns.assemble(&self.values);
-        Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
+        Ok(())
     }
 
     /// Equations minus unknowns, of the equation of motion that has the fewest to spare.

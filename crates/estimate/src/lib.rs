@@ -24,12 +24,16 @@
 mod equation_of_motion;
 mod error;
 mod estimate;
+pub mod frequency_domain;
+mod frf;
 mod least_squares;
+mod noise_spectrum;
 mod triangular;
 mod unknowns;
 
 pub use equation_of_motion::EquationOfMotion;
 pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
+pub use frf::{Frf, FrfEstimator, Segments};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use unknowns::{Parameter, Unknowns};

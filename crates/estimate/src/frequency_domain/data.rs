@@ -1,0 +1,234 @@
+//! Forces and displacements at chosen frequencies: what every estimator of this module takes.
+
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use super::{Lines, Motion, NoiseSpectrum};
+use crate::EstimateError;
+
+/// Complex amplitudes of forces and displacements, one row per frequency and experiment.
+///
+/// Motion measured as velocity or acceleration is kept as displacement, X = V/(iω) = −A/ω²;
+/// what was measured is remembered, because that is where the noise is white.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrequencyData {
+    omega: Vec<f64>,
+    force: DMatrix<Complex<f64>>,
+    displacement: DMatrix<Complex<f64>>,
+    measured: Motion,
+    noise: Option<NoiseSpectrum>,
+}
+
+impl FrequencyData {
+    /// The chosen lines of one record of force (N) and motion, both over whole periods.
+    ///
+    /// Channel j of either record belongs to degree of freedom j; a degree of freedom
+    /// without a force has a channel of zeros. To read many records with one prepared
+    /// transform use [`FrequencyData::read`].
+    ///
+    /// # Errors
+    /// As [`Lines::new`] and [`FrequencyData::read`].
+    pub fn from_records(
+        force: &Record,
+        motion: &Record,
+        measured: Motion,
+        lines: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, EstimateError> {
+        Self::read(&Lines::new(force.sampling(), lines)?, force, motion, measured)
+    }
+
+    /// Force (N) and motion at prepared lines.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if the records have not the same number of channels,
+    /// [`EstimateError::Signal`] if their time axes are not that of the lines.
+    pub fn read(
+        lines: &Lines,
+        force: &Record,
+        motion: &Record,
+        measured: Motion,
+    ) -> Result<Self, EstimateError> {
+        Self::from_amplitudes(lines.omega(), lines.read(force)?, lines.read(motion)?, measured)
+    }
+
+    /// The chosen lines of two spectra over the same whole periods.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`], [`EstimateError::LineOutOfRange`],
+    /// [`EstimateError::NoExcitedLine`] or [`EstimateError::Signal`], as for records.
+    pub fn from_spectra(
+        force: &Spectrum,
+        motion: &Spectrum,
+        measured: Motion,
+        lines: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, EstimateError> {
+        super::lines::check_sampling(force.sampling(), motion.sampling())?;
+        let lines = Lines::new(force.sampling(), lines)?;
+        let rows = |s: &Spectrum| {
+            DMatrix::from_fn(lines.as_slice().len(), s.channels(), |r, c| {
+                s.line(lines.as_slice()[r], c)
+            })
+        };
+        Self::from_amplitudes(lines.omega(), rows(force), rows(motion), measured)
+    }
+
+    /// From complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if the shapes differ, [`EstimateError::NoExcitedLine`]
+    /// if there is no row, [`EstimateError::NotFinite`] for a frequency that is not
+    /// positive or an amplitude that is not finite.
+    pub fn from_amplitudes(
+        omega: Vec<f64>,
+        force: DMatrix<Complex<f64>>,
+        mut motion: DMatrix<Complex<f64>>,
+        measured: Motion,
+    ) -> Result<Self, EstimateError> {
+        check_shapes(&omega, &force, &motion)?;
+        for (r, &w) in omega.iter().enumerate() {
+            let to_displacement = measured.per_displacement(w).inv();
+            motion.row_mut(r).apply(|x| *x *= to_displacement);
+        }
+        Ok(Self { omega, force, displacement: motion, measured, noise: None })
+    }
+
+    /// The same data with what is known of their noise.
+    ///
+    /// # Errors
+    /// [`EstimateError::FrequencyMismatch`] or [`EstimateError::Size`] if the noise
+    /// belongs to other frequencies or another number of degrees of freedom.
+    pub fn with_noise(mut self, noise: NoiseSpectrum) -> Result<Self, EstimateError> {
+        check_same_frequencies(&self.omega, noise.omega())?;
+        if noise.dof() != self.dof() {
+            let (got, expected) = (noise.dof(), self.dof());
+            return Err(EstimateError::Size {
+                what: "channels of the noise spectrum",
+                got,
+                expected,
+            });
+        }
+        self.noise = Some(noise);
+        Ok(self)
+    }
+
+    /// The rows of both: several experiments on one system.
+    ///
+    /// The noise is kept if it is known of both.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if the numbers of degrees of freedom differ,
+    /// [`EstimateError::MixedMotion`] if the quantities measured do.
+    pub fn and(&self, other: &Self) -> Result<Self, EstimateError> {
+        if self.dof() != other.dof() {
+            let (got, expected) = (other.dof(), self.dof());
+            return Err(EstimateError::Size {
+                what: "channels of the second experiment",
+                got,
+                expected,
+            });
+        }
+        if self.measured != other.measured {
+            return Err(EstimateError::MixedMotion { left: self.measured, right: other.measured });
+        }
+        let stack = |upper: &DMatrix<Complex<f64>>, lower: &DMatrix<Complex<f64>>| {
+            let mut both =
+                upper.clone().resize_vertically(self.len() + other.len(), Complex::default());
+            both.rows_mut(self.len(), other.len()).copy_from(lower);
+            both
+        };
+        Ok(Self {
+            omega: [&self.omega[..], &other.omega].concat(),
+            force: stack(&self.force, &other.force),
+            displacement: stack(&self.displacement, &other.displacement),
+            measured: self.measured,
+            noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
+        })
+    }
+
+    /// Degrees of freedom n.
+    pub fn dof(&self) -> usize {
+        self.force.ncols()
+    }
+
+    /// Number of rows: frequencies, summed over the experiments.
+    #[allow(clippy::len_without_is_empty, reason = "never empty")]
+    pub fn len(&self) -> usize {
+        self.omega.len()
+    }
+
+    /// Angular frequency of every row, in rad/s.
+    pub fn omega(&self) -> &[f64] {
+        &self.omega
+    }
+
+    /// Force amplitudes, rows × n, in N.
+    pub fn force(&self) -> &DMatrix<Complex<f64>> {
+        &self.force
+    }
+
+    /// Displacement amplitudes, rows × n, in m.
+    pub fn displacement(&self) -> &DMatrix<Complex<f64>> {
+        &self.displacement
+    }
+
+    /// The quantity the motion was measured as.
+    pub fn measured(&self) -> Motion {
+        self.measured
+    }
+
+    /// What is known of the noise.
+    pub fn noise(&self) -> Option<&NoiseSpectrum> {
+        self.noise.as_ref()
+    }
+}
+
+pub(crate) fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), EstimateError> {
+    if left.len() != right.len() {
+        let (got, expected) = (right.len(), left.len());
+        return Err(EstimateError::Size { what: "frequencies", got, expected });
+    }
+    for (row, (&left, &right)) in left.iter().zip(right).enumerate() {
+        if (left - right).abs() > 1e-9 * left.abs() {
+            return Err(EstimateError::FrequencyMismatch { row, left, right });
+        }
+    }
+    Ok(())
+}
+
+fn check_shapes(
+    omega: &[f64],
+    force: &DMatrix<Complex<f64>>,
+    motion: &DMatrix<Complex<f64>>,
+) -> Result<(), EstimateError> {
+    if force.ncols() != motion.ncols() || motion.ncols() == 0 {
+        let (got, expected) = (motion.ncols(), force.ncols().max(1));
+        return Err(EstimateError::Size { what: "channels of the motion", got, expected });
+    }
+    for rows in [force.nrows(), motion.nrows()] {
+        if rows != omega.len() {
+            return Err(EstimateError::Size {
+                what: "rows of amplitudes",
+                got: rows,
+                expected: omega.len(),
+            });
+        }
+    }
+    if omega.is_empty() {
+        return Err(EstimateError::NoExcitedLine);
+    }
+    if let Some(&value) = omega.iter().find(|w| !(**w > 0.0 && w.is_finite())) {
+        return Err(EstimateError::Frequency { value });
+    }
+    for (what, amplitudes) in [("force amplitudes", force), ("motion amplitudes", motion)] {
+        if let Some(at) = amplitudes.iter().position(|z| !z.is_finite()) {
+            let (row, column) = (at % omega.len(), at / omega.len());
+            return Err(EstimateError::NotFinite {
+                what,
+                row,
+                column,
+                value: amplitudes[at].norm(),
+            });
+        }
+    }
+    Ok(())
+}

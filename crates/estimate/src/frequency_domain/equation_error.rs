@@ -1,0 +1,88 @@
+//! Least squares on the equation of motion, line by line.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::FrequencyData;
+use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
+
+/// Least squares on −ω²M X + iωC X + K X = F at every row, real and imaginary parts apart.
+///
+/// Exact on exact spectra, and fast: no iteration, no start values. Noise on the motion
+/// stands among the regressors, multiplied by ω and ω², and biases the answer; the standard
+/// errors do not show that bias. Use it where noise is negligible, and as the start of
+/// [`output_error`](super::output_error).
+///
+/// Parameters the lines do not excite are reported in [`Estimate::undetermined`].
+///
+/// ```
+/// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, Motion, equation_error}};
+/// use nalgebra::{Complex, DMatrix};
+///
+/// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies.
+/// let omega = vec![10.0, 20.0, 30.0];
+/// let force = DMatrix::from_element(3, 1, Complex::new(50.0, 0.0));
+/// let displacement = DMatrix::from_fn(3, 1, |row, _| {
+///     let w = omega[row];
+///     force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w)
+/// });
+/// let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)?;
+/// let found = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
+/// assert!((found.stiffness()[(0, 0)] - 5000.0).abs() < 1e-9);
+/// # Ok::<(), mechid_estimate::EstimateError>(())
+/// ```
+///
+/// # Errors
+/// [`EstimateError::NoExcitedLine`] if no row carries force, [`EstimateError::OnlyRatios`]
+/// if an equation of motion has neither force nor a known entry, and what
+/// [`EquationOfMotion::solve`] refuses.
+///
+/// # Source
+/// Dissertation eqs. (4.6.12) and (4.6.31).
+pub fn equation_error(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Result<Estimate, EstimateError> {
+    equation_rows(data)?.solve(unknowns)
+}
+
+/// The rows of [`equation_error`], to be merged with those of other data or to be solved
+/// for several sets of unknowns.
+///
+/// # Errors
+/// [`EstimateError::NoExcitedLine`] if no row carries force.
+pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateError> {
+    if data.force().iter().all(|f| *f == Complex::default()) {
+        return Err(EstimateError::NoExcitedLine);
+    }
+    let s = |row: usize| Complex::new(0.0, data.omega()[row]);
+    let x = data.displacement();
+    let velocity = real_rows(x, |row, x| s(row) * x);
+    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x);
+    let displacement = real_rows(x, |_, x| x);
+    let force = real_rows(data.force(), |_, f| f);
+    let mut rows = EquationOfMotion::new(data.dof());
+    rows.push_rows(
+        acceleration.as_view(),
+        velocity.as_view(),
+        displacement.as_view(),
+        force.as_view(),
+    )?;
+    Ok(rows)
+}
+
+/// The real parts of all rows, then the imaginary parts.
+pub(super) fn real_rows(
+    amplitudes: &DMatrix<Complex<f64>>,
+    factor: impl Fn(usize, Complex<f64>) -> Complex<f64>,
+) -> DMatrix<f64> {
+    let len = amplitudes.nrows();
+    let mut real = DMatrix::zeros(2 * len, amplitudes.ncols());
+    for (from, mut to) in amplitudes.column_iter().zip(real.column_iter_mut()) {
+        let (re, im) = to.as_mut_slice().split_at_mut(len);
+        for (row, z) in from.iter().enumerate() {
+            let z = factor(row, *z);
+            (re[row], im[row]) = (z.re, z.im);
+        }
+    }
+    real
+}

@@ -1,0 +1,201 @@
+//! Instrumental variables: another measurement of the same motion rids least squares of its bias.
+
+use mechid_model::Matrix;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::FrequencyData;
+use super::data::check_same_frequencies;
+use super::equation_error::{equation_rows, real_rows};
+use crate::estimate::Findings;
+use crate::{Estimate, EstimateError, Parameter, Unknowns};
+
+/// The equation of motion solved with two measurements of the same experiment, each the
+/// instrument of the other.
+///
+/// The normal equations ΦᵀΦ θ = Φᵀy of least squares are biased because Φ carries its noise
+/// twice; in ZᵀΦ θ = Zᵀy, with Z the same regressors from other periods, the two noises are
+/// independent. The answer is consistent, its scatter is larger than that of
+/// [`output_error`](super::output_error). Forces may be noisy too.
+///
+/// `first` and `second` must come from different periods (see
+/// [`RepeatedPeriods::halves`](super::RepeatedPeriods::halves)). The standard errors allow for
+/// an equation error of unequal size over the lines.
+///
+/// # Errors
+/// [`EstimateError::FrequencyMismatch`] or [`EstimateError::Size`] if the two are not alike,
+/// [`EstimateError::Undetermined`] if the data leave a parameter open, and what
+/// [`equation_error`](super::equation_error) refuses.
+///
+/// # Source
+/// Söderström & Stoica, *System Identification* (1989), chapter 8; White (1980), Econometrica 48,
+/// 817–838, for the covariance; proposed in section 6.2 of the dissertation.
+pub fn instrumental_variables(
+    first: &FrequencyData,
+    second: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Result<Estimate, EstimateError> {
+    check_same_frequencies(first.omega(), second.omega())?;
+    if first.dof() != second.dof() {
+        let what = "channels of the second measurement";
+        return Err(EstimateError::Size { what, expected: first.dof(), got: second.dof() });
+    }
+    // Least squares finds out what can be determined, and refuses what it must.
+    let mut rows = equation_rows(first)?;
+    rows.merge(&equation_rows(second)?)?;
+    rows.solve(unknowns)?.check_determined()?;
+    let both = [Terms::of(first), Terms::of(second)];
+    let free = unknowns.free();
+    let mut equations = Vec::new();
+    for dof in 0..first.dof() {
+        let own: Vec<Parameter> = free.iter().filter(|p| p.row() == dof).copied().collect();
+        equations.push(Equation::solve(&both, unknowns, dof, &own)?);
+    }
+    Ok(assemble(&equations, unknowns, &free))
+}
+
+/// Acceleration, velocity, displacement and force of one measurement, real and imaginary rows.
+struct Terms {
+    motions: [DMatrix<f64>; 3],
+    force: DMatrix<f64>,
+}
+
+impl Terms {
+    fn of(data: &FrequencyData) -> Self {
+        let s = |row: usize| Complex::new(0.0, data.omega()[row]);
+        let x = data.displacement();
+        Self {
+            motions: [
+                real_rows(x, |row, x| s(row) * s(row) * x),
+                real_rows(x, |row, x| s(row) * x),
+                real_rows(x, |_, x| x),
+            ],
+            force: real_rows(data.force(), |_, f| f),
+        }
+    }
+
+    fn regressors(&self, own: &[Parameter]) -> DMatrix<f64> {
+        let mut regressors = DMatrix::zeros(self.force.nrows(), own.len());
+        for (mut column, p) in regressors.column_iter_mut().zip(own) {
+            column.copy_from(&self.motions[p.matrix() as usize].column(p.column()));
+        }
+        regressors
+    }
+
+    /// The force less what known entries account for.
+    fn target(&self, unknowns: &Unknowns, dof: usize) -> DVector<f64> {
+        let mut target = self.force.column(dof).into_owned();
+        for matrix in [Matrix::Mass, Matrix::Damping, Matrix::Stiffness] {
+            for column in 0..self.force.ncols() {
+                if let Some(value) = unknowns.fixed(matrix, dof, column) {
+                    target.axpy(-value, &self.motions[matrix as usize].column(column), 1.0);
+                }
+            }
+        }
+        target
+    }
+}
+
+/// One equation of motion, solved.
+struct Equation {
+    own: Vec<Parameter>,
+    values: DVector<f64>,
+    /// Change of the values per change of the right-hand side, times the residual: one
+    /// column per row of the equations.
+    scores: DMatrix<f64>,
+    rows: usize,
+    residual_nrmse: f64,
+    condition: f64,
+}
+
+impl Equation {
+    fn solve(
+        [first, second]: &[Terms; 2],
+        unknowns: &Unknowns,
+        dof: usize,
+        own: &[Parameter],
+    ) -> Result<Self, EstimateError> {
+        let regressors = stack(&first.regressors(own), &second.regressors(own));
+        let instruments = stack(&second.regressors(own), &first.regressors(own));
+        let (upper, lower) = (first.target(unknowns, dof), second.target(unknowns, dof));
+        let target =
+            DVector::from_iterator(regressors.nrows(), upper.iter().chain(lower.iter()).copied());
+        let scale: Vec<f64> = regressors.column_iter().map(|c| c.norm()).collect();
+        let scaled = |mut m: DMatrix<f64>| {
+            m.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
+            m
+        };
+        // Zᵀ = RᵀQᵀ, and R drops out of ZᵀΦ θ = Zᵀy: no product of ill-scaled matrices.
+        let q = scaled(instruments).qr().q();
+        let projected = q.tr_mul(&scaled(regressors.clone()));
+        let singular_values = projected.singular_values();
+        let solver = projected.lu().solve(&q.transpose()).ok_or_else(|| open(own))?;
+        let mut influence = solver;
+        influence.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row /= *s);
+        let values = &influence * &target;
+        if values.iter().any(|v| !v.is_finite()) {
+            return Err(open(own));
+        }
+        let residual = &target - &regressors * &values;
+        let mut scores = influence;
+        scores.column_iter_mut().zip(residual.iter()).for_each(|(mut c, e)| c *= *e);
+        Ok(Self {
+            own: own.to_vec(),
+            values,
+            scores,
+            rows: target.len(),
+            residual_nrmse: residual.norm() / target.norm(),
+            condition: if own.is_empty() {
+                1.0
+            } else {
+                singular_values.max() / singular_values.min()
+            },
+        })
+    }
+
+    /// The two measurements together have as many independent rows, less the unknowns.
+    fn degrees_of_freedom(&self) -> usize {
+        self.rows.saturating_sub(self.own.len())
+    }
+}
+
+fn open(own: &[Parameter]) -> EstimateError {
+    let names: Vec<String> = own.iter().map(Parameter::to_string).collect();
+    EstimateError::Undetermined {
+        parameters: names.join(", "),
+        directions: "the two measurements have nothing in common".to_owned(),
+    }
+}
+
+fn stack(upper: &DMatrix<f64>, lower: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut both = DMatrix::zeros(upper.nrows() + lower.nrows(), upper.ncols());
+    both.rows_mut(0, upper.nrows()).copy_from(upper);
+    both.rows_mut(upper.nrows(), lower.nrows()).copy_from(lower);
+    both
+}
+
+fn assemble(equations: &[Equation], unknowns: &Unknowns, free: &[Parameter]) -> Estimate {
+    let places: Vec<(&Equation, usize)> = free
+        .iter()
+        .map(|p| {
+            let equation = &equations[p.row()];
+            let at = equation.own.iter().position(|own| own == p).expect("its own equation");
+            (equation, at)
+        })
+        .collect();
+    let covariance = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+        let ((left, p), (right, q)) = (places[i], places[j]);
+        let spare = (left.degrees_of_freedom() * right.degrees_of_freedom()) as f64;
+        let correction = left.rows as f64 / spare.sqrt();
+        correction * left.scores.row(p).dot(&right.scores.row(q))
+    });
+    let solved = equations.iter().filter(|e| !e.own.is_empty());
+    Estimate::new(Findings {
+        unknowns: unknowns.clone(),
+        values: places.iter().map(|(equation, at)| equation.values[*at]).collect(),
+        covariance,
+        degrees_of_freedom: solved.clone().map(Equation::degrees_of_freedom).min().unwrap_or(0),
+        residual_nrmse: equations.iter().map(|e| e.residual_nrmse).collect(),
+        condition: solved.map(|e| e.condition).fold(1.0, f64::max),
+        undetermined: Vec::new(),
+    })
+}

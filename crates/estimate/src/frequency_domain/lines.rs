@@ -1,0 +1,189 @@
+//! Chosen spectral lines of whole periods, with the transform prepared once.
+
+use std::fmt;
+use std::sync::Arc;
+
+use mechid_signal::{Record, Sampling};
+use nalgebra::{Complex, DMatrix};
+use realfft::{RealFftPlanner, RealToComplex};
+
+use crate::EstimateError;
+
+/// Spectral lines to be read from records of one sampling, the transform planned once.
+///
+/// Line n stands at n·ω0 of the record. Line 0 (the mean) and, for an even
+/// length, the line at half the sampling rate carry no phase and cannot be chosen.
+#[derive(Clone)]
+pub struct Lines {
+    sampling: Sampling,
+    lines: Vec<usize>,
+    plan: Arc<dyn RealToComplex<f64>>,
+}
+
+impl fmt::Debug for Lines {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lines")
+            .field("sampling", &self.sampling)
+            .field("lines", &self.lines)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Lines {
+    /// The given lines of records of this sampling, in the given order.
+    ///
+    /// # Errors
+    /// [`EstimateError::NoExcitedLine`] if none is given, [`EstimateError::LineOutOfRange`]
+    /// for a line that does not exist or carries no phase.
+    pub fn new(
+        sampling: Sampling,
+        lines: impl IntoIterator<Item = usize>,
+    ) -> Result<Self, EstimateError> {
+        let last = last_line(sampling);
+        let lines: Vec<usize> = lines.into_iter().collect();
+        if lines.is_empty() {
+            return Err(EstimateError::NoExcitedLine);
+        }
+        if let Some(&line) = lines.iter().find(|&&line| line == 0 || line > last) {
+            return Err(EstimateError::LineOutOfRange { line, last });
+        }
+        let plan = RealFftPlanner::new().plan_fft_forward(sampling.len());
+        Ok(Self { sampling, lines, plan })
+    }
+
+    /// The lines where at least one force channel has an amplitude of `threshold` times
+    /// its largest one or more.
+    ///
+    /// A multisine stands far above the noise between its lines: 0.1 separates them.
+    ///
+    /// # Errors
+    /// [`EstimateError::NoExcitedLine`] if the force is zero on all usable lines.
+    pub fn excited(force: &Record, threshold: f64) -> Result<Self, EstimateError> {
+        let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
+        let amplitudes = all.read(force)?.map(|z| z.norm());
+        let largest: Vec<f64> = amplitudes.column_iter().map(|c| c.max()).collect();
+        let lines: Vec<usize> = amplitudes
+            .row_iter()
+            .enumerate()
+            .filter(|(_, row)| {
+                row.iter().zip(&largest).any(|(a, max)| *max > 0.0 && *a >= threshold * max)
+            })
+            .map(|(n, _)| n + 1)
+            .collect();
+        if lines.is_empty() {
+            return Err(EstimateError::NoExcitedLine);
+        }
+        Ok(Self { lines, ..all })
+    }
+
+    /// The time axis of the records these lines are read from.
+    pub fn sampling(&self) -> Sampling {
+        self.sampling
+    }
+
+    /// The chosen lines, in the order they were chosen.
+    pub fn as_slice(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// Angular frequencies of the chosen lines, in rad/s.
+    pub fn omega(&self) -> Vec<f64> {
+        let omega0 = self.sampling.omega0();
+        self.lines.iter().map(|&n| n as f64 * omega0).collect()
+    }
+
+    /// Complex amplitudes of a record at these lines: lines × channels,
+    /// scaled as in [`mechid_signal::spectrum`].
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] if the record has another time axis.
+    pub fn read(&self, record: &Record) -> Result<DMatrix<Complex<f64>>, EstimateError> {
+        check_sampling(self.sampling, record.sampling())?;
+        Ok(self.read_window(record, 0))
+    }
+
+    /// As [`Lines::read`], from the samples starting at `start` of a longer record.
+    pub(crate) fn read_window(&self, record: &Record, start: usize) -> DMatrix<Complex<f64>> {
+        let len = self.sampling.len();
+        let scale = 2.0 / len as f64;
+        let (mut input, mut output) = (self.plan.make_input_vec(), self.plan.make_output_vec());
+        let mut scratch = self.plan.make_scratch_vec();
+        let mut amplitudes = DMatrix::zeros(self.lines.len(), record.channels());
+        for (channel, mut column) in amplitudes.column_iter_mut().enumerate() {
+            input.copy_from_slice(&record.channel(channel)[start..start + len]);
+            self.plan
+                .process_with_scratch(&mut input, &mut output, &mut scratch)
+                .expect("buffers come from the plan");
+            for (z, &line) in column.iter_mut().zip(&self.lines) {
+                *z = output[line] * scale;
+            }
+        }
+        amplitudes
+    }
+}
+
+/// The last line below half the sampling rate.
+fn last_line(sampling: Sampling) -> usize {
+    (sampling.len() - 1) / 2
+}
+
+pub(crate) fn check_sampling(left: Sampling, right: Sampling) -> Result<(), EstimateError> {
+    // Steps read from files differ by rounding.
+    if left.len() == right.len() && (left.dt() - right.dt()).abs() <= 1e-9 * left.dt() {
+        return Ok(());
+    }
+    Err(mechid_signal::SignalError::SamplingMismatch {
+        left_len: left.len(),
+        left_dt: left.dt(),
+        right_len: right.len(),
+        right_dt: right.dt(),
+    }
+    .into())
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::Spectrum;
+
+    use super::*;
+
+    fn record(len: usize) -> Record {
+        let sampling = Sampling::new(0.01, len).unwrap();
+        let omega0 = sampling.omega0();
+        let x = sampling
+            .times()
+            .map(|t| 2.0 + (2.0 * omega0 * t).cos() - 3.0 * (3.0 * omega0 * t).sin())
+            .collect();
+        Record::from_channel(sampling, x).unwrap()
+    }
+
+    #[test]
+    fn chosen_lines_are_those_of_the_whole_spectrum() {
+        for len in [15, 16] {
+            let r = record(len);
+            let lines = Lines::new(r.sampling(), [3, 1, 7]).unwrap();
+            let (read, all) = (lines.read(&r).unwrap(), Spectrum::of(&r));
+            for (row, &n) in lines.as_slice().iter().enumerate() {
+                assert!((read[(row, 0)] - all.line(n, 0)).norm() < 1e-14);
+            }
+        }
+    }
+
+    #[test]
+    fn only_lines_with_a_phase_can_be_chosen() {
+        let s = Sampling::new(0.01, 16).unwrap();
+        for line in [0, 8, 99] {
+            let e = Lines::new(s, [1, line]).unwrap_err();
+            assert_eq!(e, EstimateError::LineOutOfRange { line, last: 7 });
+        }
+        assert_eq!(Lines::new(s, []).unwrap_err(), EstimateError::NoExcitedLine);
+    }
+
+    #[test]
+    fn excited_lines_are_found() {
+        assert_eq!(Lines::excited(&record(16), 0.1).unwrap().as_slice(), [2, 3]);
+        assert_eq!(Lines::excited(&record(16), 0.5).unwrap().as_slice(), [3]);
+        let still = Record::from_channel(Sampling::new(0.1, 8).unwrap(), vec![1.0; 8]).unwrap();
+        assert_eq!(Lines::excited(&still, 0.1).unwrap_err(), EstimateError::NoExcitedLine);
+    }
+}

@@ -1,0 +1,214 @@
+//! The covariance of measurement noise, frequency by frequency.
+
+use mechid_signal::Sampling;
+use nalgebra::{Complex, DMatrix};
+
+use crate::EstimateError;
+use crate::frequency_domain::Motion;
+
+/// Over which lines a noise covariance is averaged.
+///
+/// A covariance of few periods is itself uncertain, and an estimator weighted with it
+/// loses by that. Noise spectra are smooth, so neighbouring lines may share theirs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pooling {
+    /// Every line has its own covariance: from about 8 periods on.
+    PerLine,
+    /// Every line takes the mean of the covariances of this many chosen lines to either side.
+    Neighbours(usize),
+    /// One covariance for all lines: white noise in the quantity measured.
+    AllLines,
+}
+
+/// Covariance of the measured displacement and force amplitudes, one matrix per row of data.
+///
+/// For every row the Hermitian 2n×2n matrix E[z zᴴ] with z = (ΔX₁ … ΔXₙ, ΔF₁ … ΔFₙ),
+/// in m², m·N and N², of one-sided amplitudes scaled as in [`mechid_signal::spectrum`].
+/// The noise is circular: real and imaginary part are independent and equally large.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NoiseSpectrum {
+    omega: Vec<f64>,
+    covariance: Vec<DMatrix<Complex<f64>>>,
+    degrees_of_freedom: f64,
+    total_degrees_of_freedom: f64,
+}
+
+impl NoiseSpectrum {
+    /// A known covariance per row, at `omega` (rad/s).
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if there is not one matrix per frequency,
+    /// [`EstimateError::Size`] if they are not square of one even size,
+    /// [`EstimateError::NoiseVariance`] if a variance is negative or not finite.
+    pub fn new(
+        omega: Vec<f64>,
+        covariance: Vec<DMatrix<Complex<f64>>>,
+    ) -> Result<Self, EstimateError> {
+        if covariance.len() != omega.len() || omega.is_empty() {
+            let (got, expected) = (covariance.len(), omega.len().max(1));
+            return Err(EstimateError::Size { what: "noise covariances", got, expected });
+        }
+        let size = covariance[0].nrows();
+        let expected = 2 * size.div_ceil(2).max(1);
+        for (row, c) in covariance.iter().enumerate() {
+            if let Some(&got) = [c.nrows(), c.ncols()].iter().find(|s| **s != expected) {
+                return Err(EstimateError::Size {
+                    what: "rows or columns of a noise covariance",
+                    got,
+                    expected,
+                });
+            }
+            let bad = |v: &Complex<f64>| !(v.re >= 0.0 && v.re.is_finite());
+            if let Some(column) = c.diagonal().iter().position(bad) {
+                let value = c[(column, column)].re;
+                return Err(EstimateError::NoiseVariance { row, column, value });
+            }
+        }
+        let known = f64::INFINITY;
+        Ok(Self { omega, covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
+    }
+
+    /// White noise of known standard deviation on the samples of every motion channel (in
+    /// the unit measured) and force channel (N), as it stands on spectral lines of one
+    /// period: E|X_n|² = 4 s²/N. For the mean of P periods divide both by √P.
+    ///
+    /// # Errors
+    /// As [`NoiseSpectrum::new`].
+    pub fn white(
+        sampling: Sampling,
+        lines: &[usize],
+        measured: Motion,
+        motion_deviation: &[f64],
+        force_deviation: &[f64],
+    ) -> Result<Self, EstimateError> {
+        let scale = 4.0 / sampling.len() as f64;
+        let diagonal: Vec<_> = motion_deviation
+            .iter()
+            .chain(force_deviation)
+            .map(|s| Complex::new(scale * s * s, 0.0))
+            .collect();
+        let one = DMatrix::from_diagonal(&diagonal.into());
+        let omega: Vec<f64> = lines.iter().map(|&n| n as f64 * sampling.omega0()).collect();
+        let mut covariance = vec![one; lines.len()];
+        to_displacement(&omega, &mut covariance, measured);
+        Self::new(omega, covariance)
+    }
+
+    /// From sample covariances of the quantity measured, each of `degrees_of_freedom`.
+    pub(crate) fn of_measured(
+        omega: &[f64],
+        covariance: Vec<DMatrix<Complex<f64>>>,
+        measured: Motion,
+        degrees_of_freedom: usize,
+        pooling: Pooling,
+    ) -> Result<Self, EstimateError> {
+        let (mut covariance, pooled) = pool(covariance, pooling);
+        to_displacement(omega, &mut covariance, measured);
+        let total_degrees_of_freedom = (degrees_of_freedom * omega.len()) as f64;
+        let degrees_of_freedom = (degrees_of_freedom * pooled) as f64;
+        let known = Self::new(omega.to_vec(), covariance)?;
+        Ok(Self { degrees_of_freedom, total_degrees_of_freedom, ..known })
+    }
+
+    /// The same noise with the force taken as known exactly.
+    pub fn with_exact_force(mut self) -> Self {
+        let n = self.dof();
+        for c in &mut self.covariance {
+            c.rows_mut(n, n).fill(Complex::default());
+            c.columns_mut(n, n).fill(Complex::default());
+        }
+        self
+    }
+
+    /// Degrees of freedom n of the system; the matrices are 2n×2n.
+    pub fn dof(&self) -> usize {
+        self.covariance[0].nrows() / 2
+    }
+
+    /// Angular frequency of every row, in rad/s.
+    pub fn omega(&self) -> &[f64] {
+        &self.omega
+    }
+
+    /// E[z zᴴ] of a row, 2n×2n: displacements first, then forces.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn covariance(&self, row: usize) -> &DMatrix<Complex<f64>> {
+        &self.covariance[row]
+    }
+
+    /// How many independent complex deviations each covariance was averaged from;
+    /// infinite for known noise.
+    pub fn degrees_of_freedom(&self) -> f64 {
+        self.degrees_of_freedom
+    }
+
+    /// Whether any force is noisy.
+    pub fn has_force(&self) -> bool {
+        let n = self.dof();
+        self.covariance.iter().any(|c| (n..2 * n).any(|i| c[(i, i)].re > 0.0))
+    }
+
+    /// Degrees of freedom of a variance averaged over all rows, for Student's t; known noise
+    /// has as many as make it the normal distribution.
+    pub(crate) fn total_degrees_of_freedom(&self) -> usize {
+        // Real and imaginary deviations both count.
+        (2.0 * self.total_degrees_of_freedom).min(1e6) as usize
+    }
+
+    /// E[Ŝ⁻¹] S of a sample covariance Ŝ of `channels` channels: ν/(ν − n).
+    pub(crate) fn mean_inverse_ratio(&self, channels: usize) -> f64 {
+        let nu = self.degrees_of_freedom;
+        if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
+    }
+
+    /// Rows of `self`, then those of `other`: the noise of two experiments.
+    pub(crate) fn chain(&self, other: &Self) -> Self {
+        Self {
+            omega: [&self.omega[..], &other.omega].concat(),
+            covariance: [&self.covariance[..], &other.covariance].concat(),
+            // The more uncertain of the two decides how far the weights can be trusted.
+            degrees_of_freedom: self.degrees_of_freedom.min(other.degrees_of_freedom),
+            total_degrees_of_freedom: self.total_degrees_of_freedom
+                + other.total_degrees_of_freedom,
+        }
+    }
+}
+
+/// Mean covariances, and how many lines the least averaged of them is made of.
+fn pool(
+    covariance: Vec<DMatrix<Complex<f64>>>,
+    pooling: Pooling,
+) -> (Vec<DMatrix<Complex<f64>>>, usize) {
+    let len = covariance.len();
+    let half_width = match pooling {
+        Pooling::PerLine => return (covariance, 1),
+        Pooling::Neighbours(half_width) => half_width.min(len),
+        Pooling::AllLines => len,
+    };
+    let window = |row: usize| row.saturating_sub(half_width)..(row + half_width + 1).min(len);
+    let mean = |range: std::ops::Range<usize>| {
+        let count = range.len() as f64;
+        let mut sum = covariance[range.start].clone();
+        covariance[range.start + 1..range.end].iter().for_each(|c| sum += c);
+        sum.unscale(count)
+    };
+    if half_width == len {
+        return (vec![mean(0..len); len], len);
+    }
+    ((0..len).map(|row| mean(window(row))).collect(), window(0).len())
+}
+
+/// Turns covariances of the quantity measured into covariances of displacement.
+fn to_displacement(omega: &[f64], covariance: &mut [DMatrix<Complex<f64>>], measured: Motion) {
+    if measured == Motion::Displacement {
+        return;
+    }
+    for (c, &w) in covariance.iter_mut().zip(omega) {
+        let n = c.nrows() / 2;
+        let factor = measured.per_displacement(w).inv();
+        c.rows_mut(0, n).apply(|v| *v *= factor);
+        c.columns_mut(0, n).apply(|v| *v *= factor.conj());
+    }
+}

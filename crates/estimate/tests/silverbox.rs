@@ -1,0 +1,59 @@
+//! A measured oscillator: the Schroeder record of the Silverbox benchmark.
+//!
+//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear
+//! system identification", ECC 2013. The data stand beside the project, not in it; without
+//! them this test says so and passes.
+
+use std::path::Path;
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::{
+    FrequencyData, Lines, Motion, equation_error, output_error,
+};
+use mechid_signal::{Record, Sampling};
+
+/// Force (first channel) and displacement (second) of the whole record, in volts.
+fn whole_record() -> Option<Record> {
+    let place = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/data/silverbox/Schroeder80mV.csv");
+    let text = std::fs::read_to_string(place).ok()?;
+    let mut channels = [Vec::new(), Vec::new()];
+    for row in text.lines().skip(1).filter(|row| !row.is_empty()) {
+        let fields: Vec<&str> = row.split(',').collect();
+        for (channel, field) in channels.iter_mut().zip(&fields[2..4]) {
+            channel.push(field.trim().parse().expect("a voltage"));
+        }
+    }
+    let sampling = Sampling::from_rate_hz(1e7 / 16384.0, channels[0].len()).unwrap();
+    Some(Record::from_channels(sampling, &channels).unwrap())
+}
+
+#[test]
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
+fn the_measured_oscillator_has_its_known_frequency_and_damping() {
+    let Some(record) = whole_record() else {
+        eprintln!("skipped: the Silverbox record is not beside the project");
+        return;
+    };
+    // One period after a steady run-in; the sensors' offset is that of the whole record.
+    let period = record.without_mean().window(10584, 1024).unwrap();
+    let channel =
+        |c: usize| Record::from_channel(period.sampling(), period.channel(c).to_vec()).unwrap();
+    let (force, motion) = (channel(0), channel(1));
+    let odd: Vec<usize> = (1..=335).step_by(2).collect();
+    assert_eq!(Lines::excited(&force, 0.1).unwrap().as_slice(), odd);
+    let data = FrequencyData::from_records(&force, &motion, Motion::Displacement, odd).unwrap();
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let found = equation_error(&data, &unknowns).unwrap().system().unwrap();
+    let mode = &found.modes().unwrap()[0];
+    let natural_hz = mode.natural_frequency() / std::f64::consts::TAU;
+    // The published benchmark values with the digits they are given in.
+    assert!((natural_hz - 72.38).abs() < 0.05, "{natural_hz} Hz");
+    assert!((mode.damping_ratio() - 0.0471).abs() < 0.0005, "ζ = {}", mode.damping_ratio());
+
+    // Maximum likelihood weighs the cubic spring's remainder differently: close, not equal.
+    let likely = output_error(&data, &unknowns).unwrap().estimate.system().unwrap();
+    let mode = &likely.modes().unwrap()[0];
+    let natural_hz = mode.natural_frequency() / std::f64::consts::TAU;
+    assert!((natural_hz - 72.38).abs() < 2.0, "{natural_hz} Hz");
+}
