@@ -25,6 +25,7 @@ mod multisine;
 pub mod noise;
 pub mod phases;
 mod record;
+pub mod resample;
 mod sampling;
 pub mod spectrum;
 
@@ -34,5 +35,6 @@ pub use multisine::Multisine;
 pub use noise::NoiseLevel;
 pub use phases::Phases;
 pub use record::Record;
+pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;

@@ -1,0 +1,30 @@
+//! Interpolation of a period by its Fourier series.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::{Record, Sampling, Spectrum};
+
+/// Re Σ X_n exp(i n ω0 t), by Horner's rule.
+pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
+    let turn = (t / spectrum.sampling().duration()).fract() * TAU;
+    let z = Complex::from_polar(1.0, turn);
+    let lines = spectrum.lines().column(channel);
+    lines.iter().rev().fold(Complex::from(0.0), |sum, x| sum * z + x).re
+}
+
+/// The same period with at least as many samples, by a longer inverse transform; `None` if the
+/// new time axis is not that.
+pub(super) fn same_period(spectrum: &Spectrum, sampling: Sampling) -> Option<Record> {
+    let duration = spectrum.sampling().duration();
+    let same = (sampling.duration() - duration).abs() <= 1e-12 * duration;
+    if !same || sampling.len() < spectrum.sampling().len() {
+        return None;
+    }
+    // One-sided amplitudes do not depend on the number of samples: the old Nyquist line is a
+    // cosine like any other on the finer axis.
+    let mut lines = DMatrix::zeros(sampling.lines(), spectrum.channels());
+    lines.rows_mut(0, spectrum.len()).copy_from(spectrum.lines());
+    Some(Spectrum::from_lines(sampling, lines).to_record())
+}

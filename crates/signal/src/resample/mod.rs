@@ -1,0 +1,190 @@
+//! Values between the samples of a record.
+//!
+//! | [`Interpolation`] | Exact for | Use |
+//! |---|---|---|
+//! | `Linear` | straight lines | never overshoots; damps high lines |
+//! | `NaturalSpline` | straight lines | smooth; no bending at the ends |
+//! | `NotAKnotSpline` | cubics | smooth; the best of the splines at the ends |
+//! | `Pchip` | straight lines | monotone where the samples are; no overshoot at steps |
+//! | `BandLimited` | one period of anything below Nyquist | multisines and their responses |
+//!
+//! ```
+//! use mechid_signal::{Interpolation, Interpolator, Multisine, Phases, Sampling};
+//!
+//! let sampling = Sampling::new(0.01, 64)?;
+//! let force = Multisine::flat(1..=31, 1.0, Phases::Schroeder)?;
+//! let record = force.sample(sampling)?;
+//! // Half-way between two samples, as a Runge-Kutta stage asks for it.
+//! let exact = force.value(0.105, sampling.omega0());
+//! let of = |method| Interpolator::new(&record, method)?.value(0.105, 0);
+//! assert!((of(Interpolation::BandLimited)? - exact).abs() < 1e-12);
+//! assert!((of(Interpolation::Linear)? - exact).abs() > 1e-3);
+//! # Ok::<(), mechid_signal::SignalError>(())
+//! ```
+//!
+//! # Source
+//! Dissertation section 6.2 and Appendix B.
+
+mod fourier;
+mod pchip;
+mod spline;
+
+use nalgebra::DMatrix;
+
+use crate::{Record, Sampling, SignalError, Spectrum};
+
+/// A way to find values between samples; compared in the [module documentation](self).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Straight lines from sample to sample.
+    Linear,
+    /// Cubic spline with no second derivative at the two ends.
+    NaturalSpline,
+    /// Cubic spline whose two outermost intervals share one cubic at each end.
+    NotAKnotSpline,
+    /// Piecewise cubic Hermite interpolation with monotone pieces (Fritsch and Butland).
+    Pchip,
+    /// The Fourier series of the record taken as one whole period.
+    BandLimited,
+}
+
+/// A record made ready to be asked for values between its samples.
+#[derive(Debug, Clone)]
+pub struct Interpolator {
+    sampling: Sampling,
+    pieces: Pieces,
+}
+
+/// What the values are computed from.
+#[derive(Debug, Clone)]
+enum Pieces {
+    Linear(DMatrix<f64>),
+    /// Samples and slopes per sampling step.
+    Hermite(DMatrix<f64>, DMatrix<f64>),
+    Fourier(Spectrum),
+}
+
+impl Interpolator {
+    /// Prepares a record: slopes of a spline, or the spectrum, are found once.
+    ///
+    /// # Errors
+    /// [`SignalError::TooFew`] for a record of a single sample, unless it is a period.
+    pub fn new(record: &Record, method: Interpolation) -> Result<Self, SignalError> {
+        let sampling = record.sampling();
+        if method != Interpolation::BandLimited && record.len() < 2 {
+            let got = record.len();
+            return Err(SignalError::TooFew { what: "interpolation", least: 2, got });
+        }
+        let hermite = |slopes: fn(&[f64]) -> Vec<f64>| {
+            let columns = (0..record.channels()).flat_map(|c| slopes(record.channel(c)));
+            let slopes = DMatrix::from_iterator(record.len(), record.channels(), columns);
+            Pieces::Hermite(record.data().clone(), slopes)
+        };
+        let pieces = match method {
+            Interpolation::Linear => Pieces::Linear(record.data().clone()),
+            Interpolation::NaturalSpline => hermite(spline::natural),
+            Interpolation::NotAKnotSpline => hermite(spline::not_a_knot),
+            Interpolation::Pchip => hermite(pchip::slopes),
+            Interpolation::BandLimited => Pieces::Fourier(Spectrum::of(record)),
+        };
+        Ok(Self { sampling, pieces })
+    }
+
+    /// The value of a channel at `t` seconds.
+    ///
+    /// # Errors
+    /// [`SignalError::Range`] if `t` is not between the first and the last sample; a period goes
+    /// on forever, so that [`Interpolation::BandLimited`] only asks for a finite `t`.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    pub fn value(&self, t: f64, channel: usize) -> Result<f64, SignalError> {
+        match &self.pieces {
+            Pieces::Fourier(spectrum) => {
+                crate::error::finite("time", t)?;
+                Ok(fourier::value(spectrum, channel, t))
+            }
+            Pieces::Linear(y) => {
+                let (k, u) = self.place(t)?;
+                Ok((1.0 - u) * y[(k, channel)] + u * y[(k + 1, channel)])
+            }
+            Pieces::Hermite(y, d) => {
+                let (k, u) = self.place(t)?;
+                let at = |k| (y[(k, channel)], d[(k, channel)]);
+                Ok(hermite(at(k), at(k + 1), u))
+            }
+        }
+    }
+
+    /// The interval `t` lies in and how far, from 0 to 1.
+    fn place(&self, t: f64) -> Result<(usize, f64), SignalError> {
+        let last = self.sampling.len() - 1;
+        let steps = t / self.sampling.dt();
+        // An instant meant to be the last sample must not be lost to rounding.
+        let slack = 1e-9 * (1.0 + last as f64);
+        if !(steps >= -slack && steps <= last as f64 + slack) {
+            let high = self.sampling.time(last);
+            return Err(SignalError::Range { what: "time", value: t, low: 0.0, high });
+        }
+        let k = (steps.max(0.0).floor() as usize).min(last - 1);
+        Ok((k, steps - k as f64))
+    }
+}
+
+/// The cubic through two values with two slopes, `u` of the way along a unit interval.
+fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
+    let secant = y1 - y0;
+    let (c2, c3) = (3.0 * secant - 2.0 * d0 - d1, d0 + d1 - 2.0 * secant);
+    y0 + u * (d0 + u * (c2 + u * c3))
+}
+
+/// The record at the instants of another time axis, both beginning at t = 0.
+///
+/// Nothing is filtered: with a longer step, what lies above the new Nyquist frequency folds back,
+/// as it does when a signal is sampled.
+///
+/// # Errors
+/// As [`Interpolator::new`] and [`Interpolator::value`].
+pub fn resample(
+    record: &Record,
+    sampling: Sampling,
+    method: Interpolation,
+) -> Result<Record, SignalError> {
+    let interpolator = Interpolator::new(record, method)?;
+    if let Pieces::Fourier(spectrum) = &interpolator.pieces
+        && let Some(resampled) = fourier::same_period(spectrum, sampling)
+    {
+        return Ok(resampled);
+    }
+    let mut data = DMatrix::zeros(sampling.len(), record.channels());
+    for (channel, mut column) in data.column_iter_mut().enumerate() {
+        for (x, t) in column.iter_mut().zip(sampling.times()) {
+            *x = interpolator.value(t, channel)?;
+        }
+    }
+    Record::new(sampling, data)
+}
+
+/// The record with `factor − 1` further instants in every interval.
+///
+/// A period keeps its duration and has `factor` times as many samples; any other record ends with
+/// its last sample.
+///
+/// # Errors
+/// As [`Interpolator::new`], and [`SignalError::TooFew`] if `factor` is 0.
+pub fn refine(
+    record: &Record,
+    factor: usize,
+    method: Interpolation,
+) -> Result<Record, SignalError> {
+    if factor == 0 {
+        let what = "refining, in steps per interval,";
+        return Err(SignalError::TooFew { what, least: 1, got: 0 });
+    }
+    let intervals = match method {
+        Interpolation::BandLimited => record.len().saturating_mul(factor),
+        _ => (record.len() - 1).saturating_mul(factor) + 1,
+    };
+    let sampling = Sampling::new(record.sampling().dt() / factor as f64, intervals)?;
+    resample(record, sampling, method)
+}
