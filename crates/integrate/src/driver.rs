@@ -1,0 +1,121 @@
+//! Integration from given initial values.
+
+use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+
+use crate::force::ForceTable;
+use crate::run::{Motion, Run};
+use crate::scheme::check_finite;
+use crate::{IntegrateError, SampledForce, Scheme};
+
+/// The motion of `system` from `initial` under a sampled force (samples × n, in N).
+///
+/// Displacement, velocity and acceleration belong to the same instants as the samples of the
+/// force, the first of them to t = 0.
+///
+/// # Errors
+/// Those of [`Scheme::prepare`]; [`IntegrateError::Components`] if force or initial values do not
+/// fit the system; [`IntegrateError::MidStepMissing`]; [`IntegrateError::NotAtRest`];
+/// [`IntegrateError::Overflow`].
+pub fn integrate<'a>(
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+    force: impl Into<SampledForce<'a>>,
+    initial: &InitialState,
+) -> Result<Response, IntegrateError> {
+    let table = ForceTable::ending(scheme, system.dof(), force.into())?;
+    run(scheme, system, &table, initial)
+}
+
+/// The motion of `system` from `initial` under a force given as a function of time:
+/// `force(t, f)` writes the n components at t (s) into `f` (N).
+///
+/// Every scheme gets the function's values at the instants where it looks at the force.
+///
+/// # Errors
+/// Those of [`integrate`]; [`IntegrateError::NotFinite`] if the function yields a NaN or infinity.
+pub fn integrate_function(
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+    sampling: Sampling,
+    initial: &InitialState,
+    mut force: impl FnMut(f64, &mut [f64]),
+) -> Result<Response, IntegrateError> {
+    let sampled = Sampled::of(scheme, system.dof(), sampling, &mut force)?;
+    let mut next = vec![0.0; system.dof()];
+    let end = sampling.duration();
+    force(end, &mut next);
+    check_finite("the force", &next, end)?;
+    let table = ForceTable::ending(scheme, system.dof(), sampled.force())?.continued(next);
+    run(scheme, system, &table, initial)
+}
+
+/// A function of time sampled where a scheme needs it.
+pub(crate) struct Sampled {
+    samples: Record,
+    middle: Option<Record>,
+}
+
+impl Sampled {
+    pub(crate) fn of(
+        scheme: &dyn Scheme,
+        dof: usize,
+        sampling: Sampling,
+        force: &mut impl FnMut(f64, &mut [f64]),
+    ) -> Result<Self, IntegrateError> {
+        let samples = sample(dof, sampling, 0.0, force)?;
+        let middle = if scheme.needs_mid_step_force() {
+            Some(sample(dof, sampling, 0.5, force)?)
+        } else {
+            None
+        };
+        Ok(Self { samples, middle })
+    }
+
+    pub(crate) fn force(&self) -> SampledForce<'_> {
+        match &self.middle {
+            None => SampledForce::from(&self.samples),
+            Some(middle) => SampledForce::with_mid_step(&self.samples, middle),
+        }
+    }
+}
+
+/// The force at t = (k + `shift`) Δt.
+fn sample(
+    dof: usize,
+    sampling: Sampling,
+    shift: f64,
+    force: &mut impl FnMut(f64, &mut [f64]),
+) -> Result<Record, IntegrateError> {
+    let mut data = DMatrix::zeros(sampling.len(), dof);
+    let mut row = vec![0.0; dof];
+    for k in 0..sampling.len() {
+        let time = (k as f64 + shift) * sampling.dt();
+        force(time, &mut row);
+        check_finite("the force", &row, time)?;
+        data.row_mut(k).iter_mut().zip(&row).for_each(|(entry, f)| *entry = *f);
+    }
+    Ok(Record::new(sampling, data)?)
+}
+
+fn run(
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+    table: &ForceTable<'_>,
+    initial: &InitialState,
+) -> Result<Response, IntegrateError> {
+    let dof = system.dof();
+    initial.check_dof(dof)?;
+    let sampling = table.sampling();
+    let mut run = Run::new(scheme.prepare(system, sampling.dt())?);
+    let first = run.stepper().first();
+    let mut motions = vec![vec![0.0; 3 * dof]; first + 1];
+    run.start(initial, &table.early(first), &mut motions)?;
+    let mut motion = Motion::zeros(sampling.len(), dof);
+    for (k, values) in motions.iter().enumerate().take(sampling.len()) {
+        motion.set(k, values);
+    }
+    run.advance(table, first, (sampling.len() - 1).max(first), &mut motion);
+    motion.into_response(table)
+}

@@ -1,0 +1,152 @@
+//! What can be wrong with an integration.
+
+/// An integration that cannot be set up or carried out; every variant carries the offending numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum IntegrateError {
+    /// The time step is not a positive finite number of seconds.
+    #[error("time step must be positive and finite, got {dt} s")]
+    TimeStep {
+        /// The step given, in seconds.
+        dt: f64,
+    },
+    /// A parameter of a scheme lies outside its range.
+    #[error("{scheme}: {parameter} must lie between {least} and {most}, got {value}")]
+    Parameter {
+        /// Which scheme.
+        scheme: &'static str,
+        /// Which parameter.
+        parameter: &'static str,
+        /// Smallest value allowed.
+        least: f64,
+        /// Largest value allowed (may be infinite).
+        most: f64,
+        /// The value given.
+        value: f64,
+    },
+    /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
+    #[error("{what} has {got} components, the system has {dof} degrees of freedom")]
+    Components {
+        /// What was given.
+        what: &'static str,
+        /// Components found.
+        got: usize,
+        /// Degrees of freedom of the system.
+        dof: usize,
+    },
+    /// The forces in the middle of the steps do not lie on the time axis of the force.
+    #[error("the mid-step forces have {got} samples at {got_dt} s, the force {expected} at {dt} s")]
+    MidStepSampling {
+        /// Samples of the mid-step forces.
+        got: usize,
+        /// Their step, in seconds.
+        got_dt: f64,
+        /// Samples of the force.
+        expected: usize,
+        /// Its step, in seconds.
+        dt: f64,
+    },
+    /// The scheme needs the force in the middle of the steps and was given samples alone.
+    #[error(
+        "{scheme} needs the force in the middle of each step: supply it, or choose held or linear"
+    )]
+    MidStepMissing {
+        /// The scheme's name.
+        scheme: String,
+    },
+    /// A value given or computed by the caller's function is NaN or infinite.
+    #[error("{what}, component {component}, is {value} at t = {time} s, not a finite number")]
+    NotFinite {
+        /// What was given.
+        what: &'static str,
+        /// Component, counted from 1.
+        component: usize,
+        /// Instant, in seconds.
+        time: f64,
+        /// The value found.
+        value: f64,
+    },
+    /// The matrix the scheme has to solve with is singular.
+    #[error(
+        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivots {smallest:.1e} and {largest:.1e})"
+    )]
+    SingularEffectiveMass {
+        /// Which scheme.
+        scheme: &'static str,
+        /// Time step, in seconds.
+        dt: f64,
+        /// Smallest pivot of its factorisation.
+        smallest: f64,
+        /// Largest pivot.
+        largest: f64,
+    },
+    /// The step makes the free motion of a stable system grow.
+    #[error(
+        "{scheme} is unstable at Δt = {dt} s: spectral radius {spectral_radius:.6}; {}",
+        limit_text(*.critical_step)
+    )]
+    Unstable {
+        /// The scheme's name.
+        scheme: String,
+        /// The step asked for, in seconds.
+        dt: f64,
+        /// Spectral radius of the amplification matrix at that step.
+        spectral_radius: f64,
+        /// Largest stable step in seconds, if there is one.
+        critical_step: Option<f64>,
+    },
+    /// A start from rest was asked for, but the machine moves.
+    #[error(
+        "the start from rest needs zero initial velocity, component {component} is {velocity} m/s"
+    )]
+    NotAtRest {
+        /// Component, counted from 1.
+        component: usize,
+        /// Its velocity, in m/s.
+        velocity: f64,
+    },
+    /// No response repeats with the period of the force, or none that can be told from rounding.
+    #[error(
+        "no unique response repeats every {period} s: the free motion repeats too \
+         (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})"
+    )]
+    NoPeriodicState {
+        /// Period of the force, in seconds.
+        period: f64,
+        /// Reciprocal condition of I − Φ, Φ being the free motion over one period.
+        reciprocal_condition: f64,
+        /// What rounding alone can make of it.
+        rounding: f64,
+    },
+    /// The response grew beyond what a number can hold.
+    #[error("the response overflows at sample {sample}, degree of freedom {component}")]
+    Overflow {
+        /// Sample, counted from 0.
+        sample: usize,
+        /// Degree of freedom, counted from 1.
+        component: usize,
+    },
+    /// A damping ratio or a step that no accuracy analysis can use.
+    #[error("{what} must be finite and at least {least}, got {value}")]
+    Analysis {
+        /// The quantity.
+        what: &'static str,
+        /// Smallest value allowed.
+        least: f64,
+        /// The value given.
+        value: f64,
+    },
+    /// A system is not usable.
+    #[error(transparent)]
+    Model(#[from] mechid_model::ModelError),
+    /// A signal is not usable.
+    #[error(transparent)]
+    Signal(#[from] mechid_signal::SignalError),
+}
+
+fn limit_text(critical_step: Option<f64>) -> String {
+    match critical_step {
+        Some(limit) => format!("the limit is Δt = {limit:.6e} s"),
+        None => "no smaller step is stable either".to_owned(),
+    }
+}

@@ -1,0 +1,146 @@
+//! The force of an integration: samples, and what stands beyond and between them.
+
+use mechid_signal::{Record, Sampling};
+
+use crate::{Instant, IntegrateError, Scheme};
+
+/// A sampled force, one channel per degree of freedom, in N.
+///
+/// A `&Record` is one; [`with_mid_step`](Self::with_mid_step) adds the force in the middle of the
+/// steps for the schemes that need it.
+#[derive(Debug, Clone, Copy)]
+pub struct SampledForce<'a> {
+    samples: &'a Record,
+    mid_step: Option<&'a Record>,
+}
+
+impl<'a> From<&'a Record> for SampledForce<'a> {
+    fn from(samples: &'a Record) -> Self {
+        Self { samples, mid_step: None }
+    }
+}
+
+impl<'a> SampledForce<'a> {
+    /// Sample k of `mid_step` is the force at t = (k + ½) Δt; it has the length of `samples` (the
+    /// last one is used in periodic integration only).
+    pub fn with_mid_step(samples: &'a Record, mid_step: &'a Record) -> Self {
+        Self { samples, mid_step: Some(mid_step) }
+    }
+}
+
+/// Every value of the force an integration may ask for, without copying the samples.
+#[derive(Debug)]
+pub(crate) struct ForceTable<'a> {
+    samples: &'a Record,
+    mid_step: Option<&'a Record>,
+    /// The two rows that follow the last sample.
+    after: [Vec<f64>; 2],
+}
+
+impl<'a> ForceTable<'a> {
+    /// A force that repeats after its last sample.
+    pub(crate) fn periodic(
+        scheme: &dyn Scheme,
+        dof: usize,
+        force: SampledForce<'a>,
+    ) -> Result<Self, IntegrateError> {
+        check(scheme, dof, force)?;
+        let len = force.samples.len();
+        let after = [0, 1].map(|k| row(force.samples, k % len));
+        Ok(Self { samples: force.samples, mid_step: force.mid_step, after })
+    }
+
+    /// A force that ends with its last sample; the row behind it lies on the line through the last
+    /// two, so that a load interpolated across the end is the one projected from before it.
+    pub(crate) fn ending(
+        scheme: &dyn Scheme,
+        dof: usize,
+        force: SampledForce<'a>,
+    ) -> Result<Self, IntegrateError> {
+        check(scheme, dof, force)?;
+        let last = row(force.samples, force.samples.len() - 1);
+        let before = row(force.samples, force.samples.len().saturating_sub(2));
+        let line = last.iter().zip(&before).map(|(l, b)| 2.0 * l - b).collect();
+        Ok(Self { samples: force.samples, mid_step: force.mid_step, after: [line, last] })
+    }
+
+    /// The same with the row behind the last sample known.
+    pub(crate) fn continued(mut self, next: Vec<f64>) -> Self {
+        self.after[0] = next;
+        self
+    }
+
+    pub(crate) fn sampling(&self) -> Sampling {
+        self.samples.sampling()
+    }
+
+    pub(crate) fn dof(&self) -> usize {
+        self.samples.channels()
+    }
+
+    /// Copies the force at `instant` of step `k` into `out`.
+    pub(crate) fn load(&self, instant: Instant, k: usize, out: &mut [f64]) {
+        let (record, k) = match instant {
+            Instant::Now => (Some(self.samples), k),
+            Instant::Middle => (self.mid_step, k),
+            Instant::Next => (Some(self.samples), k + 1),
+            Instant::Beyond => (Some(self.samples), k + 2),
+        };
+        let Some(record) = record else { return };
+        if k >= record.len() {
+            out.copy_from_slice(&self.after[k - record.len()]);
+            return;
+        }
+        for (c, out) in out.iter_mut().enumerate() {
+            *out = record.data()[(k, c)];
+        }
+    }
+
+    /// Channel `c` of the force at `instant` of step `from` and those after it, as far as the
+    /// samples go.
+    pub(crate) fn stream(&self, instant: Instant, from: usize, c: usize) -> &[f64] {
+        let (record, from) = match instant {
+            Instant::Now => (Some(self.samples), from),
+            Instant::Middle => (self.mid_step, from),
+            Instant::Next => (Some(self.samples), from + 1),
+            Instant::Beyond => (Some(self.samples), from + 2),
+        };
+        record.and_then(|r| r.channel(c).get(from..)).unwrap_or(&[])
+    }
+
+    /// The forces at samples 0 ..= `last`.
+    pub(crate) fn early(&self, last: usize) -> Vec<Vec<f64>> {
+        let end = self.samples.len() - 1;
+        (0..=last).map(|k| row(self.samples, k.min(end))).collect()
+    }
+}
+
+fn check(scheme: &dyn Scheme, dof: usize, force: SampledForce<'_>) -> Result<(), IntegrateError> {
+    let samples = force.samples;
+    if samples.channels() != dof {
+        return Err(IntegrateError::Components { what: "the force", got: samples.channels(), dof });
+    }
+    let Some(middle) = force.mid_step else {
+        if scheme.needs_mid_step_force() {
+            return Err(IntegrateError::MidStepMissing { scheme: scheme.name() });
+        }
+        return Ok(());
+    };
+    if middle.channels() != dof {
+        let got = middle.channels();
+        return Err(IntegrateError::Components { what: "the mid-step force", got, dof });
+    }
+    if samples.check_same_sampling(middle).is_err() {
+        return Err(IntegrateError::MidStepSampling {
+            got: middle.len(),
+            got_dt: middle.sampling().dt(),
+            expected: samples.len(),
+            dt: samples.sampling().dt(),
+        });
+    }
+    Ok(())
+}
+
+fn row(record: &Record, k: usize) -> Vec<f64> {
+    record.data().row(k).iter().copied().collect()
+}

@@ -1,0 +1,200 @@
+//! Newmark's family, central difference as its explicit member among them.
+
+use mechid_model::{InitialState, SecondOrderSystem};
+
+use crate::effective::{Effective, consistent_acceleration};
+use crate::scheme::check_step;
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+
+/// Newmark's scheme: equilibrium at t + Δt with
+///
+/// ```text
+/// x(t+Δt) = x + Δt ẋ + Δt² [(½ − β) ẍ + β ẍ(t+Δt)]
+/// ẋ(t+Δt) = ẋ + Δt [(1 − γ) ẍ + γ ẍ(t+Δt)]
+/// ```
+///
+/// Second order for γ = ½; unconditionally stable for 2β ≥ γ ≥ ½. Loads at t + Δt. Starts from the
+/// consistent acceleration M ẍ(0) = F(0) − C ẋ(0) − K x(0). The acceleration is the unknown solved
+/// for, so that β = 0 is a member like any other.
+///
+/// # Source
+/// Dissertation eqs. (3.3.4.1)–(3.3.4.3) with α = β and δ = γ; Hughes (1987), section 9.1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Newmark {
+    beta: f64,
+    gamma: f64,
+}
+
+impl Newmark {
+    /// β = ¼, γ = ½: the trapezoidal rule. Unconditionally stable, no numerical damping.
+    pub const AVERAGE_ACCELERATION: Self = Self { beta: 0.25, gamma: 0.5 };
+    /// β = ⅙, γ = ½. Stable up to ωΔt = 2√3.
+    pub const LINEAR_ACCELERATION: Self = Self { beta: 1.0 / 6.0, gamma: 0.5 };
+    /// β = 1/12, γ = ½: fourth-order period accuracy without damping. Stable up to ωΔt = √6.
+    pub const FOX_GOODWIN: Self = Self { beta: 1.0 / 12.0, gamma: 0.5 };
+    /// β = 0, γ = ½. Stable up to ωΔt = 2.
+    pub const CENTRAL_DIFFERENCE: Self = Self { beta: 0.0, gamma: 0.5 };
+
+    /// Any member with β and γ between 0 and 1.
+    ///
+    /// # Errors
+    /// [`IntegrateError::Parameter`].
+    pub fn new(beta: f64, gamma: f64) -> Result<Self, IntegrateError> {
+        for (parameter, value) in [("β", beta), ("γ", gamma)] {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(IntegrateError::Parameter {
+                    scheme: "Newmark",
+                    parameter,
+                    least: 0.0,
+                    most: 1.0,
+                    value,
+                });
+            }
+        }
+        Ok(Self { beta, gamma })
+    }
+
+    /// Weight of the new acceleration in the displacement.
+    pub fn beta(&self) -> f64 {
+        self.beta
+    }
+
+    /// Weight of the new acceleration in the velocity.
+    pub fn gamma(&self) -> f64 {
+        self.gamma
+    }
+}
+
+impl Scheme for Newmark {
+    fn name(&self) -> String {
+        let member = [
+            (Self::AVERAGE_ACCELERATION, "average acceleration, "),
+            (Self::LINEAR_ACCELERATION, "linear acceleration, "),
+            (Self::FOX_GOODWIN, "Fox–Goodwin, "),
+            (Self::CENTRAL_DIFFERENCE, "central difference, "),
+        ]
+        .iter()
+        .find(|(known, _)| known == self)
+        .map_or("", |(_, name)| name);
+        format!("Newmark ({member}β = {:.6}, γ = {:.6})", self.beta, self.gamma)
+    }
+
+    fn conventions(&self) -> Vec<Convention> {
+        vec![
+            Convention { what: "load", choice: "equilibrium at t+Δt" },
+            Convention { what: "start", choice: "consistent acceleration at t = 0" },
+        ]
+    }
+
+    fn prepare_unchecked(
+        &self,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+        Ok(Box::new(NewmarkStepper::new("Newmark", *self, system, dt)?))
+    }
+}
+
+/// Newmark's scheme prepared: state `[x, ẋ, ẍ]`.
+#[derive(Debug)]
+pub(crate) struct NewmarkStepper {
+    pub(crate) effective: Effective,
+    pub(crate) mass: Effective,
+    pub(crate) dt: f64,
+    scheme: Newmark,
+    x_hat: Vec<f64>,
+    v_hat: Vec<f64>,
+}
+
+impl NewmarkStepper {
+    pub(crate) fn new(
+        name: &'static str,
+        scheme: Newmark,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Self, IntegrateError> {
+        let dt = check_step(dt)?;
+        let n = system.dof();
+        let (gamma_hat, beta_hat) = (scheme.gamma * dt, scheme.beta * dt * dt);
+        Ok(Self {
+            effective: Effective::new(name, system, dt, gamma_hat, beta_hat)?,
+            mass: Effective::mass_only(name, system, dt)?,
+            dt,
+            scheme,
+            x_hat: vec![0.0; n],
+            v_hat: vec![0.0; n],
+        })
+    }
+}
+
+impl Stepper for NewmarkStepper {
+    fn dof(&self) -> usize {
+        self.x_hat.len()
+    }
+
+    fn state_len(&self) -> usize {
+        3 * self.dof()
+    }
+
+    fn instants(&self) -> &'static [Instant] {
+        &[Instant::Next]
+    }
+
+    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+        let (n, dt, Newmark { beta, gamma }) = (self.dof(), self.dt, self.scheme);
+        let (x, v, a) = motion(state, n);
+        let (dx, dv, da) = motion_mut(change, n);
+        for i in 0..n {
+            // The known parts of the changes first, then what the new acceleration adds.
+            dx[i] = dt * (v[i] + dt * (0.5 - beta) * a[i]);
+            dv[i] = dt * (1.0 - gamma) * a[i];
+            self.x_hat[i] = x[i] + dx[i];
+            self.v_hat[i] = v[i] + dv[i];
+        }
+        da.copy_from_slice(&loads.next[..n]);
+        self.effective.solve(&self.v_hat, &self.x_hat, da);
+        for i in 0..n {
+            dx[i] += beta * dt * dt * da[i];
+            dv[i] += gamma * dt * da[i];
+            da[i] -= a[i];
+        }
+    }
+
+    fn start(
+        &mut self,
+        initial: &InitialState,
+        early: &[Vec<f64>],
+        motions: &mut [Vec<f64>],
+        state: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        start_consistently(&self.mass, initial, &early[0], state);
+        motions[0].copy_from_slice(&state[..3 * self.dof()]);
+        Ok(())
+    }
+}
+
+/// `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, into `state`.
+pub(crate) fn start_consistently(
+    mass: &Effective,
+    initial: &InitialState,
+    force: &[f64],
+    state: &mut [f64],
+) {
+    let (x, v, a) = motion_mut(state, force.len());
+    x.copy_from_slice(initial.displacement().as_slice());
+    v.copy_from_slice(initial.velocity().as_slice());
+    a.copy_from_slice(force);
+    consistent_acceleration(mass, x, v, a);
+}
+
+/// The three parts of a motion in `n` degrees of freedom.
+pub(crate) fn motion(state: &[f64], n: usize) -> (&[f64], &[f64], &[f64]) {
+    (&state[..n], &state[n..2 * n], &state[2 * n..3 * n])
+}
+
+/// The three parts of a motion in `n` degrees of freedom, to be written.
+pub(crate) fn motion_mut(state: &mut [f64], n: usize) -> (&mut [f64], &mut [f64], &mut [f64]) {
+    let (x, rest) = state.split_at_mut(n);
+    let (v, rest) = rest.split_at_mut(n);
+    (x, v, &mut rest[..n])
+}

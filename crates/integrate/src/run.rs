@@ -1,0 +1,185 @@
+//! The stepping loop: the prepared stepper itself, or its transition at fixed size for few
+//! degrees of freedom.
+
+use mechid_model::{InitialState, Response};
+use mechid_signal::{Record, SignalError};
+use nalgebra::DMatrix;
+
+use crate::force::ForceTable;
+use crate::transition::Transition;
+use crate::{Instant, IntegrateError, Loads, Stepper};
+
+/// Displacement, velocity and acceleration, samples × degrees of freedom.
+#[derive(Debug)]
+pub(crate) struct Motion {
+    parts: [DMatrix<f64>; 3],
+}
+
+impl Motion {
+    pub(crate) fn zeros(samples: usize, dof: usize) -> Self {
+        Self { parts: [(); 3].map(|()| DMatrix::zeros(samples, dof)) }
+    }
+
+    /// Writes the motion `[x, ẋ, ẍ]` at sample `k`.
+    pub(crate) fn set(&mut self, k: usize, motion: &[f64]) {
+        let n = self.parts[0].ncols();
+        for (part, values) in self.parts.iter_mut().zip(motion.chunks_exact(n)) {
+            for (c, &value) in values.iter().enumerate() {
+                part[(k, c)] = value;
+            }
+        }
+    }
+
+    /// Samples `from .. from + len` of every column: n of x, n of ẋ, n of ẍ.
+    fn columns(&mut self, from: usize, len: usize) -> Vec<&mut [f64]> {
+        let rows = self.parts[0].nrows();
+        let columns = self.parts.iter_mut().flat_map(|p| p.as_mut_slice().chunks_exact_mut(rows));
+        columns.map(|c| &mut c[from..from + len]).collect()
+    }
+
+    /// The response on the time axis of `table`.
+    pub(crate) fn into_response(self, table: &ForceTable<'_>) -> Result<Response, IntegrateError> {
+        let record = |data| match Record::new(table.sampling(), data) {
+            Err(SignalError::NotFinite { sample, channel, .. }) => {
+                Err(IntegrateError::Overflow { sample, component: channel + 1 })
+            }
+            other => other.map_err(IntegrateError::from),
+        };
+        let [x, v, a] = self.parts;
+        Ok(Response::new(record(x)?, record(v)?, record(a)?)?)
+    }
+}
+
+/// A stepper on its way through a force, with all the memory the way needs.
+pub(crate) struct Run {
+    stepper: Box<dyn Stepper>,
+    transition: Option<Transition>,
+    pub(crate) state: Vec<f64>,
+    change: Vec<f64>,
+    rows: [Vec<f64>; 4],
+}
+
+/// Up to this many degrees of freedom a step is one small matrix product of fixed size.
+const FIXED_SIZE_DOF: usize = 2;
+
+impl Run {
+    pub(crate) fn new(mut stepper: Box<dyn Stepper>) -> Self {
+        let (n, len) = (stepper.dof(), stepper.state_len());
+        let transition = (n <= FIXED_SIZE_DOF).then(|| Transition::of(stepper.as_mut()));
+        let rows = [(); 4].map(|()| vec![0.0; n]);
+        Self { stepper, transition, state: vec![0.0; len], change: vec![0.0; len], rows }
+    }
+
+    /// Starts the stepper and keeps the state it starts in.
+    pub(crate) fn start(
+        &mut self,
+        initial: &InitialState,
+        early: &[Vec<f64>],
+        motions: &mut [Vec<f64>],
+    ) -> Result<(), IntegrateError> {
+        self.stepper.start(initial, early, motions, &mut self.state)
+    }
+
+    pub(crate) fn stepper(&mut self) -> &mut dyn Stepper {
+        self.stepper.as_mut()
+    }
+
+    /// Takes steps `from .. to`, writing the motion at samples `from + 1 ..= to` as far as
+    /// `motion` has them.
+    pub(crate) fn advance(
+        &mut self,
+        table: &ForceTable<'_>,
+        from: usize,
+        to: usize,
+        motion: &mut Motion,
+    ) {
+        let done = self.advance_fixed(table, from, to, motion);
+        for k in done..to {
+            self.step(table, k);
+            if k + 1 < motion.parts[0].nrows() {
+                motion.set(k + 1, &self.state);
+            }
+        }
+    }
+
+    /// One step through the stepper itself.
+    fn step(&mut self, table: &ForceTable<'_>, k: usize) {
+        for &instant in self.stepper.instants() {
+            table.load(instant, k, &mut self.rows[instant as usize]);
+        }
+        let [now, middle, next, beyond] = &self.rows;
+        let loads = Loads { now, middle, next, beyond };
+        self.stepper.change(&self.state, &loads, &mut self.change);
+        self.state.iter_mut().zip(&self.change).for_each(|(z, dz)| *z += dz);
+    }
+
+    /// Takes as many steps as it can at fixed size; returns the step to go on with.
+    fn advance_fixed(
+        &mut self,
+        table: &ForceTable<'_>,
+        from: usize,
+        to: usize,
+        motion: &mut Motion,
+    ) -> usize {
+        let Some(transition) = &self.transition else { return from };
+        let n = table.dof();
+        let mut streams = Vec::with_capacity(4);
+        for (instant, _) in &transition.loads {
+            streams.extend((0..n).map(|c| table.stream(*instant, from, c)));
+        }
+        let steps = streams.iter().map(|s| s.len()).min().unwrap_or(0).min(to - from);
+        let steps = steps.min((motion.parts[0].nrows() - 1).saturating_sub(from));
+        let mut columns = motion.columns(from + 1, steps);
+        let state = &mut self.state;
+        match (state.len(), streams.len(), n) {
+            (3, 1, 1) => fixed::<3, 1, 3>(transition, state, &streams, &mut columns, steps),
+            (3, 2, 1) => fixed::<3, 2, 3>(transition, state, &streams, &mut columns, steps),
+            (4, 1, 1) => fixed::<4, 1, 3>(transition, state, &streams, &mut columns, steps),
+            (6, 2, 2) => fixed::<6, 2, 6>(transition, state, &streams, &mut columns, steps),
+            (6, 4, 2) => fixed::<6, 4, 6>(transition, state, &streams, &mut columns, steps),
+            (8, 2, 2) => fixed::<8, 2, 6>(transition, state, &streams, &mut columns, steps),
+            _ => return from,
+        }
+        from + steps
+    }
+}
+
+/// `steps` steps z += D z + B w of a state of `S` numbers under `W` loads, the first `O` numbers of
+/// the state being stored.
+fn fixed<const S: usize, const W: usize, const O: usize>(
+    transition: &Transition,
+    state: &mut [f64],
+    streams: &[&[f64]],
+    columns: &mut [&mut [f64]],
+    steps: usize,
+) {
+    let d: [[f64; S]; S] =
+        std::array::from_fn(|j| std::array::from_fn(|i| transition.change[(i, j)]));
+    let n = W / transition.loads.len();
+    let b: [[f64; S]; W] =
+        std::array::from_fn(|j| std::array::from_fn(|i| transition.loads[j / n].1[(i, j % n)]));
+    let mut z: [f64; S] = std::array::from_fn(|i| state[i]);
+    let streams: [&[f64]; W] = std::array::from_fn(|j| &streams[j][..steps]);
+    for k in 0..steps {
+        let mut even = [0.0; S];
+        let mut odd = z;
+        for (b, w) in b.iter().zip(&streams) {
+            let w = w[k];
+            (0..S).for_each(|i| even[i] += b[i] * w);
+        }
+        for j in (0..S).step_by(2) {
+            (0..S).for_each(|i| even[i] += d[j][i] * z[j]);
+        }
+        for j in (1..S).step_by(2) {
+            (0..S).for_each(|i| odd[i] += d[j][i] * z[j]);
+        }
+        (0..S).for_each(|i| z[i] = odd[i] + even[i]);
+        for (column, value) in columns[..O].iter_mut().zip(&z) {
+            column[k] = *value;
+        }
+    }
+    state.copy_from_slice(&z);
+}
+
+/// Which of the four rows an instant is kept in.
+const _: () = assert!(Instant::Now as usize == 0 && Instant::Beyond as usize == 3);

@@ -1,0 +1,205 @@
+//! What a scheme is: parameters a user chooses, and the work prepared once from them.
+
+use std::fmt;
+
+use mechid_model::{InitialState, SecondOrderSystem};
+
+use crate::{IntegrateError, stability};
+
+/// A choice on which programs that share a formula still differ; printed with every result.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Convention {
+    /// What is chosen.
+    pub what: &'static str,
+    /// The choice in force.
+    pub choice: &'static str,
+}
+
+/// An integration scheme with its parameters and conventions: a value.
+///
+/// A table of results, a command line and a test suite are loops over `[&dyn Scheme]`.
+pub trait Scheme: fmt::Debug + Send + Sync {
+    /// The scheme and its parameters, such as `Newmark (β = 0.25, γ = 0.5)`.
+    fn name(&self) -> String;
+
+    /// The conventions in force.
+    fn conventions(&self) -> Vec<Convention>;
+
+    /// Whether the force in the middle of each step must be supplied.
+    fn needs_mid_step_force(&self) -> bool {
+        false
+    }
+
+    /// All the work that is done once for a system and a step of `dt` seconds, stable or not.
+    ///
+    /// # Errors
+    /// [`IntegrateError::TimeStep`], [`IntegrateError::SingularEffectiveMass`], and
+    /// [`IntegrateError::Components`] if starting values do not fit the system.
+    fn prepare_unchecked(
+        &self,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Box<dyn Stepper>, IntegrateError>;
+
+    /// As [`prepare_unchecked`](Self::prepare_unchecked), but refuses a step that makes the motion
+    /// of the system grow. Wrap the scheme in [`AllowUnstable`] to go on all the same.
+    ///
+    /// # Errors
+    /// Those of [`prepare_unchecked`](Self::prepare_unchecked), and
+    /// [`IntegrateError::Unstable`] with the largest stable step.
+    fn prepare(
+        &self,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+        let mut stepper = self.prepare_unchecked(system, dt)?;
+        let prepare = |dt| self.prepare_unchecked(system, dt);
+        stability::refuse_unstable(&prepare, &|| self.name(), system, dt, stepper.as_mut())?;
+        Ok(stepper)
+    }
+}
+
+/// A scheme that also takes steps at which it is unstable.
+///
+/// ```
+/// use mechid_integrate::{AllowUnstable, CentralDifference, IntegrateError, Scheme};
+/// use mechid_model::Sdof;
+///
+/// let system = Sdof::new(1.0, 0.0, 1.0)?.system(); // ω = 1 rad/s: the limit is Δt = 2 s
+/// let scheme = CentralDifference::default();
+/// assert!(matches!(scheme.prepare(&system, 2.1), Err(IntegrateError::Unstable { .. })));
+/// assert!(AllowUnstable(&scheme).prepare(&system, 2.1).is_ok());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct AllowUnstable<'a>(pub &'a dyn Scheme);
+
+impl Scheme for AllowUnstable<'_> {
+    fn name(&self) -> String {
+        self.0.name()
+    }
+
+    fn conventions(&self) -> Vec<Convention> {
+        self.0.conventions()
+    }
+
+    fn needs_mid_step_force(&self) -> bool {
+        self.0.needs_mid_step_force()
+    }
+
+    fn prepare_unchecked(
+        &self,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+        self.0.prepare_unchecked(system, dt)
+    }
+
+    fn prepare(
+        &self,
+        system: &SecondOrderSystem,
+        dt: f64,
+    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+        self.0.prepare_unchecked(system, dt)
+    }
+}
+
+/// Where in a step from t to t + Δt a scheme looks at the force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Instant {
+    /// t
+    Now,
+    /// t + Δt/2
+    Middle,
+    /// t + Δt
+    Next,
+    /// t + 2Δt
+    Beyond,
+}
+
+impl Instant {
+    /// All four, in the order of time.
+    pub const ALL: [Self; 4] = [Self::Now, Self::Middle, Self::Next, Self::Beyond];
+}
+
+/// The forces of one step from t to t + Δt, in N, one entry per degree of freedom.
+///
+/// A scheme reads those of [`Stepper::instants`] only; the others may be anything.
+#[derive(Debug, Clone, Copy)]
+pub struct Loads<'a> {
+    /// F(t).
+    pub now: &'a [f64],
+    /// F(t + Δt/2).
+    pub middle: &'a [f64],
+    /// F(t + Δt).
+    pub next: &'a [f64],
+    /// F(t + 2Δt).
+    pub beyond: &'a [f64],
+}
+
+/// A scheme prepared for one system and one step: the linear map from one state to the next.
+///
+/// The state at t begins with the motion at t, `[x, ẋ, ẍ]`, 3·n numbers at one and the same
+/// instant; what a scheme has to remember beyond that follows. Stepping neither fails nor
+/// allocates.
+pub trait Stepper: Send {
+    /// Degrees of freedom n.
+    fn dof(&self) -> usize;
+
+    /// Length of the state, at least 3·n.
+    fn state_len(&self) -> usize;
+
+    /// At which instants of a step the force is read.
+    fn instants(&self) -> &'static [Instant];
+
+    /// Writes what the step adds to `state` into `change`: z(t + Δt) − z(t).
+    ///
+    /// The difference, and not the new state, is what can be computed to full relative precision
+    /// however small the step: near Δt = 0 the amplification matrix is I + O(Δt).
+    ///
+    /// # Panics
+    /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or a load that is
+    /// read shorter than [`dof`](Self::dof).
+    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]);
+
+    /// The sample at which the scheme's own recurrence takes over from its starting procedure.
+    fn first(&self) -> usize {
+        0
+    }
+
+    /// Starts the motion from `initial`, the forces at samples 0 ..= [`first`](Self::first) being
+    /// `early`: writes the motion `[x, ẋ, ẍ]` at each of these samples into `motions` and the
+    /// state at the last of them into `state`.
+    ///
+    /// # Errors
+    /// [`IntegrateError::NotAtRest`] if the starting procedure chosen cannot take the velocity.
+    fn start(
+        &mut self,
+        initial: &InitialState,
+        early: &[Vec<f64>],
+        motions: &mut [Vec<f64>],
+        state: &mut [f64],
+    ) -> Result<(), IntegrateError>;
+}
+
+/// `dt`, if it is positive and finite.
+pub(crate) fn check_step(dt: f64) -> Result<f64, IntegrateError> {
+    if dt > 0.0 && dt.is_finite() {
+        return Ok(dt);
+    }
+    Err(IntegrateError::TimeStep { dt })
+}
+
+/// An error at the first entry of `values` that is not finite.
+pub(crate) fn check_finite(
+    what: &'static str,
+    values: &[f64],
+    time: f64,
+) -> Result<(), IntegrateError> {
+    match values.iter().position(|v| !v.is_finite()) {
+        None => Ok(()),
+        Some(at) => {
+            Err(IntegrateError::NotFinite { what, component: at + 1, time, value: values[at] })
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Stability and accuracy of a scheme, derived from the stepping code itself.
+//!
+//! Everything here starts from [`Transition::of`], which feeds unit states to the stepper that
+//! does the integrating. There is no second set of formulas that could be right while the code is
+//! wrong.
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
+
+use crate::{IntegrateError, Scheme, Stepper, Transition};
+
+/// Growth per step that a refusal tolerates. Rounding makes 1 ± √ε, times a condition, of the
+/// double eigenvalue 1 of a free body, which is no instability; at this rate a motion needs a
+/// million steps to grow by a factor e.
+const TOLERATED: f64 = 1e-6;
+
+/// Growth per step above which a step lies beyond the critical one, where rounding permits.
+const SHARP: f64 = 1e-10;
+
+/// Spectral radius of the amplification matrix of `scheme` on `system` at a step of `dt` seconds.
+///
+/// # Errors
+/// Those of [`Scheme::prepare_unchecked`].
+pub fn spectral_radius(
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+    dt: f64,
+) -> Result<f64, IntegrateError> {
+    let mut stepper = scheme.prepare_unchecked(system, dt)?;
+    Ok(growth(&Transition::of(stepper.as_mut()), f64::NEG_INFINITY).exp())
+}
+
+/// The largest step at which `scheme` does not make the motion of `system` grow, in seconds;
+/// `None` if there is no limit.
+///
+/// The first step size beyond which the motion grows is looked for from a thousandth of the
+/// shortest time scale 1/|λ| of the system up to a million times that, in factors of √2, then
+/// bisected to rounding. A system that is unstable itself is allowed twice its own growth.
+///
+/// # Errors
+/// Those of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the
+/// smallest step is stable.
+pub fn critical_step(
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+) -> Result<Option<f64>, IntegrateError> {
+    limit(&|dt| scheme.prepare_unchecked(system, dt), &|| scheme.name(), system)
+}
+
+/// How a scheme prepares a step of a given size for a system.
+pub(crate) type Prepare<'a> = dyn Fn(f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
+
+fn limit(
+    prepare: &Prepare<'_>,
+    name: &dyn Fn() -> String,
+    system: &SecondOrderSystem,
+) -> Result<Option<f64>, IntegrateError> {
+    let eigenvalues = system.eigenvalues()?;
+    let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
+    if fastest == 0.0 {
+        return Ok(None);
+    }
+    let own_growth = eigenvalues.iter().map(|l| l.re).fold(0.0, f64::max);
+    let excess = |dt: f64, tolerated: f64| -> Result<f64, IntegrateError> {
+        let mut stepper = prepare(dt)?;
+        let allowed = tolerated + 2.0 * own_growth * dt;
+        Ok(growth(&Transition::of(stepper.as_mut()), allowed) - allowed)
+    };
+    let smallest = 1e-3 / fastest;
+    let sharp = excess(smallest, SHARP)? <= 0.0;
+    let tolerated = if sharp { SHARP } else { TOLERATED };
+    let first = excess(smallest, tolerated)?;
+    if first > 0.0 {
+        return Err(IntegrateError::Unstable {
+            scheme: name(),
+            dt: smallest,
+            spectral_radius: (first + tolerated + 2.0 * own_growth * smallest).exp(),
+            critical_step: None,
+        });
+    }
+    let (mut stable, mut unstable) = (smallest, smallest * std::f64::consts::SQRT_2);
+    while excess(unstable, tolerated)? <= 0.0 {
+        (stable, unstable) = (unstable, unstable * std::f64::consts::SQRT_2);
+        if unstable * fastest > 1e6 {
+            return Ok(None);
+        }
+    }
+    while unstable - stable > 4.0 * f64::EPSILON * stable {
+        let middle = 0.5 * (stable + unstable);
+        if excess(middle, tolerated)? <= 0.0 { stable = middle } else { unstable = middle }
+    }
+    Ok(Some(stable))
+}
+
+/// An error if the prepared `stepper` makes a motion grow that does not grow by itself.
+pub(crate) fn refuse_unstable(
+    prepare: &Prepare<'_>,
+    name: &dyn Fn() -> String,
+    system: &SecondOrderSystem,
+    dt: f64,
+    stepper: &mut dyn Stepper,
+) -> Result<(), IntegrateError> {
+    let transition = Transition::of(stepper);
+    if growth(&transition, TOLERATED) <= TOLERATED {
+        return Ok(());
+    }
+    let own_growth = system.eigenvalues()?.iter().map(|l| l.re).fold(0.0, f64::max);
+    let allowed = TOLERATED + 2.0 * own_growth * dt;
+    let rate = growth(&transition, allowed);
+    if rate <= allowed {
+        return Ok(());
+    }
+    let critical_step = match limit(prepare, name, system) {
+        Ok(limit) => limit.filter(|limit| *limit < dt),
+        Err(IntegrateError::Unstable { .. }) => None,
+        Err(other) => return Err(other),
+    };
+    Err(IntegrateError::Unstable { scheme: name(), dt, spectral_radius: rate.exp(), critical_step })
+}
+
+/// ln ρ(A), or any bound of it from above that is not greater than `enough`.
+///
+/// ‖A^m‖^(1/m) falls to ρ for m = 1, 2, 4 … (Gelfand's formula), each power being the square of
+/// the one before, scaled. It stays right where eigenvalues are defective, as at every stability
+/// limit, and where QR iterations do not converge.
+fn growth(transition: &Transition, enough: f64) -> f64 {
+    let mut power = transition.amplification();
+    if power.iter().any(|v| !v.is_finite()) {
+        return f64::INFINITY;
+    }
+    balance_parlett_reinsch(&mut power);
+    let mut log_norm = 0.0;
+    let mut bound = f64::INFINITY;
+    // The bound exceeds ln ρ by ln(condition)/m; m = 2⁴⁰ leaves that far below rounding.
+    for doubling in 0..=40 {
+        let norm = power.norm();
+        if norm == 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        log_norm += norm.ln();
+        bound = log_norm / f64::powi(2.0, doubling);
+        if bound <= enough {
+            break;
+        }
+        power /= norm;
+        power = &power * &power;
+        log_norm *= 2.0;
+    }
+    bound
+}

@@ -1,0 +1,58 @@
+//! The linear map of one step, read off the stepping code by unit states and unit loads.
+
+use nalgebra::DMatrix;
+
+use crate::{Instant, Loads, Stepper};
+
+/// z(t+Δt) = z(t) + D z(t) + Σ B_i F(t_i), the instants t_i being those the scheme reads.
+///
+/// D = A − I, A being the amplification matrix: near Δt = 0 it keeps the digits that A loses.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Transition {
+    /// D, state × state.
+    pub change: DMatrix<f64>,
+    /// Per instant, the state × n matrix the force there is multiplied by.
+    pub loads: Vec<(Instant, DMatrix<f64>)>,
+}
+
+impl Transition {
+    /// The map `stepper` performs. State `j` of 1 and all else 0 gives column j of D, a force of
+    /// 1 N a column of B.
+    pub fn of(stepper: &mut dyn Stepper) -> Self {
+        let (n, len) = (stepper.dof(), stepper.state_len());
+        let zeros = vec![0.0; n];
+        let still = Loads { now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
+        let mut state = vec![0.0; len];
+        let mut change = DMatrix::zeros(len, len);
+        for j in 0..len {
+            state[j] = 1.0;
+            let column = &mut change.as_mut_slice()[j * len..(j + 1) * len];
+            stepper.change(&state, &still, column);
+            state[j] = 0.0;
+        }
+        let mut unit = vec![0.0; n];
+        let mut loads = Vec::new();
+        for &instant in stepper.instants() {
+            let mut matrix = DMatrix::zeros(len, n);
+            for j in 0..n {
+                unit[j] = 1.0;
+                let mut one = still;
+                *match instant {
+                    Instant::Now => &mut one.now,
+                    Instant::Middle => &mut one.middle,
+                    Instant::Next => &mut one.next,
+                    Instant::Beyond => &mut one.beyond,
+                } = &unit;
+                stepper.change(&state, &one, &mut matrix.as_mut_slice()[j * len..(j + 1) * len]);
+                unit[j] = 0.0;
+            }
+            loads.push((instant, matrix));
+        }
+        Self { change, loads }
+    }
+
+    /// The amplification matrix A = I + D.
+    pub fn amplification(&self) -> DMatrix<f64> {
+        &self.change + DMatrix::identity(self.change.nrows(), self.change.nrows())
+    }
+}

@@ -1,0 +1,69 @@
+//! All schemes with all their conventions, and what the other files need to compare responses.
+
+use mechid_integrate::*;
+use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+
+/// Every scheme in every convention that works on samples alone, in any number of degrees of freedom.
+pub fn schemes() -> Vec<Box<dyn Scheme>> {
+    let wilson = WilsonTheta::new(1.4).unwrap();
+    vec![
+        Box::new(Newmark::AVERAGE_ACCELERATION),
+        Box::new(Newmark::LINEAR_ACCELERATION),
+        Box::new(Newmark::FOX_GOODWIN),
+        Box::new(Newmark::CENTRAL_DIFFERENCE),
+        Box::new(Newmark::new(0.3025, 0.6).unwrap()),
+        Box::new(CentralDifference::default()),
+        Box::new(CentralDifference { start: CentralDifferenceStart::Rest }),
+        Box::new(Houbolt::default()),
+        Box::new(Houbolt { start: HouboltStart::CentralDifference }),
+        Box::new(wilson),
+        Box::new(wilson.with_load(WilsonLoad::Interpolated)),
+        Box::new(RungeKutta4::HELD),
+        Box::new(RungeKutta4::LINEAR),
+    ]
+}
+
+/// A force without a sample at zero, with content on every channel: Σ of three sines, shifted.
+pub fn force_at(t: f64, f: &mut [f64]) {
+    for (c, f) in f.iter_mut().enumerate() {
+        let c = c as f64;
+        *f = 3.0 * (2.0 * t + 0.3 + c).cos() + (5.1 * t - c).sin() + 0.7;
+    }
+}
+
+/// [`force_at`] sampled.
+pub fn force(sampling: Sampling, dof: usize) -> Record {
+    let mut data = DMatrix::zeros(sampling.len(), dof);
+    let mut row = vec![0.0; dof];
+    for k in 0..sampling.len() {
+        force_at(sampling.time(k), &mut row);
+        data.row_mut(k).iter_mut().zip(&row).for_each(|(d, f)| *d = *f);
+    }
+    Record::new(sampling, data).unwrap()
+}
+
+/// Non-zero x(0) and ẋ(0).
+pub fn moving(dof: usize) -> InitialState {
+    InitialState::new(
+        nalgebra::DVector::from_fn(dof, |i, _| 0.2 - 0.1 * i as f64),
+        nalgebra::DVector::from_fn(dof, |i, _| -0.5 + 0.3 * i as f64),
+    )
+    .unwrap()
+}
+
+/// The stage that all quantities of a response play on: `[x, ẋ, ẍ]`.
+pub fn parts(response: &Response) -> [&DMatrix<f64>; 3] {
+    [response.displacement(), response.velocity(), response.acceleration()].map(Record::data)
+}
+
+/// Two degrees of freedom, damped, C and K without symmetry; |λ| up to about 6 rad/s.
+pub fn coupled() -> SecondOrderSystem {
+    SecondOrderSystem::new(
+        nalgebra::dmatrix![2.0, 0.1; 0.0, 1.5],
+        nalgebra::dmatrix![1.1, 0.4; -0.2, 0.9],
+        nalgebra::dmatrix![30.0, -8.0; -11.0, 40.0],
+    )
+    .unwrap()
+}

@@ -1,0 +1,5 @@
+//! What every scheme must do: the suite that defines the word.
+
+mod common;
+mod order;
+mod periodic;

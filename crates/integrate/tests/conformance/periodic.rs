@@ -1,0 +1,165 @@
+//! The periodic steady state.
+
+use mechid_integrate::*;
+use mechid_model::{Response, Sdof, SecondOrderSystem};
+use mechid_signal::{Multisine, Phases, Record, Sampling};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::common::*;
+
+/// The steady state of the scheme's recurrence line by line: (e^{iωΔt} I − A) Z = Σ B e^{iωτ} F,
+/// with direct sums for the Fourier transforms.
+fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> [DMatrix<f64>; 3] {
+    let (len, n) = (force.len(), force.channels());
+    let dt = force.sampling().dt();
+    let mut stepper = scheme.prepare_unchecked(system, dt).unwrap();
+    let transition = Transition::of(stepper.as_mut());
+    let states = transition.change.nrows();
+    let mut parts = [(); 3].map(|()| DMatrix::zeros(len, n));
+    for line in 0..len {
+        let turn = |k: usize| {
+            let angle = std::f64::consts::TAU * ((k * line) % len) as f64 / len as f64;
+            Complex::from_polar(1.0, angle)
+        };
+        let spectrum = DVector::from_fn(n, |c, _| {
+            let sum: Complex<f64> =
+                force.channel(c).iter().enumerate().map(|(k, f)| turn(k).conj() * f).sum();
+            sum / len as f64
+        });
+        // e^{iωΔt} − 1 without cancellation: 2i sin(ωΔt/2) e^{iωΔt/2}.
+        let half = std::f64::consts::PI * line as f64 / len as f64;
+        let less_one = Complex::new(0.0, 2.0 * half.sin()) * Complex::from_polar(1.0, half);
+        let matrix = DMatrix::from_diagonal_element(states, states, less_one)
+            - transition.change.map(Complex::from);
+        let mut rhs = DVector::zeros(states);
+        for (instant, b) in &transition.loads {
+            let shift = match instant {
+                Instant::Now => turn(0),
+                Instant::Next => turn(1),
+                Instant::Beyond => turn(2),
+                Instant::Middle => unreachable!("sampled schemes only"),
+            };
+            rhs += b.map(Complex::from) * &spectrum * shift;
+        }
+        let state = matrix.lu().solve(&rhs).unwrap();
+        for k in 0..len {
+            for (p, part) in parts.iter_mut().enumerate() {
+                for c in 0..n {
+                    part[(k, c)] += (state[p * n + c] * turn(k)).re;
+                }
+            }
+        }
+    }
+    parts
+}
+
+/// Largest difference from the line-by-line answer, each quantity relative to its largest value.
+fn error(response: &Response, judge: &[DMatrix<f64>; 3]) -> f64 {
+    parts(response).iter().zip(judge).map(|(r, j)| (*r - j).amax() / j.amax()).fold(0.0, f64::max)
+}
+
+fn schroeder(dt: f64, len: usize, dof: usize) -> Record {
+    let one = Multisine::flat(1..=len / 2 - 1, 1.0, Phases::SchroederBinary)
+        .unwrap()
+        .sample(Sampling::new(dt, len).unwrap())
+        .unwrap();
+    // Every channel the same signal, 5 samples apart, so that F(0) differs from channel to channel.
+    let data = DMatrix::from_fn(len, dof, |k, c| one.channel(0)[(k + 5 * c) % len]);
+    Record::new(one.sampling(), data).unwrap()
+}
+
+#[test]
+fn the_repeating_response_is_exact_at_any_damping() {
+    for zeta in [0.4, 1e-2, 1e-4, 1e-6, 1e-8] {
+        let system = Sdof::from_modal(10.0, zeta, 22.36).unwrap().system();
+        for len in [60, 255, 256] {
+            let force = schroeder(2e-3, len, 1);
+            for scheme in schemes() {
+                let response = integrate_periodic(scheme.as_ref(), &system, &force).unwrap();
+                let error = error(&response, &by_lines(scheme.as_ref(), &system, &force));
+                // The natural frequency lies between lines: no resonance multiplies rounding.
+                assert!(error < 1e-12, "{} ζ {zeta} N {len}: {error:e}", scheme.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn coupled_systems_of_any_size_repeat() {
+    for (dof, len) in [(2, 64), (3, 50), (8, 48)] {
+        let system = mechid_problems::random_stable(dof, 7);
+        let force = schroeder(1e-3, len, dof);
+        for scheme in schemes() {
+            let response = integrate_periodic(scheme.as_ref(), &system, &force).unwrap();
+            let error = error(&response, &by_lines(scheme.as_ref(), &system, &force));
+            assert!(error < 1e-12, "{} n {dof}: {error:e}", scheme.name());
+        }
+    }
+}
+
+#[test]
+fn waiting_gives_the_same() {
+    // ζ = 0.4: after 60 periods of about 3.6 natural ones the transient is far below rounding.
+    let system = Sdof::from_modal(10.0, 0.4, 22.36).unwrap().system();
+    let (len, periods) = (128, 60);
+    let one = schroeder(8e-3, len, 1);
+    let long = Record::from_channel(
+        Sampling::new(8e-3, len * periods).unwrap(),
+        one.channel(0).repeat(periods),
+    )
+    .unwrap();
+    for scheme in schemes() {
+        let name = scheme.name();
+        let response = integrate_periodic(scheme.as_ref(), &system, &one).unwrap();
+        let waited =
+            integrate(scheme.as_ref(), &system, &long, &mechid_model::InitialState::rest(1))
+                .unwrap();
+        for (now, then) in parts(&response).iter().zip(parts(&waited)) {
+            let then = then.rows((periods - 2) * len, len);
+            assert!((*now - then).amax() < 1e-12 * now.amax(), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_response_at_resonance_still_closes() {
+    // Central difference sees 2 sin(θ/2)/Δt as frequency: put it on line 3 of 64, ζ = 1e-9.
+    let (dt, len) = (0.01, 64);
+    let omega = 2.0 / dt * (std::f64::consts::PI * 3.0 / 64.0).sin();
+    let system = Sdof::from_modal(1.0, 1e-9, omega).unwrap().system();
+    let scheme = CentralDifference::default();
+    let force = schroeder(dt, len, 1);
+    let response = integrate_periodic(&scheme, &system, &force).unwrap();
+    // The last step must lead back to the first sample.
+    let (x, v, a) = (response.displacement(), response.velocity(), response.acceleration());
+    let end = len - 1;
+    let half_step = v.channel(0)[end] + 0.5 * dt * a.channel(0)[end];
+    let closed = x.channel(0)[end] + dt * half_step;
+    assert!((closed - x.channel(0)[0]).abs() < 1e-12 * x.column(0).amax());
+    // And the line at resonance is F/(c ω'), ω' = sin θ/Δt being the factor from x to v. In the
+    // damping of 1e-9 rounding of K leaves about seven digits; the other lines add 1e-8.
+    let seen = (std::f64::consts::TAU * 3.0 / 64.0).sin() / dt;
+    let expected = 1.0 / (2e-9 * omega * seen);
+    assert!((x.column(0).amax() / expected - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn what_does_not_repeat_is_refused() {
+    let force = schroeder(0.01, 64, 1);
+    let omega = 2.0 / 0.01 * (std::f64::consts::PI * 3.0 / 64.0).sin();
+    let undamped = Sdof::from_modal(1.0, 0.0, omega).unwrap().system();
+    let refused = integrate_periodic(&CentralDifference::default(), &undamped, &force);
+    assert!(matches!(refused, Err(IntegrateError::NoPeriodicState { .. })), "{refused:?}");
+    let one = |v: f64| DMatrix::from_element(1, 1, v);
+    for damping in [0.0, 3.0] {
+        let free = SecondOrderSystem::new(one(2.0), one(damping), one(0.0)).unwrap();
+        for scheme in schemes() {
+            let refused = integrate_periodic(scheme.as_ref(), &free, &force);
+            assert!(
+                matches!(refused, Err(IntegrateError::NoPeriodicState { .. })),
+                "{}: {refused:?}",
+                scheme.name()
+            );
+        }
+    }
+}
