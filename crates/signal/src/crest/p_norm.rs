@@ -8,11 +8,7 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use crate::Multisine;
 use crate::phases::gcd;
 
-/// Samples per Nyquist interval the norm is taken on: between them a sine at the highest line
-/// rises by 1 − cos(π/64), 0.1 %, at most.
-const OVERSAMPLING: usize = 32;
-
-/// The norm for given lines and amplitudes.
+/// The norm for given lines and amplitudes, of unit RMS.
 pub(super) struct PNorm {
     lines: Vec<usize>,
     amplitudes: Vec<f64>,
@@ -21,31 +17,38 @@ pub(super) struct PNorm {
 }
 
 impl PNorm {
-    pub(super) fn new(multisine: &Multisine) -> Self {
+    /// The norm over a grid of `oversampling` samples per Nyquist interval, or more.
+    pub(super) fn new(multisine: &Multisine, oversampling: usize) -> Self {
         // The waveform of lines 10, 20, 30 is the one of lines 1, 2, 3.
         let common = multisine.lines().iter().fold(0, |d, n| gcd(d, *n));
         let lines: Vec<usize> = multisine.lines().iter().map(|n| n / common).collect();
         let rms = multisine.rms();
         let amplitudes = multisine.amplitudes().iter().map(|a| a / rms).collect();
         let last = lines[lines.len() - 1];
-        let len = (2 * (last + 1) * OVERSAMPLING).next_power_of_two();
+        let len = (2 * (last + 1) * oversampling).next_power_of_two();
         let mut planner = RealFftPlanner::new();
         let (forward, inverse) = (planner.plan_fft_forward(len), planner.plan_fft_inverse(len));
         Self { lines, amplitudes, forward, inverse }
     }
 
-    /// The period on the fine grid, for unit RMS.
+    /// The period on the grid.
     pub(super) fn signal(&self, phases: &[f64]) -> Vec<f64> {
+        let terms = self.amplitudes.iter().zip(phases);
+        self.synthesise(terms.map(|(a, phase)| Complex::from_polar(*a, *phase)))
+    }
+
+    /// Re Σ z_n exp(i n θ_k), one z per line.
+    fn synthesise(&self, values: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
         let (mut input, mut output) =
             (self.inverse.make_input_vec(), self.inverse.make_output_vec());
-        for ((n, a), phase) in self.lines.iter().zip(&self.amplitudes).zip(phases) {
-            input[*n] = Complex::from_polar(0.5 * a, *phase);
+        for (n, z) in self.lines.iter().zip(values) {
+            input[*n] = z * 0.5;
         }
         self.inverse.process(&mut input, &mut output).expect("buffers come from the plan");
         output
     }
 
-    /// Σ y_k exp(+i 2π n k / len) for n = 0 … len/2.
+    /// Σ y_k exp(+i n θ_k) for n = 0, 1, 2, …
     fn transform(&self, mut samples: Vec<f64>) -> Vec<Complex<f64>> {
         let mut output = self.forward.make_output_vec();
         self.forward.process(&mut samples, &mut output).expect("buffers come from the plan");
@@ -53,15 +56,7 @@ impl PNorm {
         output
     }
 
-    /// Mean of the diagonal of the first term of the Hessian, per p − 1: with Σ A²/2 = 1 and
-    /// sin² taken as ½, it is Σ_k (x/s)^(p−2) / s² over the number of lines.
-    pub(super) fn mean_curvature(&self, signal: &[f64], p: i32) -> f64 {
-        let s = peak(signal);
-        let weight: f64 = signal.iter().map(|x| (x / s).powi(p - 2)).sum();
-        weight / (s * s * self.lines.len() as f64)
-    }
-
-    /// Hessian and gradient of (1/p) Σ_k (x_k / s)^p, s being the present peak.
+    /// First and second derivatives of (1/p) Σ_k (x_k / s)^p, s being the present peak.
     ///
     /// With x'_n = −A_n sin(nθ + φ_n) the derivative by φ_n, x''_n = −A_n cos(nθ + φ_n) and no
     /// mixed second derivatives:
@@ -71,37 +66,79 @@ impl PNorm {
     /// H_nm = (p−1) Σ_k (x/s)^(p−2) x'_n x'_m / s² + δ_nm Σ_k (x/s)^(p−1) x''_n / s
     /// ```
     ///
-    /// The sums over k are Fourier sums of the two powers of x, since
-    /// 2 sin a sin b = cos(a − b) − cos(a + b): two transforms give all of them.
-    pub(super) fn derivatives(
-        &self,
-        phases: &[f64],
-        signal: &[f64],
-        p: i32,
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    /// The sums over k are Fourier sums of the two powers of x.
+    pub(super) fn derivatives(&self, phases: &[f64], signal: &[f64], p: i32) -> Derivatives<'_> {
         let s = peak(signal);
         let weight: Vec<f64> = signal.iter().map(|x| (x / s).powi(p - 2)).collect();
         let pull = weight.iter().zip(signal).map(|(w, x)| w * x / s).collect();
-        let (weight, pull) = (self.transform(weight), self.transform(pull));
-
-        let n = self.lines.len();
+        let pull = self.transform(pull);
         let turned: Vec<Complex<f64>> = (self.amplitudes.iter().zip(phases))
             .map(|(a, phase)| Complex::from_polar(a / s, *phase))
             .collect();
-        let mut hessian = DMatrix::zeros(n, n);
-        let mut gradient = DVector::zeros(n);
-        for (j, (zj, lj)) in turned.iter().zip(&self.lines).enumerate() {
-            for (i, (zi, li)) in turned.iter().zip(&self.lines).enumerate().skip(j) {
-                // Only the lower triangle is read by the Cholesky factorisation.
-                let difference = zi * zj.conj() * weight[li - lj];
-                let sum = zi * zj * weight[li + lj];
-                hessian[(i, j)] = 0.5 * f64::from(p - 1) * (difference.re - sum.re);
-            }
-            let z = zj * pull[*lj];
-            gradient[j] = -z.im;
-            hessian[(j, j)] -= z.re;
+        let pulled: Vec<Complex<f64>> =
+            turned.iter().zip(&self.lines).map(|(z, n)| z * pull[*n]).collect();
+        Derivatives {
+            norm: self,
+            gradient: DVector::from_iterator(pulled.len(), pulled.iter().map(|z| -z.im)),
+            own: pulled.iter().map(|z| -z.re).collect(),
+            turned,
+            weight,
+            factor: f64::from(p - 1),
         }
-        (hessian, gradient)
+    }
+}
+
+/// Gradient and Hessian at one point; the Hessian is formed or applied on demand.
+pub(super) struct Derivatives<'a> {
+    norm: &'a PNorm,
+    pub(super) gradient: DVector<f64>,
+    /// The second term of the Hessian, a diagonal.
+    own: Vec<f64>,
+    /// (A_n / s) exp(i φ_n).
+    turned: Vec<Complex<f64>>,
+    /// (x/s)^(p−2).
+    weight: Vec<f64>,
+    /// p − 1.
+    factor: f64,
+}
+
+impl Derivatives<'_> {
+    /// Mean of the diagonal of the first term of the Hessian, with sin² taken as ½.
+    pub(super) fn mean_curvature(&self) -> f64 {
+        let power: f64 = self.turned.iter().map(|z| 0.5 * z.norm_sqr()).sum();
+        self.factor * power * self.weight.iter().sum::<f64>() / self.turned.len() as f64
+    }
+
+    /// The lower triangle of the Hessian, which is all the Cholesky factorisation reads.
+    ///
+    /// 2 sin a sin b = cos(a − b) − cos(a + b) makes one transform of the weight give all of it.
+    pub(super) fn hessian(&self) -> DMatrix<f64> {
+        let weight = self.norm.transform(self.weight.clone());
+        let lines = &self.norm.lines;
+        let mut hessian = DMatrix::zeros(lines.len(), lines.len());
+        for (j, zj) in self.turned.iter().enumerate() {
+            for (i, zi) in self.turned.iter().enumerate().skip(j) {
+                let difference = zi * zj.conj() * weight[lines[i] - lines[j]];
+                let sum = zi * zj * weight[lines[i] + lines[j]];
+                hessian[(i, j)] = 0.5 * self.factor * (difference.re - sum.re);
+            }
+            hessian[(j, j)] += self.own[j];
+        }
+        hessian
+    }
+
+    /// The Hessian times a vector, by two transforms.
+    pub(super) fn apply(&self, v: &DVector<f64>) -> DVector<f64> {
+        // −A sin(nθ + φ) is the real part of i A exp(i (nθ + φ)).
+        let terms = self.turned.iter().zip(v).map(|(z, v)| z * Complex::new(0.0, *v));
+        let mut along = self.norm.synthesise(terms);
+        along.iter_mut().zip(&self.weight).for_each(|(y, w)| *y *= w);
+        let sums = self.norm.transform(along);
+        let terms = self.turned.iter().zip(&self.norm.lines).zip(v.iter().zip(&self.own));
+        DVector::from_iterator(
+            v.len(),
+            terms.map(|((z, n), (v, own))| -self.factor * (z * sums[*n]).im + own * v),
+        )
     }
 }
 
@@ -131,10 +168,11 @@ mod tests {
         let lines = vec![1, 2, 5, 6];
         let amplitudes = vec![1.0, 0.5, 2.0, 1.5];
         let m = Multisine::new(lines, amplitudes, Phases::Random { seed: 3 }).unwrap();
-        let (norm, p, h) = (PNorm::new(&m), 8, 1e-4);
+        let (norm, p, h) = (PNorm::new(&m, 32), 8, 1e-4);
         let signal = norm.signal(m.phases());
         let s = peak(&signal);
-        let (hessian, gradient) = norm.derivatives(m.phases(), &signal, p);
+        let derivatives = norm.derivatives(m.phases(), &signal, p);
+        let (hessian, gradient) = (derivatives.hessian(), &derivatives.gradient);
         let at = |i: usize, a: f64, j: usize, b: f64| {
             let mut phases = m.phases().to_vec();
             phases[i] += a;
@@ -146,10 +184,12 @@ mod tests {
         for i in 0..4 {
             let slope = (at(i, h, i, 0.0) - at(i, -h, i, 0.0)) / (2.0 * h);
             assert!((slope - gradient[i]).abs() < tolerance, "gradient {i}");
+            let column = derivatives.apply(&DVector::from_fn(4, |k, _| f64::from(k == i)));
             for j in 0..=i {
                 let mixed = at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h);
                 let curvature = mixed / (4.0 * h * h);
                 assert!((curvature - hessian[(i, j)]).abs() < tolerance, "Hessian {i} {j}");
+                assert!((curvature - column[j]).abs() < tolerance, "applied {i} {j}");
             }
         }
     }

@@ -1,0 +1,138 @@
+//! Damped Newton steps on the p-norm of a multisine.
+
+use nalgebra::{Cholesky, DVector};
+
+use super::p_norm::{Derivatives, PNorm, norm};
+
+/// Steps allowed per exponent; far more than are ever needed.
+const MAX_STEPS: usize = 400;
+
+/// Two successive steps that gain less than this fraction of the norm end an exponent.
+const LEAST_GAIN: f64 = 1e-5;
+
+/// Above this damping the norm is stationary to rounding.
+const MOST_DAMPING: f64 = 1e6;
+
+/// Up to this many lines the Hessian is formed and factored, with more it is only applied; about
+/// here the two cost the same.
+const MOST_DENSE: usize = 400;
+
+/// Residual, as a fraction of the gradient, at which conjugate gradients stop, and their number.
+const CG_TOLERANCE: f64 = 0.05;
+const MOST_CG: usize = 60;
+
+/// Phases and what follows from them.
+pub(super) struct Point {
+    pub(super) phases: Vec<f64>,
+    signal: Vec<f64>,
+    norm: f64,
+}
+
+impl Point {
+    fn new(objective: &PNorm, phases: Vec<f64>, p: i32) -> Self {
+        let signal = objective.signal(&phases);
+        let norm = norm(&signal, p);
+        Self { phases, signal, norm }
+    }
+}
+
+/// Brings ‖x‖_p down from given phases; `damping` is handed from one exponent to the next.
+pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mut f64) -> Vec<f64> {
+    let mut point = Point::new(objective, phases, p);
+    let mut small_gains = 0;
+    for _ in 0..MAX_STEPS {
+        let Some(next) = step(objective, &point, p, damping) else {
+            break;
+        };
+        let small = point.norm - next.norm < LEAST_GAIN * point.norm;
+        small_gains = if small { small_gains + 1 } else { 0 };
+        point = next;
+        if small_gains == 2 {
+            break;
+        }
+    }
+    point.phases
+}
+
+/// One step that lowers the norm, with the damping it took; `None` at a stationary point.
+fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Point> {
+    let derivatives = objective.derivatives(&from.phases, &from.signal, p);
+    // Levenberg's multiple of the identity: a common shift in time has no curvature of its own.
+    let scale = derivatives.mean_curvature();
+    let hessian = (from.phases.len() <= MOST_DENSE).then(|| derivatives.hessian());
+    while *damping < MOST_DAMPING {
+        let added = *damping * scale;
+        // Where the damped norm is not convex there is no step, and the damping grows.
+        let step = match &hessian {
+            Some(hessian) => {
+                let mut damped = hessian.clone();
+                (0..damped.nrows()).for_each(|i| damped[(i, i)] += added);
+                Cholesky::new(damped).map(|factor| factor.solve(&derivatives.gradient))
+            }
+            None => conjugate_gradients(&derivatives, added),
+        };
+        if let Some(step) = step {
+            let phases = from.phases.iter().zip(&step).map(|(a, d)| a - d).collect();
+            let next = Point::new(objective, phases, p);
+            if next.norm < from.norm {
+                *damping = (0.3 * *damping).max(1e-9);
+                return Some(next);
+            }
+        }
+        *damping *= 4.0;
+    }
+    *damping = super::FIRST_DAMPING;
+    None
+}
+
+/// (H + added·I) d = g to a few per cent; `None` on meeting negative curvature.
+fn conjugate_gradients(derivatives: &Derivatives<'_>, added: f64) -> Option<DVector<f64>> {
+    let g = &derivatives.gradient;
+    let mut solution = DVector::zeros(g.len());
+    let mut residual = g.clone();
+    let mut direction = g.clone();
+    let mut square = residual.norm_squared();
+    let target = CG_TOLERANCE.powi(2) * square;
+    for _ in 0..MOST_CG.min(g.len()) {
+        let mut applied = derivatives.apply(&direction);
+        applied.axpy(added, &direction, 1.0);
+        let curvature = direction.dot(&applied);
+        if curvature <= 0.0 {
+            return None;
+        }
+        let length = square / curvature;
+        solution.axpy(length, &direction, 1.0);
+        residual.axpy(-length, &applied, 1.0);
+        let next = residual.norm_squared();
+        if next <= target {
+            break;
+        }
+        direction = &residual + direction * (next / square);
+        square = next;
+    }
+    Some(solution)
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::DMatrix;
+
+    use super::*;
+    use crate::{Multisine, Phases};
+
+    #[test]
+    fn conjugate_gradients_solve_the_damped_system() {
+        let m = Multisine::flat(1..=24, 1.0, Phases::Random { seed: 5 }).unwrap();
+        let norm = PNorm::new(&m, 8);
+        let derivatives = norm.derivatives(m.phases(), &norm.signal(m.phases()), 16);
+        // Enough to make the matrix positive definite, so that both ways have a step.
+        let added = 2.0 * derivatives.mean_curvature();
+        let lower = derivatives.hessian();
+        let full = DMatrix::from_fn(24, 24, |i, j| lower[(i.max(j), i.min(j))]);
+        let step = conjugate_gradients(&derivatives, added).unwrap();
+        let residual = full * &step + added * &step - &derivatives.gradient;
+        assert!(residual.norm() <= 1.001 * CG_TOLERANCE * derivatives.gradient.norm());
+        // Undamped, a point that is no minimum has negative curvature.
+        assert!(conjugate_gradients(&derivatives, -added).is_none());
+    }
+}
