@@ -1,25 +1,43 @@
 //! Linear mechanical systems M ẍ + C ẋ + K x = F and what is known of them in closed form.
 //!
 //! ```
-//! use mechid_model::SecondOrderSystem;
-//! use nalgebra::dmatrix;
+//! use mechid_model::{JournalBearing, KyxSign, OilFilm};
 //!
-//! // An oil film couples the two directions: C and K need not be symmetric.
-//! let shaft = SecondOrderSystem::new(
-//!     dmatrix![14.8, 0.0; 0.0, 14.8],
-//!     dmatrix![20.0, 10.0; 10.0, 30.0],
-//!     dmatrix![40.0, 50.0; -20.0, 60.0],
-//! )?;
-//! assert_eq!(shaft.dof(), 2);
+//! // A rigid shaft of 14.8 kg in an oil film. The film couples the two directions, and not
+//! // symmetrically: whether the shaft whirls depends on the sign of Kyx.
+//! let film = OilFilm {
+//!     kxx: 40.0, kxy: 50.0, kyx: 20.0, kyy: 60.0,
+//!     cxx: 20.0, cxy: 10.0, cyx: 10.0, cyy: 30.0,
+//! };
+//! let shaft = JournalBearing::new(14.8, film, KyxSign::Minus)?.system();
+//!
+//! let whirl = &shaft.modes()?[0];
+//! assert!((whirl.damped_frequency() - 1.63331).abs() < 5e-6);
+//! assert!((whirl.damping_ratio() - 0.0537).abs() < 5e-5);
+//!
+//! // Amplitude and phase of x (m) under 1 N in y, at the frequency of the whirl.
+//! let x = shaft.receptance(whirl.damped_frequency())?[(0, 1)];
+//! assert!(x.norm() > 5.0 * shaft.receptance(0.0)?[(0, 1)].norm());
 //! # Ok::<(), mechid_model::ModelError>(())
 //! ```
+//!
+//! | To get | Use |
+//! |---|---|
+//! | a system | [`SecondOrderSystem::new`], [`Sdof`], [`JournalBearing`] |
+//! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
+//! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
+//! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
+//! | a time axis that suits the system | [`npi_sampling`] |
 
+mod closed_form;
+mod divided_exp;
 mod error;
 mod frequency_response;
 mod initial_state;
 mod journal_bearing;
 mod modes;
 mod response;
+mod sampled_force;
 mod sampling_rule;
 mod sdof;
 mod second_order;

@@ -111,37 +111,41 @@ impl SecondOrderSystem {
         let eigenvalues = self.eigenvalues()?;
         let mut modes: Vec<Mode> = Vec::with_capacity(self.dof());
         for eigenvalue in eigenvalues.into_iter().filter(|l| l.im >= 0.0) {
-            let twins = modes
-                .iter()
-                .filter(|m| (m.eigenvalue - eigenvalue).norm() <= REPEATED * eigenvalue.norm())
-                .count();
-            modes.push(Mode { eigenvalue, shape: self.shape(eigenvalue, twins)? });
+            let near =
+                |m: &&Mode| (m.eigenvalue - eigenvalue).norm() <= REPEATED * eigenvalue.norm();
+            let twins = modes.iter().filter(near).count();
+            // Independent shapes must come from one decomposition: that of the first twin.
+            let first = modes.iter().find(near).map_or(eigenvalue, |m| m.eigenvalue);
+            let shape = match self.shape(first, twins)? {
+                Some(shape) => shape,
+                None => self.shape(eigenvalue, 0)?.expect("there is always a smallest"),
+            };
+            modes.push(Mode { eigenvalue, shape });
         }
         Ok(modes)
     }
 
-    /// The null vector of λ²M + λC + K; for the `twins`-th copy of a repeated λ the next
-    /// independent one, if there is one.
+    /// The `copy`-th null vector of λ²M + λC + K, counted from 0; None if there are not so many.
     fn shape(
         &self,
         eigenvalue: Complex<f64>,
-        twins: usize,
-    ) -> Result<DVector<Complex<f64>>, ModelError> {
+        copy: usize,
+    ) -> Result<Option<DVector<Complex<f64>>>, ModelError> {
         let (m, c, k) = (self.mass(), self.damping(), self.stiffness());
         let l = eigenvalue;
         let pencil = m.map(|v| l * l * v) + c.map(|v| l * v) + k.map(Complex::from);
         let size = m.norm() * l.norm_sqr() + c.norm() * l.norm() + k.norm();
         let svd = SVD::try_new(pencil, false, true, f64::EPSILON, 1000 * self.dof())
             .ok_or(ModelError::ModesNotConverged { dof: self.dof() })?;
-        let last = self.dof() - 1;
-        let vanishes = |from_last: usize| {
-            from_last <= last && svd.singular_values[last - from_last] <= 10.0 * REPEATED * size
-        };
-        let row = last - if vanishes(twins) { twins } else { 0 };
-        let rows = svd.v_t.as_ref().expect("asked for");
-        let shape = rows.row(row).adjoint();
-        let largest = shape[shape.icamax()];
-        Ok(shape / largest)
+        let Some(row) = self.dof().checked_sub(copy + 1) else { return Ok(None) };
+        if copy > 0 && svd.singular_values[row] > 10.0 * REPEATED * size {
+            return Ok(None);
+        }
+        let shape = svd.v_t.as_ref().expect("asked for").row(row).adjoint();
+        let largest = shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
+            if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
+        });
+        Ok(Some(shape / largest))
     }
 }
 
