@@ -103,6 +103,22 @@ pub enum EstimateError {
         /// The combinations of parameters on which the data say nothing.
         directions: String,
     },
+    /// The motion from sample to sample belongs to no continuous machine.
+    #[error(
+        "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
+         has no logarithm and no continuous machine moves like that: either a mode oscillates near or \
+         above half the sampling rate (sample faster), or one dies out within a sample, or noise drowns it"
+    )]
+    NoLogarithm {
+        /// The offending eigenvalue of Φ, zero or negative.
+        eigenvalue: f64,
+    },
+    /// The eigenvalues of a matrix could not be computed.
+    #[error("the eigenvalues of a {size}×{size} matrix could not be computed")]
+    Eigenvalues {
+        /// Rows of the matrix.
+        size: usize,
+    },
     /// A confidence level outside (0, 1).
     #[error("a confidence level lies between 0 and 1, got {level}")]
     Level {

@@ -27,7 +27,10 @@ mod estimate;
 pub mod frequency_domain;
 mod frf;
 mod least_squares;
+mod logarithm;
 mod noise_spectrum;
+mod quasi_triangular;
+mod real_schur;
 mod triangular;
 mod unknowns;
 
@@ -36,4 +39,5 @@ pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
 pub use frf::{Frf, FrfEstimator, Segments};
 pub use least_squares::{Direction, LeastSquares, Solution};
+pub use logarithm::logarithm;
 pub use unknowns::{Parameter, Unknowns};

@@ -1,0 +1,183 @@
+//! The real Schur form of a small matrix.
+//!
+//! nalgebra has one, but its shifts suffer from cancellation and are never exceptional: it goes
+//! round in circles for several eigenvalues that are equal to rounding.
+
+use nalgebra::{DMatrix, Hessenberg, Vector3};
+
+use crate::EstimateError;
+
+/// Diagonal blocks (first row, size 1 or 2) of a quasi-upper-triangular matrix.
+pub(crate) type Blocks = Vec<(usize, usize)>;
+
+/// Sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is dropped too.
+const PATIENCE: usize = 20;
+
+/// Sweeps without a deflation after which the iteration is given up.
+const LIMIT: usize = 100;
+
+/// A = Q T Qᵀ with T quasi-upper-triangular, as (Q, T, diagonal blocks).
+///
+/// Francis' double-shift QR iteration. A 2×2 block may also hold two real eigenvalues.
+///
+/// # Errors
+/// [`EstimateError::Eigenvalues`] if the iteration does not converge.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
+pub(crate) fn real_schur(
+    a: DMatrix<f64>,
+) -> Result<(DMatrix<f64>, DMatrix<f64>, Blocks), EstimateError> {
+    let size = a.nrows();
+    if size < 2 {
+        return Ok((DMatrix::identity(size, size), a, (0..size).map(|at| (at, 1)).collect()));
+    }
+    let norm = a.norm();
+    let (mut q, mut h) = Hessenberg::new(a).unpack();
+    let mut blocks = Blocks::new();
+    let (mut end, mut sweeps) = (size, 0);
+    while end > 0 {
+        let last = end - 1;
+        let start = first_of_unreduced(&mut h, last, if sweeps < PATIENCE { 0.0 } else { norm });
+        if last - start < 2 {
+            blocks.push((start, end - start));
+            end = start;
+            sweeps = 0;
+            continue;
+        }
+        sweeps += 1;
+        if sweeps > LIMIT {
+            return Err(EstimateError::Eigenvalues { size });
+        }
+        sweep(&mut h, &mut q, start, last, sweeps);
+    }
+    blocks.reverse();
+    Ok((q, h, blocks))
+}
+
+/// Goes up from `last` to the first negligible subdiagonal entry and clears it.
+fn first_of_unreduced(h: &mut DMatrix<f64>, last: usize, norm: f64) -> usize {
+    for at in (1..=last).rev() {
+        let neighbours = h[(at, at)].abs() + h[(at - 1, at - 1)].abs();
+        if h[(at, at - 1)].abs() <= f64::EPSILON * neighbours.max(norm) {
+            h[(at, at - 1)] = 0.0;
+            return at;
+        }
+    }
+    0
+}
+
+/// One double-shift step on rows and columns `start..=last`.
+fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, count: usize) {
+    let (x, y, w) = if count.is_multiple_of(10) {
+        // An exceptional shift, of the size of the entries that refuse to vanish.
+        let size = h[(last, last - 1)].abs() + h[(last - 1, last - 2)].abs();
+        (0.75 * size, 0.75 * size, -0.4375 * size * size)
+    } else {
+        let product = h[(last, last - 1)] * h[(last - 1, last)];
+        (h[(last, last)], h[(last - 1, last - 1)], product)
+    };
+    // The first column of H² − (x + y) H + (x y − w) I, over h21. Differences come first: the
+    // plain formula loses everything to cancellation when the eigenvalues are close together.
+    let (r, s) = (x - h[(start, start)], y - h[(start, start)]);
+    let mut bulge = Vector3::new(
+        (r * s - w) / h[(start + 1, start)] + h[(start, start + 1)],
+        h[(start + 1, start + 1)] - h[(start, start)] - r - s,
+        h[(start + 2, start + 1)],
+    );
+    for k in start..last {
+        let width = 3.min(last - k + 1);
+        if k > start {
+            let third = if width == 3 { h[(k + 2, k - 1)] } else { 0.0 };
+            bulge = Vector3::new(h[(k, k - 1)], h[(k + 1, k - 1)], third);
+        }
+        if width == 2 {
+            bulge.z = 0.0;
+        }
+        let Some(axis) = mirror_axis(bulge) else { continue };
+        reflect_rows(h, axis, k, width, k.saturating_sub(1).max(start));
+        reflect_columns(h, axis, k, width, (k + 4).min(last + 1));
+        reflect_columns(q, axis, k, width, q.nrows());
+        if k > start {
+            // What the reflection was made to clear, exactly.
+            h.view_mut((k + 1, k - 1), (width - 1, 1)).fill(0.0);
+        }
+    }
+}
+
+/// Unit normal of the mirror that sends `v` to the first axis; `None` if it is there already.
+fn mirror_axis(v: Vector3<f64>) -> Option<Vector3<f64>> {
+    let largest = v.amax();
+    if largest == 0.0 || (v.y == 0.0 && v.z == 0.0) {
+        return None;
+    }
+    let mut axis = v / largest;
+    axis.x += axis.norm().copysign(axis.x);
+    Some(axis.normalize())
+}
+
+/// Rows `at..at + width` of `a` ← (I − 2 u uᵀ) of them, from column `from` on.
+fn reflect_rows(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, from: usize) {
+    for mut column in a.columns_range_mut(from..).column_iter_mut() {
+        let part: f64 = (0..width).map(|i| u[i] * column[at + i]).sum();
+        for i in 0..width {
+            column[at + i] -= 2.0 * part * u[i];
+        }
+    }
+}
+
+/// Columns `at..at + width` of the first `rows` rows of `a` ← those times (I − 2 u uᵀ).
+fn reflect_columns(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, rows: usize) {
+    for row in 0..rows {
+        let part: f64 = (0..width).map(|j| u[j] * a[(row, at + j)]).sum();
+        for j in 0..width {
+            a[(row, at + j)] -= 2.0 * part * u[j];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+
+    fn check(a: &DMatrix<f64>) {
+        let size = a.nrows();
+        let (q, t, blocks) = real_schur(a.clone()).unwrap();
+        let scale = 1e-14 * (1.0 + size as f64) * a.norm().max(f64::MIN_POSITIVE);
+        assert!((&q * &t * q.transpose() - a).norm() <= scale);
+        assert!((q.tr_mul(&q) - DMatrix::identity(size, size)).norm() < 1e-14 * size as f64);
+        assert_eq!(blocks.iter().map(|(_, width)| width).sum::<usize>(), size);
+        for (start, width) in blocks {
+            for column in start..start + width {
+                assert!((start + width..size).all(|row| t[(row, column)] == 0.0));
+            }
+        }
+    }
+
+    #[test]
+    fn random_repeated_defective_and_zero_matrices_are_reduced() {
+        for seed in 0..200 {
+            let mut source = ChaCha8Rng::seed_from_u64(seed);
+            let size = 1 + seed as usize % 12;
+            let v: DMatrix<f64> =
+                DMatrix::from_fn(size, size, |_, _| source.random_range(-1.0..1.0));
+            check(&v);
+            // Eigenvalues that differ by rounding only, in scrambled coordinates.
+            let equal = DMatrix::from_diagonal_element(size, size, 0.7);
+            let noise = v.map(|x| 1e-15 * x);
+            check(&(equal + noise));
+            let well: DMatrix<f64> = v + 3.0 * DMatrix::identity(size, size);
+            let twice = DMatrix::from_fn(size, size, |i, j| if i == j { -0.3 } else { 0.0 })
+                + DMatrix::from_fn(size, size, |i, j| if j == i + 1 { 1e-12 } else { 0.0 });
+            check(&well.clone().lu().solve(&(twice * &well)).unwrap());
+        }
+        for size in 1..5 {
+            check(&DMatrix::zeros(size, size));
+            // A cyclic permutation: ordinary shifts leave it as it is.
+            check(&DMatrix::from_fn(size, size, |i, j| f64::from((j + 1) % size == i)));
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! The matrix logarithm alone, judged by the exponential and by closed forms.
+
+use mechid_estimate::{EstimateError, logarithm};
+use nalgebra::{DMatrix, dmatrix};
+use proptest::prelude::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+fn random(size: usize, seed: u64) -> DMatrix<f64> {
+    let mut source = ChaCha8Rng::seed_from_u64(seed);
+    DMatrix::from_fn(size, size, |_, _| source.random_range(-1.0..1.0))
+}
+
+/// exp by its series after many halvings: slow and plain, the judge.
+fn exponential(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let halvings = (a.norm().log2().ceil().max(0.0) as i32) + 4;
+    let small = a / 2f64.powi(halvings);
+    // Of exp − I, so that nothing is lost against I: (I + E)² − I = 2 E + E².
+    let mut term = small.clone();
+    let mut sum = small.clone();
+    for k in 2..=20 {
+        term = &term * &small / k as f64;
+        sum += &term;
+    }
+    for _ in 0..halvings {
+        sum = &sum * 2.0 + &sum * &sum;
+    }
+    sum + DMatrix::identity(a.nrows(), a.ncols())
+}
+
+fn error(got: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
+    (got - expected).norm() / expected.norm()
+}
+
+/// V diag-blocks V⁻¹ with the eigenvalues given as (real, imaginary) pairs or single reals.
+fn with_eigenvalues(reals: &[f64], pairs: &[(f64, f64)], seed: u64) -> DMatrix<f64> {
+    let size = reals.len() + 2 * pairs.len();
+    let mut blocks = DMatrix::zeros(size, size);
+    for (at, value) in reals.iter().enumerate() {
+        blocks[(at, at)] = *value;
+    }
+    for (at, (re, im)) in pairs.iter().enumerate() {
+        let at = reals.len() + 2 * at;
+        blocks.view_mut((at, at), (2, 2)).copy_from(&dmatrix![*re, *im; -*im, *re]);
+    }
+    let v: DMatrix<f64> = random(size, seed) + 3.0 * DMatrix::identity(size, size);
+    let lu = v.clone().lu();
+    lu.solve(&(&blocks * &v)).unwrap()
+}
+
+#[test]
+fn closed_forms() {
+    // A Jordan block: log(1 + N) = N − N²/2, defective as can be.
+    let jordan = dmatrix![1.0, 1.0, 0.0; 0.0, 1.0, 1.0; 0.0, 0.0, 1.0];
+    let expected = dmatrix![0.0, 1.0, -0.5; 0.0, 0.0, 1.0; 0.0, 0.0, 0.0];
+    assert!((logarithm(&jordan).unwrap() - expected).norm() < 1e-14);
+    // A damped turn by 3 rad, nearly half a turn.
+    let (s, c) = 3f64.sin_cos();
+    let turn = dmatrix![c, -s; s, c] * (-0.2f64).exp();
+    let expected = dmatrix![-0.2, -3.0; 3.0, -0.2];
+    assert!((logarithm(&turn).unwrap() - expected).norm() < 1e-14);
+    assert_eq!(logarithm(&DMatrix::identity(3, 3)).unwrap(), DMatrix::zeros(3, 3));
+    assert!((logarithm(&dmatrix![0.01]).unwrap()[(0, 0)] - 0.01f64.ln()).abs() < 1e-14);
+}
+
+#[test]
+fn clustered_eigenvalues_cost_no_accuracy() {
+    for gap in [1e-2, 1e-5, 1e-8, 1e-12, 0.0] {
+        let a = with_eigenvalues(&[0.7, 0.7 + gap, 0.7 - gap], &[(0.7, gap), (0.5, 0.5)], 5);
+        let log = logarithm(&a).unwrap();
+        assert!(error(&exponential(&log), &a) < 1e-12, "gap {gap}");
+    }
+}
+
+#[test]
+fn nearly_defective_matrices_are_as_accurate_as_their_conditioning_allows() {
+    // Eigenvalues 0.9 and 0.9 + gap joined by a coupling of 1: the logarithm is known exactly
+    // through the divided difference of ln, stable as ln1p(gap/0.9)/gap.
+    for gap in [1e-1, 1e-4, 1e-8, 1e-13] {
+        let a = dmatrix![0.9, 1.0; 0.0, 0.9 + gap];
+        let actual_gap = a[(1, 1)] - 0.9;
+        let log = logarithm(&a).unwrap();
+        let expected = dmatrix![
+            0.9f64.ln(), (actual_gap / 0.9).ln_1p() / actual_gap; 0.0, (0.9 + gap).ln()
+        ];
+        assert!(error(&log, &expected) < 1e-14, "gap {gap}: {log} {expected}");
+        // The same turned out of its triangular shape: Schur sees the gap only to √ε, but
+        // the logarithm is not sensitive to it (its condition number here is below 10).
+        let q = random(2, 3).qr().q();
+        let turned = &q * &a * q.transpose();
+        let expected = &q * expected * q.transpose();
+        assert!(error(&logarithm(&turned).unwrap(), &expected) < 1e-13, "gap {gap}");
+    }
+}
+
+#[test]
+fn matrices_close_to_the_identity_keep_their_relative_accuracy() {
+    for size in [1e-3, 1e-6, 1e-10] {
+        let step = random(4, 9) * size;
+        let a = DMatrix::identity(4, 4) + &step;
+        // What is left of the step after rounding a to doubles.
+        let x = &a - DMatrix::identity(4, 4);
+        let series = &x - &x * &x / 2.0 + &x * &x * &x / 3.0 - &x * &x * &x * &x / 4.0;
+        // The series stops at x⁵/5, a share of size⁴ of the first term.
+        let bound = 1e-14 + 10.0 * size.powi(4);
+        assert!(error(&logarithm(&a).unwrap(), &series) < bound, "size {size}");
+    }
+}
+
+#[test]
+fn what_has_no_logarithm_is_refused_with_its_eigenvalue() {
+    for eigenvalue in [-0.4, 0.0] {
+        let a = with_eigenvalues(&[eigenvalue, 0.3], &[(0.2, 0.4)], 4);
+        let Err(EstimateError::NoLogarithm { eigenvalue: got }) = logarithm(&a) else {
+            panic!("eigenvalue {eigenvalue} accepted")
+        };
+        assert!((got - eigenvalue).abs() < 1e-14);
+    }
+    assert!(logarithm(&DMatrix::zeros(2, 3)).is_err());
+    assert!(logarithm(&dmatrix![f64::INFINITY]).is_err());
+    let message = EstimateError::NoLogarithm { eigenvalue: -0.4 }.to_string();
+    assert!(message.contains("sample faster"));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_exponential_undoes_the_logarithm(size in 1usize..12, seed in 0u64..10_000) {
+        // Eigenvalues of the exponent within the unit disc times √size: inside ±iπ.
+        let exponent = random(size, seed);
+        let a = exponential(&exponent);
+        let log = logarithm(&a).unwrap();
+        prop_assert!(error(&exponential(&log), &a) < 1e-12);
+        prop_assert!(error(&log, &exponent) < 1e-11);
+    }
+}
