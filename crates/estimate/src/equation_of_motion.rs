@@ -106,6 +106,15 @@ impl EquationOfMotion {
     /// # Source
     /// Dissertation eqs. (4.4.1)–(4.4.6), (4.6.12), (4.6.31).
     pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, EstimateError> {
+        Ok(Estimate::new(self.findings(unknowns)?.0))
+    }
+
+    /// The estimate to be, and for every parameter how it follows from the right-hand side of its
+    /// equation: parameters × rows of the compressed data.
+    pub(crate) fn findings(
+        &self,
+        unknowns: &Unknowns,
+    ) -> Result<(Findings, DMatrix<f64>), EstimateError> {
         size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         let free = unknowns.free();
         if free.is_empty() {
@@ -121,7 +130,9 @@ impl EquationOfMotion {
                 residual_nrmse[*equation] = *nrmse;
             }
         }
-        Ok(Estimate::new(Findings {
+        let rows: Vec<_> =
+            places.iter().map(|p| p.group.solution.inverse.row(p.row).into_owned()).collect();
+        let findings = Findings {
             values: values.collect(),
             covariance: covariance(&places),
             degrees_of_freedom: minimum(&groups),
@@ -129,7 +140,25 @@ impl EquationOfMotion {
             condition: groups.iter().map(|g| g.solution.condition).fold(1.0, f64::max),
             undetermined: groups.iter().flat_map(|g| g.undetermined(&free)).collect(),
             unknowns: unknowns.clone(),
-        }))
+        };
+        Ok((findings, DMatrix::from_rows(&rows)))
+    }
+
+    /// Rows \[ẍ | ẋ | x | F\] that stand for `rows` original ones with the same Gram matrix.
+    pub(crate) fn from_compressed(
+        dof: usize,
+        parts: [DMatrixView<'_, f64>; 4],
+        rows: usize,
+    ) -> Self {
+        let mut equations = Self::new(dof);
+        equations.factor.push(&parts);
+        equations.factor.stand_for(rows);
+        equations
+    }
+
+    /// The compressed columns \[ẋ | x | F\], side by side.
+    pub(crate) fn motion_and_force(&self) -> DMatrixView<'_, f64> {
+        self.factor.r().columns(self.dof, 3 * self.dof)
     }
 
     fn groups(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<Vec<Group>, EstimateError> {

@@ -103,6 +103,14 @@ pub enum EstimateError {
         /// The combinations of parameters on which the data say nothing.
         directions: String,
     },
+    /// Records that are to be fitted together have different steps.
+    #[error("the records have different time steps: {expected} s and {got} s")]
+    Step {
+        /// Step of the first record, in seconds.
+        expected: f64,
+        /// Step of the other, in seconds.
+        got: f64,
+    },
     /// The motion from sample to sample belongs to no continuous machine.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \

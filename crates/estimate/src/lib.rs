@@ -31,6 +31,7 @@ mod logarithm;
 mod noise_spectrum;
 mod quasi_triangular;
 mod real_schur;
+pub mod time_domain;
 mod triangular;
 mod unknowns;
 

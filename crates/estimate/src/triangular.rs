@@ -62,6 +62,11 @@ impl TriangularFactor {
     pub(crate) fn merge(&mut self, other: &Self) {
         let rows = self.rows + other.rows;
         self.push(&[other.r.as_view()]);
+        self.stand_for(rows);
+    }
+
+    /// From now on the rows seen count as `rows`.
+    pub(crate) fn stand_for(&mut self, rows: usize) {
         self.rows = rows;
     }
 

@@ -1,0 +1,61 @@
+//! From the motion between samples to the motion in time, and how errors follow.
+
+use nalgebra::DMatrix;
+
+use super::Discretisation;
+use crate::EstimateError;
+use crate::logarithm::Generator;
+
+/// \[A B\] from \[Φ − I, Γ\], and the derivative of that.
+///
+/// Works on the state (x, Δt ẋ), in which both rows of Φ are of one size.
+pub(super) struct Continuous {
+    dt: f64,
+    dof: usize,
+    /// Empty for Euler, which has AΔt = Φ − I.
+    generator: Option<Generator>,
+    /// \[A B\]: 2n × (2n + forces).
+    pub(super) value: DMatrix<f64>,
+}
+
+impl Continuous {
+    /// `change` is \[Φ − I, Γ\]: 2n × (2n + forces).
+    pub(super) fn new(
+        change: &DMatrix<f64>,
+        dt: f64,
+        discretisation: Discretisation,
+    ) -> Result<Self, EstimateError> {
+        let states = change.nrows();
+        let mut this = Self { dt, dof: states / 2, generator: None, value: DMatrix::zeros(0, 0) };
+        let scaled = this.scaled(change, 1.0);
+        let logarithm = match discretisation {
+            Discretisation::Euler => scaled,
+            Discretisation::ZeroOrderHold | Discretisation::FirstOrderHold => {
+                let own = scaled.columns(0, states).into_owned();
+                let input = scaled.columns(states, scaled.ncols() - states).into_owned();
+                let generator = Generator::new(&own, &input)?;
+                let value = generator.value.clone();
+                this.generator = Some(generator);
+                value
+            }
+        };
+        this.value = this.scaled(&logarithm, -1.0) / dt;
+        Ok(this)
+    }
+
+    /// How \[A B\] changes with \[Φ − I, Γ\].
+    pub(super) fn derivative(&self, change: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
+        let Some(generator) = &self.generator else { return Ok(change / self.dt) };
+        let moved = generator.derivative(&self.scaled(change, 1.0))?;
+        Ok(self.scaled(&moved, -1.0) / self.dt)
+    }
+
+    /// To the state (x, Δt ẋ), or with `power` −1 back to (x, ẋ).
+    fn scaled(&self, matrix: &DMatrix<f64>, power: f64) -> DMatrix<f64> {
+        let (n, factor) = (self.dof, self.dt.powf(power));
+        let mut scaled = matrix.clone();
+        scaled.rows_mut(n, n).scale_mut(factor);
+        scaled.columns_mut(n, n).unscale_mut(factor);
+        scaled
+    }
+}

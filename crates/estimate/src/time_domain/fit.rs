@@ -1,0 +1,330 @@
+//! The time-domain estimate: M, C, K and the transition they come from.
+
+use mechid_model::Matrix;
+use mechid_signal::Record;
+use nalgebra::{DMatrix, RowDVector};
+
+use super::continuous::Continuous;
+use super::{Discretisation, Extent, Transitions};
+use crate::estimate::Findings;
+use crate::least_squares::{Solution, size, solve_compressed};
+use crate::{EquationOfMotion, Estimate, EstimateError, Parameter, Undetermined, Unknowns};
+
+/// M̂, Ĉ, K̂ and the sampled and continuous state equations they were found through.
+///
+/// The residual ratios of its [`Estimate`] are those of the velocity increments ẋ⁺ − ẋ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeDomainFit {
+    estimate: Estimate,
+    discretisation: Discretisation,
+    /// \[Φ − I, Γ(, Γ⁺)\], forces left out put back as zeros.
+    change: DMatrix<f64>,
+    state_matrix: DMatrix<f64>,
+    dt: f64,
+}
+
+/// The least-squares answer in terms of the state equations.
+struct Fitted<'a> {
+    rows: &'a Transitions,
+    /// Forces that are not identically zero.
+    forces: Vec<usize>,
+    /// Coefficients of the force at the next sample, too.
+    two_forces: bool,
+    solution: Solution,
+    continuous: Continuous,
+}
+
+/// How each parameter follows from \[A₂₁ A₂₂ B₂\]: d p = −Σ_j M_ij weight · d(row j).
+struct Sensitivity {
+    equation: usize,
+    weight: RowDVector<f64>,
+}
+
+impl TimeDomainFit {
+    pub(super) fn new(
+        rows: &Transitions,
+        discretisation: Discretisation,
+        unknowns: &Unknowns,
+    ) -> Result<Self, EstimateError> {
+        let (fitted, coefficients) = Fitted::new(rows, discretisation)?;
+        let (mut findings, sensitivities) = fitted.parameters(unknowns)?;
+        let [mass, _, _] = unknowns.assemble(&findings.values);
+        findings.covariance = fitted.covariance(&mass, &sensitivities)?;
+        let n = rows.dof();
+        findings.residual_nrmse = fitted.solution.residual_nrmse[n..].to_vec();
+        findings.degrees_of_freedom = fitted.solution.degrees_of_freedom;
+        findings.condition = fitted.solution.condition;
+        Ok(Self {
+            estimate: Estimate::new(findings),
+            discretisation,
+            change: fitted.all_forces(&coefficients),
+            state_matrix: fitted.continuous.value.columns(0, 2 * n).into_owned(),
+            dt: rows.dt(),
+        })
+    }
+
+    /// M̂, Ĉ, K̂ with their covariance.
+    pub fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    /// M̂, Ĉ, K̂ with their covariance, leaving the state equations behind.
+    pub fn into_estimate(self) -> Estimate {
+        self.estimate
+    }
+
+    /// The assumption between samples.
+    pub fn discretisation(&self) -> Discretisation {
+        self.discretisation
+    }
+
+    /// Φ of z⁺ = Φ z + Γ F with z = (x, ẋ): 2n × 2n.
+    pub fn transition(&self) -> DMatrix<f64> {
+        let states = self.change.nrows();
+        self.change.columns(0, states) + DMatrix::identity(states, states)
+    }
+
+    /// A of ż = A z + B F: 2n × 2n. In exact data its upper half is \[0 I\].
+    pub fn state_matrix(&self) -> &DMatrix<f64> {
+        &self.state_matrix
+    }
+
+    /// How far the identified dx/dt is from the measured velocity: the largest deviation of the
+    /// upper half of A from \[0 I\], relative, displacements counted in steps of velocity.
+    ///
+    /// A velocity of the wrong scale shows here, as does a discretisation that does not fit.
+    pub fn kinematic_error(&self) -> f64 {
+        let n = self.state_matrix.nrows() / 2;
+        let of_velocity = self.state_matrix.view((0, n), (n, n)) - DMatrix::identity(n, n);
+        let of_displacement = self.state_matrix.view((0, 0), (n, n)) * self.dt;
+        of_velocity.amax().max(of_displacement.amax())
+    }
+
+    /// What one step ahead was predicted wrong, on this or another record: rows × 2n, first the
+    /// errors of x⁺ (m), then those of ẋ⁺ (m/s).
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`], [`EstimateError::Signal`], [`EstimateError::Step`] if the record
+    /// does not fit.
+    pub fn one_step_errors(
+        &self,
+        displacement: &Record,
+        velocity: &Record,
+        force: &Record,
+        extent: Extent,
+    ) -> Result<DMatrix<f64>, EstimateError> {
+        let n = self.estimate.dof();
+        for record in [displacement, velocity, force] {
+            size("channels of a record", n, record.channels())?;
+            displacement.check_same_sampling(record)?;
+        }
+        let got = displacement.sampling().dt();
+        if (got - self.dt).abs() > 1e-9 * self.dt {
+            return Err(EstimateError::Step { expected: self.dt, got });
+        }
+        let samples = displacement.len();
+        let pairs = if extent == Extent::Open { samples - 1 } else { samples };
+        let [x, v, f] = [displacement, velocity, force].map(Record::data);
+        let column = |at: usize, k: usize| match at / n {
+            0 => x[(k, at)],
+            1 => v[(k, at - n)],
+            2 => f[(k, at - 2 * n)],
+            _ => f[((k + 1) % samples, at - 3 * n)],
+        };
+        let regressors = DMatrix::from_fn(pairs, self.change.ncols(), |k, at| column(at, k));
+        let increments =
+            DMatrix::from_fn(pairs, 2 * n, |k, at| column(at, (k + 1) % samples) - column(at, k));
+        Ok(increments - regressors * self.change.transpose())
+    }
+}
+
+impl<'a> Fitted<'a> {
+    /// With the coefficients (regressors × 2n), the smallest of those that fit equally well.
+    fn new(
+        rows: &'a Transitions,
+        discretisation: Discretisation,
+    ) -> Result<(Self, DMatrix<f64>), EstimateError> {
+        let n = rows.dof();
+        let force_columns = rows.columns(2);
+        let forces: Vec<usize> = (0..n).filter(|j| force_columns.column(*j).norm() > 0.0).collect();
+        let two_forces = discretisation == Discretisation::FirstOrderHold;
+        let mut regressors: Vec<_> =
+            (0..2 * n).map(|at| rows.columns(at / n).column(at % n).into_owned()).collect();
+        for kind in 2..if two_forces { 4 } else { 3 } {
+            let columns = rows.columns(kind);
+            regressors.extend(forces.iter().map(|j| columns.column(*j).into_owned()));
+        }
+        let increments: Vec<_> =
+            (0..2 * n).map(|at| rows.columns(4 + at / n).column(at % n).into_owned()).collect();
+        let (regressors, targets) =
+            (DMatrix::from_columns(&regressors), DMatrix::from_columns(&increments));
+        let solution = solve_compressed(regressors.as_view(), targets.as_view(), rows.rows())?;
+        let coefficients = &solution.inverse * targets;
+        let change = joined(&coefficients, 2 * n, forces.len());
+        let continuous = Continuous::new(&change, rows.dt(), discretisation)?;
+        Ok((Self { rows, forces, two_forces, solution, continuous }, coefficients))
+    }
+
+    /// The values, and how they follow from the state equations.
+    fn parameters(
+        &self,
+        unknowns: &Unknowns,
+    ) -> Result<(Findings, Vec<Sensitivity>), EstimateError> {
+        let n = self.rows.dof();
+        let free = unknowns.free();
+        match unknowns.mass() {
+            Some(mass) if free.len() == 2 * n * n => {
+                Ok(self.with_known_mass(unknowns, &free, &mass))
+            }
+            _ => self.by_equation_of_motion(unknowns, &free),
+        }
+    }
+
+    /// K̂ = −M A₂₁, Ĉ = −M A₂₂.
+    fn with_known_mass(
+        &self,
+        unknowns: &Unknowns,
+        free: &[Parameter],
+        mass: &DMatrix<f64>,
+    ) -> (Findings, Vec<Sensitivity>) {
+        let n = self.rows.dof();
+        let lower = self.continuous.value.rows(n, n);
+        let force = -(mass * lower);
+        let place = |p: &Parameter| p.column() + if p.matrix() == Matrix::Damping { n } else { 0 };
+        let sensitivity = |p: &Parameter| {
+            let mut weight = RowDVector::zeros(lower.ncols());
+            weight[place(p)] = 1.0;
+            Sensitivity { equation: p.row(), weight }
+        };
+        let findings = Findings {
+            unknowns: unknowns.clone(),
+            values: free.iter().map(|p| force[(p.row(), place(p))]).collect(),
+            covariance: DMatrix::zeros(0, 0),
+            degrees_of_freedom: 0,
+            residual_nrmse: Vec::new(),
+            condition: 1.0,
+            undetermined: self.undetermined(free, place),
+        };
+        (findings, free.iter().map(sensitivity).collect())
+    }
+
+    /// The directions of the regressors on which the data say nothing, for every equation of motion.
+    fn undetermined(
+        &self,
+        free: &[Parameter],
+        place: impl Fn(&Parameter) -> usize,
+    ) -> Vec<Undetermined> {
+        let mut found = Vec::new();
+        for direction in &self.solution.undetermined {
+            for equation in 0..self.rows.dof() {
+                let own = free.iter().filter(|p| p.row() == equation);
+                let terms: Vec<_> = own
+                    .filter(|p| direction.involved[place(p)])
+                    .map(|p| (*p, direction.combination[place(p)]))
+                    .collect();
+                // A direction among the forces alone concerns neither C nor K.
+                if !terms.is_empty() {
+                    let relative_singular_value = direction.relative_singular_value;
+                    found.push(Undetermined { relative_singular_value, terms });
+                }
+            }
+        }
+        found
+    }
+
+    /// M ẍ + C ẋ + K x = F with the accelerations that belong to the samples.
+    fn by_equation_of_motion(
+        &self,
+        unknowns: &Unknowns,
+        free: &[Parameter],
+    ) -> Result<(Findings, Vec<Sensitivity>), EstimateError> {
+        let (n, rows) = (self.rows.dof(), self.rows);
+        let (x, v, f) = (rows.columns(0), rows.columns(1), rows.columns(2));
+        let lower = self.continuous.value.rows(n, n);
+        let mut acceleration =
+            x * lower.columns(0, n).transpose() + v * lower.columns(n, n).transpose();
+        for (at, force) in self.forces.iter().enumerate() {
+            acceleration += f.column(*force) * lower.column(2 * n + at).transpose();
+        }
+        let parts = [acceleration.as_view(), v, x, f];
+        let equations = EquationOfMotion::from_compressed(n, parts, rows.rows());
+        let (findings, inverse) = equations.findings(unknowns)?;
+        let motion = equations.motion_and_force();
+        let sensitivity = |(at, p): (usize, &Parameter)| {
+            // Back from the order ẋ, x, F to x, ẋ, and the forces that act.
+            let all = inverse.row(at) * motion;
+            let order = (n..2 * n).chain(0..n).chain(self.forces.iter().map(|j| 2 * n + j));
+            let weight: Vec<f64> = order.map(|column| all[column]).collect();
+            Sensitivity { equation: p.row(), weight: RowDVector::from_vec(weight) }
+        };
+        let sensitivities = free.iter().enumerate().map(sensitivity).collect();
+        Ok((findings, sensitivities))
+    }
+
+    /// The delta method: with G_p the derivative of parameter p by the coefficients (regressors ×
+    /// 2n), W = (ZᵀZ)⁻¹ and S the residual covariance, Cov(p, q) = ⟨W G_p S, G_q⟩.
+    fn covariance(
+        &self,
+        mass: &DMatrix<f64>,
+        sensitivities: &[Sensitivity],
+    ) -> Result<DMatrix<f64>, EstimateError> {
+        let n = self.rows.dof();
+        let (states, forces) = (2 * n, self.forces.len());
+        let regressors = self.solution.inverse.nrows();
+        let mut gradients = vec![DMatrix::zeros(regressors, states); sensitivities.len()];
+        for row in 0..states {
+            for column in 0..states + forces {
+                let mut change = DMatrix::zeros(states, states + forces);
+                change[(row, column)] = 1.0;
+                let moved = self.continuous.derivative(&change)?;
+                let by_equation = mass * moved.rows(n, n);
+                for (gradient, s) in gradients.iter_mut().zip(sensitivities) {
+                    let value = -by_equation.row(s.equation).dot(&s.weight);
+                    gradient[(column, row)] = value;
+                    if self.two_forces && column >= states {
+                        gradient[(column + forces, row)] = value;
+                    }
+                }
+            }
+        }
+        let weighted: Vec<_> = gradients
+            .iter()
+            .map(|g| &self.solution.unscaled_covariance * g * &self.solution.residual_covariance)
+            .collect();
+        let count = sensitivities.len();
+        Ok(DMatrix::from_fn(count, count, |p, q| {
+            // Symmetric to the last bit: both orders are computed the same way.
+            let (p, q) = (p.min(q), p.max(q));
+            weighted[p].dot(&gradients[q])
+        }))
+    }
+
+    /// \[Φ − I, Γ(, Γ⁺)\] with zeros for the forces left out.
+    fn all_forces(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
+        let (n, forces) = (self.rows.dof(), self.forces.len());
+        let groups = if self.two_forces { 2 } else { 1 };
+        let mut change = DMatrix::zeros(2 * n, (2 + groups) * n);
+        for state in 0..2 * n {
+            change.set_column(state, &coefficients.row(state).transpose());
+        }
+        for group in 0..groups {
+            for (at, force) in self.forces.iter().enumerate() {
+                let from = coefficients.row(2 * n + group * forces + at).transpose();
+                change.set_column((2 + group) * n + force, &from);
+            }
+        }
+        change
+    }
+}
+
+/// \[Φ − I, Γ₀ + Γ₁\] from the coefficients (regressors × states).
+fn joined(coefficients: &DMatrix<f64>, states: usize, forces: usize) -> DMatrix<f64> {
+    let mut joined = coefficients.rows(0, states + forces).transpose();
+    let groups = coefficients.nrows().saturating_sub(states).checked_div(forces).unwrap_or(1);
+    for group in 1..groups {
+        let next = coefficients.rows(states + group * forces, forces).transpose();
+        let mut total = joined.columns_mut(states, forces);
+        total += next;
+    }
+    joined
+}

@@ -1,0 +1,125 @@
+//! M, C and K from sampled displacement, velocity and force.
+//!
+//! From one sample to the next a machine moves by z⁺ = Φ z + Γ F, with the state z = (x, ẋ).
+//! Φ and Γ are fitted by least squares, every entry left free, and turned into M, C and K by what
+//! is assumed to happen between the samples ([`Discretisation`]). A force that is identically
+//! zero is left out.
+//!
+//! | Discretisation | The force between samples | Error on noise-free data |
+//! |---|---|---|
+//! | [`Discretisation::Euler`] | irrelevant: ẋ is a difference quotient | proportional to the step, often per cents |
+//! | [`Discretisation::ZeroOrderHold`] | held, as a digital converter drives a shaker | none if it truly is |
+//! | [`Discretisation::FirstOrderHold`] | linear from sample to sample | none if it truly is; for a smooth force proportional to the square of the step |
+//!
+//! When the acceleration is measured too, [`equation_of_motion`] needs no discretisation at all.
+//!
+//! Noise on displacement or velocity makes all of these biased (they stand among the regressors);
+//! for noisy periodic records use the [frequency domain](crate::frequency_domain).
+//!
+//! ```
+//! use mechid_estimate::Unknowns;
+//! use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+//! use mechid_problems::{dissertation_sdof, exact_zoh_periodic};
+//! use mechid_signal::{Record, Sampling};
+//!
+//! let machine = dissertation_sdof().system();
+//! let force = Record::from_fn(Sampling::new(0.02, 64)?, |t| 50.0 * (9.0 * t * t).sin())?;
+//! let motion = exact_zoh_periodic(&machine, &force)?;
+//!
+//! let unknowns = Unknowns::known_mass(machine.mass())?;
+//! let euler = TimeDomain::new(Discretisation::Euler, Extent::WholePeriod);
+//! let exact = TimeDomain::new(Discretisation::ZeroOrderHold, Extent::WholePeriod);
+//! let k = |method: TimeDomain| -> Result<f64, Box<dyn std::error::Error>> {
+//!     let fit = method.fit(motion.displacement(), motion.velocity(), &force, &unknowns)?;
+//!     Ok(fit.estimate().parameter("k")?.value)
+//! };
+//! assert!((k(euler)? / 5000.0 - 1.0).abs() > 0.1);
+//! assert!((k(exact)? / 5000.0 - 1.0).abs() < 1e-10);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod continuous;
+mod direct;
+mod fit;
+mod transitions;
+
+use mechid_signal::Record;
+
+pub use direct::equation_of_motion;
+pub use fit::TimeDomainFit;
+pub use transitions::Transitions;
+
+use crate::{EstimateError, Unknowns};
+
+/// What is assumed of the time between two samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Discretisation {
+    /// z⁺ = z + Δt ż: Φ = I + AΔt, Γ = BΔt. Biased by terms of order Δt.
+    ///
+    /// # Source
+    /// Dissertation eqs. (4.5.9)–(4.5.12), (4.5.28).
+    Euler,
+    /// The force is held from its sample to the next: Φ = exp(AΔt), Γ = ∫₀^Δt exp(As) ds B.
+    ///
+    /// # Source
+    /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (zero-order
+    /// hold and its inverse by the matrix logarithm).
+    ZeroOrderHold,
+    /// The force is linear between samples: Φ as above, z⁺ = Φ z + Γ₀ F + Γ₁ F⁺, where
+    /// Γ₀ + Γ₁ = ∫₀^Δt exp(As) ds B.
+    FirstOrderHold,
+}
+
+/// What the samples of a record are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Extent {
+    /// Any stretch of motion: N samples give N − 1 rows.
+    Open,
+    /// Exactly one period: the first sample follows the last again, N samples give N rows.
+    WholePeriod,
+}
+
+/// A time-domain estimator: a discretisation, and what the records are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeDomain {
+    discretisation: Discretisation,
+    extent: Extent,
+}
+
+impl TimeDomain {
+    /// An estimator for records of that extent.
+    pub fn new(discretisation: Discretisation, extent: Extent) -> Self {
+        Self { discretisation, extent }
+    }
+
+    /// The assumption between samples.
+    pub fn discretisation(&self) -> Discretisation {
+        self.discretisation
+    }
+
+    /// What the records are.
+    pub fn extent(&self) -> Extent {
+        self.extent
+    }
+
+    /// Fits one record: displacement (m), velocity (m/s) and force (N), samples × degrees of
+    /// freedom on one time axis.
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together,
+    /// and as [`Transitions::fit`].
+    pub fn fit(
+        &self,
+        displacement: &Record,
+        velocity: &Record,
+        force: &Record,
+        unknowns: &Unknowns,
+    ) -> Result<TimeDomainFit, EstimateError> {
+        let sampling = displacement.sampling();
+        let mut rows = Transitions::new(displacement.channels(), sampling.dt())?;
+        rows.push(displacement, velocity, force, self.extent)?;
+        rows.fit(self.discretisation, unknowns)
+    }
+}

@@ -1,0 +1,154 @@
+//! Pairs of neighbouring samples, gathered from any number of records.
+
+use mechid_signal::{Record, Sampling};
+use nalgebra::{DMatrix, DMatrixView};
+
+use super::{Discretisation, Extent, TimeDomainFit};
+use crate::least_squares::size;
+use crate::triangular::TriangularFactor;
+use crate::{EstimateError, Unknowns};
+
+/// Pairs reduced at a time.
+const BLOCK: usize = 256;
+
+/// Pairs of neighbouring samples, reduced block by block to one small triangle.
+///
+/// Memory does not grow with the records. A long open record can be pushed in pieces that overlap
+/// by one sample; a record from another experiment simply follows.
+#[derive(Debug, Clone)]
+pub struct Transitions {
+    dof: usize,
+    dt: f64,
+    /// Of the columns \[x | ẋ | F | F⁺ | x⁺ − x | ẋ⁺ − ẋ\].
+    factor: TriangularFactor,
+}
+
+impl Transitions {
+    /// No pairs yet, of records with step `dt` in seconds.
+    ///
+    /// # Errors
+    /// [`EstimateError::NoDof`], [`EstimateError::Signal`] for an impossible step.
+    pub fn new(dof: usize, dt: f64) -> Result<Self, EstimateError> {
+        if dof == 0 {
+            return Err(EstimateError::NoDof);
+        }
+        let dt = Sampling::new(dt, 1)?.dt();
+        Ok(Self { dof, dt, factor: TriangularFactor::new(6 * dof) })
+    }
+
+    /// Degrees of freedom.
+    pub fn dof(&self) -> usize {
+        self.dof
+    }
+
+    /// Time step, in seconds.
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+
+    /// Pairs seen so far.
+    pub fn rows(&self) -> usize {
+        self.factor.rows()
+    }
+
+    /// Adds the pairs of one record: displacement (m), velocity (m/s), force (N).
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] if they lie on different time axes, [`EstimateError::Size`] for a
+    /// wrong number of channels, [`EstimateError::Step`] for another step than the first record's.
+    pub fn push(
+        &mut self,
+        displacement: &Record,
+        velocity: &Record,
+        force: &Record,
+        extent: Extent,
+    ) -> Result<(), EstimateError> {
+        size("channels of the displacement", self.dof, displacement.channels())?;
+        size("channels of the velocity", self.dof, velocity.channels())?;
+        size("channels of the force", self.dof, force.channels())?;
+        displacement.check_same_sampling(velocity)?;
+        displacement.check_same_sampling(force)?;
+        let got = displacement.sampling().dt();
+        if (got - self.dt).abs() > 1e-9 * self.dt {
+            return Err(EstimateError::Step { expected: self.dt, got });
+        }
+        let quantities = [displacement, velocity, force].map(|r| r.data().as_view());
+        let pairs = match extent {
+            Extent::Open => displacement.len() - 1,
+            Extent::WholePeriod => displacement.len(),
+        };
+        let mut block = DMatrix::zeros(BLOCK, 6 * self.dof);
+        for start in (0..pairs).step_by(BLOCK) {
+            let len = BLOCK.min(pairs - start);
+            self.fill(&mut block, quantities, start, len);
+            self.factor.push(&[block.rows(0, len)]);
+        }
+        Ok(())
+    }
+
+    /// Adds everything `other` has seen.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`], [`EstimateError::Step`].
+    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
+        size("degrees of freedom", self.dof, other.dof)?;
+        if (other.dt - self.dt).abs() > 1e-9 * self.dt {
+            return Err(EstimateError::Step { expected: self.dt, got: other.dt });
+        }
+        self.factor.merge(&other.factor);
+        Ok(())
+    }
+
+    /// M, C and K from all pairs so far.
+    ///
+    /// With M known and C and K free they are K̂ = −M A₂₁ and Ĉ = −M A₂₂ from the lower half of
+    /// the state matrix A; the coefficient of the force is left free and not used. Otherwise the
+    /// equation of motion is fitted to the accelerations A₂₁x + A₂₂ẋ + B₂F that belong to the
+    /// samples, with whatever is known held fixed. Standard errors follow by the delta method
+    /// through the logarithm.
+    ///
+    /// # Errors
+    /// [`EstimateError::TooFewRows`]; [`EstimateError::NoLogarithm`] if the samples belong to no
+    /// continuous machine; and as [`crate::EquationOfMotion::solve`].
+    ///
+    /// # Source
+    /// Dissertation eqs. (4.5.12), (4.5.28) with its last rows corrected to Δt/M.
+    pub fn fit(
+        &self,
+        discretisation: Discretisation,
+        unknowns: &Unknowns,
+    ) -> Result<TimeDomainFit, EstimateError> {
+        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        TimeDomainFit::new(self, discretisation, unknowns)
+    }
+
+    fn fill(
+        &self,
+        block: &mut DMatrix<f64>,
+        quantities: [DMatrixView<'_, f64>; 3],
+        start: usize,
+        len: usize,
+    ) {
+        let n = self.dof;
+        let samples = quantities[0].nrows();
+        for (kind, quantity) in quantities.iter().enumerate() {
+            // Where the value now and the value (force) or increment (state) next go.
+            let (now, next) = [(0, 4), (1, 5), (2, 3)][kind];
+            for channel in 0..n {
+                let values = quantity.column(channel);
+                for row in 0..len {
+                    let (k, value) = (start + row, values[start + row]);
+                    let after = values[(k + 1) % samples];
+                    block[(row, now * n + channel)] = value;
+                    block[(row, next * n + channel)] =
+                        if kind == 2 { after } else { after - value };
+                }
+            }
+        }
+    }
+
+    /// Columns of the triangle: 0 x, 1 ẋ, 2 F, 3 F⁺, 4 the increments of x, 5 those of ẋ.
+    pub(super) fn columns(&self, kind: usize) -> DMatrixView<'_, f64> {
+        self.factor.r().columns(kind * self.dof, self.dof)
+    }
+}
