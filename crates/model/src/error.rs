@@ -96,6 +96,12 @@ pub enum ModelError {
         /// 1 / ((‖K‖ + ω²‖M‖ + ω‖C‖) ‖D⁻¹‖) in the 1-norm; 0 if a pivot vanished.
         reciprocal_condition: f64,
     },
+    /// M⁻¹K or M⁻¹C is too large to compute eigenvalues with.
+    #[error("M⁻¹K or M⁻¹C has an entry of size {largest:.1e}: too large for eigenvalues")]
+    StateMatrixOverflow {
+        /// Largest modulus of an entry.
+        largest: f64,
+    },
     /// The eigenvalue or singular value iteration did not converge.
     #[error("the modes of a system with {dof} degrees of freedom did not converge")]
     ModesNotConverged {

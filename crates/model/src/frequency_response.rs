@@ -92,5 +92,7 @@ mod tests {
         }
         assert!(s.receptance(1.0 + 1e-9).is_ok());
         assert!(matches!(s.receptance(f64::NAN), Err(ModelError::Parameter { .. })));
+        // ω² overflows: refused, not returned as NaN.
+        assert!(s.receptance(1e200).is_err());
     }
 }

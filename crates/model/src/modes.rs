@@ -83,9 +83,15 @@ impl SecondOrderSystem {
     /// All 2n eigenvalues (rad/s), by modulus, of a conjugate pair the one with Im λ > 0 first.
     ///
     /// # Errors
-    /// [`ModelError::ModesNotConverged`] if the QR iteration does not converge.
+    /// [`ModelError::ModesNotConverged`] if the QR iteration does not converge,
+    /// [`ModelError::StateMatrixOverflow`] if M⁻¹K or M⁻¹C exceeds 1e150.
     pub fn eigenvalues(&self) -> Result<Vec<Complex<f64>>, ModelError> {
         let mut a = self.state_matrix();
+        // Balancing squares the entries, and does not end on infinite ones.
+        let largest = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        if largest > 1e150 || a.iter().any(|v| v.is_nan()) {
+            return Err(ModelError::StateMatrixOverflow { largest });
+        }
         // Displacements and velocities differ by a factor ω: balance before iterating.
         balance_parlett_reinsch(&mut a);
         let iterations = 100 * a.nrows();
@@ -106,7 +112,7 @@ impl SecondOrderSystem {
     /// damping) a shape is given more than once.
     ///
     /// # Errors
-    /// [`ModelError::ModesNotConverged`] if an iteration does not converge.
+    /// As [`eigenvalues`](Self::eigenvalues).
     pub fn modes(&self) -> Result<Vec<Mode>, ModelError> {
         let eigenvalues = self.eigenvalues()?;
         let mut modes: Vec<Mode> = Vec::with_capacity(self.dof());
@@ -256,6 +262,16 @@ mod tests {
             assert!((mode.eigenvalue() + 2.0).norm() < 1e-7, "{mode:?}");
             assert_eq!(mode.shape()[0], Complex::from(1.0));
         }
+    }
+
+    #[test]
+    fn absurd_magnitudes_are_refused_not_looped_over() {
+        for (m, k) in [(1e-300, 1e300), (1e-160, 1.0)] {
+            let s = system(dmatrix![m], dmatrix![0.0], dmatrix![k]);
+            let refused = s.modes();
+            assert!(matches!(refused, Err(ModelError::StateMatrixOverflow { .. })), "{refused:?}");
+        }
+        assert!(system(dmatrix![1e-10], dmatrix![0.0], dmatrix![1e100]).modes().is_ok());
     }
 
     #[test]

@@ -173,6 +173,19 @@ mod tests {
     }
 
     #[test]
+    fn extreme_values_do_not_panic() {
+        for m in [5e-324, 1e-300, 1e300, f64::MAX] {
+            for k in [5e-324, 1.0, f64::MAX] {
+                let sdof = Sdof::new(m, 1.0, k).unwrap();
+                assert_eq!(sdof.system().mass()[(0, 0)], m);
+                let _ = sdof.system().modes();
+                let sampling = mechid_signal::Sampling::new(0.1, 3).unwrap();
+                let _ = sdof.free_response(sampling, 1.0, 0.0);
+            }
+        }
+    }
+
+    #[test]
     fn impossible_parameters_are_named() {
         for (got, parameter) in [
             (Sdof::new(0.0, 1.0, 1.0), "mass"),

@@ -86,7 +86,9 @@ impl SecondOrderSystem {
         }
         let singular_values = mass.singular_values();
         let reciprocal_condition = singular_values.min() / singular_values.max();
-        if reciprocal_condition.is_nan() || reciprocal_condition < 1e-15 {
+        // Others factor M by LU: what passes here must not meet a vanishing pivot there.
+        let invertible = mass.clone().lu().is_invertible();
+        if !invertible || reciprocal_condition.is_nan() || reciprocal_condition < 1e-15 {
             return Err(ModelError::SingularMass { reciprocal_condition });
         }
         Ok(Self { mass, damping, stiffness })

@@ -19,6 +19,14 @@ pub enum ProblemError {
         /// Smallest singular value of I − Φᴺ relative to 1 + ‖Φᴺ‖.
         reciprocal_condition: f64,
     },
+    /// The step holds so many radians that no digit of the motion would be left.
+    #[error("a step of {dt} s is too long for this system: (ω dt)² is about {scale:.1e}")]
+    StepTooLong {
+        /// Time step, in seconds.
+        dt: f64,
+        /// Largest entry of M⁻¹K dt² and M⁻¹C dt.
+        scale: f64,
+    },
     /// The system or its frequency response cannot be evaluated.
     #[error(transparent)]
     Model(#[from] ModelError),

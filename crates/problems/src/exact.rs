@@ -24,6 +24,7 @@ use crate::transition::{Between, Transition};
 ///
 /// # Errors
 /// [`ProblemError::Model`] if force or state do not fit the system,
+/// [`ProblemError::StepTooLong`] if ω Δt exceeds 10⁶,
 /// [`ProblemError::Signal`] if an unstable motion overflows.
 pub fn exact_zoh(
     system: &SecondOrderSystem,
@@ -131,7 +132,7 @@ fn from_start(
     between: Between,
 ) -> Result<Response, ProblemError> {
     start.check_dof(system.dof())?;
-    let transition = Transition::new(system, force.sampling().dt(), between);
+    let transition = Transition::new(system, force.sampling().dt(), between)?;
     transition.check(force.channels())?;
     let state = transition.state(start.displacement(), start.velocity());
     Ok(run(&transition, force, state)?.0)
@@ -142,7 +143,7 @@ fn periodic(
     force: &Record,
     between: Between,
 ) -> Result<Response, ProblemError> {
-    let transition = Transition::new(system, force.sampling().dt(), between);
+    let transition = Transition::new(system, force.sampling().dt(), between)?;
     transition.check(force.channels())?;
     // z(T) = Φᴺ z(0) + s, and s is where rest leads to: (I − Φᴺ) z(0) = s.
     let size = 2 * system.dof();

@@ -3,6 +3,8 @@
 use mechid_model::{ModelError, SecondOrderSystem};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
+use crate::ProblemError;
+
 /// What the force does between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Between {
@@ -35,10 +37,19 @@ pub(crate) struct Transition {
 }
 
 impl Transition {
-    pub(crate) fn new(system: &SecondOrderSystem, dt: f64, between: Between) -> Self {
+    pub(crate) fn new(
+        system: &SecondOrderSystem,
+        dt: f64,
+        between: Between,
+    ) -> Result<Self, ProblemError> {
         let n = system.dof();
+        let a = in_steps(system, dt);
+        let scale = a.iter().map(|v| v.abs()).fold(0.0, f64::max);
+        if scale > 1e12 || a.iter().any(|v| v.is_nan()) {
+            return Err(ProblemError::StepTooLong { dt, scale });
+        }
         let mut generator = DMatrix::zeros(4 * n, 4 * n);
-        generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&in_steps(system, dt));
+        generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&a);
         generator.view_mut((n, 2 * n), (n, n)).fill_with_identity();
         generator.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
         let exponential = generator.exp();
@@ -52,7 +63,7 @@ impl Transition {
             Between::Held => (p1, DMatrix::zeros(2 * n, n)),
             Between::Linear => (p1 - &p2, p2),
         };
-        Self { phi: block(0, 2 * n), from_left, from_right, mass, system: system.clone(), dt }
+        Ok(Self { phi: block(0, 2 * n), from_left, from_right, mass, system: system.clone(), dt })
     }
 
     /// One step: what `state` becomes under the forces at its two ends.

@@ -254,6 +254,10 @@ fn misfits_are_refused_and_overflow_is_told() {
         exact_foh(&system, &two, &InitialState::rest(3)),
         Err(ProblemError::Model(ModelError::StateLength { got: 3, dof: 2 }))
     );
+    assert!(matches!(
+        exact_zoh(&system, &random_force(2, 4, 1e155), &InitialState::rest(2)),
+        Err(ProblemError::StepTooLong { .. })
+    ));
     let bursting = SecondOrderSystem::new(dmatrix![1.0], dmatrix![-200.0], dmatrix![1.0]).unwrap();
     assert!(exact_zoh(&bursting, &one, &InitialState::rest(1)).is_ok());
     let long = repeated(&one, 4);
