@@ -1,0 +1,170 @@
+//! Printed cells beside computed ones, with a verdict on each.
+
+use super::case::Machine;
+use super::misprints::{self, Field, Misprint};
+use super::published::{Cell, Method, Published};
+use super::results::{Key, Results};
+use super::verdict::{Verdict, compare};
+
+/// A printed number beside ours.
+#[derive(Debug, Clone)]
+pub struct Judged {
+    /// As printed.
+    pub printed: String,
+    /// As recomputed, slips included.
+    pub value: f64,
+    /// How they stand to each other.
+    pub verdict: Verdict,
+    /// Why, where it is a misprint.
+    pub reason: Option<&'static str>,
+}
+
+/// One printed cell of an identification table, reproduced and corrected.
+#[derive(Debug, Clone)]
+pub struct Row {
+    /// What is printed.
+    pub cell: Cell,
+    /// The estimate.
+    pub estimate: Judged,
+    /// Its error in per cent.
+    pub error: Judged,
+    /// The same estimator without slips.
+    pub correct: f64,
+    /// Error of that, in per cent.
+    pub correct_error: f64,
+    /// Our best estimator.
+    pub best: f64,
+    /// Error of that, in per cent.
+    pub best_error: f64,
+}
+
+/// The rows of a table whose settings are known.
+pub fn rows(table: &str, published: &Published, results: &Results) -> Vec<Row> {
+    published.table(table).filter_map(|cell| row(cell, results)).collect()
+}
+
+fn row(cell: &Cell, results: &Results) -> Option<Row> {
+    let key = Key::of(cell)?;
+    let estimates = results.get(key)?;
+    let machine = key.case().machine;
+    let at = machine.parameters().iter().position(|p| *p == cell.parameter)?;
+    let truth = machine.truth()[at];
+    let percent = |v: f64| 100.0 * ((v - truth) / truth).abs();
+    let value = estimates.slipped[at];
+    let misprint = |field| misprints::find(&cell.table, cell.method, cell.npi, field);
+    let estimate = judge(value, &cell.estimate, misprint(Field::Estimate), -value);
+    let error = judge_error(
+        percent(value),
+        percent(-value),
+        cell,
+        misprint(Field::Error),
+        cell.estimate.parse().map_or(f64::NAN, percent),
+    );
+    Some(Row {
+        cell: cell.clone(),
+        estimate,
+        error,
+        correct: estimates.correct[at],
+        correct_error: percent(estimates.correct[at]),
+        best: estimates.best[at],
+        best_error: percent(estimates.best[at]),
+    })
+}
+
+/// A listed misprint is believed only if the number it ought to be is the one we compute: for a
+/// cell its corrected digits, for a column the printed digits under the other sign.
+fn judge(value: f64, printed: &str, misprint: Option<&'static Misprint>, reversed: f64) -> Judged {
+    let plain = compare(value, printed);
+    let (verdict, reason) = match misprint {
+        Some(m) if plain == Verdict::Unexplained => {
+            let confirmed = match m.npi {
+                Some(_) => compare(value, m.right),
+                None => compare(reversed, printed),
+            };
+            let known = matches!(confirmed, Verdict::ToTheDigit | Verdict::Rounding);
+            if known { (Verdict::Misprint, Some(m.reason)) } else { (plain, None) }
+        }
+        Some(m) if m.npi.is_some() && plain == Verdict::Rounding => {
+            (Verdict::Misprint, Some(m.reason))
+        }
+        _ => (plain, None),
+    };
+    Judged { printed: printed.to_owned(), value, verdict, reason }
+}
+
+/// An error may also have been formed from the printed, already shortened estimate.
+fn judge_error(
+    value: f64,
+    reversed: f64,
+    cell: &Cell,
+    misprint: Option<&'static Misprint>,
+    from_printed: f64,
+) -> Judged {
+    let mut judged = judge(value, &cell.error_percent, misprint, reversed);
+    if judged.verdict == Verdict::Unexplained && cell.error_percent.is_empty() {
+        judged.verdict = Verdict::ToTheDigit;
+    }
+    if judged.verdict == Verdict::Unexplained
+        && compare(from_printed, &cell.error_percent) == Verdict::ToTheDigit
+    {
+        judged.verdict = Verdict::Rounding;
+    }
+    judged
+}
+
+/// A printed mean error beside the mean of the printed errors and beside ours.
+#[derive(Debug, Clone)]
+pub struct Mean {
+    /// What is estimated.
+    pub parameter: String,
+    /// Column.
+    pub method: Method,
+    /// Printed and recomputed from the printed errors of the column.
+    pub printed: Judged,
+    /// Mean of the errors without slips.
+    pub correct: f64,
+    /// Mean of the errors of our best estimator.
+    pub best: f64,
+}
+
+/// The mean-error row of a table.
+pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
+    let printed = published.means.iter().filter(|m| m.table == table);
+    printed
+        .map(|m| {
+            let column: Vec<&Row> = rows
+                .iter()
+                .filter(|r| r.cell.method == m.method && r.cell.parameter == m.parameter)
+                .collect();
+            let errors = column.iter().filter_map(|r| r.error.printed.parse::<f64>().ok());
+            let value = average(errors);
+            let listed = misprints::MEANS.iter().find(|x| x.table == table && x.method == m.method);
+            let plain = compare(value, &m.mean_error_percent);
+            let (verdict, reason) = match listed {
+                Some(x) => (Verdict::Misprint, Some(x.reason)),
+                None => (plain, None),
+            };
+            Mean {
+                parameter: m.parameter.clone(),
+                method: m.method,
+                printed: Judged { printed: m.mean_error_percent.clone(), value, verdict, reason },
+                correct: average(column.iter().map(|r| r.correct_error)),
+                best: average(column.iter().map(|r| r.best_error)),
+            }
+        })
+        .collect()
+}
+
+fn average(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
+    sum / count as f64
+}
+
+/// The machine of a table, for its headings.
+pub fn machine_of(cell: &Cell) -> Machine {
+    if cell.parameter.len() == 3 {
+        Machine::Bearing { kyx: mechid::model::KyxSign::Minus }
+    } else {
+        Machine::SDOF
+    }
+}

@@ -1,0 +1,102 @@
+//! Stiffness and damping from the sequences of a simulation, with and without slips.
+
+use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::estimate::{LeastSquares, Unknowns};
+use mechid::signal::Spectrum;
+use nalgebra::{Complex, DMatrix};
+
+use super::simulate::Sequences;
+
+/// The estimates in the order and with the signs of `Machine::parameters`.
+pub type Listed = Result<Vec<f64>, String>;
+
+/// Least squares on the spectra, eqs. (4.6.12) and (4.6.31): ω = n·ω0, n = 1 … Nt/2 − 1.
+pub fn frequency(sequences: &Sequences) -> Listed {
+    let sampling = sequences.force.sampling();
+    let data = FrequencyData::from_records(
+        &sequences.force,
+        sequences.response.displacement(),
+        Motion::Displacement,
+        1..(sampling.len() - 1).div_ceil(2),
+    )
+    .map_err(words)?;
+    fit(sequences, &data)
+}
+
+/// The same with the harmonic offset: harmonic n at (n + 1)·ω0, the mean among the harmonics.
+pub fn frequency_offset(sequences: &Sequences) -> Listed {
+    let (omega, force, displacement) = offset_amplitudes(sequences);
+    let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)
+        .map_err(words)?;
+    fit(sequences, &data)
+}
+
+/// The harmonic offset together with a free coefficient of the force:
+/// K x + i ω C x − g F = ω² M x, with g found beside K and C.
+pub fn frequency_offset_free_force(sequences: &Sequences) -> Listed {
+    let (omega, force, displacement) = offset_amplitudes(sequences);
+    let mass = sequences.machine.system().mass()[(0, 0)];
+    let mut fit = LeastSquares::new(3, 1);
+    for (row, &w) in omega.iter().enumerate() {
+        let (x, f) = (displacement[(row, 0)], force[(row, 0)]);
+        let terms = [x, Complex::i() * w * x, -f];
+        let target = w * w * mass * x;
+        let regressors =
+            DMatrix::from_fn(2, 3, |part, c| if part == 0 { terms[c].re } else { terms[c].im });
+        let targets = DMatrix::from_column_slice(2, 1, &[target.re, target.im]);
+        fit.push_rows(regressors.as_view(), targets.as_view()).map_err(words)?;
+    }
+    let solution = fit.solve().map_err(words)?;
+    Ok(solution.coefficients.column(0).iter().take(2).copied().collect())
+}
+
+type Amplitudes = (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>);
+
+fn offset_amplitudes(sequences: &Sequences) -> Amplitudes {
+    let (x, f) = (Spectrum::of(sequences.response.displacement()), Spectrum::of(&sequences.force));
+    let harmonics = x.sampling().len() / 2;
+    let omega0 = x.sampling().omega0();
+    // The original series has no constant term; its zeroth coefficient is 2/N Σ x, twice the mean.
+    let amplitudes = |s: &Spectrum| {
+        DMatrix::from_fn(harmonics, s.channels(), |n, c| {
+            if n == 0 { s.line(0, c) * 2.0 } else { s.line(n, c) }
+        })
+    };
+    let omega = (0..harmonics).map(|n| (n + 1) as f64 * omega0).collect();
+    (omega, amplitudes(&f), amplitudes(&x))
+}
+
+fn fit(sequences: &Sequences, data: &FrequencyData) -> Listed {
+    let machine = sequences.machine;
+    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
+    let estimate = equation_error(data, &unknowns).map_err(words)?;
+    Ok(machine.listed(&estimate.stiffness(), &estimate.damping()))
+}
+
+/// The dissertation's estimator in the time domain, eqs. (4.5.12) and (4.5.28): Euler over a
+/// whole period.
+pub fn time(sequences: &Sequences) -> Listed {
+    fit_in_time(sequences, Discretisation::Euler)
+}
+
+/// Our best estimator on one noise-free period with a known force: exact for a force that is
+/// linear between samples. What error it leaves is the integrator's.
+pub fn best(sequences: &Sequences) -> Listed {
+    fit_in_time(sequences, Discretisation::FirstOrderHold)
+}
+
+fn fit_in_time(sequences: &Sequences, discretisation: Discretisation) -> Listed {
+    let machine = sequences.machine;
+    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
+    let (x, v) = (sequences.response.displacement(), sequences.response.velocity());
+    let fit = TimeDomain::new(discretisation, Extent::WholePeriod)
+        .fit(x, v, &sequences.force, &unknowns)
+        .map_err(words)?;
+    let estimate = fit.estimate();
+    Ok(machine.listed(&estimate.stiffness(), &estimate.damping()))
+}
+
+fn words(error: impl std::fmt::Display) -> String {
+    error.to_string()
+}

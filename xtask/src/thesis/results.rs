@@ -1,0 +1,120 @@
+//! Every simulation the tables need, run once and in parallel.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::case::{Case, Machine};
+use super::estimates::{self, Listed};
+use super::published::{Cell, Method, Published};
+use super::simulate::{Sequences, correct, slipped};
+
+/// What identifies one estimation: a printed row's settings and its column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Key {
+    /// Time or frequency.
+    pub frequency: bool,
+    /// The bearing, or the single degree of freedom.
+    pub bearing: bool,
+    /// Tables 5.3.1 and 5.3.2 leave the coefficient of the force free in two columns.
+    pub free_force: bool,
+    /// Samples of one period.
+    pub nt: usize,
+    /// NPI in tenths, so that it can be compared.
+    pub npi_tenths: u32,
+    /// Column.
+    pub method: Method,
+}
+
+impl Key {
+    /// The settings of a printed cell; `None` where the text does not state them.
+    pub fn of(cell: &Cell) -> Option<Self> {
+        if !Method::ALL.contains(&cell.method) || cell.table.starts_with('E') {
+            return None;
+        }
+        let free_force = matches!(cell.table.as_str(), "5.3.1" | "5.3.2")
+            && matches!(cell.method, Method::Rk4 | Method::CentralDifference);
+        Some(Self {
+            frequency: cell.domain == "frequency",
+            bearing: cell.parameter.len() == 3,
+            free_force,
+            nt: cell.nt?,
+            npi_tenths: (cell.npi? * 10.0).round() as u32,
+            method: cell.method,
+        })
+    }
+
+    /// The simulation behind it.
+    pub fn case(self) -> Case {
+        let machine = if self.bearing {
+            Machine::Bearing { kyx: mechid::model::KyxSign::Minus }
+        } else {
+            Machine::SDOF
+        };
+        Case { machine, nt: self.nt, npi: f64::from(self.npi_tenths) / 10.0 }
+    }
+}
+
+/// The estimates of one key, each in the order of `Machine::parameters`.
+#[derive(Debug, Clone)]
+pub struct Estimates {
+    /// With the slips of the original programs.
+    pub slipped: Vec<f64>,
+    /// The same estimator on the same scheme, without them.
+    pub correct: Vec<f64>,
+    /// Our best estimator on the response without slips.
+    pub best: Vec<f64>,
+}
+
+/// Everything estimated, by key.
+#[derive(Debug, Clone)]
+pub struct Results(BTreeMap<Key, Estimates>);
+
+impl Results {
+    /// Runs every estimation that a printed cell asks for; `tick` is called after each.
+    ///
+    /// # Errors
+    /// The words of the first estimation that fails.
+    pub fn compute(published: &Published, tick: impl Fn() + Sync) -> Result<Self, String> {
+        let keys = Self::keys(published);
+        let estimates: Result<Vec<(Key, Estimates)>, String> = keys
+            .into_par_iter()
+            .map(|key| {
+                let estimates = estimate(key).map_err(|e| format!("{key:?}: {e}"))?;
+                tick();
+                Ok((key, estimates))
+            })
+            .collect();
+        Ok(Self(estimates?.into_iter().collect()))
+    }
+
+    /// The keys of the printed cells, each once.
+    pub fn keys(published: &Published) -> Vec<Key> {
+        let mut keys: Vec<Key> = published.cells.iter().filter_map(Key::of).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        keys
+    }
+
+    /// The estimates of a key.
+    pub fn get(&self, key: Key) -> Option<&Estimates> {
+        self.0.get(&key)
+    }
+}
+
+fn estimate(key: Key) -> Result<Estimates, String> {
+    let case = key.case();
+    let (replayed, right) = (slipped(case, key.method)?, correct(case, key.method)?);
+    let fit: fn(&Sequences) -> Listed =
+        if key.frequency { estimates::frequency } else { estimates::time };
+    let slipped_fit: fn(&Sequences) -> Listed = match (key.frequency, key.free_force) {
+        (true, true) => estimates::frequency_offset_free_force,
+        (true, false) => estimates::frequency_offset,
+        (false, _) => estimates::time,
+    };
+    Ok(Estimates {
+        slipped: slipped_fit(&replayed)?,
+        correct: fit(&right)?,
+        best: estimates::best(&right)?,
+    })
+}

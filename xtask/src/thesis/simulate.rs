@@ -1,0 +1,85 @@
+//! The five integrations of one case: as the equations ask, and with the slips replayed.
+
+use mechid::integrate::{
+    CentralDifference, Houbolt, Newmark, RungeKutta4, SampledForce, Scheme, WilsonTheta,
+    integrate_periodic,
+};
+use mechid::model::{KyxSign, Response};
+use mechid::signal::Record;
+
+use super::case::{Case, Machine};
+use super::published::Method;
+use super::slips::{one_sample_early, stage_loads};
+
+/// What an estimator is given: one period of motion and force.
+#[derive(Debug, Clone)]
+pub struct Sequences {
+    /// The machine that moved.
+    pub machine: Machine,
+    /// Displacement, velocity, acceleration.
+    pub response: Response,
+    /// The force the estimator is told.
+    pub force: Record,
+}
+
+/// The scheme behind a column, with the parameters of the dissertation.
+fn scheme(method: Method) -> Box<dyn Scheme> {
+    match method {
+        Method::Newmark => Box::new(Newmark::AVERAGE_ACCELERATION),
+        Method::CentralDifference => Box::new(CentralDifference::default()),
+        Method::Houbolt => Box::new(Houbolt::default()),
+        Method::WilsonTheta => Box::new(WilsonTheta::new(1.4).expect("θ above 1")),
+        _ => Box::new(RungeKutta4::LINEAR),
+    }
+}
+
+/// The periodic steady state of a scheme on the system of eq. (4.2.3), nothing misplaced.
+///
+/// # Errors
+/// The integrator's own words.
+pub fn correct(case: Case, method: Method) -> Result<Sequences, String> {
+    let machine = match case.machine {
+        Machine::Bearing { .. } => Machine::Bearing { kyx: KyxSign::Minus },
+        single => single,
+    };
+    let force = case.force();
+    let response = integrate_periodic(scheme(method).as_ref(), &machine.system(), &force)
+        .map_err(|e| format!("{}: {e}", method.name()))?;
+    Ok(Sequences { machine, response, force })
+}
+
+/// The sequences the original programs worked on: the same library, the slips applied.
+///
+/// # Errors
+/// The integrator's own words.
+pub fn slipped(case: Case, method: Method) -> Result<Sequences, String> {
+    let words = |e| format!("{}: {e}", method.name());
+    let machine = match (case.machine, method) {
+        (Machine::Bearing { .. }, Method::Rk4) => Machine::Bearing { kyx: KyxSign::Minus },
+        (Machine::Bearing { .. }, _) => Machine::Bearing { kyx: KyxSign::Plus },
+        (single, _) => single,
+    };
+    let (system, force) = (machine.system(), case.force());
+    let response = if method == Method::Rk4 {
+        let (samples, middles) = stage_loads(&force);
+        let loads = SampledForce::with_mid_step(&samples, &middles);
+        integrate_periodic(&RungeKutta4::SUPPLIED, &system, loads).map_err(words)?
+    } else {
+        integrate_periodic(scheme(method).as_ref(), &system, &force).map_err(words)?
+    };
+    let response = misplaced(response, method);
+    Ok(Sequences { machine, response, force })
+}
+
+/// The response as the original program stored it beside the force.
+fn misplaced(response: Response, method: Method) -> Response {
+    let early = one_sample_early(response.displacement());
+    let (velocity, acceleration) = match method {
+        Method::CentralDifference => (response.velocity().clone(), response.acceleration().clone()),
+        Method::WilsonTheta => {
+            (one_sample_early(response.velocity()), one_sample_early(response.acceleration()))
+        }
+        _ => return response,
+    };
+    Response::new(early, velocity, acceleration).expect("the same time axis")
+}
