@@ -2,16 +2,18 @@
 
 use nalgebra::{DMatrix, DVector};
 
+use crate::triangular::TriangularFactor;
+
 /// A sum of squares to be minimised over its parameters.
 pub(super) trait SumOfSquares {
     /// Number of residuals.
     fn residuals(&self) -> usize;
 
     /// The residuals at `theta`; `false` where they do not exist.
-    fn residual(&self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
+    fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool;
 
-    /// Their derivatives, residuals × parameters, at a `theta` where they exist.
-    fn jacobian(&self, theta: &DVector<f64>, jacobian: &mut DMatrix<f64>);
+    /// Their derivatives, residuals × parameters, where they were last evaluated.
+    fn jacobian(&self, jacobian: &mut DMatrix<f64>);
 }
 
 /// Where a search ended.
@@ -40,7 +42,10 @@ const MAX_DAMPING: f64 = 1e12;
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; scaling after Moré (1978).
-pub(super) fn minimise(problem: &impl SumOfSquares, mut theta: DVector<f64>) -> Option<Minimum> {
+pub(super) fn minimise(
+    problem: &mut impl SumOfSquares,
+    mut theta: DVector<f64>,
+) -> Option<Minimum> {
     let (rows, columns) = (problem.residuals(), theta.len());
     let mut residual = DVector::zeros(rows);
     if !problem.residual(&theta, &mut residual) {
@@ -48,24 +53,11 @@ pub(super) fn minimise(problem: &impl SumOfSquares, mut theta: DVector<f64>) -> 
     }
     let mut cost = residual.norm_squared();
     let mut trial_residual = residual.clone();
+    let mut jacobian = DMatrix::zeros(rows, columns);
     let mut damping = 0.0;
     for steps in 0..MAX_STEPS {
-        let mut augmented = DMatrix::zeros(rows, columns + 1);
-        let mut jacobian = DMatrix::zeros(rows, columns);
-        problem.jacobian(&theta, &mut jacobian);
-        let scale = DVector::from_iterator(
-            columns,
-            jacobian.column_iter().map(|c| if c.norm() > 0.0 { c.norm() } else { 1.0 }),
-        );
-        for (j, mut column) in augmented.column_iter_mut().enumerate() {
-            if j < columns {
-                column.copy_from(&jacobian.column(j));
-                column /= scale[j];
-            } else {
-                column.copy_from(&residual);
-            }
-        }
-        let upper = augmented.qr().unpack_r();
+        problem.jacobian(&mut jacobian);
+        let (upper, scale) = triangle(&jacobian, &residual);
         let reachable = upper.view((0, columns), (columns, 1)).norm_squared();
         loop {
             let scaled_step = damped_step(&upper, columns, damping);
@@ -90,6 +82,23 @@ pub(super) fn minimise(problem: &impl SumOfSquares, mut theta: DVector<f64>) -> 
         }
     }
     Some(Minimum { theta, cost, steps: MAX_STEPS, converged: false })
+}
+
+/// The triangle \[R q\] of \[J r\] with the columns of J scaled to unit length, and their lengths.
+fn triangle(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    let columns = jacobian.ncols();
+    let mut factor = TriangularFactor::new(columns + 1);
+    factor.push(&[jacobian.as_view(), residual.as_view()]);
+    let mut upper = factor.r().clone();
+    let mut scale = DVector::from_element(columns, 1.0);
+    for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
+        // A rotation keeps lengths: those of R are those of J.
+        if column.norm() > 0.0 {
+            *length = column.norm();
+            column /= *length;
+        }
+    }
+    (upper, scale)
 }
 
 /// The minimiser y of ‖R y − q‖² + damping·‖y‖², with [R q] the upper triangle.
@@ -118,27 +127,30 @@ mod tests {
     use super::*;
 
     /// Rosenbrock's valley, 10(y − x²) and 1 − x.
-    struct Valley;
+    struct Valley {
+        x: f64,
+    }
 
     impl SumOfSquares for Valley {
         fn residuals(&self) -> usize {
             2
         }
 
-        fn residual(&self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+        fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+            self.x = theta[0];
             residual[0] = 10.0 * (theta[1] - theta[0] * theta[0]);
             residual[1] = 1.0 - theta[0];
             true
         }
 
-        fn jacobian(&self, theta: &DVector<f64>, jacobian: &mut DMatrix<f64>) {
-            jacobian.copy_from_slice(&[-20.0 * theta[0], -1.0, 10.0, 0.0]);
+        fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
+            jacobian.copy_from_slice(&[-20.0 * self.x, -1.0, 10.0, 0.0]);
         }
     }
 
     #[test]
     fn the_valley_is_followed_to_its_end() {
-        let minimum = minimise(&Valley, DVector::from_vec(vec![-1.2, 1.0])).unwrap();
+        let minimum = minimise(&mut Valley { x: 0.0 }, DVector::from_vec(vec![-1.2, 1.0])).unwrap();
         assert!(minimum.converged && minimum.steps < 40);
         assert!((minimum.theta - DVector::from_vec(vec![1.0, 1.0])).norm() < 1e-10);
     }

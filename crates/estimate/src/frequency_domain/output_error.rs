@@ -2,11 +2,12 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::levenberg_marquardt::minimise;
+use super::levenberg_marquardt::{Minimum, SumOfSquares, minimise};
 use super::misfit::{Misfit, Noise, output_weights};
 use super::{FrequencyData, NoiseSpectrum, equation_error};
 use crate::estimate::Findings;
 use crate::least_squares::solve_compressed;
+use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// An [`Estimate`] by maximum likelihood, with what its search tells.
@@ -73,8 +74,8 @@ fn with_known_noise(
     let inflation = sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?;
     let weights =
         if noise.has_force() { Noise::Both(noise) } else { Noise::Output(output_weights(noise)?) };
-    let misfit = Misfit::new(data, unknowns, weights);
-    let fit = search(&misfit, theta)?;
+    let mut misfit = Misfit::new(data, unknowns, weights);
+    let fit = search(&mut misfit, theta)?;
     let spare = spare(data, &fit.theta);
     // A sampled covariance makes the weights too large by ν/(ν − n) on average.
     let expected = spare as f64 * noise.mean_inverse_ratio(data.dof());
@@ -100,11 +101,10 @@ fn with_white_noise(
     let mut levels = measured_size(data, data.displacement());
     let mut steps = 0;
     for _ in 0..MAX_ROUNDS {
-        let misfit = Misfit::new(data, unknowns, Noise::Output(white_weights(data, &levels)));
-        let mut fit = search(&misfit, theta)?;
+        let mut misfit = Misfit::new(data, unknowns, Noise::Output(white_weights(data, &levels)));
+        let mut fit = search(&mut misfit, theta)?;
         steps += fit.steps;
-        let errors = misfit.errors(&fit.theta).ok_or(EstimateError::NotConverged { steps })?;
-        let found = measured_size(data, &errors);
+        let found = measured_size(data, &misfit.errors());
         // Only the ratios between the channels weigh; the common level is the residual's.
         let common = found[0] / levels[0];
         let settled =
@@ -132,12 +132,14 @@ fn with_white_noise(
     Err(EstimateError::NotConverged { steps })
 }
 
-fn search(
-    misfit: &Misfit<'_>,
-    theta: DVector<f64>,
-) -> Result<super::levenberg_marquardt::Minimum, EstimateError> {
+/// The minimum, at which `misfit` is left evaluated.
+fn search(misfit: &mut Misfit<'_>, theta: DVector<f64>) -> Result<Minimum, EstimateError> {
     let fit = minimise(misfit, theta).ok_or(EstimateError::NotConverged { steps: 0 })?;
-    if fit.converged { Ok(fit) } else { Err(EstimateError::NotConverged { steps: fit.steps }) }
+    if !fit.converged {
+        return Err(EstimateError::NotConverged { steps: fit.steps });
+    }
+    misfit.residual(&fit.theta, &mut DVector::zeros(misfit.residuals()));
+    Ok(fit)
 }
 
 /// How the covariance follows from the Fisher information.
@@ -151,14 +153,15 @@ fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
     misfit: &Misfit<'_>,
-    fit: &super::levenberg_marquardt::Minimum,
+    fit: &Minimum,
     scale: Scale,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let sensitivity = misfit.sensitivity(&fit.theta);
-    let none = DMatrix::zeros(sensitivity.nrows(), 1);
-    let linear = solve_compressed(sensitivity.as_view(), none.as_view(), sensitivity.nrows())?;
-    let errors =
-        misfit.errors(&fit.theta).ok_or(EstimateError::NotConverged { steps: fit.steps })?;
+    let sensitivity = misfit.sensitivity();
+    let mut factor = TriangularFactor::new(sensitivity.ncols());
+    factor.push(&[sensitivity.as_view()]);
+    let none = DMatrix::zeros(sensitivity.ncols(), 1);
+    let linear = solve_compressed(factor.r().as_view(), none.as_view(), factor.rows())?;
+    let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors
         .column_iter()

@@ -94,6 +94,8 @@ impl RepeatedPeriods {
 
     /// Covariance of the mean over the periods, line by line or pooled over lines.
     ///
+    /// A force that is the same in every period to rounding is taken as exact.
+    ///
     /// # Errors
     /// [`EstimateError::TooFewAverages`] if there is only one period.
     pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, EstimateError> {
@@ -103,18 +105,38 @@ impl RepeatedPeriods {
         }
         let mean = self.mean_amplitudes(0..count);
         // Of the mean: the scatter of one period, divided by their number once more.
-        let scale = 1.0 / ((count - 1) * count) as f64;
-        let covariance: Vec<_> = (0..self.omega.len())
-            .map(|line| {
-                let mut sum = DMatrix::zeros(2 * self.dof, 2 * self.dof);
-                for period in &self.amplitudes {
-                    let deviation = (period.row(line) - mean.row(line)).transpose();
-                    sum += &deviation * deviation.adjoint();
+        let scale = Complex::from(1.0 / ((count - 1) * count) as f64);
+        let covariance = (0..self.omega.len()).map(|line| self.scatter(line, &mean) * scale);
+        let noise = NoiseSpectrum::of_measured(
+            &self.omega,
+            covariance.collect(),
+            self.measured,
+            count - 1,
+            pooling,
+        )?;
+        Ok(if self.force_repeats(&mean) { noise.with_exact_force() } else { noise })
+    }
+
+    /// Σ (z − z̄)(z − z̄)ᴴ over the periods, 2n×2n.
+    fn scatter(&self, line: usize, mean: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+        let size = 2 * self.dof;
+        let mut sum = DMatrix::zeros(size, size);
+        for period in &self.amplitudes {
+            let deviation = |c: usize| period[(line, c)] - mean[(line, c)];
+            for j in 0..size {
+                for i in 0..size {
+                    sum[(i, j)] += deviation(i) * deviation(j).conj();
                 }
-                sum.scale(scale)
-            })
-            .collect();
-        NoiseSpectrum::of_measured(&self.omega, covariance, self.measured, count - 1, pooling)
+            }
+        }
+        sum
+    }
+
+    /// Whether the force is the same in every period, to rounding: a computed one, not measured.
+    fn force_repeats(&self, mean: &DMatrix<Complex<f64>>) -> bool {
+        let force = mean.columns(self.dof, self.dof);
+        let rounding = 1e-12 * force.norm();
+        self.amplitudes.iter().all(|p| (p.columns(self.dof, self.dof) - force).norm() <= rounding)
     }
 
     fn mean_of(&self, periods: std::ops::Range<usize>) -> Result<FrequencyData, EstimateError> {

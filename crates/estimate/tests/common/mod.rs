@@ -1,6 +1,8 @@
 //! Closed-form steady states: the judges of the estimators.
 #![allow(dead_code, reason = "every test file uses its own part")]
 
+pub mod monte_carlo;
+
 use mechid_estimate::frequency_domain::Motion;
 use mechid_model::{JournalBearing, KyxSign, OilFilm, Sdof, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};
