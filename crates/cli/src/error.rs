@@ -27,13 +27,110 @@ pub enum CliError {
         "{file} has no column called time, time_s or t: name the time column with --time, or give \
          --sample-rate in Hz; its columns are {available}"
     )]
-    #[allow(dead_code, reason = "for the subcommands that compute")]
     NoTimeAxis {
         /// The record.
         file: String,
         /// Numbers and names of the columns there are.
         available: String,
     },
+    /// No motion was measured.
+    #[error(
+        "the motion is missing: name its columns with --displacement, --velocity or --acceleration"
+    )]
+    NoMotion,
+    /// The columns do not pair up with the degrees of freedom.
+    #[error(
+        "{option} names {got} columns and --force {forces}: every degree of freedom needs one of each \
+         (--force 0 where no force acts)"
+    )]
+    ColumnCount {
+        /// The option with the wrong number of columns.
+        option: &'static str,
+        /// Columns it names.
+        got: usize,
+        /// Columns that `--force` names.
+        forces: usize,
+    },
+    /// The force does nothing.
+    #[error(
+        "{file}: the force (column {columns}) is zero throughout the window: nothing drives the machine"
+    )]
+    ZeroForce {
+        /// The record.
+        file: String,
+        /// The force columns.
+        columns: String,
+    },
+    /// A mass that no body has.
+    #[error("a mass must be positive and finite, got {value} kg")]
+    Mass {
+        /// The value given, in kg.
+        value: f64,
+    },
+    /// Not one mass per degree of freedom.
+    #[error(
+        "--mass gives {got} values, the record has {dof} degrees of freedom: give one mass for each, or all {dof}×{dof} entries row by row"
+    )]
+    MassCount {
+        /// Values given.
+        got: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// No line of the band is driven.
+    #[error(
+        "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
+         {first_hz:.6} and {last_hz:.6} Hz"
+    )]
+    EmptyBand {
+        /// Lower end asked for, in Hz.
+        low_hz: f64,
+        /// Upper end asked for, in Hz.
+        high_hz: f64,
+        /// Lowest frequency with force, in Hz.
+        first_hz: f64,
+        /// Highest frequency with force, in Hz.
+        last_hz: f64,
+    },
+    /// None of the lines chosen is driven.
+    #[error("no excited line among {lines}: the force has its lines between {first} and {last}")]
+    NoExcitedLine {
+        /// The choice.
+        lines: String,
+        /// Lowest line with force.
+        first: usize,
+        /// Highest line with force.
+        last: usize,
+    },
+    /// The equation of motion needs all three motions.
+    #[error(
+        "in the time domain --displacement, --velocity and --acceleration are all needed (in the \
+         frequency domain one of them is enough)"
+    )]
+    TimeDomainMotions,
+    /// No receptance can be read off the record.
+    #[error(
+        "nothing to plot: several forces act on every line, so the record shows no single receptance"
+    )]
+    NothingToDraw,
+    /// There are no spectra to draw.
+    #[error("--plot draws receptances: it needs --domain frequency")]
+    PlotNeedsSpectra,
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] mechid::plot::PlotError),
+    /// The simulation failed.
+    #[error(transparent)]
+    Simulate(#[from] mechid::SimulateError),
+    /// The identification failed.
+    #[error(transparent)]
+    Estimate(#[from] mechid::estimate::EstimateError),
+    /// A signal cannot be used.
+    #[error(transparent)]
+    Signal(#[from] mechid::signal::SignalError),
+    /// A model cannot be used.
+    #[error(transparent)]
+    Model(#[from] mechid::model::ModelError),
     /// The report cannot be printed.
     #[error("cannot print the report: {0}")]
     Print(#[from] std::io::Error),

@@ -21,7 +21,6 @@ pub struct ReportArgs {
 
 /// Where to draw the result.
 #[derive(Debug, Default, Args)]
-#[allow(dead_code, reason = "for the subcommands that draw")]
 pub struct PlotArgs {
     /// Draw the result into this file; its ending, .svg or .png, says how
     #[arg(long, value_name = "FILE.svg|.png", value_parser = plot_file, help_heading = "Output")]
@@ -114,7 +113,6 @@ impl RecordArgs {
 
     /// The columns `wanted` as the channels of a record: whole, then detrended, then windowed to
     /// `periods` periods.
-    #[allow(dead_code, reason = "for the subcommands that compute")]
     pub fn window(&self, table: &Table, wanted: &[impl AsRef<str>]) -> Result<Record, CliError> {
         let time = self.time_axis(table).ok_or_else(|| CliError::NoTimeAxis {
             file: table.file().into(),

@@ -3,10 +3,14 @@
 use std::io::{self, Write as _};
 
 use mechid::io::{OutputFile, write_all};
+use mechid::plot::Figure;
 use serde::Serialize;
 
 use crate::error::CliError;
-use crate::options::ReportArgs;
+use crate::options::{PlotArgs, ReportArgs};
+
+/// Pixels of a PNG file for each px of the drawing.
+const PNG_SCALE: f64 = 2.0;
 
 /// The result of a subcommand, complete before anything is written or printed.
 #[derive(Debug)]
@@ -27,10 +31,23 @@ impl Outcome {
     }
 
     /// The same outcome with one more file to write.
-    #[allow(dead_code, reason = "for the subcommands that write")]
     pub fn with_file(mut self, path: &std::path::Path, content: impl Into<Vec<u8>>) -> Self {
         self.files.push(OutputFile { path: path.to_owned(), content: content.into() });
         self
+    }
+
+    /// The same outcome with the figure that `--plot` asks for, drawn only then.
+    pub fn with_plot(
+        self,
+        plot: &PlotArgs,
+        figure: impl FnOnce() -> Result<Figure, CliError>,
+    ) -> Result<Self, CliError> {
+        let Some(path) = &plot.plot else { return Ok(self) };
+        let figure = figure()?;
+        let bitmap = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+        let content =
+            if bitmap { figure.to_png(PNG_SCALE)? } else { figure.to_svg()?.into_bytes() };
+        Ok(self.with_file(path, content))
     }
 
     /// Writes the files, all or none, and prints the report.

@@ -38,6 +38,16 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
+/// As [`significant`], without zeros at the end: for numbers that were chosen, not measured.
+pub fn compact(value: f64, digits: usize) -> String {
+    let text = significant(value, digits);
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -62,5 +72,9 @@ mod tests {
         ] {
             assert_eq!(significant(value, digits), expected);
         }
+        assert_eq!(
+            (compact(128.0, 8), compact(610.3515625, 8)),
+            ("128".into(), "610.35156".into())
+        );
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling};
 use nalgebra::DMatrix;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use crate::system::SystemDescription;
 use crate::{IoError, LineSpec};
@@ -40,6 +40,9 @@ pub struct Experiment {
     /// Which response: the one that repeats, or the one from rest.
     #[serde(default)]
     pub response: ResponseKind,
+    /// Whether a scheme may take steps at which the motion grows by itself.
+    #[serde(default)]
+    pub allow_unstable: bool,
     /// How many periods of the excitation the record has.
     #[serde(default = "one")]
     pub periods: usize,
@@ -107,14 +110,25 @@ pub enum SchemeChoice {
         gamma: f64,
     },
     /// The central difference method.
-    CentralDifference,
+    CentralDifference {
+        /// Where the displacement before the first sample comes from.
+        #[serde(default)]
+        start: FirstDisplacements,
+    },
     /// Houbolt's method.
-    Houbolt,
+    Houbolt {
+        /// Where the first two steps come from.
+        #[serde(default)]
+        start: FirstSteps,
+    },
     /// Wilson's θ method.
     WilsonTheta {
         /// θ, 1.4 by default.
         #[serde(default = "wilson")]
         theta: f64,
+        /// The force at t + θΔt.
+        #[serde(default)]
+        load: LoadBeyond,
     },
     /// The classical Runge-Kutta method of fourth order.
     #[serde(rename = "runge-kutta-4")]
@@ -146,8 +160,41 @@ pub enum MiddleLoad {
     Linear,
 }
 
-/// Which of the responses to a periodic force.
+/// The displacement before the first sample, for central difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FirstDisplacements {
+    /// By the Taylor step with the consistent acceleration.
+    #[default]
+    Taylor,
+    /// That of the first sample: at rest until then.
+    Rest,
+}
+
+/// The first two steps of Houbolt's method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FirstSteps {
+    /// By Newmark's average acceleration.
+    #[default]
+    AverageAcceleration,
+    /// By central difference.
+    CentralDifference,
+}
+
+/// The force at t + θΔt, for Wilson's method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoadBeyond {
+    /// On the line through both ends of the step.
+    #[default]
+    Projected,
+    /// Between the samples around it.
+    Interpolated,
+}
+
+/// Which of the responses to a periodic force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResponseKind {
     /// The steady state: one period is like the next.

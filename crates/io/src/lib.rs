@@ -28,8 +28,12 @@ mod time_axis;
 
 pub use csv_text::csv_text;
 pub use error::IoError;
-pub use experiment::{Experiment, Level, MiddleLoad, Noise, ResponseKind, SchemeChoice};
+pub use experiment::{
+    Experiment, FirstDisplacements, FirstSteps, Level, LoadBeyond, MiddleLoad, Noise, ResponseKind,
+    SchemeChoice,
+};
 pub use line_spec::LineSpec;
 pub use output::{OutputFile, write_all};
+pub use system::{SystemMatrices, read_system};
 pub use table::Table;
 pub use time_axis::TimeAxis;

@@ -1,13 +1,58 @@
 //! The system of an experiment, in any of the ways people state it.
 
 use std::fmt;
+use std::path::Path;
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::DMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
-use serde::{Deserialize, de};
+use serde::{Deserialize, Serialize, de};
 
 use crate::IoError;
+
+/// The matrices of a system as rows of numbers: the `system` of every JSON report, which
+/// [`read_system`] reads back.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SystemMatrices {
+    /// M, in kg.
+    pub mass: Vec<Vec<f64>>,
+    /// C, in N·s/m.
+    pub damping: Vec<Vec<f64>>,
+    /// K, in N/m.
+    pub stiffness: Vec<Vec<f64>>,
+}
+
+impl From<&SecondOrderSystem> for SystemMatrices {
+    fn from(system: &SecondOrderSystem) -> Self {
+        let rows = |m: &DMatrix<f64>| m.row_iter().map(|r| r.iter().copied().collect()).collect();
+        Self {
+            mass: rows(system.mass()),
+            damping: rows(system.damping()),
+            stiffness: rows(system.stiffness()),
+        }
+    }
+}
+
+/// The system in a JSON file: the `system` of an [`Experiment`](crate::Experiment), or of the report
+/// that `mechid identify --json` prints.
+///
+/// # Errors
+/// [`IoError::Read`], [`IoError::Json`], [`IoError::Description`], [`IoError::Model`].
+pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError> {
+    #[derive(Deserialize)]
+    struct Described {
+        system: SystemDescription,
+    }
+    let file = path.as_ref().display().to_string();
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(source) => return Err(IoError::Read { file, source }),
+    };
+    match serde_json::from_str::<Described>(&text) {
+        Ok(described) => described.system.system(&file),
+        Err(source) => Err(IoError::Json { file, source }),
+    }
+}
 
 /// M with C and K, or (one degree of freedom) the mass with natural frequency and damping ratio.
 #[derive(Debug, Clone, PartialEq, Deserialize)]

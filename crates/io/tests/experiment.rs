@@ -1,6 +1,9 @@
 //! Descriptions of experiments: what they mean, and what is said about wrong ones.
 
-use mechid_io::{Experiment, IoError, MiddleLoad, SchemeChoice};
+use mechid_io::{
+    Experiment, FirstDisplacements, IoError, LoadBeyond, MiddleLoad, SchemeChoice, SystemMatrices,
+    read_system,
+};
 
 /// A description with these lines in place of the default ones.
 fn description(system: &str, excitation: &str, more: &str) -> String {
@@ -48,7 +51,14 @@ fn schemes_have_their_standard_parameters() {
     for (json, expected) in [
         (r#"{ "name": "exact" }"#, SchemeChoice::Exact),
         (r#"{ "name": "newmark" }"#, SchemeChoice::Newmark { beta: 0.25, gamma: 0.5 }),
-        (r#"{ "name": "wilson-theta", "theta": 1.5 }"#, SchemeChoice::WilsonTheta { theta: 1.5 }),
+        (
+            r#"{ "name": "wilson-theta", "theta": 1.5 }"#,
+            SchemeChoice::WilsonTheta { theta: 1.5, load: LoadBeyond::Projected },
+        ),
+        (
+            r#"{ "name": "central-difference", "start": "rest" }"#,
+            SchemeChoice::CentralDifference { start: FirstDisplacements::Rest },
+        ),
         (
             r#"{ "name": "runge-kutta-4", "load": "linear" }"#,
             SchemeChoice::RungeKutta4 { load: MiddleLoad::Linear },
@@ -119,4 +129,17 @@ fn wrong_descriptions_say_what_is_wrong() {
 fn a_record_too_large_for_memory_is_refused() {
     let text = description(SDOF, FORCE, r#", "periods": 1000000000000"#);
     assert!(matches!(parse(&text).unwrap().force(), Err(IoError::Description { .. })));
+}
+
+#[test]
+fn the_system_of_a_report_is_read_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("report.json");
+    let text = description(SDOF, FORCE, "");
+    let system = parse(&text).unwrap().system().unwrap();
+    let report = serde_json::json!({ "nrmse": 0.1, "system": SystemMatrices::from(&system) });
+    std::fs::write(&path, report.to_string()).unwrap();
+    assert_eq!(read_system(&path).unwrap(), system);
+    std::fs::write(&path, "{}").unwrap();
+    assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
 }

@@ -198,3 +198,25 @@ fn fully_degenerate_systems_converge() {
         }
     }
 }
+
+#[test]
+fn an_unsupported_chain_moves_as_one_body() {
+    // Free-free: the defective zero eigenvalue appears as a few √ε of the fastest rate, its shape
+    // is the same displacement everywhere.
+    for n in [2, 5, 20] {
+        let chain = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+            0 if i == 0 || i == n - 1 => 1.0,
+            0 => 2.0,
+            1 => -1.0,
+            _ => 0.0,
+        });
+        let s = SecondOrderSystem::new(DMatrix::identity(n, n), &chain * 0.02, chain * 100.0);
+        let modes = s.unwrap().modes().unwrap();
+        assert!(modes[0].natural_frequency() < 20.0 * 1e-7);
+        assert!(modes[0].shape().iter().all(|z| (z - 1.0).norm() < 1e-6));
+        // The first bending-like mode: 2·10·sin(π/2n).
+        let omega = 20.0 * (std::f64::consts::PI / (2 * n) as f64).sin();
+        let first = modes.iter().find(|m| m.natural_frequency() > 1e-3).unwrap();
+        assert!((first.natural_frequency() / omega - 1.0).abs() < 1e-11);
+    }
+}

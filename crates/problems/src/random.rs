@@ -9,7 +9,8 @@ use rand_distr::{Distribution, StandardNormal};
 /// A stable system of `dof` degrees of freedom, the same for the same seed.
 ///
 /// M is symmetric positive definite and full, C and K are full and non-symmetric, damping is
-/// not proportional. With M = L Lᵀ the matrices are
+/// not proportional. Of many degrees of freedom some motions creep instead of oscillating.
+/// With M = L Lᵀ the matrices are
 ///
 /// ```text
 /// C = L (D + G) Lᵀ,      K = L (S + N) Lᵀ

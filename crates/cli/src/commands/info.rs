@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::error::CliError;
 use crate::options::{Detrend, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
-use crate::text_table::{significant, text_table};
+use crate::text_table::{compact, significant, text_table};
 
 /// Show what is in a record: columns, sampling, level and crest factor
 #[derive(Debug, Args)]
@@ -150,9 +150,9 @@ impl Report {
         text += &match &self.sampling {
             Some(s) => format!(
                 "{} Hz, a step of {} s, {} s long\n\n",
-                significant(s.rate_hz, 8),
-                significant(s.step_s, 6),
-                significant(s.duration_s, 6)
+                compact(s.rate_hz, 8),
+                compact(s.step_s, 6),
+                compact(s.duration_s, 6)
             ),
             None => "no time column: give --time or --sample-rate\n\n".into(),
         };

@@ -5,7 +5,9 @@
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
 //! [`CliError`](crate::error::CliError).
 
+mod identify;
 mod info;
+mod simulate;
 
 use clap::{Parser, Subcommand};
 
@@ -30,21 +32,27 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
+    Simulate(simulate::SimulateArgs),
 }
 
 impl Command {
     /// What the command found; nothing is printed or written yet.
     pub fn run(&self) -> Result<Outcome, CliError> {
         match self {
+            Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
+            Command::Simulate(args) => args.run(),
         }
     }
 
     /// How the user wants to be told.
     pub fn report(&self) -> &ReportArgs {
         match self {
+            Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
+            Command::Simulate(args) => &args.report,
         }
     }
 }

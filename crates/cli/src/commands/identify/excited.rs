@@ -1,0 +1,125 @@
+//! The spectral lines an identification uses.
+
+use std::str::FromStr;
+
+use mechid::io::LineSpec;
+use mechid::signal::{Record, Spectrum, lines};
+
+use crate::error::CliError;
+
+/// A frequency band, `low:high`, in Hz.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Band {
+    low_hz: f64,
+    high_hz: f64,
+}
+
+impl FromStr for Band {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parsed = text.split_once(':').and_then(|(low, high)| {
+            Some(Self { low_hz: low.trim().parse().ok()?, high_hz: high.trim().parse().ok()? })
+        });
+        parsed
+            .filter(|b| b.low_hz >= 0.0 && b.low_hz < b.high_hz && b.high_hz.is_finite())
+            .ok_or_else(|| "a band is written low:high, in Hz, such as 40:120".into())
+    }
+}
+
+/// A line is excited if it carries at least this part of the strongest line of its force: far above
+/// rounding and quantisation, far below any line that somebody meant to drive.
+const EXCITED: f64 = 1e-3;
+
+/// A force whose strongest line is below this part of its peak value does not move at all: what its
+/// spectrum shows is the rounding of a constant.
+const ROUNDING: f64 = 1e-12;
+
+/// The lines of one period of the force to identify from: the choice as it stands; without one, all
+/// excited lines (of the band).
+///
+/// # Errors
+/// [`CliError::NoExcitedLine`], [`CliError::EmptyBand`] if no chosen line is excited.
+pub fn choose_lines(
+    force: &Record,
+    spec: Option<&LineSpec>,
+    band: Option<Band>,
+) -> Result<Vec<usize>, CliError> {
+    let sampling = force.sampling();
+    let excited = excited_lines(force);
+    let (first, last) = (excited.first().copied(), excited.last().copied());
+    let (first, last) = (first.unwrap_or(0), last.unwrap_or(0));
+    if let Some(spec) = spec {
+        let chosen = spec.lines(sampling)?;
+        if !chosen.iter().any(|n| excited.binary_search(n).is_ok()) {
+            return Err(CliError::NoExcitedLine { lines: spec.to_string(), first, last });
+        }
+        return Ok(chosen);
+    }
+    let Some(Band { low_hz, high_hz }) = band else {
+        if excited.is_empty() {
+            return Err(CliError::NoExcitedLine { lines: "all lines".into(), first, last });
+        }
+        return Ok(excited);
+    };
+    let inside = lines::band(sampling, low_hz, high_hz);
+    let chosen: Vec<usize> =
+        excited.into_iter().filter(|n| inside.binary_search(n).is_ok()).collect();
+    if chosen.is_empty() {
+        let hz = |line: usize| line as f64 * sampling.line_spacing_hz();
+        let (first_hz, last_hz) = (hz(first), hz(last));
+        return Err(CliError::EmptyBand { low_hz, high_hz, first_hz, last_hz });
+    }
+    Ok(chosen)
+}
+
+fn excited_lines(force: &Record) -> Vec<usize> {
+    let spectrum = Spectrum::of(force);
+    let mut full = lines::full(force.sampling());
+    let limits: Vec<f64> = (0..force.channels())
+        .map(|c| {
+            let peak = force.channel(c).iter().fold(0.0_f64, |p, f| p.max(f.abs()));
+            let strongest = full.iter().map(|n| spectrum.line(*n, c).norm()).fold(0.0, f64::max);
+            if strongest > ROUNDING * peak { EXCITED * strongest } else { f64::INFINITY }
+        })
+        .collect();
+    full.retain(|n| (0..limits.len()).any(|c| spectrum.line(*n, c).norm() >= limits[c]));
+    full
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid::signal::{Multisine, Phases, Sampling};
+
+    use super::*;
+
+    #[test]
+    fn excited_lines_are_found_and_bands_cut_them() {
+        let sampling = Sampling::new(1.0 / 64.0, 64).unwrap();
+        let force = Multisine::flat([3, 5, 7], 2.0, Phases::Schroeder).unwrap();
+        let force = force.sample(sampling).unwrap();
+        let choose = |spec: Option<&str>, band: Option<&str>| {
+            let spec = spec.map(|s| s.parse::<LineSpec>().unwrap());
+            choose_lines(&force, spec.as_ref(), band.map(|b| b.parse().unwrap()))
+        };
+        assert_eq!(choose(None, None).unwrap(), [3, 5, 7]);
+        // The choice stands as it is, undriven lines and all.
+        assert_eq!(choose(Some("1:6"), None).unwrap(), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(choose(None, Some("4:7")).unwrap(), [5, 7]);
+        assert_eq!(
+            choose(None, Some("8:20")).unwrap_err().to_string(),
+            "no excited line between 8 and 20 Hz: the force has its lines between 3.000000 and 7.000000 Hz"
+        );
+        assert_eq!(
+            choose(Some("even"), None).unwrap_err().to_string(),
+            "no excited line among even: the force has its lines between 3 and 7"
+        );
+    }
+
+    #[test]
+    fn bands_are_low_then_high() {
+        for text in ["", "3", "9:3", "3:3", "a:b", "-1:3", "1:inf", "NaN:3"] {
+            assert!(text.parse::<Band>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! `mechid simulate`: the record an experiment would give.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::Simulation;
+use mechid::io::{Experiment, ResponseKind, SystemMatrices, csv_text};
+use mechid::signal::Record;
+use serde::Serialize;
+
+use crate::error::CliError;
+use crate::options::ReportArgs;
+use crate::outcome::Outcome;
+use crate::text_table::{compact, significant, text_table};
+
+/// Simulate the experiment described in a file and write its record
+///
+/// The description is a JSON file with
+///
+///   system      mass, damping, stiffness (numbers, or matrices as lists of rows), or mass,
+///               natural_frequency_hz, damping_ratio
+///
+///   sampling    samples in one period, rate_hz
+///
+///   excitation  a list of multisines: dof (counted from 1), lines (all, odd, 1:2:99 …), amplitude
+///               of each line in N, phases (schroeder, schroeder-binary, random with seed, zero)
+///
+///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, runge-kutta-4) and
+///               its parameters (beta, gamma; start; start; theta, load; load)
+///
+///   response    periodic (the steady state) or from-rest
+///
+///   periods     how many
+///
+///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
+///               fraction_of_rms; and a seed
+#[derive(Debug, Args)]
+#[command(
+    verbatim_doc_comment,
+    after_help = "Example:\n  mechid simulate examples/machine.json --output record.csv\n  \
+                  mechid identify record.csv --force force --displacement displacement"
+)]
+pub struct SimulateArgs {
+    /// The description of the experiment
+    #[arg(value_name = "SYSTEM.json")]
+    experiment: PathBuf,
+    /// Where the record goes: columns time, force, displacement, velocity, acceleration in SI units;
+    /// with several degrees of freedom force_1, force_2, …
+    #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    record: String,
+    scheme: String,
+    conventions: Vec<Convention>,
+    response: ResponseKind,
+    samples: usize,
+    periods: usize,
+    sample_rate_hz: f64,
+    modes: Vec<Mode>,
+    channels: Vec<Channel>,
+    system: SystemMatrices,
+}
+
+#[derive(Debug, Serialize)]
+struct Convention {
+    what: &'static str,
+    choice: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Mode {
+    natural_frequency_hz: f64,
+    damping_ratio: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Channel {
+    column: String,
+    unit: &'static str,
+    rms: f64,
+    /// RMS value of the noise in it.
+    noise_rms: f64,
+}
+
+impl SimulateArgs {
+    /// Simulates and hands over the record.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let experiment = Experiment::read(&self.experiment)?;
+        let simulation = mechid::simulate(&experiment)?;
+        let groups = groups(&simulation);
+        let mut columns: Vec<(String, &[f64])> = Vec::new();
+        let mut channels = Vec::new();
+        for (name, unit, truth, measured) in groups {
+            for dof in 0..measured.channels() {
+                let column = match measured.channels() {
+                    1 => name.to_string(),
+                    _ => format!("{name}_{}", dof + 1),
+                };
+                let noise = measured.column(dof) - truth.column(dof);
+                let per_sample = (measured.len() as f64).sqrt();
+                channels.push(Channel {
+                    column: column.clone(),
+                    unit,
+                    rms: measured.column(dof).norm() / per_sample,
+                    noise_rms: noise.norm() / per_sample,
+                });
+                columns.push((column, measured.channel(dof)));
+            }
+        }
+        let text = csv_text(simulation.force.sampling(), &columns);
+        let report = self.describe(&experiment, &simulation, channels)?;
+        Ok(Outcome::new(report.text(), &report)?.with_file(&self.output, text))
+    }
+
+    fn describe(
+        &self,
+        experiment: &Experiment,
+        simulation: &Simulation,
+        channels: Vec<Channel>,
+    ) -> Result<Report, CliError> {
+        let modes = simulation.system.modes()?;
+        Ok(Report {
+            record: self.output.display().to_string(),
+            scheme: simulation.scheme.clone(),
+            conventions: simulation
+                .conventions
+                .iter()
+                .map(|c| Convention { what: c.what, choice: c.choice })
+                .collect(),
+            response: experiment.response,
+            samples: simulation.force.len(),
+            periods: experiment.periods,
+            sample_rate_hz: simulation.force.sampling().rate_hz(),
+            modes: modes
+                .iter()
+                .map(|mode| Mode {
+                    natural_frequency_hz: mode.natural_frequency() / std::f64::consts::TAU,
+                    damping_ratio: mode.damping_ratio(),
+                })
+                .collect(),
+            channels,
+            system: SystemMatrices::from(&simulation.system),
+        })
+    }
+}
+
+/// Name, unit, truth and measurement of each quantity.
+fn groups(s: &Simulation) -> [(&'static str, &'static str, &Record, &Record); 4] {
+    let (truth, measured) = (&s.response, &s.measured_response);
+    [
+        ("force", "N", &s.force, &s.measured_force),
+        ("displacement", "m", truth.displacement(), measured.displacement()),
+        ("velocity", "m/s", truth.velocity(), measured.velocity()),
+        ("acceleration", "m/s²", truth.acceleration(), measured.acceleration()),
+    ]
+}
+
+impl Report {
+    fn text(&self) -> String {
+        let kind = match self.response {
+            ResponseKind::Periodic => "the response that repeats",
+            ResponseKind::FromRest => "from rest",
+        };
+        let mut text = format!(
+            "{}: {} samples at {} Hz, {} {}, {kind}\nscheme: {}\n",
+            self.record,
+            self.samples,
+            compact(self.sample_rate_hz, 8),
+            self.periods,
+            if self.periods == 1 { "period" } else { "periods" },
+            self.scheme,
+        );
+        for Convention { what, choice } in &self.conventions {
+            text += &format!("  {what}: {choice}\n");
+        }
+        let header = |cells: [&str; 3]| cells.map(String::from).to_vec();
+        let mut rows = vec![header(["mode", "natural frequency (Hz)", "damping ratio"])];
+        for (number, mode) in (1..).zip(&self.modes) {
+            let cells = [mode.natural_frequency_hz, mode.damping_ratio];
+            let mut row = vec![format!("{number}")];
+            row.extend(cells.map(|v| significant(v, 5)));
+            rows.push(row);
+        }
+        text += &format!("\n{}\n", text_table(&rows));
+        let mut rows = vec![header(["column", "RMS", "noise RMS"])];
+        for c in &self.channels {
+            let cells = [c.rms, c.noise_rms].map(|v| format!("{} {}", significant(v, 4), c.unit));
+            let mut row = vec![c.column.clone()];
+            row.extend(cells);
+            rows.push(row);
+        }
+        text + &text_table(&rows)
+    }
+}

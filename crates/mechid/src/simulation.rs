@@ -1,0 +1,209 @@
+//! The record an experiment would give: excitation, response, noise.
+
+use mechid_integrate::{
+    AllowUnstable, CentralDifference, CentralDifferenceStart, Convention, Houbolt, HouboltStart,
+    IntegrateError, Newmark, RungeKutta4, Scheme, WilsonLoad, WilsonTheta, integrate,
+    integrate_periodic,
+};
+use mechid_io::{
+    Experiment, FirstDisplacements, FirstSteps, IoError, Level, LoadBeyond, MiddleLoad,
+    ResponseKind, SchemeChoice,
+};
+use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
+use mechid_signal::{Record, SignalError, Spectrum, noise};
+use nalgebra::{Complex, DMatrix};
+
+/// What [`simulate`] makes: the truth, and what the sensors say.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation {
+    /// The machine.
+    pub system: SecondOrderSystem,
+    /// How the response was computed, with the scheme's parameters.
+    pub scheme: String,
+    /// The scheme's conventions in force.
+    pub conventions: Vec<Convention>,
+    /// The force without noise, in N: samples × degrees of freedom.
+    pub force: Record,
+    /// The response without noise.
+    pub response: Response,
+    /// The force with its noise.
+    pub measured_force: Record,
+    /// The response with its noise.
+    pub measured_response: Response,
+}
+
+/// Runs an experiment.
+///
+/// ```
+/// use mechid::io::Experiment;
+///
+/// let experiment = Experiment::parse("machine.json", r#"{
+///     "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
+///     "sampling": { "samples": 64, "rate_hz": 30 },
+///     "excitation": [{ "lines": "odd", "amplitude": 5 }],
+///     "periods": 2
+/// }"#)?;
+/// let simulation = mechid::simulate(&experiment)?;
+/// assert_eq!(simulation.response.displacement().len(), 128);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`SimulateError`]: what is wrong with the description, or a response that does not exist.
+pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
+    let system = experiment.system()?;
+    let period = experiment.force()?;
+    let force = repeated(&period, experiment.periods)?;
+    let scheme = scheme(experiment.scheme)?;
+    let response = match &scheme {
+        None if experiment.response == ResponseKind::FromRest => {
+            return Err(SimulateError::ExactFromRest);
+        }
+        None => exact_periodic(&system, &period)?,
+        Some(scheme) => {
+            let unguarded = AllowUnstable(&**scheme);
+            let scheme = if experiment.allow_unstable { &unguarded } else { &**scheme };
+            match experiment.response {
+                ResponseKind::Periodic => integrate_periodic(scheme, &system, &period)?,
+                ResponseKind::FromRest => {
+                    integrate(scheme, &system, &force, &InitialState::rest(system.dof()))?
+                }
+            }
+        }
+    };
+    let response = match experiment.response {
+        ResponseKind::Periodic => map(&response, |_, r| repeated(r, experiment.periods))?,
+        ResponseKind::FromRest => response,
+    };
+    let noise = experiment.noise;
+    let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
+        (Some(level), Some(noise)) => {
+            // One seed for the experiment, one stream for each quantity.
+            noise::add_white(record, level.into(), noise.seed.wrapping_mul(4).wrapping_add(stream))
+        }
+        _ => Ok(record.clone()),
+    };
+    let measured_force = add(&force, 0, noise.and_then(|n| n.force))?;
+    let levels = noise.map_or([None; 3], |n| [n.displacement, n.velocity, n.acceleration]);
+    let measured_response = map(&response, |which, r| add(r, which as u64 + 1, levels[which]))?;
+    Ok(Simulation {
+        scheme: scheme
+            .as_ref()
+            .map_or("exact: through the receptance, line by line".into(), |s| s.name()),
+        conventions: scheme.map_or_else(Vec::new, |s| s.conventions()),
+        system,
+        force,
+        response,
+        measured_force,
+        measured_response,
+    })
+}
+
+/// A simulation that cannot be run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimulateError {
+    /// The description is wrong.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// The scheme refuses.
+    #[error(transparent)]
+    Integrate(#[from] IntegrateError),
+    /// The system has no such response.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A record cannot be made.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// Without time steps there is no start.
+    #[error(
+        "the scheme \"exact\" gives the periodic response only: choose another one for a response from rest"
+    )]
+    ExactFromRest,
+}
+
+/// The response that repeats with a force which is band-limited between its samples, line by line
+/// X_n = (K − ω²M + iωC)⁻¹ F_n: exact to rounding, no time step involved.
+///
+/// Lines without force have no response; that spares DC for a system free to drift.
+///
+/// # Errors
+/// [`ModelError::SingularDynamicStiffness`] if a line drives an undamped system at its natural
+/// frequency; [`ModelError::Signal`] if the response overflows.
+///
+/// # Panics
+/// If the force has not one channel per degree of freedom.
+///
+/// # Source
+/// Dissertation eqs. (4.6.9)–(4.6.10).
+pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Response, ModelError> {
+    let dof = system.dof();
+    assert_eq!(force.channels(), dof, "one force per degree of freedom");
+    let forces = Spectrum::of(force);
+    let mut motions = [(); 3].map(|()| DMatrix::<Complex<f64>>::zeros(forces.len(), dof));
+    for n in 0..forces.len() {
+        let driven = forces.lines().row(n).transpose();
+        if driven.iter().all(|f| f.norm() == 0.0) {
+            continue;
+        }
+        let displacement = (system.receptance(forces.omega(n))? * driven).transpose();
+        let i_omega = Complex::new(0.0, forces.omega(n));
+        motions[0].set_row(n, &displacement);
+        motions[1].set_row(n, &(&displacement * i_omega));
+        motions[2].set_row(n, &(displacement * (i_omega * i_omega)));
+    }
+    let [x, v, a] = motions.map(|lines| Spectrum::from_lines(force.sampling(), lines).to_record());
+    Response::new(x, v, a)
+}
+
+fn scheme(choice: SchemeChoice) -> Result<Option<Box<dyn Scheme>>, IntegrateError> {
+    Ok(Some(match choice {
+        SchemeChoice::Newmark { beta, gamma } => Box::new(Newmark::new(beta, gamma)?),
+        SchemeChoice::CentralDifference { start } => Box::new(CentralDifference {
+            start: match start {
+                FirstDisplacements::Taylor => CentralDifferenceStart::Taylor,
+                FirstDisplacements::Rest => CentralDifferenceStart::Rest,
+            },
+        }),
+        SchemeChoice::Houbolt { start } => Box::new(Houbolt {
+            start: match start {
+                FirstSteps::AverageAcceleration => HouboltStart::AverageAcceleration,
+                FirstSteps::CentralDifference => HouboltStart::CentralDifference,
+            },
+        }),
+        SchemeChoice::WilsonTheta { theta, load } => {
+            Box::new(WilsonTheta::new(theta)?.with_load(match load {
+                LoadBeyond::Projected => WilsonLoad::Projected,
+                LoadBeyond::Interpolated => WilsonLoad::Interpolated,
+            }))
+        }
+        SchemeChoice::RungeKutta4 { load } => Box::new(match load {
+            MiddleLoad::Held => RungeKutta4::HELD,
+            MiddleLoad::Linear => RungeKutta4::LINEAR,
+        }),
+        _ => return Ok(None),
+    }))
+}
+
+/// A record of so many periods.
+fn repeated(period: &Record, periods: usize) -> Result<Record, SignalError> {
+    let len = period.len();
+    let sampling = period.sampling().with_len(len * periods)?;
+    let data = period.data();
+    Record::new(
+        sampling,
+        DMatrix::from_fn(len * periods, period.channels(), |k, c| data[(k % len, c)]),
+    )
+}
+
+/// A response made of another one, record by record.
+fn map(
+    response: &Response,
+    change: impl Fn(usize, &Record) -> Result<Record, SignalError>,
+) -> Result<Response, ModelError> {
+    Response::new(
+        change(0, response.displacement())?,
+        change(1, response.velocity())?,
+        change(2, response.acceleration())?,
+    )
+}
