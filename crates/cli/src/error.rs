@@ -122,6 +122,17 @@ pub enum CliError {
     /// The simulation failed.
     #[error(transparent)]
     Simulate(#[from] mechid::SimulateError),
+    /// More numbers than can be held.
+    #[error(
+        "a record of {numbers} numbers is too large, {largest} is the limit: fewer --samples, \
+         --periods or --inputs"
+    )]
+    RecordSize {
+        /// Samples times columns.
+        numbers: usize,
+        /// The limit.
+        largest: usize,
+    },
     /// The identification failed.
     #[error(transparent)]
     Estimate(#[from] mechid::estimate::EstimateError),

@@ -82,7 +82,7 @@ pub enum Detrend {
     Mean,
 }
 
-fn at_least_one(text: &str) -> Result<usize, String> {
+pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("counted from 1".into()),
         Ok(n) => Ok(n),

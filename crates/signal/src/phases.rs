@@ -74,7 +74,7 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
             // Every step adds the power passed so far once more to Σ (n − l) p_l.
             phase += ((line - previous) / step) as f64 * share;
         }
-        phases.push(-TAU * phase.fract());
+        phases.push(0.0 - TAU * phase.fract());
         share += if total > 0.0 { a * a / total } else { 0.0 };
         previous = Some(line);
     }

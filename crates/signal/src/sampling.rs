@@ -1,6 +1,7 @@
 //! The uniform time axis.
 
 use crate::SignalError;
+use crate::error::positive;
 
 /// A uniform time axis: `len` samples, `dt` seconds apart, the first at t = 0.
 ///
@@ -35,9 +36,10 @@ impl Sampling {
     /// A time axis of `len` samples at `rate_hz` samples per second.
     ///
     /// # Errors
-    /// As [`Sampling::new`] with `dt = 1 / rate_hz`.
+    /// [`SignalError::NotPositive`] if the rate is not positive and finite,
+    /// [`SignalError::Empty`] if `len` is 0.
     pub fn from_rate_hz(rate_hz: f64, len: usize) -> Result<Self, SignalError> {
-        Self::new(1.0 / rate_hz, len)
+        Self::new(1.0 / positive("sampling rate in Hz", rate_hz)?, len)
     }
 
     /// Time step, in seconds.
@@ -124,6 +126,11 @@ mod tests {
             assert_eq!(Sampling::new(dt, 4), Err(SignalError::TimeStep { dt }));
         }
         assert!(Sampling::new(f64::NAN, 4).is_err());
+        let rate = Sampling::from_rate_hz(-50.0, 4);
+        assert_eq!(
+            rate,
+            Err(SignalError::NotPositive { what: "sampling rate in Hz", value: -50.0 })
+        );
         assert_eq!(Sampling::new(1.0, 0), Err(SignalError::Empty));
     }
 }

@@ -7,6 +7,7 @@
 
 mod identify;
 mod info;
+mod multisine;
 mod simulate;
 
 use clap::{Parser, Subcommand};
@@ -34,6 +35,7 @@ pub struct Cli {
 pub enum Command {
     Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
+    Multisine(multisine::MultisineArgs),
     Simulate(simulate::SimulateArgs),
 }
 
@@ -43,6 +45,7 @@ impl Command {
         match self {
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
+            Command::Multisine(args) => args.run(),
             Command::Simulate(args) => args.run(),
         }
     }
@@ -52,6 +55,7 @@ impl Command {
         match self {
             Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
+            Command::Multisine(args) => &args.report,
             Command::Simulate(args) => &args.report,
         }
     }
