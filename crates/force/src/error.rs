@@ -1,6 +1,6 @@
 //! What can keep a force from being reconstructed.
 
-use mechid_model::ModelError;
+use mechid_model::{Matrix, ModelError};
 use mechid_signal::SignalError;
 
 /// A force that cannot be reconstructed; every variant carries the offending numbers.
@@ -139,6 +139,37 @@ pub enum ForceError {
         /// The value found.
         value: f64,
     },
+    /// An open record too long for the dense problem.
+    #[error(
+        "{unknowns} unknowns (samples × forces) are more than the {limit} an open record may \
+         have: take whole periods, a shorter window, or the Kalman smoother"
+    )]
+    TooLarge {
+        /// Samples × forces.
+        unknowns: usize,
+        /// The most there may be.
+        limit: usize,
+    },
+    /// The measured channels cannot show a force, at any frequency.
+    #[error(
+        "no frequency shows the force on degree of freedom {dof} (counted from 0) apart from the \
+         others in the measured channels: measure elsewhere, or name fewer forces"
+    )]
+    Unseen {
+        /// The forced degree of freedom, counted from 0.
+        dof: usize,
+    },
+    /// Not one random walk per force.
+    #[error("{walks} random-walk intensities were given for {forces} forces")]
+    WalkCount {
+        /// Intensities given.
+        walks: usize,
+        /// Forces sought.
+        forces: usize,
+    },
+    /// Nothing to reconstruct from.
+    #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
+    Silent,
     /// Two force records have different numbers of channels.
     #[error("the forces compared have {estimate} and {truth} channels")]
     Compared {
@@ -156,6 +187,56 @@ pub enum ForceError {
     /// A ratio to a force that is not there.
     #[error("the force compared with is zero on every channel")]
     NoForce,
+    /// A covariance that is not one row and column per entry.
+    #[error("the covariance is {rows}×{columns}, {entries} entries are uncertain")]
+    CovarianceShape {
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// Entries named.
+        entries: usize,
+    },
+    /// A variance that cannot be one, or a covariance that is not a number.
+    #[error(
+        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) has variance {variance}, \
+         or a covariance that is not finite: leave out what was not identified"
+    )]
+    Variance {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+        /// The variance given.
+        variance: f64,
+    },
+    /// The same entry was named twice.
+    #[error("entry ({row}, {column}) of the {matrix} matrix (counted from 0) is named twice")]
+    RepeatedEntry {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+    },
+    /// An entry outside the matrices.
+    #[error(
+        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) of a system of {dofs} \
+         degrees of freedom"
+    )]
+    NoSuchEntry {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+        /// Degrees of freedom.
+        dofs: usize,
+    },
     /// The model is not usable.
     #[error(transparent)]
     Model(#[from] ModelError),

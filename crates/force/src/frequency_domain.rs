@@ -10,7 +10,7 @@ use crate::{ForceError, IdentifiedForce, Measurement};
 
 /// What is known of the noise in the measured channels, taken as white.
 #[derive(Debug, Clone, PartialEq)]
-pub enum NoiseLevel {
+pub enum Noise {
     /// Nothing: no standard error, and channels count by their size.
     Unknown,
     /// One standard deviation per channel, in the channel's unit.
@@ -20,7 +20,7 @@ pub enum NoiseLevel {
     OutsideLines,
 }
 
-/// Fewest lines that [`NoiseLevel::OutsideLines`] measures a noise level on: each gives two
+/// Fewest lines that [`Noise::OutsideLines`] measures a noise level on: each gives two
 /// degrees of freedom, so the level is known to about 20 % or better.
 pub const MIN_OUTSIDE_LINES: usize = 8;
 
@@ -50,7 +50,7 @@ pub fn frequency_domain(
     measured: &Measurement,
     forced: &[usize],
     lines: &[usize],
-    noise: &NoiseLevel,
+    noise: &Noise,
 ) -> Result<IdentifiedForce, ForceError> {
     measured.check(system.dof(), forced)?;
     let spectrum = Spectrum::of(measured.record());
@@ -90,7 +90,7 @@ pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
     if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
 }
 
-impl NoiseLevel {
+impl Noise {
     /// Standard deviation per channel, if it is known.
     pub(crate) fn resolve(
         &self,
@@ -99,8 +99,8 @@ impl NoiseLevel {
         lines: &[usize],
     ) -> Result<Option<Vec<f64>>, ForceError> {
         match self {
-            NoiseLevel::Unknown => Ok(None),
-            NoiseLevel::PerChannel(level) => {
+            Noise::Unknown => Ok(None),
+            Noise::PerChannel(level) => {
                 if level.len() != measured.channels().len() {
                     return Err(ForceError::ChannelCount {
                         record: measured.channels().len(),
@@ -112,7 +112,7 @@ impl NoiseLevel {
                     None => Ok(Some(level.clone())),
                 }
             }
-            NoiseLevel::OutsideLines => outside_level(measured, spectrum, lines).map(Some),
+            Noise::OutsideLines => outside_level(measured, spectrum, lines).map(Some),
         }
     }
 }
@@ -156,7 +156,7 @@ pub(crate) fn sizes(record: &Record) -> Vec<f64> {
         .collect()
 }
 
-fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), ForceError> {
+pub(crate) fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), ForceError> {
     if lines.is_empty() {
         return Err(ForceError::NoLines);
     }

@@ -5,9 +5,15 @@
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
 //! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
+//! | [`regularised`] | any channels, a period or up to a thousand samples | they are not, or there is no period |
+//! | [`kalman`] | any channels, any length | the record is long |
+//!
+//! [`with_uncertain_system`] adds to any of them what the covariance of an identified machine means
+//! for the force. The book's chapter on forces has the reasons, and every method's error side by
+//! side.
 //!
 //! ```
-//! use mechid_force::{Measurement, NoiseLevel, Quantity, frequency_domain, relative_error};
+//! use mechid_force::{Measurement, Noise, Quantity, frequency_domain, relative_error};
 //! use mechid_model::SecondOrderSystem;
 //! use mechid_signal::{Record, Sampling, Spectrum};
 //! use nalgebra::{Complex, DMatrix, dmatrix, dvector};
@@ -38,25 +44,41 @@
 //!     Quantity::Displacement,
 //!     Record::from_channel(period, displacement.channel(0).to_vec())?,
 //! );
-//! let found = frequency_domain(&rotor, &measured, &[1], &lines, &NoiseLevel::Unknown)?;
+//! let found = frequency_domain(&rotor, &measured, &[1], &lines, &Noise::Unknown)?;
 //! assert!(relative_error(found.record(), &force)? < 1e-12);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod components;
 mod continuous;
 mod discretised;
 mod error;
+mod evidence;
 mod frequency_domain;
 mod identified;
+mod kalman;
 mod measurement;
 mod measures;
+mod nelder_mead;
+mod open_operator;
+mod period_operator;
+mod regularised;
+mod rule;
+mod smoother;
+mod state_space;
 mod transfer;
 mod transition;
+mod uncertainty;
 
 pub use continuous::continuous;
 pub use discretised::{Discretisation, Ends, discretised};
 pub use error::ForceError;
-pub use frequency_domain::{MIN_OUTSIDE_LINES, NoiseLevel, frequency_domain, inner_lines};
+pub use frequency_domain::{MIN_OUTSIDE_LINES, Noise, frequency_domain, inner_lines};
 pub use identified::IdentifiedForce;
+pub use kalman::{KalmanForce, Tuning, kalman};
 pub use measurement::{Channel, Measurement, Quantity};
 pub use measures::{channel_errors, line_errors, relative_error, spectrum_ratio, spurious_ratio};
+pub use open_operator::OPEN_UNKNOWNS;
+pub use regularised::{Extent, RegularisedForce, Start, regularised};
+pub use rule::{Filter, Rule};
+pub use uncertainty::{Entry, SystemCovariance, with_uncertain_system};

@@ -21,17 +21,6 @@ pub(crate) struct Transfer<'a> {
 }
 
 impl Transfer<'_> {
-    /// K − ω²M + iωC.
-    fn dynamic_stiffness(&self, omega: f64) -> DMatrix<Line> {
-        let s = self.system;
-        DMatrix::from_fn(s.dof(), s.dof(), |i, j| {
-            Complex::new(
-                s.stiffness()[(i, j)] - omega * omega * s.mass()[(i, j)],
-                omega * s.damping()[(i, j)],
-            )
-        })
-    }
-
     /// Measured channels × forces, each row divided by the scale of its channel.
     pub fn scaled(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
         let n = self.system.dof();
@@ -39,6 +28,7 @@ impl Transfer<'_> {
             Complex::new(if i == self.forced[j] { 1.0 } else { 0.0 }, 0.0)
         });
         let motion = self
+            .system
             .dynamic_stiffness(omega)
             .lu()
             .solve(&forces)
@@ -85,7 +75,7 @@ impl Transfer<'_> {
     }
 
     fn direct(&self, line: usize, omega: f64) -> Result<DMatrix<Line>, ForceError> {
-        let stiffness = self.dynamic_stiffness(omega);
+        let stiffness = self.system.dynamic_stiffness(omega);
         let mut inverse = DMatrix::zeros(self.forced.len(), self.channels.len());
         for (c, channel) in self.channels.iter().enumerate() {
             let derivative = channel.quantity.derivative(omega);

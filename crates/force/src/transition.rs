@@ -32,7 +32,7 @@ impl Transition {
     pub fn exact(system: &SecondOrderSystem, dt: f64) -> Self {
         let n = system.dof();
         let mut generator = DMatrix::zeros(4 * n, 4 * n);
-        generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&rate(system, dt));
+        generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&Self::rate(system, dt));
         generator.view_mut((n, 2 * n), (n, n)).fill_with_identity();
         generator.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
         let e = generator.exp();
@@ -50,7 +50,7 @@ impl Transition {
     /// ```
     pub fn taylor(system: &SecondOrderSystem, dt: f64, order: usize) -> Self {
         let n = system.dof();
-        let rate = rate(system, dt);
+        let rate = Self::rate(system, dt);
         let mut term = DMatrix::identity(2 * n, 2 * n);
         let (mut state, mut held) = (term.clone(), DMatrix::zeros(2 * n, n));
         for j in 1..=order {
@@ -61,17 +61,18 @@ impl Transition {
         }
         Self { state, held, ramp: DMatrix::zeros(2 * n, n) }
     }
-}
 
-/// The rate matrix in step units.
-fn rate(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
-    let n = system.dof();
-    let mass = system.mass().clone().lu();
-    let mut rate = DMatrix::zeros(2 * n, 2 * n);
-    rate.view_mut((0, n), (n, n)).fill_with_identity();
-    for (column, matrix, unit) in [(0, system.stiffness(), dt * dt), (n, system.damping(), dt)] {
-        let solved = mass.solve(matrix).expect("a system's mass matrix is invertible");
-        rate.view_mut((n, column), (n, n)).copy_from(&(solved * -unit));
+    /// The rate matrix in step units.
+    pub fn rate(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
+        let n = system.dof();
+        let mass = system.mass().clone().lu();
+        let mut rate = DMatrix::zeros(2 * n, 2 * n);
+        rate.view_mut((0, n), (n, n)).fill_with_identity();
+        for (column, matrix, unit) in [(0, system.stiffness(), dt * dt), (n, system.damping(), dt)]
+        {
+            let solved = mass.solve(matrix).expect("a system's mass matrix is invertible");
+            rate.view_mut((n, column), (n, n)).copy_from(&(solved * -unit));
+        }
+        rate
     }
-    rate
 }

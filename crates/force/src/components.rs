@@ -1,0 +1,73 @@
+//! The least-squares problem seen through its singular vectors: one number per unknown.
+
+/// One unknown each, by falling singular value: y_i = s_i f_i + noise.
+///
+/// A component of a complex line stands for two real unknowns and has weight 2, so that white
+/// noise of variance σ² has mean energy weight·σ² in it.
+pub(crate) struct Components {
+    /// s_i, falling, the last ones possibly zero.
+    pub singular: Vec<f64>,
+    /// |y_i|².
+    pub energy: Vec<f64>,
+    /// Real unknowns per component, 1 or 2.
+    pub weight: Vec<f64>,
+    /// Energy of the measurement that no force explains.
+    pub outside_energy: f64,
+    /// Real data in it.
+    pub outside_weight: f64,
+}
+
+/// What a choice of filter factors does to the measurement at hand.
+pub(crate) struct Fit {
+    /// Energy not explained, ‖y − H f̂‖².
+    pub residual: f64,
+    /// ‖f̂‖².
+    pub size: f64,
+    /// Σ φ_i: real unknowns that the filter lets through.
+    pub unknowns: f64,
+}
+
+impl Fit {
+    /// Residual variance per remaining real datum: the noise level if the fit is right.
+    pub fn noise(&self, components: &Components) -> f64 {
+        self.residual / (components.data() - self.unknowns).max(f64::MIN_POSITIVE)
+    }
+}
+
+impl Components {
+    /// Real data in all.
+    pub fn data(&self) -> f64 {
+        self.weight.iter().sum::<f64>() + self.outside_weight
+    }
+
+    /// Components that can carry a force at all: s_i above rounding of the largest.
+    pub fn transmitted(&self) -> usize {
+        let floor = 1e-14 * self.singular[0];
+        self.singular.partition_point(|s| *s > floor)
+    }
+
+    /// Residual, size and unknowns for filter factors φ_i (f̂_i = φ_i y_i / s_i).
+    pub fn fit(&self, factor: impl Fn(usize) -> f64) -> Fit {
+        let mut fit = Fit { residual: self.outside_energy, size: 0.0, unknowns: 0.0 };
+        for (i, (energy, s)) in self.energy.iter().zip(&self.singular).enumerate() {
+            let phi = factor(i);
+            fit.residual += (1.0 - phi).powi(2) * energy;
+            if phi > 0.0 {
+                fit.size += (phi / s).powi(2) * energy;
+            }
+            fit.unknowns += phi * self.weight[i];
+        }
+        fit
+    }
+
+    /// Tikhonov's factor s²/(s² + λ²).
+    pub fn tikhonov(&self, i: usize, lambda: f64) -> f64 {
+        let square = self.singular[i].powi(2);
+        square / (square + lambda * lambda)
+    }
+
+    /// 1 for the components at least as strong as `lambda`, 0 for the others.
+    pub fn truncated(&self, i: usize, lambda: f64) -> f64 {
+        if self.singular[i] >= lambda { 1.0 } else { 0.0 }
+    }
+}

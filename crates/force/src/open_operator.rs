@@ -1,0 +1,89 @@
+//! An open record: the impulse responses as one dense matrix.
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::{DMatrix, DVector};
+
+use crate::components::Components;
+use crate::regularised::Operator;
+use crate::state_space::Machine;
+use crate::{ForceError, Measurement, Start};
+
+/// Most unknowns (samples × forces) of an open record: the dense problem then takes seconds.
+pub const OPEN_UNKNOWNS: usize = 1024;
+
+pub(crate) struct OpenOperator {
+    components: Components,
+    /// Undamped coefficient y_i / s_i of each component.
+    coefficients: Vec<f64>,
+    /// Unknowns × components; the unknowns are force after force, sample after sample.
+    shapes: DMatrix<f64>,
+    samples: usize,
+    forces: usize,
+}
+
+impl OpenOperator {
+    pub fn new(
+        system: &SecondOrderSystem,
+        measured: &Measurement,
+        forced: &[usize],
+        start: Start,
+        scale: &[f64],
+    ) -> Result<Self, ForceError> {
+        let (samples, forces) = (measured.sampling().len(), forced.len());
+        if samples < 2 {
+            return Err(ForceError::TooShort { samples, needed: 2 });
+        }
+        if samples * forces > OPEN_UNKNOWNS {
+            let (unknowns, limit) = (samples * forces, OPEN_UNKNOWNS);
+            return Err(ForceError::TooLarge { unknowns, limit });
+        }
+        let machine = Machine::new(system, measured, forced, scale);
+        let mut matrix = machine.impulse_responses(samples);
+        let mut data = DVector::from_fn(samples * scale.len(), |row, _| {
+            measured.record().data()[(row % samples, row / samples)] / scale[row / samples]
+        });
+        let rows = data.len();
+        let mut freed = 0;
+        if start == Start::InMotion {
+            // What any state at the first sample explains is taken out of both sides.
+            let free = machine.free_responses(samples).qr().q();
+            freed = free.ncols();
+            matrix -= &free * free.tr_mul(&matrix);
+            data -= &free * free.tr_mul(&data);
+        }
+        let mut svd = matrix.svd(true, true);
+        svd.sort_by_singular_values();
+        let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+        let parts = u.tr_mul(&data);
+        let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
+        let coefficients =
+            parts.iter().zip(&singular).map(|(y, s)| if *s > 0.0 { y / s } else { 0.0 }).collect();
+        let components = Components {
+            energy: parts.iter().map(|y| y * y).collect(),
+            weight: vec![1.0; singular.len()],
+            singular,
+            outside_energy: (data.norm_squared() - parts.norm_squared()).max(0.0),
+            outside_weight: rows.saturating_sub(freed + parts.len()) as f64,
+        };
+        Ok(Self { components, coefficients, shapes: v_t.transpose(), samples, forces })
+    }
+}
+
+impl Operator for OpenOperator {
+    fn components(&self) -> &Components {
+        &self.components
+    }
+
+    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+        let damped = DVector::from_fn(factors.len(), |i, _| factors[i] * self.coefficients[i]);
+        (&self.shapes * damped)
+            .reshape_generic(nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces))
+    }
+
+    fn variance(&self, components: &[f64]) -> DMatrix<f64> {
+        DMatrix::from_fn(self.samples, self.forces, |k, f| {
+            let shape = self.shapes.row(f * self.samples + k);
+            shape.iter().zip(components).map(|(v, variance)| v * v * variance).sum()
+        })
+    }
+}

@@ -1,0 +1,100 @@
+//! A whole period: one small problem per line.
+
+use mechid_model::SecondOrderSystem;
+use mechid_signal::{Sampling, Spectrum};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::components::Components;
+use crate::frequency_domain::{check_lines, noise_weight};
+use crate::regularised::Operator;
+use crate::transfer::Transfer;
+use crate::{ForceError, Measurement};
+
+/// Lines are taken in units in which white noise of variance σ² in time has variance σ² in each
+/// real part: amplitude times √(N/2), at DC √N. Then ‖F‖² is the same in time and over the lines.
+pub(crate) struct PeriodOperator {
+    components: Components,
+    /// Where each component lives and the shape of its force.
+    places: Vec<Place>,
+    sampling: Sampling,
+    forces: usize,
+}
+
+struct Place {
+    line: usize,
+    /// y_i with its phase, over s_i: the undamped coefficient of the force.
+    coefficient: Complex<f64>,
+    shape: DVector<Complex<f64>>,
+}
+
+impl PeriodOperator {
+    pub fn new(
+        system: &SecondOrderSystem,
+        measured: &Measurement,
+        forced: &[usize],
+        lines: &[usize],
+        scale: &[f64],
+    ) -> Result<Self, ForceError> {
+        let spectrum = Spectrum::of(measured.record());
+        check_lines(&spectrum, lines)?;
+        let sampling = measured.sampling();
+        let transfer = Transfer { system, channels: measured.channels(), forced, scale };
+        let mut found = Vec::new();
+        let (mut outside_energy, mut outside_weight) = (0.0, 0.0);
+        for &n in lines {
+            let unit = noise_weight(sampling.len(), n).sqrt();
+            let weight = if unit * unit * sampling.len() as f64 > 1.5 { 2.0 } else { 1.0 };
+            let svd = transfer.scaled(n, spectrum.omega(n))?.svd(true, true);
+            let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
+            let data =
+                DVector::from_fn(scale.len(), |c, _| spectrum.line(n, c) / (scale[c] * unit));
+            let parts = u.ad_mul(&data);
+            outside_energy += (data.norm_squared() - parts.norm_squared()).max(0.0);
+            outside_weight += weight * (scale.len() - parts.len()) as f64;
+            for (i, part) in parts.iter().enumerate() {
+                let s = svd.singular_values[i];
+                let coefficient = if s > 0.0 { part / s } else { Complex::ZERO };
+                let shape = v_t.row(i).adjoint();
+                found.push((s, part.norm_sqr(), weight, Place { line: n, coefficient, shape }));
+            }
+        }
+        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let components = Components {
+            singular: found.iter().map(|f| f.0).collect(),
+            energy: found.iter().map(|f| f.1).collect(),
+            weight: found.iter().map(|f| f.2).collect(),
+            outside_energy,
+            outside_weight,
+        };
+        let places = found.into_iter().map(|f| f.3).collect();
+        Ok(Self { components, places, sampling, forces: forced.len() })
+    }
+}
+
+impl Operator for PeriodOperator {
+    fn components(&self) -> &Components {
+        &self.components
+    }
+
+    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+        let mut lines = DMatrix::zeros(self.sampling.lines(), self.forces);
+        for (place, factor) in self.places.iter().zip(factors) {
+            let unit = factor * noise_weight(self.sampling.len(), place.line).sqrt();
+            for (f, shape) in place.shape.iter().enumerate() {
+                lines[(place.line, f)] += shape * place.coefficient * unit;
+            }
+        }
+        Spectrum::from_lines(self.sampling, lines).to_record().into_data()
+    }
+
+    fn variance(&self, components: &[f64]) -> DMatrix<f64> {
+        let mut sums = vec![0.0; self.forces];
+        for (place, variance) in self.places.iter().zip(components) {
+            let unit = variance * noise_weight(self.sampling.len(), place.line);
+            for (sum, shape) in sums.iter_mut().zip(&place.shape) {
+                *sum += unit * shape.norm_sqr();
+            }
+        }
+        DMatrix::from_fn(self.sampling.len(), self.forces, |_, f| sums[f])
+    }
+}

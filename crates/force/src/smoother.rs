@@ -1,0 +1,293 @@
+//! The Kalman filter and fixed-interval smoother, one scalar measurement at a time.
+//!
+//! Taking the channels of a sample one after the other needs no matrix inverse, and the smoother
+//! in the form of backward sums r and N needs none either; nothing is allocated in their loops.
+//! The estimates are those of the Rauch-Tung-Striebel smoother.
+//!
+//! # Source
+//! Durbin & Koopman (2012), Time Series Analysis by State Space Methods, sections 4.4 and 6.4.
+
+/// a(k+1) = T a(k) + noise of covariance Q, y_c(k) = Z_c a(k) + noise of variance R.
+///
+/// Square matrices are stored row after row.
+pub(crate) struct StateSpace {
+    pub states: usize,
+    pub channels: usize,
+    pub transition: Vec<f64>,
+    pub process: Vec<f64>,
+    pub output: Vec<f64>,
+    pub noise: f64,
+    /// Mean and covariance of the state at the first sample, before its measurement.
+    pub start_mean: Vec<f64>,
+    pub start: Vec<f64>,
+}
+
+/// Everything the backward pass needs: one block per sample, laid out once.
+pub(crate) struct Passage {
+    mean: Vec<f64>,
+    covariance: Vec<f64>,
+    /// P Zᵀ of each scalar measurement.
+    gain: Vec<f64>,
+    /// Innovation and its variance.
+    innovation: Vec<(f64, f64)>,
+}
+
+impl Passage {
+    /// Variance of each state before the measurement of sample k.
+    pub fn variances(&self, k: usize, states: usize) -> impl Iterator<Item = f64> + '_ {
+        let block = &self.covariance[k * states * states..][..states * states];
+        block.iter().step_by(states + 1).copied()
+    }
+}
+
+struct Filter {
+    mean: Vec<f64>,
+    covariance: Vec<f64>,
+    gain: Vec<f64>,
+    moved: Vec<f64>,
+    product: Vec<f64>,
+    log_likelihood: f64,
+}
+
+impl StateSpace {
+    /// Log-likelihood of the samples (channels of a sample side by side), constants left out.
+    pub fn log_likelihood(&self, samples: &[f64]) -> f64 {
+        let mut filter = Filter::new(self);
+        for sample in samples.chunks_exact(self.channels) {
+            for (c, y) in sample.iter().enumerate() {
+                filter.measure(self, c, *y);
+            }
+            filter.advance(self);
+        }
+        filter.log_likelihood
+    }
+
+    /// The forward pass with what the smoother needs of it.
+    pub fn filter(&self, samples: &[f64]) -> Passage {
+        let (m, len) = (self.states, samples.len() / self.channels);
+        let mut passage = Passage {
+            mean: Vec::with_capacity(len * m),
+            covariance: Vec::with_capacity(len * m * m),
+            gain: Vec::with_capacity(samples.len() * m),
+            innovation: Vec::with_capacity(samples.len()),
+        };
+        let mut filter = Filter::new(self);
+        for sample in samples.chunks_exact(self.channels) {
+            passage.mean.extend_from_slice(&filter.mean);
+            passage.covariance.extend_from_slice(&filter.covariance);
+            for (c, y) in sample.iter().enumerate() {
+                passage.innovation.push(filter.measure(self, c, *y));
+                passage.gain.extend_from_slice(&filter.gain);
+            }
+            filter.advance(self);
+        }
+        passage
+    }
+
+    /// Mean and variance of every state at every sample given the whole record, sample after
+    /// sample, written over the filter's own.
+    pub fn smooth(&self, mut passage: Passage) -> (Vec<f64>, Vec<f64>) {
+        let (m, channels) = (self.states, self.channels);
+        let len = passage.mean.len() / m;
+        let mut variance = vec![0.0; len * m];
+        let (mut r, mut n) = (vec![0.0; m], vec![0.0; m * m]);
+        let (mut vector, mut product) = (vec![0.0; m], vec![0.0; m * m]);
+        for k in (0..len).rev() {
+            for c in (0..channels).rev() {
+                let at = k * channels + c;
+                let (gain, z) = (&passage.gain[at * m..][..m], &self.output[c * m..][..m]);
+                back_over_measurement(&mut r, &mut n, &mut vector, z, gain, passage.innovation[at]);
+            }
+            let mean = &mut passage.mean[k * m..][..m];
+            let p = &passage.covariance[k * m * m..][..m * m];
+            for i in 0..m {
+                let row = &p[i * m..][..m];
+                mean[i] += dot(row, &r);
+                times(&n, row, &mut vector);
+                variance[k * m + i] = (row[i] - dot(row, &vector)).max(0.0);
+            }
+            self.back_over_step(&mut r, &mut n, &mut vector, &mut product);
+        }
+        (passage.mean, variance)
+    }
+
+    /// r ← Tᵀ r, N ← Tᵀ N T.
+    fn back_over_step(
+        &self,
+        r: &mut [f64],
+        n: &mut [f64],
+        vector: &mut [f64],
+        product: &mut [f64],
+    ) {
+        let m = self.states;
+        vector.fill(0.0);
+        for (row, weight) in self.transition.chunks_exact(m).zip(r.iter()) {
+            vector.iter_mut().zip(row).for_each(|(v, t)| *v += t * weight);
+        }
+        r.copy_from_slice(vector);
+        multiply(n, &self.transition, product, m);
+        n.fill(0.0);
+        for (row, t) in product.chunks_exact(m).zip(self.transition.chunks_exact(m)) {
+            for (i, weight) in t.iter().enumerate() {
+                n[i * m..][..m].iter_mut().zip(row).for_each(|(n, p)| *n += weight * p);
+            }
+        }
+    }
+}
+
+impl Filter {
+    fn new(space: &StateSpace) -> Self {
+        let m = space.states;
+        Self {
+            mean: space.start_mean.clone(),
+            covariance: space.start.clone(),
+            gain: vec![0.0; m],
+            moved: vec![0.0; m],
+            product: vec![0.0; m * m],
+            log_likelihood: 0.0,
+        }
+    }
+
+    /// Takes in one scalar measurement; returns the innovation and its variance.
+    fn measure(&mut self, space: &StateSpace, channel: usize, y: f64) -> (f64, f64) {
+        let m = space.states;
+        let z = &space.output[channel * m..][..m];
+        times(&self.covariance, z, &mut self.gain);
+        let variance = dot(z, &self.gain) + space.noise;
+        let innovation = y - dot(z, &self.mean);
+        let weight = innovation / variance;
+        self.mean.iter_mut().zip(&self.gain).for_each(|(a, g)| *a += g * weight);
+        for (row, g) in self.covariance.chunks_exact_mut(m).zip(&self.gain) {
+            let g = g / variance;
+            row.iter_mut().zip(&self.gain).for_each(|(p, h)| *p -= g * h);
+        }
+        self.log_likelihood -= 0.5 * (variance.ln() + innovation * weight);
+        (innovation, variance)
+    }
+
+    /// To the next sample: a ← T a, P ← T P Tᵀ + Q.
+    fn advance(&mut self, space: &StateSpace) {
+        let (m, t) = (space.states, &space.transition);
+        times(t, &self.mean, &mut self.moved);
+        self.mean.copy_from_slice(&self.moved);
+        multiply(t, &self.covariance, &mut self.product, m);
+        for (i, row) in self.product.chunks_exact(m).enumerate() {
+            for j in i..m {
+                let p = dot(row, &t[j * m..][..m]) + space.process[i * m + j];
+                self.covariance[i * m + j] = p;
+                self.covariance[j * m + i] = p;
+            }
+        }
+    }
+}
+
+/// r ← Zᵀ v/F + Lᵀ r and N ← ZᵀZ/F + Lᵀ N L with L = I − g Z/F.
+fn back_over_measurement(
+    r: &mut [f64],
+    n: &mut [f64],
+    vector: &mut [f64],
+    z: &[f64],
+    gain: &[f64],
+    (innovation, variance): (f64, f64),
+) {
+    let m = r.len();
+    let weight = (innovation - dot(gain, r)) / variance;
+    r.iter_mut().zip(z).for_each(|(r, z)| *r += z * weight);
+    times(n, gain, vector);
+    let square = (1.0 + dot(gain, vector) / variance) / variance;
+    for i in 0..m {
+        for j in 0..m {
+            n[i * m + j] += square * z[i] * z[j] - (z[i] * vector[j] + vector[i] * z[j]) / variance;
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+/// out ← A x.
+fn times(a: &[f64], x: &[f64], out: &mut [f64]) {
+    for (out, row) in out.iter_mut().zip(a.chunks_exact(x.len())) {
+        *out = dot(row, x);
+    }
+}
+
+/// out ← A B, all m×m.
+fn multiply(a: &[f64], b: &[f64], out: &mut [f64], m: usize) {
+    for (row, out) in a.chunks_exact(m).zip(out.chunks_exact_mut(m)) {
+        out.fill(0.0);
+        for (a, b) in row.iter().zip(b.chunks_exact(m)) {
+            out.iter_mut().zip(b).for_each(|(o, b)| *o += a * b);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::StateSpace;
+
+    const M: usize = 3;
+    const CHANNELS: usize = 2;
+    const LEN: usize = 9;
+
+    fn space() -> StateSpace {
+        StateSpace {
+            states: M,
+            channels: CHANNELS,
+            transition: vec![0.9, 0.3, 0.1, -0.4, 0.8, 0.5, 0.0, 0.0, 1.0],
+            process: vec![0.02, 0.01, 0.03, 0.01, 0.05, 0.02, 0.03, 0.02, 0.3],
+            output: vec![1.0, 0.0, 0.0, 0.2, 1.0, 0.7],
+            noise: 0.3,
+            start_mean: vec![0.0; M],
+            start: vec![0.5, 0.1, 0.0, 0.1, 0.7, 0.0, 0.0, 0.0, 4.0],
+        }
+    }
+
+    fn samples() -> Vec<f64> {
+        (0..LEN * CHANNELS).map(|i| (1.3 * i as f64).sin() + 0.1 * i as f64).collect()
+    }
+
+    /// Everything at once: the joint covariance of all states, conditioned on all samples.
+    fn conditioned() -> (DVector<f64>, DVector<f64>, f64) {
+        let s = space();
+        let t = DMatrix::from_row_slice(M, M, &s.transition);
+        let q = DMatrix::from_row_slice(M, M, &s.process);
+        let mut prior = DMatrix::zeros(M * LEN, M * LEN);
+        let mut diagonal = DMatrix::from_row_slice(M, M, &s.start);
+        for k in 0..LEN {
+            let mut block = diagonal.clone();
+            for l in k..LEN {
+                prior.view_mut((l * M, k * M), (M, M)).copy_from(&block);
+                prior.view_mut((k * M, l * M), (M, M)).copy_from(&block.transpose());
+                block = &t * block;
+            }
+            diagonal = &t * diagonal * t.transpose() + &q;
+        }
+        let z = DMatrix::from_row_slice(CHANNELS, M, &s.output);
+        let out = DMatrix::<f64>::identity(LEN, LEN).kronecker(&z);
+        let cross = &prior * out.transpose();
+        let mut seen = &out * &cross;
+        seen.iter_mut().step_by(LEN * CHANNELS + 1).for_each(|v| *v += s.noise);
+        let y = DVector::from_vec(samples());
+        let lu = seen.lu();
+        let weights = lu.solve(&y).unwrap();
+        let likelihood = -0.5 * (lu.determinant().ln() + y.dot(&weights));
+        let left = prior - &cross * lu.solve(&cross.transpose()).unwrap();
+        (cross * weights, left.diagonal(), likelihood)
+    }
+
+    #[test]
+    fn the_smoother_is_the_conditional_distribution_of_all_states() {
+        let (mean, variance, likelihood) = conditioned();
+        let (smooth, spread) = space().smooth(space().filter(&samples()));
+        for i in 0..M * LEN {
+            assert!((smooth[i] - mean[i]).abs() < 1e-12, "state {i}");
+            assert!((spread[i] - variance[i]).abs() < 1e-12, "variance {i}");
+        }
+        let found = space().log_likelihood(&samples());
+        assert!((found - likelihood).abs() < 1e-11, "{found} {likelihood}");
+    }
+}

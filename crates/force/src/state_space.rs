@@ -1,0 +1,91 @@
+//! The machine between unknown forces and measured channels, sample by sample.
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::DMatrix;
+
+use crate::transition::Transition;
+use crate::{Measurement, Quantity};
+
+/// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
+pub(crate) struct Machine {
+    pub transition: Transition,
+    /// Channels × 2n, divided by the channel's scale.
+    pub out: DMatrix<f64>,
+    /// Channels × forces.
+    pub through: DMatrix<f64>,
+    /// n × forces: q of a unit force.
+    pub input: DMatrix<f64>,
+}
+
+impl Machine {
+    pub fn new(
+        system: &SecondOrderSystem,
+        measured: &Measurement,
+        forced: &[usize],
+        scale: &[f64],
+    ) -> Self {
+        let (n, dt) = (system.dof(), measured.sampling().dt());
+        let transition = Transition::exact(system, dt);
+        let unit =
+            DMatrix::from_fn(n, forced.len(), |i, j| if i == forced[j] { dt * dt } else { 0.0 });
+        let input = system.mass().clone().lu().solve(&unit).expect("M is invertible");
+        let rate = Transition::rate(system, dt);
+        let channels = measured.channels();
+        let mut out = DMatrix::zeros(channels.len(), 2 * n);
+        let mut through = DMatrix::zeros(channels.len(), forced.len());
+        for (c, channel) in channels.iter().enumerate() {
+            match channel.quantity {
+                Quantity::Displacement => out[(c, channel.dof)] = 1.0 / scale[c],
+                Quantity::Velocity => out[(c, n + channel.dof)] = 1.0 / (dt * scale[c]),
+                Quantity::Acceleration => {
+                    let unit = 1.0 / (dt * dt * scale[c]);
+                    out.set_row(c, &(rate.row(n + channel.dof) * unit));
+                    through.set_row(c, &(input.row(channel.dof) * unit));
+                }
+            }
+        }
+        Self { transition, out, through, input }
+    }
+
+    /// Rows channel after channel, columns force after force, of unit forces at each sample.
+    pub fn impulse_responses(&self, samples: usize) -> DMatrix<f64> {
+        let (channels, forces) = self.through.shape();
+        let ramp = &self.transition.ramp * &self.input;
+        let fall = (&self.transition.held - &self.transition.ramp) * &self.input;
+        // An impulse at sample 0 has no rising flank inside the record.
+        let (mut first, mut inner) = (fall.clone(), &self.transition.state * &ramp + &fall);
+        let mut matrix = DMatrix::zeros(channels * samples, forces * samples);
+        let mut place = |lag: usize, first: &DMatrix<f64>, inner: &DMatrix<f64>| {
+            for c in 0..channels {
+                for f in 0..forces {
+                    matrix[(c * samples + lag, f * samples)] = first[(c, f)];
+                    for k in 1..samples - lag {
+                        matrix[(c * samples + k + lag, f * samples + k)] = inner[(c, f)];
+                    }
+                }
+            }
+        };
+        place(0, &self.through, &(&self.out * &ramp + &self.through));
+        for lag in 1..samples {
+            place(lag, &(&self.out * &first), &(&self.out * &inner));
+            first = &self.transition.state * first;
+            inner = &self.transition.state * inner;
+        }
+        matrix
+    }
+
+    /// Rows as above, one column per entry of the state at the first sample.
+    pub fn free_responses(&self, samples: usize) -> DMatrix<f64> {
+        let (channels, states) = self.out.shape();
+        let mut matrix = DMatrix::zeros(channels * samples, states);
+        let mut power = DMatrix::identity(states, states);
+        for k in 0..samples {
+            let row = &self.out * &power;
+            for c in 0..channels {
+                matrix.set_row(c * samples + k, &row.row(c));
+            }
+            power = &self.transition.state * power;
+        }
+        matrix
+    }
+}
