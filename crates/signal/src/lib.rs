@@ -1,19 +1,41 @@
 //! Sampling, records, spectra and test excitations for vibration measurement.
 //!
+//! ```
+//! use mechid_signal::{CrestSearch, Multisine, NoiseLevel, Phases, Sampling, Spectrum};
+//! use mechid_signal::{lines, measures, noise};
+//!
+//! // One second at 1 kHz: odd lines up to 200 Hz, as much force as a 100 N shaker allows.
+//! let sampling = Sampling::from_rate_hz(1000.0, 1000)?;
+//! let schroeder = Multisine::flat(lines::odd(200), 1.0, Phases::Schroeder)?.with_peak(100.0)?;
+//! let searched = CrestSearch { starts: 4, seed: 1 }.minimise(&schroeder)?.with_peak(100.0)?;
+//! assert!(searched.rms() > 1.15 * schroeder.rms());
+//!
+//! // What is sampled is what was asked for, line by line.
+//! let force = searched.sample(sampling)?;
+//! let spectrum = Spectrum::of(&force);
+//! assert!((spectrum.line(199, 0).norm() - searched.amplitudes()[99]).abs() < 1e-12);
+//! assert_eq!(measures::persistent_excitation_order(&spectrum, 0, 1e-9)?, 200);
+//!
+//! // A sensor adds noise 40 dB below.
+//! let measured = noise::add_white(&force, NoiseLevel::SnrDb(40.0), 7)?;
+//! let error = measures::rms((measured.data() - force.data()).as_slice());
+//! assert!((error / searched.rms() - 0.01).abs() < 0.001);
+//! # Ok::<(), mechid_signal::SignalError>(())
+//! ```
+//!
 //! Everything in `mechid` that has a time axis is a [`Record`] on a [`Sampling`],
 //! and everything that has a frequency axis is a [`Spectrum`], whose scaling is
 //! stated once, in [`spectrum`].
 //!
-//! ```
-//! use mechid_signal::{Record, Sampling, Spectrum};
-//!
-//! // One period of 3 cos(2·ω0·t), eight samples.
-//! let sampling = Sampling::new(0.5, 8)?;
-//! let force: Vec<f64> = sampling.times().map(|t| 3.0 * (2.0 * sampling.omega0() * t).cos()).collect();
-//! let spectrum = Spectrum::of(&Record::from_channel(sampling, force)?);
-//! assert!((spectrum.line(2, 0).re - 3.0).abs() < 1e-14);
-//! # Ok::<(), mechid_signal::SignalError>(())
-//! ```
+//! | Wanted | Where |
+//! |---|---|
+//! | a multisine: lines, phases, level | [`Multisine`], [`lines`], [`Phases`] |
+//! | phases of least crest factor | [`CrestSearch`] |
+//! | uncorrelated inputs | [`multi_input`] |
+//! | impact, noise, sweep, binary sequence | [`excitation`] |
+//! | crest factor, flatness, order of excitation | [`measures`] |
+//! | disturbances at a stated level | [`noise`] |
+//! | values between samples | [`resample`] |
 
 pub mod crest;
 mod error;

@@ -1,7 +1,7 @@
 //! What the excitations are chosen for.
 
-use mechid_signal::excitation::Prbs;
-use mechid_signal::{Multisine, Phases, Sampling};
+use mechid_signal::excitation::{HalfSine, Impulse, Prbs, Random, Sweep, SweepLaw};
+use mechid_signal::{CrestSearch, Multisine, Phases, Record, Sampling, Spectrum, measures};
 
 /// (1/N) Σ x_n x_{n+k}, indices modulo N, term by term.
 fn circular(x: &[f64], lag: usize) -> f64 {
@@ -35,4 +35,47 @@ fn flat_multisine_is_as_white_as_its_lines_allow() {
         let got = circular(record.channel(0), lag);
         assert!((got - expected).abs() < 1e-11, "lag {lag}: {got}");
     }
+}
+
+/// The table of docs/excitations.md: a period of 1023 samples, 1 s long, of which lines 1 to 400
+/// matter, and a largest force of 1 N.
+#[test]
+fn excitations_side_by_side() {
+    let s = Sampling::from_rate_hz(1023.0, 1023).unwrap();
+    let multisine = |p| Multisine::flat(1..=400, 1.0, p).unwrap();
+    let searched = CrestSearch { starts: 1, seed: 0 }.minimise(&multisine(Phases::Schroeder));
+    let sweep = Sweep::new(1.0, 1.0, 400.0, 1.0, SweepLaw::Linear).unwrap();
+    let log_sweep = Sweep::new(1.0, 1.0, 400.0, 1.0, SweepLaw::Logarithmic).unwrap();
+    let random = Random::band_limited(1.0, 1.0, 400.0, 1).unwrap();
+    let half_sine = HalfSine::new(1.0, 0.01, 0.002).unwrap();
+    let rows = [
+        ("searched phases", searched.unwrap().sample(s), (1.38, 1.0, 0.0514)),
+        ("Schroeder", multisine(Phases::Schroeder).sample(s), (1.63, 1.0, 0.0434)),
+        ("two-valued", multisine(Phases::SchroederBinary).sample(s), (2.11, 1.0, 0.0334)),
+        ("random phases", multisine(Phases::Random { seed: 1 }).sample(s), (3.137, 1.0, 0.0225)),
+        ("binary sequence", Prbs::new(10, 1.0, 1).unwrap().sample(s), (1.0, 1.0, 0.0626)),
+        ("linear sweep", sweep.with_ramps(0.01).unwrap().sample(s), (1.43, 0.98, 0.0217)),
+        ("log sweep", log_sweep.with_ramps(0.01).unwrap().sample(s), (1.44, 0.43, 0.0072)),
+        ("random", random.sample(s), (3.46, 0.55, 0.0010)),
+        ("burst random", random.burst(0.5).unwrap().sample(s), (4.87, 0.56, 0.0008)),
+        ("half sine", half_sine.sample(s), (29.2, 0.92, 0.0014)),
+        ("impulse", Impulse::new(1.0, 0.01).unwrap().sample(s), (32.0, 1.0, 0.0020)),
+    ];
+    for (name, record, (crest, flatness, weakest)) in rows {
+        let got = figures(&record.unwrap());
+        // As printed in the table: three figures, two decimals, four decimals.
+        assert!((got.0 / crest - 1.0).abs() < 0.005, "{name}: crest factor {}", got.0);
+        assert!((got.1 - flatness).abs() < 0.006, "{name}: flatness {}", got.1);
+        assert!((got.2 - weakest).abs() < 0.0002, "{name}: weakest line {}", got.2);
+    }
+}
+
+/// Crest factor of the samples, flatness of lines 1 to 400, and the amplitude of the weakest of
+/// them for a peak of 1.
+fn figures(record: &Record) -> (f64, f64, f64) {
+    let spectrum = Spectrum::of(record);
+    let flatness = measures::spectral_flatness(&spectrum, 0, 1..=400).unwrap();
+    let weakest = (1..=400).map(|n| spectrum.line(n, 0).norm()).fold(f64::INFINITY, f64::min);
+    let peak = measures::peak(record.channel(0));
+    (measures::crest_factor(record, 0).unwrap(), flatness, weakest / peak)
 }
