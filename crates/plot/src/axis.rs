@@ -67,7 +67,7 @@ impl Axis {
     }
 
     /// `label (unit)`, or the label alone for a pure number.
-    pub(crate) fn caption(&self) -> String {
+    pub fn caption(&self) -> String {
         match (self.label.is_empty(), self.unit.is_empty()) {
             (_, true) => self.label.clone(),
             (true, false) => format!("({})", self.unit),

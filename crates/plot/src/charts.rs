@@ -31,12 +31,21 @@ pub struct Series<'a> {
     pub x: &'a [f64],
     /// Ordinates.
     pub y: &'a [f64],
+    /// Place in the cycle of looks; `None` follows the order of the series.
+    pub slot: Option<usize>,
 }
 
 impl<'a> Series<'a> {
     /// A series.
     pub const fn new(name: &'a str, x: &'a [f64], y: &'a [f64]) -> Self {
-        Series { name, x, y }
+        Series { name, x, y, slot: None }
+    }
+
+    /// The same with the look of number `slot` of the cycle, wherever it stands.
+    #[must_use]
+    pub const fn slot(mut self, slot: usize) -> Self {
+        self.slot = Some(slot);
+        self
     }
 }
 
@@ -116,8 +125,9 @@ pub fn sweep_panel(
     truth: Option<f64>,
 ) -> Panel {
     let mut panel = Panel::new(setting, Axis::linear(coefficient.name, coefficient.unit));
-    for (slot, method) in methods.iter().enumerate() {
-        panel = panel.curve(Curve::marked_line(method.name, method.x, method.y).slot(slot));
+    for (index, method) in methods.iter().enumerate() {
+        let curve = Curve::marked_line(method.name, method.x, method.y);
+        panel = panel.curve(curve.slot(method.slot.unwrap_or(index)));
     }
     match truth {
         Some(value) => panel.reference(Reference::horizontal("true value", value)),

@@ -177,4 +177,19 @@ impl Reference {
         self.dash = dash;
         self
     }
+
+    /// Legend label.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Where the line lies.
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// Whether the line runs across at one ordinate, not up at one abscissa.
+    pub fn is_horizontal(&self) -> bool {
+        self.horizontal
+    }
 }

@@ -250,7 +250,7 @@ fn axes(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {
     }
     let vertical = TextStyle { vertical: true, ..caption };
     sheet.text((layout.y_caption, top + height / 2.0), &panel.y.caption(), &vertical);
-    if !panel.title.is_empty() {
+    if layout.titled {
         let above = if layout.place == Place::Above {
             legend::strip_height(&layout.entries, width)
         } else {

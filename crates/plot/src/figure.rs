@@ -4,7 +4,6 @@ use std::path::Path;
 
 use crate::bitmap;
 use crate::canvas::Canvas;
-use crate::curve::Curve;
 use crate::draw;
 use crate::error::PlotError;
 use crate::layout::Layout;
@@ -49,7 +48,8 @@ impl Figure {
         self
     }
 
-    /// Gives the panels of a column one abscissa, labelled under the lowest.
+    /// Gives the panels of a column one abscissa, labelled under the lowest;
+    /// a title that repeats the one above is written once.
     #[must_use]
     pub fn share_x(mut self) -> Self {
         self.share_x = true;
@@ -76,9 +76,9 @@ impl Figure {
         &self.title
     }
 
-    /// The curves of each panel in order, for writing the drawn numbers to a table.
-    pub fn data(&self) -> impl Iterator<Item = &[Curve]> {
-        self.panels.iter().map(|panel| panel.curves.as_slice())
+    /// The panels in order, for writing the drawn numbers to a table.
+    pub fn panels(&self) -> &[Panel] {
+        &self.panels
     }
 
     /// The figure as an SVG document.

@@ -42,6 +42,8 @@ pub(crate) struct PanelLayout {
     pub(crate) y_ticks: Ticks,
     /// Whether ticks and caption of the abscissa are written under this panel.
     pub(crate) labels_x: bool,
+    /// Whether the panel's title is written above it.
+    pub(crate) titled: bool,
     /// Centre line of the ordinate's caption.
     pub(crate) y_caption: f64,
     pub(crate) entries: Vec<Entry>,
@@ -122,6 +124,15 @@ impl<'a> Planner<'a> {
         !self.figure.share_x || index + self.columns >= self.figure.panels.len()
     }
 
+    /// Whether a panel's title is written: a title that repeats the one of the panel above is not.
+    fn titled(&self, index: usize) -> bool {
+        let title = |index: usize| &self.figure.panels[index].title;
+        let repeated = self.figure.share_x
+            && index >= self.columns
+            && title(index) == title(index - self.columns);
+        !title(index).is_empty() && !repeated
+    }
+
     fn place(&self, above: &[bool]) -> Result<Layout, PlotError> {
         let strip_height = legend::strip_height(&self.strip, self.size.0 - 2.0 * EDGE);
         let strip_top = EDGE + if self.figure.title.is_empty() { 0.0 } else { TITLE };
@@ -189,7 +200,7 @@ impl<'a> Planner<'a> {
         let has_factor =
             |scale, range: (f64, f64)| ticks(scale, range.0, range.1, 6.0, None).factor.is_some();
         let mut margins = Margins { before: 4.0, after: 8.0 };
-        if !panel.title.is_empty() {
+        if self.titled(index) {
             margins.before += PANEL_TITLE;
         } else if has_factor(panel.y.scale, y_range) {
             margins.before += FACTOR;
@@ -283,6 +294,7 @@ impl<'a> Planner<'a> {
             x_ticks: x_ticks(panel, x_range, size.0),
             y_ticks,
             labels_x: self.labels_x(index),
+            titled: self.titled(index),
             y_caption,
             entries,
             place,

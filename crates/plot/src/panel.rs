@@ -26,6 +26,7 @@ pub struct Panel {
     pub(crate) curves: Vec<Curve>,
     pub(crate) references: Vec<Reference>,
     pub(crate) legend: Legend,
+    pub(crate) reach_y: Option<(f64, f64)>,
 }
 
 impl Panel {
@@ -38,6 +39,7 @@ impl Panel {
             curves: Vec::new(),
             references: Vec::new(),
             legend: Legend::Auto,
+            reach_y: None,
         }
     }
 
@@ -69,11 +71,43 @@ impl Panel {
         self
     }
 
+    /// Makes the ordinate reach from `low` to `high` at least, so that panels can share a scale.
+    #[must_use]
+    pub fn including_y(mut self, low: f64, high: f64) -> Self {
+        self.reach_y = Some((low, high));
+        self
+    }
+
     /// Places the legend.
     #[must_use]
     pub fn legend(mut self, legend: Legend) -> Self {
         self.legend = legend;
         self
+    }
+
+    /// Title.
+    pub fn name(&self) -> &str {
+        &self.title
+    }
+
+    /// The abscissa.
+    pub fn x_axis(&self) -> &Axis {
+        &self.x
+    }
+
+    /// The ordinate.
+    pub fn y_axis(&self) -> &Axis {
+        &self.y
+    }
+
+    /// The curves in order.
+    pub fn data(&self) -> &[Curve] {
+        &self.curves
+    }
+
+    /// The reference lines in order.
+    pub fn references(&self) -> &[Reference] {
+        &self.references
     }
 
     /// Style of each curve, in order.
@@ -102,6 +136,11 @@ impl Panel {
             {
                 return Err(PlotError::Range { axis: axis.caption(), low, high });
             }
+        }
+        if let Some((low, high)) = self.reach_y
+            && !(self.y.scale.can_show(low) && self.y.scale.can_show(high))
+        {
+            return Err(PlotError::Range { axis: self.y.caption(), low, high });
         }
         for curve in &self.curves {
             self.validate_curve(curve)?;
@@ -171,7 +210,9 @@ impl Panel {
         }
         let references =
             self.references.iter().filter(|line| line.horizontal).map(|line| line.value);
-        let (low, high) = extent(self.curves.iter().flat_map(Curve::ordinates).chain(references));
+        let reach = self.reach_y.iter().flat_map(|(low, high)| [*low, *high]);
+        let values = self.curves.iter().flat_map(Curve::ordinates);
+        let (low, high) = extent(values.chain(references).chain(reach));
         let from_zero = self.y.scale == Scale::Linear
             && self.curves.iter().any(|curve| curve.kind == Kind::Stems);
         if from_zero {
