@@ -1,3 +1,5 @@
 //! Project tasks, as a library so that tests can run them too.
 
+pub mod drawing;
+pub mod figures;
 pub mod thesis;

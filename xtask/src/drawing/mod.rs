@@ -16,30 +16,34 @@ pub struct Drawing {
     pub svg: String,
 }
 
+/// Their numbers, in the order of the dissertation.
+pub const NUMBERS: [&str; 14] = [
+    "4.2.1", "4.2.2", "4.2.3", "5.2.3", "5.3.3", "5.4.1", "5.4.4", "5.5.1", "5.6.1", "5.7.1",
+    "5.8.1", "5.8.6", "5.9.1", "E1",
+];
+
 /// All of them, in the order of the dissertation.
 pub fn all() -> Vec<Drawing> {
     use Domain::{Frequency, Time};
     use ForceEquation::{Continuous, Discretised};
     use Machine::{Bearing, Sdof};
-    [
-        ("4.2.1", sketches::mass_spring_damper()),
-        ("4.2.2", sketches::shaft_and_bearing()),
-        ("4.2.3", sketches::bearing_scheme()),
-        ("5.2.3", diagrams::identification(Sdof, Time)),
-        ("5.3.3", diagrams::identification(Sdof, Frequency)),
-        ("5.4.1", diagrams::force(Sdof, Time, Continuous)),
-        ("5.4.4", diagrams::force(Sdof, Frequency, Continuous)),
-        ("5.5.1", diagrams::force(Sdof, Time, Discretised)),
-        ("5.6.1", diagrams::identification(Bearing, Time)),
-        ("5.7.1", diagrams::identification(Bearing, Frequency)),
-        ("5.8.1", diagrams::force(Bearing, Time, Continuous)),
-        ("5.8.6", diagrams::force(Bearing, Frequency, Continuous)),
-        ("5.9.1", diagrams::force(Bearing, Time, Discretised)),
-        ("E1", diagrams::modal()),
-    ]
-    .into_iter()
-    .map(|(number, svg)| Drawing { number, svg })
-    .collect()
+    let drawn = [
+        sketches::mass_spring_damper(),
+        sketches::shaft_and_bearing(),
+        sketches::bearing_scheme(),
+        diagrams::identification(Sdof, Time),
+        diagrams::identification(Sdof, Frequency),
+        diagrams::force(Sdof, Time, Continuous),
+        diagrams::force(Sdof, Frequency, Continuous),
+        diagrams::force(Sdof, Time, Discretised),
+        diagrams::identification(Bearing, Time),
+        diagrams::identification(Bearing, Frequency),
+        diagrams::force(Bearing, Time, Continuous),
+        diagrams::force(Bearing, Frequency, Continuous),
+        diagrams::force(Bearing, Time, Discretised),
+        diagrams::modal(),
+    ];
+    NUMBERS.into_iter().zip(drawn).map(|(number, svg)| Drawing { number, svg }).collect()
 }
 
 #[cfg(test)]
