@@ -5,8 +5,8 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_signal::{CrestSearch, Multisine, Phases, Sampling, lines};
 
-/// 10⁶ samples with all 499,999 lines; the period of the dissertation; one exact value, as a
-/// Runge-Kutta stage asks for it.
+/// 10⁶ samples with all 499,999 lines; the period of the dissertation, beside the plain sum of
+/// cosines; one exact value, as a Runge-Kutta stage asks for it.
 fn sampling(c: &mut Criterion) {
     let sampling = Sampling::new(1e-6, 1_000_000).unwrap();
     let all = lines::full(sampling);
@@ -18,6 +18,9 @@ fn sampling(c: &mut Criterion) {
     let short = Sampling::new(1e-3, 256).unwrap();
     group.bench_function("sample 256", |b| b.iter(|| black_box(&few).sample(short)));
     let omega0 = short.omega0();
+    group.bench_function("sum of cosines 256", |b| {
+        b.iter(|| short.times().map(|t| black_box(&few).value(t, omega0)).sum::<f64>())
+    });
     group.bench_function("value of 127 lines", |b| {
         b.iter(|| black_box(&few).value(black_box(0.1234), omega0))
     });

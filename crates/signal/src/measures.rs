@@ -22,8 +22,13 @@ use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// Root mean square; 0 for no samples.
 pub fn rms(samples: &[f64]) -> f64 {
-    let sum: f64 = samples.iter().map(|x| x * x).sum();
-    if samples.is_empty() { 0.0 } else { (sum / samples.len() as f64).sqrt() }
+    let peak = peak(samples);
+    if peak == 0.0 {
+        return 0.0;
+    }
+    // Relative to the peak: squares of large or small values leave the range of numbers.
+    let sum: f64 = samples.iter().map(|x| (x / peak).powi(2)).sum();
+    peak * (sum / samples.len() as f64).sqrt()
 }
 
 /// Largest absolute value; 0 for no samples.

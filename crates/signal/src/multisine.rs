@@ -48,7 +48,7 @@ impl Multisine {
     /// [`SignalError::NoLines`], [`SignalError::Line`] for DC or a line above
     /// [`MAX_LINE`](Self::MAX_LINE), [`SignalError::LineOrder`], [`SignalError::PerLine`] if the
     /// lists differ in length, [`SignalError::Negative`] for an amplitude below zero or not
-    /// finite, [`SignalError::Infinite`] for a given phase that is not finite.
+    /// finite or for amplitudes too large to be added up, [`SignalError::Infinite`] for a given phase that is not finite.
     pub fn new(
         lines: Vec<usize>,
         amplitudes: Vec<f64>,
@@ -68,9 +68,7 @@ impl Multisine {
         if got != count {
             return Err(SignalError::PerLine { what: "amplitudes", lines: count, got });
         }
-        for a in &amplitudes {
-            not_negative("amplitude", *a)?;
-        }
+        check_amplitudes(&amplitudes)?;
         let phases = phases.of(&lines, &amplitudes)?;
         Ok(Self { lines, amplitudes, phases })
     }
@@ -152,6 +150,7 @@ impl Multisine {
     fn scaled(mut self, wanted: f64, now: f64) -> Result<Self, SignalError> {
         positive("present level", now).map_err(|_| SignalError::Silent { channel: 0 })?;
         self.amplitudes.iter_mut().for_each(|a| *a *= wanted / now);
+        check_amplitudes(&self.amplitudes)?;
         Ok(self)
     }
 
@@ -189,7 +188,13 @@ impl Multisine {
 
     /// Root mean square over a period, √(Σ A_n² / 2).
     pub fn rms(&self) -> f64 {
-        (0.5 * self.amplitudes.iter().map(|a| a * a).sum::<f64>()).sqrt()
+        // Relative to the largest amplitude: squares of large or small ones leave the range.
+        let largest = self.amplitudes.iter().fold(0.0_f64, |m, a| m.max(*a));
+        if largest == 0.0 {
+            return 0.0;
+        }
+        let squares = self.amplitudes.iter().map(|a| (a / largest).powi(2));
+        largest * (0.5 * squares.sum::<f64>()).sqrt()
     }
 
     /// Largest absolute value over a period, seen at
@@ -225,6 +230,16 @@ impl Multisine {
         let record = reduced.sample(sampling).expect("far below Nyquist");
         record.channel(0).to_vec()
     }
+}
+
+/// Amplitudes are finite and not negative, and so is every sum of them.
+fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
+    for a in amplitudes {
+        not_negative("amplitude", *a)?;
+    }
+    // Twice, for what a transform adds up on its way.
+    not_negative("sum of all amplitudes", 2.0 * amplitudes.iter().sum::<f64>())?;
+    Ok(())
 }
 
 /// Largest |value| near the middle one of three equidistant samples: the top of their parabola

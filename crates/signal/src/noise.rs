@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::error::{finite, not_negative, positive};
+use crate::error::{finite, not_negative, positive, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// How strong a disturbance is.
@@ -46,7 +46,7 @@ pub enum Colour {
     /// Power density proportional to 1/f^`exponent`: 1 is pink, 2 brown (a drift), −2 violet (a
     /// differentiated signal). The lowest frequency is half a cycle per record.
     PowerLaw {
-        /// Exponent of the fall.
+        /// Exponent of the fall, −10 to 10.
         exponent: f64,
     },
     /// First-order low-pass (Gauss–Markov): an autocorrelation of exp(−2π f_c |τ|), exactly.
@@ -75,7 +75,7 @@ pub fn white(
 /// independent values it holds.
 ///
 /// # Errors
-/// [`SignalError::Negative`] for the deviation, [`SignalError::Infinite`] for the exponent,
+/// [`SignalError::Negative`] for the deviation, [`SignalError::Range`] for the exponent,
 /// [`SignalError::NotPositive`] for the corner frequency.
 pub fn coloured(
     sampling: Sampling,
@@ -134,6 +134,9 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
+/// Steepest power law: beyond it one line is all there is.
+const MOST_EXPONENT: f64 = 10.0;
+
 /// White noise shaped in frequency, from a period twice as long: noise does not close on itself
 /// at the ends of a record.
 fn power_law(
@@ -141,7 +144,7 @@ fn power_law(
     exponent: f64,
     rng: &mut ChaCha8Rng,
 ) -> Result<Vec<f64>, SignalError> {
-    finite("exponent", exponent)?;
+    within("exponent of the power law", exponent, -MOST_EXPONENT, MOST_EXPONENT)?;
     let twice = sampling.with_len(sampling.len().saturating_mul(2))?;
     let white = Record::from_channel(twice, white_channel(twice, 1.0, rng))?;
     let spectrum = Spectrum::of(&white);

@@ -64,7 +64,9 @@ impl Phases {
 /// Schroeder (1970), *Synthesis of low-peak-factor signals and binary sequences with low
 /// autocorrelation*, IEEE Trans. Inf. Theory 16, 85–89. Dissertation section 4.3.
 pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
-    let total: f64 = amplitudes.iter().map(|a| a * a).sum();
+    let largest = amplitudes.iter().fold(0.0_f64, |m, a| m.max(*a));
+    let power = |a: &f64| if largest > 0.0 { (a / largest).powi(2) } else { 0.0 };
+    let total: f64 = amplitudes.iter().map(power).sum();
     let (_, step) = first_and_step(lines);
     let (mut phase, mut share) = (0.0_f64, 0.0_f64);
     let mut previous = None;
@@ -75,7 +77,7 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
             phase += ((line - previous) / step) as f64 * share;
         }
         phases.push(0.0 - TAU * phase.fract());
-        share += if total > 0.0 { a * a / total } else { 0.0 };
+        share += if total > 0.0 { power(a) / total } else { 0.0 };
         previous = Some(line);
     }
     phases

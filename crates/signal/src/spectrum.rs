@@ -66,6 +66,9 @@ impl Spectrum {
     }
 
     /// The period this is the spectrum of; the exact inverse of [`Spectrum::of`].
+    ///
+    /// # Panics
+    /// If a line is not finite, or the lines are too large to be added up.
     pub fn to_record(&self) -> Record {
         let len = self.sampling.len();
         let plan = RealFftPlanner::new().plan_fft_inverse(len);

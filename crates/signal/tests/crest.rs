@@ -76,8 +76,14 @@ fn repeats_itself_and_never_makes_it_worse() {
     assert_eq!(low, search.minimise(&m).unwrap());
     let once_more = CrestSearch { starts: 1, seed: 9 }.minimise(&low).unwrap();
     assert!(once_more.crest_factor().unwrap() <= low.crest_factor().unwrap());
+    // Phases all zero are a stationary point: the search must leave it.
+    let zero = Multisine::flat(1..=40, 1.0, Phases::Zero).unwrap();
+    let left = CrestSearch { starts: 1, seed: 0 }.minimise(&zero).unwrap();
+    assert!(judged(&left) < 1.6, "{}", judged(&left));
     let single = Multisine::flat([9], 1.0, Phases::Zero).unwrap();
-    assert_eq!(search.minimise(&single).unwrap().crest_factor(), single.crest_factor());
+    let sine = search.minimise(&single).unwrap().crest_factor().unwrap();
+    // The parabola through three samples of a sine, 64 to a period, misses the top by 2e-6.
+    assert!((sine - f64::sqrt(2.0)).abs() < 1e-5, "{sine}");
 }
 
 #[test]

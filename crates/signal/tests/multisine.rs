@@ -117,6 +117,12 @@ fn impossible_multisines_are_refused_with_their_numbers() {
     assert_eq!(flat(vec![2, 2], 1.0), SignalError::LineOrder { previous: 2, line: 2 });
     assert_eq!(flat(vec![1], -1.0), SignalError::Negative { what: "amplitude", value: -1.0 });
     assert!(matches!(flat(vec![1], f64::NAN), SignalError::Negative { .. }));
+    let too_large = flat(vec![1, 2], f64::MAX);
+    assert!(matches!(too_large, SignalError::Negative { what: "sum of all amplitudes", .. }));
+    let large = Multisine::flat([1, 2], 1e200, Phases::Schroeder).unwrap();
+    let crest = |m: &Multisine| m.crest_factor().unwrap();
+    assert!((crest(&large) - crest(&large.clone().with_rms(1e-200).unwrap())).abs() < 1e-12);
+    assert!(large.with_rms(f64::MAX).is_err());
     let wrong = Multisine::new(vec![1, 2], vec![1.0], Phases::Zero);
     assert_eq!(wrong, Err(SignalError::PerLine { what: "amplitudes", lines: 2, got: 1 }));
     let m = Multisine::flat([1, 4], 1.0, Phases::Zero).unwrap();

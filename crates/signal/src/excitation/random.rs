@@ -53,9 +53,9 @@ impl Random {
     ///
     /// # Errors
     /// [`SignalError::AboveNyquist`] for the upper end of the band, [`SignalError::EmptyBand`] if
-    /// it holds no line.
+    /// it holds no line, [`SignalError::NotFinite`] if the deviation is out of all bounds.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
-        let white = white_channel(sampling, self.standard_deviation, &mut stream(self.seed, 0));
+        let white = white_channel(sampling, 1.0, &mut stream(self.seed, 0));
         let whole = match self.band_hz {
             None => Record::from_channel(sampling, white)?,
             Some((low_hz, high_hz)) => {
@@ -66,6 +66,7 @@ impl Random {
         let on = (self.on * sampling.len() as f64).round() as usize;
         let mut force = whole.channel(0).to_vec();
         force[on..].fill(0.0);
+        force.iter_mut().for_each(|v| *v *= self.standard_deviation);
         Record::from_channel(sampling, force)
     }
 }

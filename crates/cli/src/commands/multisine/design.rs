@@ -71,6 +71,8 @@ impl MultisineArgs {
     fn input(&self, lines: Vec<usize>, input: u64) -> Result<Multisine, SignalError> {
         let seed = self.seed.wrapping_add(input);
         let law = match self.phases {
+            // The search of a further input must not begin, and end, where the first one did.
+            PhaseLaw::LowCrest if input > 0 => Phases::Random { seed },
             PhaseLaw::Schroeder | PhaseLaw::LowCrest => Phases::Schroeder,
             PhaseLaw::SchroederBinary => Phases::SchroederBinary,
             PhaseLaw::Random => Phases::Random { seed },
