@@ -1,0 +1,167 @@
+//! Modes of identified matrices: a published case, derivatives, and intervals that hold.
+
+mod common;
+
+use common::monte_carlo::{Estimator, Experiment};
+use common::{bearing, displacements, forces, oscillator};
+use mechid_estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid_estimate::{Estimate, Unknowns};
+use mechid_model::{Mode, SecondOrderSystem};
+use mechid_problems::steffen_rade;
+use nalgebra::{Complex, DMatrix, DVector, dmatrix};
+use rayon::prelude::*;
+
+/// Equation-error estimate of all entries from a steady state with the displacement off by `noise`.
+fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
+    let lines: Vec<usize> = (1..=60).collect();
+    let fastest = system.modes().unwrap().last().unwrap().natural_frequency();
+    let omega: Vec<f64> = lines.iter().map(|n| *n as f64 * fastest / 30.0).collect();
+    let force = forces(&lines, system.dof(), 1.0);
+    let mut motion = displacements(system, &omega, &force);
+    let size = motion.norm();
+    for (at, x) in motion.iter_mut().enumerate() {
+        *x += Complex::from_polar(noise * size, (at * at) as f64);
+    }
+    let data = FrequencyData::from_amplitudes(omega, force, motion, Motion::Displacement).unwrap();
+    equation_error(&data, &Unknowns::unknown_mass(system.dof()).unwrap()).unwrap()
+}
+
+/// Printed in Appendix E, where the two damping ratios are interchanged and the column of
+/// shapes, headed y1/y2, holds y2/y1.
+#[test]
+fn the_system_of_steffen_and_rade_has_its_published_modes() {
+    let modes = identified(&steffen_rade(), 0.0).modes().unwrap();
+    assert_eq!(modes.len(), 2);
+    for (mode, (frequency, damping, ratio)) in modes.iter().zip([
+        (3.1157, 0.1869, Complex::new(1.1567, 0.3474)),
+        (3.9384, 0.4275, Complex::new(-0.6821, 0.2752)),
+    ]) {
+        // Half a unit of the last digit printed, and its truncation.
+        assert!((mode.damped_frequency_hz.value - frequency).abs() < 1e-4);
+        assert!((mode.damping_ratio.value - damping).abs() < 1e-4);
+        let shape = mode.mode.shape();
+        let found = shape[1] / shape[0];
+        // The eigenvalue of positive imaginary part may carry the conjugate.
+        let off = (found - ratio).norm().min((found - ratio.conj()).norm());
+        assert!(off < 1e-4, "{found}");
+        assert!(mode.damping_ratio.standard_error < 1e-9);
+    }
+}
+
+/// Which entry of a shape is 1 by its scaling.
+fn one(shape: &DVector<Complex<f64>>) -> usize {
+    shape.iter().position(|z| *z == Complex::from(1.0)).unwrap()
+}
+
+/// The modes of slightly changed matrices, shapes scaled alike.
+fn modes_of(
+    unknowns: &Unknowns,
+    theta: &[f64],
+    largest: &[usize],
+) -> Vec<(Mode, DVector<Complex<f64>>)> {
+    let [m, c, k] = unknowns.assemble(theta);
+    let modes = SecondOrderSystem::new(m, c, k).unwrap().modes().unwrap();
+    let scaled = |(mode, at): (Mode, &usize)| {
+        let shape = mode.shape() / mode.shape()[*at];
+        (mode, shape)
+    };
+    modes.into_iter().zip(largest).map(scaled).collect()
+}
+
+#[test]
+fn standard_errors_follow_from_differences_of_the_modes() {
+    for system in [oscillator(), bearing(), steffen_rade()] {
+        let estimate = identified(&system, 1e-4);
+        let modes = estimate.modes().unwrap();
+        let theta: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
+        let largest: Vec<usize> = modes.iter().map(|m| one(m.mode.shape())).collect();
+        let moved = |at: usize, sign: f64| {
+            let mut theta = theta.clone();
+            let size = theta.iter().fold(0.0f64, |a, b| a.max(b.abs()));
+            let step = 1e-6 * theta[at].abs().max(1e-2 * size);
+            theta[at] += sign * step;
+            (modes_of(estimate.unknowns(), &theta, &largest), step)
+        };
+        let count = theta.len();
+        let n = system.dof();
+        // Per mode: frequencies, damping ratio, and the shape's parts, by central differences.
+        let mut gradients = vec![DMatrix::zeros(3 + 2 * n, count); modes.len()];
+        for at in 0..count {
+            let ((up, step), (down, _)) = (moved(at, 1.0), moved(at, -1.0));
+            for (gradient, ((p, ps), (q, qs))) in gradients.iter_mut().zip(up.iter().zip(&down)) {
+                let slope = |f: &dyn Fn(&Mode) -> f64| (f(p) - f(q)) / (2.0 * step);
+                let tau = std::f64::consts::TAU;
+                gradient[(0, at)] = slope(&|m| m.damped_frequency_hz());
+                gradient[(1, at)] = slope(&|m| m.natural_frequency() / tau);
+                gradient[(2, at)] = slope(&|m| m.damping_ratio());
+                for i in 0..n {
+                    let d = (ps[i] - qs[i]) / (2.0 * step);
+                    (gradient[(3 + 2 * i, at)], gradient[(4 + 2 * i, at)]) = (d.re, d.im);
+                }
+            }
+        }
+        for (mode, gradient) in modes.iter().zip(&gradients) {
+            let expected = (gradient * estimate.covariance() * gradient.transpose()).diagonal();
+            let mut found = vec![
+                mode.damped_frequency_hz.standard_error,
+                mode.natural_frequency_hz.standard_error,
+                mode.damping_ratio.standard_error,
+            ];
+            found.extend(mode.shape_standard_error.iter().flat_map(|z| [z.re, z.im]));
+            let scale = expected.max().sqrt();
+            for (found, expected) in found.iter().zip(expected.iter()) {
+                // Differences of relative step 1e-6 are good to about 1e-7 of the largest.
+                assert!((found - expected.sqrt()).abs() < 1e-5 * scale, "{found} {expected}");
+            }
+        }
+    }
+}
+
+#[test]
+fn modes_that_do_not_oscillate_have_a_frequency_of_zero_without_error() {
+    let heavy = SecondOrderSystem::new(dmatrix![1.0], dmatrix![5.0], dmatrix![4.0]).unwrap();
+    let modes = identified(&heavy, 1e-4).modes().unwrap();
+    assert_eq!(modes.len(), 2);
+    for mode in &modes {
+        assert_eq!(mode.damped_frequency_hz.value, 0.0);
+        assert_eq!(mode.damped_frequency_hz.standard_error, 0.0);
+        assert_eq!(mode.damping_ratio.value, 1.0);
+        assert!(mode.natural_frequency_hz.standard_error > 0.0);
+    }
+}
+
+#[test]
+fn intervals_of_frequency_and_damping_hold() {
+    let system = bearing();
+    let unknowns = Unknowns::known_mass(system.mass()).unwrap();
+    let experiment = Experiment::new(system.clone(), unknowns, 2, 0.01);
+    let truth = system.modes().unwrap();
+    let runs = 2000u64;
+    let held: Vec<Vec<bool>> = (0..runs)
+        .into_par_iter()
+        .map(|seed| {
+            let periods = experiment.measure(10_000 + seed);
+            let modes =
+                experiment.estimate(&periods, Estimator::MaximumLikelihood).modes().unwrap();
+            let within = |found: mechid_estimate::Uncertain, truth: f64| {
+                let [low, high] = found.interval(0.95).unwrap();
+                low <= truth && truth <= high
+            };
+            modes
+                .iter()
+                .zip(&truth)
+                .flat_map(|(found, truth)| {
+                    [
+                        within(found.damped_frequency_hz, truth.damped_frequency_hz()),
+                        within(found.damping_ratio, truth.damping_ratio()),
+                    ]
+                })
+                .collect()
+        })
+        .collect();
+    for quantity in 0..4 {
+        let coverage = held.iter().filter(|h| h[quantity]).count() as f64 / runs as f64;
+        // As for the parameters themselves: 95 % ± four times 0.5 %.
+        assert!((0.93..=0.97).contains(&coverage), "{quantity}: {coverage}");
+    }
+}

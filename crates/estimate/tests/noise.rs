@@ -1,0 +1,243 @@
+//! Noise spectra from repeated periods, and what maximum likelihood makes of them.
+
+mod common;
+
+use common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
+use mechid_estimate::frequency_domain::{
+    FrequencyData, Lines, Motion, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods,
+    instrumental_variables, output_error,
+};
+use mechid_estimate::{EstimateError, Unknowns};
+use mechid_model::SecondOrderSystem;
+use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+/// Records of `periods` periods of a steady state, the motion in the quantity asked for.
+struct Setup {
+    lines: Lines,
+    force: Record,
+    motion: Record,
+    measured: Motion,
+}
+
+fn setup(system: &SecondOrderSystem, periods: usize, measured: Motion) -> Setup {
+    let fastest = system.modes().unwrap().last().unwrap().natural_frequency();
+    let sampling = Sampling::new(0.3 / fastest, 128).unwrap();
+    let lines = Lines::new(sampling, 1..=40).unwrap();
+    let force = forces(lines.as_slice(), system.dof(), 50.0);
+    let motion = displacements(system, &lines.omega(), &force);
+    let repeat = |amplitudes: &DMatrix<Complex<f64>>, quantity| {
+        let one = synthesise(sampling, lines.as_slice(), amplitudes, quantity);
+        let len = sampling.len();
+        let all = DMatrix::from_fn(len * periods, system.dof(), |k, c| one.data()[(k % len, c)]);
+        Record::new(sampling.with_len(len * periods).unwrap(), all).unwrap()
+    };
+    let (force, motion) = (repeat(&force, Motion::Displacement), repeat(&motion, measured));
+    Setup { lines, force, motion, measured }
+}
+
+impl Setup {
+    fn measure(&self, motion: f64, force: f64, seed: u64) -> RepeatedPeriods {
+        let noisy = |record: &Record, level: f64, seed| {
+            noise::add_white(record, NoiseLevel::FractionOfRms(level), seed).unwrap()
+        };
+        let motion = noisy(&self.motion, motion, 2 * seed);
+        let force = noisy(&self.force, force, 2 * seed + 1);
+        RepeatedPeriods::new(&self.lines, &force, &motion, self.measured).unwrap()
+    }
+
+    fn rms(record: &Record, channel: usize) -> f64 {
+        record.column(channel).norm() / (record.len() as f64).sqrt()
+    }
+}
+
+#[test]
+fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
+    let setup = setup(&bearing(), 400, Motion::Acceleration);
+    let periods = setup.measure(0.05, 0.02, 7);
+    assert_eq!(periods.count(), 400);
+    let motion: Vec<f64> = (0..2).map(|c| 0.05 * Setup::rms(&setup.motion, c)).collect();
+    let force: Vec<f64> = (0..2).map(|c| 0.02 * Setup::rms(&setup.force, c)).collect();
+    let known = NoiseSpectrum::white(
+        setup.lines.sampling(),
+        setup.lines.as_slice(),
+        Motion::Acceleration,
+        &motion,
+        &force,
+    )
+    .unwrap();
+    for (pooling, averages) in [
+        (Pooling::PerLine, 399.0),
+        (Pooling::Neighbours(4), 5.0 * 399.0),
+        (Pooling::AllLines, 40.0 * 399.0),
+    ] {
+        let found = periods.noise(pooling).unwrap();
+        assert_eq!(found.degrees_of_freedom(), averages);
+        for row in 0..40 {
+            // The known noise is that of one period, the found one of the mean of 400.
+            let expected = known.covariance(row) / Complex::from(400.0);
+            for i in 0..4 {
+                let variance = expected[(i, i)].re;
+                let error = found.covariance(row)[(i, i)].re / variance - 1.0;
+                // Sample variances of `averages` complex numbers scatter by 1/√averages.
+                assert!(error.abs() < 5.0 / f64::sqrt(averages), "{pooling:?} {row} {i} {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn without_noise_every_estimator_is_exact() {
+    for system in [oscillator(), bearing()] {
+        for measured in [Motion::Displacement, Motion::Velocity, Motion::Acceleration] {
+            let setup = setup(&system, 2, measured);
+            let periods =
+                RepeatedPeriods::new(&setup.lines, &setup.force, &setup.motion, measured).unwrap();
+            let unknowns = Unknowns::unknown_mass(system.dof()).unwrap();
+            let fit = output_error(&periods.mean().unwrap(), &unknowns).unwrap();
+            let (first, second) = periods.halves().unwrap();
+            let instrumental = instrumental_variables(&first, &second, &unknowns).unwrap();
+            for found in [fit.estimate, instrumental] {
+                let error = relative_error(&found.stiffness(), system.stiffness());
+                assert!(error < 1e-10, "{measured}: {error:e}");
+                assert!(relative_error(&found.damping(), system.damping()) < 1e-10);
+            }
+        }
+    }
+}
+
+/// Share of 95 % intervals that hold, and mean error over standard deviation, per parameter.
+fn judge(
+    system: &SecondOrderSystem,
+    runs: u64,
+    fit: impl Fn(u64, &Unknowns) -> OutputErrorFit + Sync,
+) -> (Vec<f64>, Vec<f64>, f64) {
+    let unknowns = Unknowns::known_mass(system.mass()).unwrap();
+    let truth: Vec<f64> =
+        unknowns.free().iter().map(|p| system.matrix(p.matrix())[(p.row(), p.column())]).collect();
+    let fits: Vec<OutputErrorFit> =
+        (0..runs).into_par_iter().map(|seed| fit(seed, &unknowns)).collect();
+    let count = runs as f64;
+    let (mut coverage, mut bias) = (Vec::new(), Vec::new());
+    for (at, truth) in truth.iter().enumerate() {
+        let found: Vec<_> = fits.iter().map(|f| f.estimate.parameters().nth(at).unwrap()).collect();
+        let held = found.iter().filter(|p| {
+            let [low, high] = p.interval(0.95).unwrap();
+            (low..=high).contains(truth)
+        });
+        coverage.push(held.count() as f64 / count);
+        let mean = found.iter().map(|p| p.value - truth).sum::<f64>() / count;
+        let power = found.iter().map(|p| (p.value - truth - mean).powi(2)).sum::<f64>() / count;
+        bias.push(mean / power.sqrt());
+    }
+    (coverage, bias, fits.iter().map(|f| f.misfit_ratio).sum::<f64>() / count)
+}
+
+#[test]
+fn noise_on_the_force_is_allowed_for() {
+    let system = oscillator();
+    let setup = setup(&system, 16, Motion::Displacement);
+    let fit = |seed, unknowns: &Unknowns| {
+        let data = setup.measure(0.05, 0.1, seed).mean_with_noise(Pooling::AllLines).unwrap();
+        assert!(data.noise().unwrap().has_force());
+        output_error(&data, unknowns).unwrap()
+    };
+    let (coverage, bias, misfit) = judge(&system, 1000, fit);
+    for (coverage, bias) in coverage.iter().zip(&bias) {
+        // 95 % of 1,000 scatters by 0.7 %, a mean of 1,000 by 1/√1000 = 0.03.
+        assert!((0.925..=0.975).contains(coverage), "{coverage}");
+        assert!(bias.abs() < 0.12, "{bias}");
+    }
+    assert!((misfit - 1.0).abs() < 0.02, "{misfit}");
+}
+
+#[test]
+fn weights_of_few_periods_widen_the_intervals_as_they_should() {
+    let system = bearing();
+    let setup = setup(&system, 8, Motion::Acceleration);
+    let fit = |seed, unknowns: &Unknowns| {
+        let noise = setup.measure(0.02, 0.0, seed);
+        output_error(&noise.mean_with_noise(Pooling::PerLine).unwrap(), unknowns).unwrap()
+    };
+    let (coverage, bias, misfit) = judge(&system, 1000, fit);
+    for (coverage, bias) in coverage.iter().zip(&bias) {
+        assert!((0.925..=0.975).contains(coverage), "{coverage}");
+        assert!(bias.abs() < 0.12, "{bias}");
+    }
+    assert!((misfit - 1.0).abs() < 0.03, "{misfit}");
+}
+
+#[test]
+fn one_period_is_weighted_by_its_own_residual() {
+    let system = bearing();
+    let setup = setup(&system, 1, Motion::Acceleration);
+    let fit = |seed, unknowns: &Unknowns| {
+        output_error(&setup.measure(0.02, 0.0, seed).mean().unwrap(), unknowns).unwrap()
+    };
+    let (coverage, bias, _) = judge(&system, 1000, fit);
+    for (coverage, bias) in coverage.iter().zip(&bias) {
+        assert!((0.925..=0.975).contains(coverage), "{coverage}");
+        assert!(bias.abs() < 0.12, "{bias}");
+    }
+}
+
+#[test]
+fn a_model_that_is_wrong_shows_in_the_misfit() {
+    // Two degrees of freedom of which only one is looked at.
+    let system = bearing();
+    let setup = setup(&system, 8, Motion::Displacement);
+    let one = |r: &Record| Record::from_channel(r.sampling(), r.channel(0).to_vec()).unwrap();
+    let motion = noise::add_white(&one(&setup.motion), NoiseLevel::FractionOfRms(0.01), 1).unwrap();
+    let periods =
+        RepeatedPeriods::new(&setup.lines, &one(&setup.force), &motion, setup.measured).unwrap();
+    let data = periods.mean_with_noise(Pooling::AllLines).unwrap();
+    let fit = output_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
+    assert!(fit.misfit_ratio > 100.0, "{}", fit.misfit_ratio);
+}
+
+#[test]
+fn noise_that_cannot_weigh_is_refused() {
+    let setup = setup(&bearing(), 3, Motion::Displacement);
+    let periods = setup.measure(0.01, 0.0, 1);
+    let unknowns = Unknowns::unknown_mass(2).unwrap();
+    let data = periods.mean_with_noise(Pooling::PerLine).unwrap();
+    assert!(matches!(
+        output_error(&data, &unknowns),
+        Err(EstimateError::TooFewAverages { got: 3, needed: 5 })
+    ));
+    let one = RepeatedPeriods::new(
+        &setup.lines,
+        &setup.force.window(0, 128).unwrap(),
+        &setup.motion.window(0, 128).unwrap(),
+        Motion::Displacement,
+    )
+    .unwrap();
+    let refused = EstimateError::TooFewAverages { got: 1, needed: 2 };
+    assert_eq!(one.noise(Pooling::AllLines), Err(refused.clone()));
+    assert_eq!(one.halves().unwrap_err(), refused);
+
+    let mean = periods.mean().unwrap();
+    let zero = NoiseSpectrum::new(mean.omega().to_vec(), vec![DMatrix::zeros(4, 4); 40]).unwrap();
+    let exact = mean.clone().with_noise(zero).unwrap();
+    assert!(matches!(output_error(&exact, &unknowns), Err(EstimateError::SingularNoise { .. })));
+
+    let other = NoiseSpectrum::new(vec![1.0; 40], vec![DMatrix::identity(4, 4); 40]).unwrap();
+    let e = mean.with_noise(other).unwrap_err();
+    assert!(matches!(e, EstimateError::FrequencyMismatch { row: 0, right: 1.0, .. }));
+    let mut negative = DMatrix::<Complex<f64>>::identity(2, 2);
+    negative[(1, 1)] = Complex::from(-1.0);
+    let e = NoiseSpectrum::new(vec![1.0], vec![negative]).unwrap_err();
+    assert_eq!(e, EstimateError::NoiseVariance { row: 0, column: 1, value: -1.0 });
+
+    // Instruments belong to the same lines.
+    let short = FrequencyData::from_amplitudes(
+        vec![1.0],
+        DMatrix::from_element(1, 2, Complex::from(1.0)),
+        DMatrix::from_element(1, 2, Complex::from(1.0)),
+        Motion::Displacement,
+    )
+    .unwrap();
+    let e = instrumental_variables(&short, &periods.mean().unwrap(), &unknowns).unwrap_err();
+    assert!(matches!(e, EstimateError::Size { expected: 1, got: 40, .. }));
+}
