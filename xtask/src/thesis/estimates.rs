@@ -26,7 +26,7 @@ pub fn frequency(sequences: &Sequences) -> Listed {
 
 /// The same with the harmonic offset: harmonic n at (n + 1)·ω0, the mean among the harmonics.
 pub fn frequency_offset(sequences: &Sequences) -> Listed {
-    let (omega, force, displacement) = offset_amplitudes(sequences);
+    let (omega, force, displacement) = amplitudes(sequences, 1);
     let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)
         .map_err(words)?;
     fit(sequences, &data)
@@ -35,7 +35,16 @@ pub fn frequency_offset(sequences: &Sequences) -> Listed {
 /// The harmonic offset together with a free coefficient of the force:
 /// K x + i ω C x − g F = ω² M x, with g found beside K and C.
 pub fn frequency_offset_free_force(sequences: &Sequences) -> Listed {
-    let (omega, force, displacement) = offset_amplitudes(sequences);
+    free_force(sequences, 1)
+}
+
+/// The free coefficient of the force alone: harmonics n ≥ 1 at n·ω0.
+pub fn frequency_free_force(sequences: &Sequences) -> Listed {
+    free_force(sequences, 0)
+}
+
+fn free_force(sequences: &Sequences, offset: usize) -> Listed {
+    let (omega, force, displacement) = amplitudes(sequences, offset);
     let mass = sequences.machine.system().mass()[(0, 0)];
     let mut fit = LeastSquares::new(3, 1);
     for (row, &w) in omega.iter().enumerate() {
@@ -53,17 +62,19 @@ pub fn frequency_offset_free_force(sequences: &Sequences) -> Listed {
 
 type Amplitudes = (Vec<f64>, DMatrix<Complex<f64>>, DMatrix<Complex<f64>>);
 
-fn offset_amplitudes(sequences: &Sequences) -> Amplitudes {
+/// Harmonic n at (n + offset)·ω0; the mean is among the harmonics where its frequency is not zero.
+fn amplitudes(sequences: &Sequences, offset: usize) -> Amplitudes {
     let (x, f) = (Spectrum::of(sequences.response.displacement()), Spectrum::of(&sequences.force));
-    let harmonics = x.sampling().len() / 2;
+    let first = 1 - offset;
+    let harmonics = x.sampling().len() / 2 - first;
     let omega0 = x.sampling().omega0();
     // The original series has no constant term; its zeroth coefficient is 2/N Σ x, twice the mean.
     let amplitudes = |s: &Spectrum| {
-        DMatrix::from_fn(harmonics, s.channels(), |n, c| {
-            if n == 0 { s.line(0, c) * 2.0 } else { s.line(n, c) }
+        DMatrix::from_fn(harmonics, s.channels(), |row, c| {
+            if row + first == 0 { s.line(0, c) * 2.0 } else { s.line(row + first, c) }
         })
     };
-    let omega = (0..harmonics).map(|n| (n + 1) as f64 * omega0).collect();
+    let omega = (0..harmonics).map(|row| (row + 1) as f64 * omega0).collect();
     (omega, amplitudes(&f), amplitudes(&x))
 }
 

@@ -1,5 +1,6 @@
 //! The dissertation, reproduced and audited.
 
+pub mod audit;
 pub mod case;
 pub mod cells;
 pub mod estimates;

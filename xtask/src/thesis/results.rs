@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use super::case::{Case, Machine};
 use super::estimates::{self, Listed};
 use super::published::{Cell, Method, Published};
-use super::simulate::{Sequences, correct, slipped};
+use super::simulate::{Sequences, correct, slipped_but};
+use super::slips::Slip;
 
 /// What identifies one estimation: a printed row's settings and its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -42,6 +43,19 @@ impl Key {
             npi_tenths: (cell.npi? * 10.0).round() as u32,
             method: cell.method,
         })
+    }
+
+    /// Whether a slip takes part in the replay of this key.
+    pub fn is_touched_by(self, slip: Slip) -> bool {
+        match slip {
+            Slip::CentralDifferenceLead => self.method == Method::CentralDifference,
+            Slip::WilsonLoadLag => self.method == Method::WilsonTheta,
+            Slip::HarmonicOffset => self.frequency,
+            Slip::StiffnessSign => self.bearing && self.method != Method::Rk4,
+            Slip::RungeKuttaStageLoads => self.method == Method::Rk4,
+            Slip::FreeForceCoefficient => self.free_force,
+            Slip::LostSigns => false,
+        }
     }
 
     /// The simulation behind it.
@@ -96,6 +110,25 @@ impl Results {
         keys
     }
 
+    /// The same results with one slip undone in the replay, to count what it is needed for.
+    ///
+    /// # Errors
+    /// The words of the first estimation that fails.
+    pub fn undone(&self, slip: Slip) -> Result<Self, String> {
+        let replayed: Result<Vec<(Key, Estimates)>, String> = self
+            .0
+            .par_iter()
+            .map(|(key, estimates)| {
+                let mut estimates = estimates.clone();
+                if key.is_touched_by(slip) {
+                    estimates.slipped = replay(*key, Some(slip))?;
+                }
+                Ok((*key, estimates))
+            })
+            .collect();
+        Ok(Self(replayed?.into_iter().collect()))
+    }
+
     /// The estimates of a key.
     pub fn get(&self, key: Key) -> Option<&Estimates> {
         self.0.get(&key)
@@ -103,18 +136,26 @@ impl Results {
 }
 
 fn estimate(key: Key) -> Result<Estimates, String> {
-    let case = key.case();
-    let (replayed, right) = (slipped(case, key.method)?, correct(case, key.method)?);
+    let right = correct(key.case(), key.method)?;
     let fit: fn(&Sequences) -> Listed =
         if key.frequency { estimates::frequency } else { estimates::time };
-    let slipped_fit: fn(&Sequences) -> Listed = match (key.frequency, key.free_force) {
-        (true, true) => estimates::frequency_offset_free_force,
-        (true, false) => estimates::frequency_offset,
-        (false, _) => estimates::time,
-    };
     Ok(Estimates {
-        slipped: slipped_fit(&replayed)?,
+        slipped: replay(key, None)?,
         correct: fit(&right)?,
         best: estimates::best(&right)?,
     })
+}
+
+/// The printed estimate of a key from the slips of the original programs, all or all but one.
+fn replay(key: Key, undone: Option<Slip>) -> Listed {
+    let sequences = slipped_but(key.case(), key.method, undone)?;
+    let offset = undone != Some(Slip::HarmonicOffset);
+    let free_force = key.free_force && undone != Some(Slip::FreeForceCoefficient);
+    match (key.frequency, offset, free_force) {
+        (false, _, _) => estimates::time(&sequences),
+        (true, true, true) => estimates::frequency_offset_free_force(&sequences),
+        (true, true, false) => estimates::frequency_offset(&sequences),
+        (true, false, true) => estimates::frequency_free_force(&sequences),
+        (true, false, false) => estimates::frequency(&sequences),
+    }
 }

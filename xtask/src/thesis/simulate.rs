@@ -9,7 +9,7 @@ use mechid::signal::Record;
 
 use super::case::{Case, Machine};
 use super::published::Method;
-use super::slips::{one_sample_early, stage_loads};
+use super::slips::{Slip, one_sample_early, stage_loads};
 
 /// What an estimator is given: one period of motion and force.
 #[derive(Debug, Clone)]
@@ -23,7 +23,7 @@ pub struct Sequences {
 }
 
 /// The scheme behind a column, with the parameters of the dissertation.
-fn scheme(method: Method) -> Box<dyn Scheme> {
+pub fn scheme(method: Method) -> Box<dyn Scheme> {
     match method {
         Method::Newmark => Box::new(Newmark::AVERAGE_ACCELERATION),
         Method::CentralDifference => Box::new(CentralDifference::default()),
@@ -53,33 +53,53 @@ pub fn correct(case: Case, method: Method) -> Result<Sequences, String> {
 /// # Errors
 /// The integrator's own words.
 pub fn slipped(case: Case, method: Method) -> Result<Sequences, String> {
+    slipped_but(case, method, None)
+}
+
+/// The same with one slip undone, to see what it alone is needed for.
+///
+/// # Errors
+/// The integrator's own words.
+pub fn slipped_but(case: Case, method: Method, undone: Option<Slip>) -> Result<Sequences, String> {
     let words = |e| format!("{}: {e}", method.name());
-    let machine = match (case.machine, method) {
-        (Machine::Bearing { .. }, Method::Rk4) => Machine::Bearing { kyx: KyxSign::Minus },
-        (Machine::Bearing { .. }, _) => Machine::Bearing { kyx: KyxSign::Plus },
-        (single, _) => single,
+    let applied = |slip| undone != Some(slip);
+    let kyx = if method != Method::Rk4 && applied(Slip::StiffnessSign) {
+        KyxSign::Plus
+    } else {
+        KyxSign::Minus
+    };
+    let machine = match case.machine {
+        Machine::Bearing { .. } => Machine::Bearing { kyx },
+        single => single,
     };
     let (system, force) = (machine.system(), case.force());
-    let response = if method == Method::Rk4 {
+    let response = if method == Method::Rk4 && applied(Slip::RungeKuttaStageLoads) {
         let (samples, middles) = stage_loads(&force);
         let loads = SampledForce::with_mid_step(&samples, &middles);
         integrate_periodic(&RungeKutta4::SUPPLIED, &system, loads).map_err(words)?
     } else {
         integrate_periodic(scheme(method).as_ref(), &system, &force).map_err(words)?
     };
-    let response = misplaced(response, method);
+    let response = match method {
+        Method::CentralDifference if applied(Slip::CentralDifferenceLead) => lead(&response),
+        Method::WilsonTheta if applied(Slip::WilsonLoadLag) => lag(&response),
+        _ => response,
+    };
     Ok(Sequences { machine, response, force })
 }
 
-/// The response as the original program stored it beside the force.
-fn misplaced(response: Response, method: Method) -> Response {
+/// The displacement alone stored one sample early.
+fn lead(response: &Response) -> Response {
+    stored(response, response.velocity().clone(), response.acceleration().clone())
+}
+
+/// The whole response stored one sample early.
+fn lag(response: &Response) -> Response {
+    let (velocity, acceleration) = (response.velocity(), response.acceleration());
+    stored(response, one_sample_early(velocity), one_sample_early(acceleration))
+}
+
+fn stored(response: &Response, velocity: Record, acceleration: Record) -> Response {
     let early = one_sample_early(response.displacement());
-    let (velocity, acceleration) = match method {
-        Method::CentralDifference => (response.velocity().clone(), response.acceleration().clone()),
-        Method::WilsonTheta => {
-            (one_sample_early(response.velocity()), one_sample_early(response.acceleration()))
-        }
-        _ => return response,
-    };
     Response::new(early, velocity, acceleration).expect("the same time axis")
 }
