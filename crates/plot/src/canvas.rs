@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::style::{Color, Dash};
-use crate::text::{FAMILY, Level, SCRIPT_SIZE, Weight, runs};
+use crate::text::{FAMILY, Level, SCRIPT_SIZE, Weight, runs, text_width};
 
 /// A point on the sheet, px, from the top left corner.
 pub type Point = (f64, f64);
@@ -189,6 +189,13 @@ impl Canvas {
         );
         if style.weight == Weight::Bold {
             self.body.push_str(r#" font-weight="bold""#);
+        }
+        // Italic advances are not measured, renderers differ on texts with scripts, and one or two
+        // letters need no help.
+        let plain = !style.italic && runs(text).len() == 1;
+        if plain && text.chars().nth(2).is_some() {
+            let length = num(text_width(text, style.size, style.weight));
+            let _ = write!(self.body, r#" textLength="{length}" lengthAdjust="spacingAndGlyphs""#);
         }
         if style.italic {
             self.body.push_str(r#" font-style="italic""#);

@@ -117,17 +117,12 @@ fn draw_curve(
         sheet.close_group();
         return;
     }
+    let radius = marker_radius(layout.size.0, points.len());
     if curve.kind == Kind::Stems {
-        let base = trace::stem_base(layout.maps, panel.y.scale, layout.y_range);
-        // Hundreds of stems would run into one block.
-        let width = (layout.size.0 / points.len() as f64 * 0.5).clamp(0.5, 1.3);
-        for &(x, y) in &points {
-            sheet.line((x, base), (x, y), Stroke::solid(style.color, width));
-        }
+        draw_stems(panel, layout, &points, style.color, sheet);
     }
-    if curve.has_markers() {
-        let radius = marker_radius(layout.size.0, points.len());
-        for &point in &points {
+    if curve.has_markers() && (curve.kind != Kind::Stems || radius > LEAST_RADIUS) {
+        for point in trace::thin_markers(points.clone()) {
             marker(sheet, style.marker, point, radius, style.color);
         }
     }
@@ -138,11 +133,30 @@ fn draw_curve(
     }
 }
 
+fn draw_stems(
+    panel: &Panel,
+    layout: &PanelLayout,
+    points: &[Point],
+    color: Color,
+    sheet: &mut Canvas,
+) {
+    let base = trace::stem_base(layout.maps, panel.y.scale, layout.y_range);
+    let stems = trace::thin_stems(points, base);
+    // Hundreds of stems would run into one block.
+    let width = (layout.size.0 / stems.len() as f64 * 0.5).clamp(0.5, 1.3);
+    for (x, y) in stems {
+        sheet.line((x, base), (x, y), Stroke::solid(color, width));
+    }
+}
+
 const BAND_OPACITY: f64 = 0.22;
+
+/// Smallest marker; stems that crowd more are drawn without.
+const LEAST_RADIUS: f64 = 1.4;
 
 /// Markers shrink before they run into one another.
 fn marker_radius(width: f64, count: usize) -> f64 {
-    (0.45 * width / count as f64).clamp(1.4, 3.6)
+    (0.45 * width / count as f64).clamp(LEAST_RADIUS, 3.6)
 }
 
 /// Draws a marker whose extent is about `radius` on each side.

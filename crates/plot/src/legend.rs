@@ -8,7 +8,9 @@ use crate::style::{Color, Resolved};
 use crate::text::{Weight, text_width};
 
 const ROW: f64 = 18.0;
-const SAMPLE: f64 = 36.0;
+/// Length of a sample with a line in it, and of one without.
+const LINE_SAMPLE: f64 = 36.0;
+const POINT_SAMPLE: f64 = 12.0;
 const GAP: f64 = 7.0;
 const BETWEEN: f64 = 20.0;
 const PADDING: f64 = 7.0;
@@ -29,17 +31,27 @@ pub(crate) struct Entry {
 }
 
 impl Entry {
-    fn width(&self) -> f64 {
-        SAMPLE + GAP + text_width(&self.label, TEXT, Weight::Regular)
+    fn sample_length(&self) -> f64 {
+        match self.sample {
+            Sample::Curve(Kind::Points | Kind::Stems, _) => POINT_SAMPLE,
+            _ => LINE_SAMPLE,
+        }
     }
 
-    fn draw(&self, sheet: &mut Canvas, (x, y): Point) {
+    fn width(&self) -> f64 {
+        self.sample_length() + GAP + text_width(&self.label, TEXT, Weight::Regular)
+    }
+
+    /// Draws the entry from `x` on, its label `indent` further to the right.
+    fn draw(&self, sheet: &mut Canvas, (x, y): Point, indent: f64) {
+        let length = self.sample_length();
+        let start = x + (indent - length) / 2.0;
         match self.sample {
-            Sample::Curve(kind, style) => draw::sample(sheet, kind, style, (x, y), SAMPLE),
-            Sample::Line(stroke) => sheet.line((x, y), (x + SAMPLE, y), stroke),
+            Sample::Curve(kind, style) => draw::sample(sheet, kind, style, (start, y), length),
+            Sample::Line(stroke) => sheet.line((start, y), (start + length, y), stroke),
         }
         let style = TextStyle::new(TEXT).anchored(Anchor::Start);
-        sheet.text((x + SAMPLE + GAP, y + 0.36 * TEXT), &self.label, &style);
+        sheet.text((x + indent + GAP, y + 0.36 * TEXT), &self.label, &style);
     }
 }
 
@@ -71,10 +83,16 @@ pub(crate) fn reference_stroke(reference: &Reference) -> Stroke {
     Stroke { color: reference.color, width: 1.1, dash: reference.dash }
 }
 
+/// Room for the samples of a legend whose labels stand one under the other.
+fn indent(entries: &[Entry]) -> f64 {
+    entries.iter().map(Entry::sample_length).fold(0.0, f64::max)
+}
+
 /// Size of a legend that stands inside a panel, one entry under the other.
 pub(crate) fn box_size(entries: &[Entry]) -> Point {
-    let widest = entries.iter().map(Entry::width).fold(0.0, f64::max);
-    (widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
+    let label = |entry: &Entry| entry.width() - entry.sample_length();
+    let widest = entries.iter().map(label).fold(0.0, f64::max);
+    (indent(entries) + widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
 }
 
 /// The corner, inside the frame from `corner` of `size`, at which a box of `legend` hides none of `drawn`.
@@ -118,7 +136,11 @@ pub(crate) fn draw_box(sheet: &mut Canvas, entries: &[Entry], (x, y): Point) {
     let edge = Stroke::solid(Color("#c8c8c8"), 0.7);
     sheet.rect((x, y), box_size(entries), Some(Color::WHITE), Some(edge));
     for (row, entry) in entries.iter().enumerate() {
-        entry.draw(sheet, (x + PADDING, y + PADDING - 2.0 + ROW * (row as f64 + 0.5)));
+        entry.draw(
+            sheet,
+            (x + PADDING, y + PADDING - 2.0 + ROW * (row as f64 + 0.5)),
+            indent(entries),
+        );
     }
 }
 
@@ -156,7 +178,7 @@ pub(crate) fn draw_strip(sheet: &mut Canvas, entries: &[Entry], at: Point, width
             members.iter().map(Entry::width).sum::<f64>() + BETWEEN * (members.len() - 1) as f64;
         let mut x = at.0 + (width - total) / 2.0;
         for entry in members {
-            entry.draw(sheet, (x, at.1 + ROW * (row as f64 + 0.5)));
+            entry.draw(sheet, (x, at.1 + ROW * (row as f64 + 0.5)), entry.sample_length());
             x += entry.width() + BETWEEN;
         }
     }

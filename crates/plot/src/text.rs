@@ -15,8 +15,10 @@ pub enum Weight {
     Bold,
 }
 
-/// Family names offered to a viewer: the embedded font first, then what is metrically near it, then any sans serif.
-pub(crate) const FAMILY: &str = "Noto Sans, Open Sans, DejaVu Sans, Verdana, sans-serif";
+/// Family names offered to a viewer: the embedded font first, then near relations, then any sans serif.
+/// [`Canvas::text`](crate::Canvas::text) states each text's length, so another font changes letters but no layout.
+pub(crate) const FAMILY: &str =
+    "Noto Sans, Open Sans, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif";
 
 /// The embedded font's files: regular, bold, italic.
 pub(crate) const FONTS: [&[u8]; 3] =

@@ -1,5 +1,7 @@
 //! Curves as pixels: mapped, thinned out, and felt for by legends.
 
+use std::collections::HashSet;
+
 use crate::axis::{Mapping, Scale};
 use crate::canvas::Point;
 use crate::curve::{Curve, Kind};
@@ -57,15 +59,33 @@ pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     kept
 }
 
+/// Leaves one of the points that fall on the same half pixel, the first: the others would not be seen.
+pub(crate) fn thin_markers(points: Vec<Point>) -> Vec<Point> {
+    let half_pixel = |value: f64| (2.0 * value).floor() as i64;
+    let mut taken = HashSet::with_capacity(points.len());
+    points.into_iter().filter(|(x, y)| taken.insert((half_pixel(*x), half_pixel(*y)))).collect()
+}
+
+/// Leaves of the stems that follow one another on the same half pixel of width the longest.
+pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
+    let longer = |a: &&Point, b: &&Point| (a.1 - base).abs().total_cmp(&(b.1 - base).abs());
+    points
+        .chunk_by(|a, b| (2.0 * a.0).floor() == (2.0 * b.0).floor())
+        .filter_map(|column| column.iter().max_by(longer).copied())
+        .collect()
+}
+
 /// Pixels close together along everything a curve draws.
 pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Point> {
     let lower = map(maps, &curve.x, &curve.y);
     match curve.kind {
-        Kind::Points => lower,
+        Kind::Points => thin_markers(lower),
         Kind::Line | Kind::MarkedLine => {
             dense(thin_out(lower, width).windows(2).map(|pair| (pair[0], pair[1])))
         }
-        Kind::Stems => dense(lower.into_iter().map(|(x, y)| ((x, base), (x, y)))),
+        Kind::Stems => {
+            dense(thin_stems(&lower, base).into_iter().map(|(x, y)| ((x, base), (x, y))))
+        }
         Kind::Band => {
             let upper = map(maps, &curve.x, &curve.upper);
             dense(lower.windows(2).chain(upper.windows(2)).map(|pair| (pair[0], pair[1])))
@@ -111,6 +131,16 @@ mod tests {
             assert_eq!(highest(&kept), highest(&points));
         }
         assert!(kept.windows(2).all(|pair| pair[0].0 <= pair[1].0));
+    }
+
+    #[test]
+    fn of_crowded_stems_the_longest_are_left() {
+        let points: Vec<Point> =
+            (0..1000).map(|i| (f64::from(i) * 0.01, f64::from(i % 7) - 3.0)).collect();
+        let kept = thin_stems(&points, 1.0);
+        assert_eq!(kept.len(), 20, "ten pixels have twenty halves");
+        assert!(kept.iter().all(|(_, y)| *y == -3.0));
+        assert_eq!(thin_markers(points).len(), 20 * 7);
     }
 
     #[test]

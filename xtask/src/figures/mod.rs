@@ -107,15 +107,19 @@ mod tests {
         assert_eq!(made.len(), 5);
         for Numbered { number, figure } in &made {
             assert!(figure.to_svg().unwrap().contains(number), "{number}");
-            let points: usize = figure
+            let text = table(figure).unwrap();
+            let filled: usize = text
+                .lines()
+                .skip(1)
+                .map(|row| row.split(',').filter(|cell| cell.parse::<f64>().is_ok()).count())
+                .sum();
+            let drawn: usize = figure
                 .panels()
                 .iter()
-                .map(|panel| {
-                    panel.references().len()
-                        + panel.data().iter().map(|c| c.x().len()).sum::<usize>()
-                })
+                .flat_map(|panel| panel.data())
+                .map(|curve| curve.y().len())
                 .sum();
-            assert_eq!(table(figure).unwrap().lines().count(), points + 1, "{number}");
+            assert!(filled > drawn, "{number}: {filled} numbers for {drawn} points");
         }
     }
 

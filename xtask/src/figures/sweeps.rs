@@ -66,7 +66,12 @@ impl Sweep {
         let truth = self.machine.truth()[index];
         let quantity = Quantity::new(&name, unit(parameter));
         let span = self.npi.last().unwrap_or(&0.0) - self.npi.first().unwrap_or(&0.0);
-        let setting = Axis::linear("NPI", "").step(if span > 10.0 { 2.0 } else { 0.5 });
+        let step = match span {
+            wide if wide > 10.0 => 2.0,
+            middle if middle > 3.0 => 1.0,
+            _ => 0.5,
+        };
+        let setting = Axis::linear("NPI", "").step(step);
         let mut panel = sweep_panel(setting, quantity, &series, Some(truth));
         for (value, label) in self
             .window
