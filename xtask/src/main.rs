@@ -1,12 +1,13 @@
-//! Project tasks.
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+//! `cargo xtask …`: project tasks.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "a program talks to its terminal")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::time::Instant;
 
 use clap::{Parser, Subcommand};
 use indicatif::ProgressBar;
-use xtask::figures;
+use xtask::thesis::reproduce::{self, Reproduction};
 
 /// Project tasks.
 #[derive(Debug, Parser)]
@@ -18,35 +19,69 @@ struct Tasks {
 
 #[derive(Debug, Subcommand)]
 enum Task {
-    /// Draw the dissertation's figures: sketches, block diagrams, and plots with their numbers.
-    Figures {
-        /// Folder the files go to.
-        #[arg(default_value = "docs/thesis/figures")]
-        folder: PathBuf,
-        /// Only this figure (5.6.10) or this part (5.6, P1).
-        #[arg(long, default_value = "")]
-        only: String,
-        /// Write PNG files as well.
+    /// Compute every table and figure of the dissertation, and write them with the audit page.
+    ReproduceThesis {
+        /// Only the table or figure of this number, for example 5.6.4 or figure-5.2.4.
+        #[arg(long, value_name = "NUMBER")]
+        only: Option<String>,
+        /// Compare with the golden files and write nothing; fails on any difference over 1e-9.
+        #[arg(long, conflicts_with = "bless")]
+        check: bool,
+        /// Rewrite the golden files on purpose.
         #[arg(long)]
-        png: bool,
+        bless: bool,
+        /// Folder the tables and figures go to [default: docs/thesis].
+        #[arg(long, value_name = "FOLDER")]
+        out: Option<PathBuf>,
     },
 }
 
 fn main() -> ExitCode {
-    let done = match Tasks::parse().task {
-        Task::Figures { folder, only, png } => {
-            let wanted = |number: &str| figures::selects(&only, number);
-            let bar = ProgressBar::new(figures::count(wanted) as u64);
-            let done = figures::write(&folder, wanted, png, || bar.inc(1));
-            bar.finish_and_clear();
-            done.map(|files| println!("{} files in {}", files.len(), folder.display()))
+    let Task::ReproduceThesis { only, check, bless, out } = Tasks::parse().task;
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
+    let out = out.unwrap_or_else(|| root.join("docs/thesis"));
+    let outcome = computed(root, only.as_deref()).and_then(|reproduction| {
+        if check {
+            return compared(root, &reproduction);
         }
-    };
-    match done {
+        let files = reproduction.write(&out)?;
+        println!("{files} files written to {}", out.display());
+        if bless {
+            reproduction.bless(root)?;
+            println!("{} golden files rewritten", reproduction.golden_files());
+        }
+        Ok(())
+    });
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(words) => {
-            eprintln!("{words}");
-            ExitCode::from(2)
+            eprintln!("error: {words}");
+            ExitCode::FAILURE
         }
     }
+}
+
+fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {
+    let start = Instant::now();
+    let bar = ProgressBar::new(reproduce::ticks(root)? as u64);
+    let all = reproduce::all(root, || bar.inc(1))?;
+    bar.finish_and_clear();
+    println!(
+        "{} tables and figures in {:.1} s",
+        all.artefacts.len(),
+        start.elapsed().as_secs_f64()
+    );
+    only.map_or(Ok(all.clone()), |number| all.only(number))
+}
+
+fn compared(root: &Path, reproduction: &Reproduction) -> Result<(), String> {
+    let differences = reproduction.differences(root);
+    if differences.is_empty() {
+        println!("{} golden files agree", reproduction.golden_files());
+        return Ok(());
+    }
+    for difference in differences.iter().take(20) {
+        eprintln!("{difference}");
+    }
+    Err(format!("{} differences from the golden files", differences.len()))
 }

@@ -9,13 +9,11 @@ mod force_spectra;
 mod frequency_responses;
 mod series;
 mod sweeps;
-mod write;
 
 use mechid::plot::Figure;
 use rayon::prelude::*;
 
 pub use self::csv::table;
-pub use self::write::{count, selects, write};
 
 /// One figure under the dissertation's number.
 #[derive(Debug, Clone, PartialEq)]

@@ -37,6 +37,28 @@ impl Slip {
         Slip::LostSigns,
     ];
 
+    /// The slips that the reproduction of a table replays.
+    pub fn of_table(table: &str) -> Vec<Self> {
+        let frequency =
+            table.starts_with("5.3.") || table.starts_with("5.7.") || table.starts_with('A');
+        let bearing = !table.starts_with("5.2.") && !table.starts_with("5.3.");
+        let newmark_alone = table == "5.3.3";
+        let free_force = matches!(table, "5.3.1" | "5.3.2");
+        let lost = matches!(table, "5.6.9" | "5.6.17" | "5.3.2");
+        Self::ALL
+            .into_iter()
+            .filter(|slip| match slip {
+                Slip::CentralDifferenceLead | Slip::WilsonLoadLag | Slip::RungeKuttaStageLoads => {
+                    !newmark_alone
+                }
+                Slip::HarmonicOffset => frequency,
+                Slip::StiffnessSign => bearing,
+                Slip::FreeForceCoefficient => free_force,
+                Slip::LostSigns => lost,
+            })
+            .collect()
+    }
+
     /// The name the audit page uses.
     pub fn name(self) -> &'static str {
         match self {

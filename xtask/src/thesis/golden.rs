@@ -1,0 +1,123 @@
+//! Golden files: our own numbers, many digits, a tripwire and no evidence.
+
+use std::path::{Path, PathBuf};
+
+use super::reproduce::Artefact;
+
+/// Relative difference from which two numbers count as different.
+const TOLERANCE: f64 = 1e-9;
+
+/// Below this share of the largest number of its column a difference is rounding noise.
+const NOISE: f64 = 1e-12;
+
+/// The same for errors in per cent: a value that moved by 1e-9 of itself moves its error by this.
+const PERCENT_NOISE: f64 = 100.0 * TOLERANCE;
+
+/// Where the golden file of an artefact lies.
+pub fn path(root: &Path, artefact: &Artefact) -> PathBuf {
+    root.join("tests/golden").join(format!("{}.csv", artefact.name))
+}
+
+/// Rewrites the golden file; a drawing has none.
+///
+/// # Errors
+/// A sentence naming the file that cannot be written.
+pub fn bless(root: &Path, artefact: &Artefact) -> Result<(), String> {
+    let Some(csv) = &artefact.csv else { return Ok(()) };
+    let path = path(root, artefact);
+    let words = |e: std::io::Error| format!("{}: {e}", path.display());
+    std::fs::create_dir_all(root.join("tests/golden")).map_err(words)?;
+    std::fs::write(&path, csv).map_err(words)
+}
+
+/// Every difference between an artefact and its golden file, one sentence each.
+pub fn differences(root: &Path, artefact: &Artefact) -> Vec<String> {
+    let Some(csv) = &artefact.csv else { return Vec::new() };
+    let path = path(root, artefact);
+    let golden = match std::fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(e) => {
+            return vec![format!("{}: no golden file ({}: {e})", artefact.name, path.display())];
+        }
+    };
+    compare(&artefact.name, &cells(&golden), &cells(csv))
+}
+
+type Grid = Vec<Vec<String>>;
+
+fn cells(text: &str) -> Grid {
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    reader.records().map_while(Result::ok).map(|r| r.iter().map(str::to_owned).collect()).collect()
+}
+
+fn compare(name: &str, golden: &Grid, ours: &Grid) -> Vec<String> {
+    if golden.len() != ours.len() {
+        return vec![format!("{name}: {} rows where golden has {}", ours.len(), golden.len())];
+    }
+    let columns = golden.iter().map(Vec::len).max().unwrap_or(0);
+    let noise: Vec<f64> = (0..columns).map(|c| noise(golden, c)).collect();
+    let mut found = Vec::new();
+    for (row, (g, o)) in golden.iter().zip(ours).enumerate() {
+        if g.len() != o.len() {
+            found.push(format!(
+                "{name}, row {row}: {} cells where golden has {}",
+                o.len(),
+                g.len()
+            ));
+            continue;
+        }
+        for (column, (g, o)) in g.iter().zip(o).enumerate() {
+            if !same(g, o, noise[column]) {
+                let head = golden[0].get(column).map_or("", String::as_str);
+                found.push(format!("{name}, row {row}, column {head}: golden {g:?}, now {o:?}"));
+            }
+        }
+    }
+    found
+}
+
+/// The absolute difference a column's numbers may have.
+fn noise(grid: &Grid, column: usize) -> f64 {
+    let head = grid.first().and_then(|r| r.get(column)).map_or("", String::as_str);
+    if head.ends_with("_percent") {
+        return PERCENT_NOISE;
+    }
+    let numbers = grid.iter().filter_map(|r| r.get(column)?.parse::<f64>().ok());
+    NOISE * numbers.map(f64::abs).filter(|v| v.is_finite()).fold(0.0, f64::max)
+}
+
+fn same(golden: &str, ours: &str, noise: f64) -> bool {
+    match (golden.parse::<f64>(), ours.parse::<f64>()) {
+        (Ok(g), Ok(o)) => (g - o).abs() <= (TOLERANCE * g.abs().max(o.abs())).max(noise),
+        _ => golden == ours,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(golden: &str, ours: &str) -> Vec<String> {
+        compare("t", &cells(golden), &cells(ours))
+    }
+
+    #[test]
+    fn rounding_passes_and_a_moved_number_is_named() {
+        let golden = "npi,k\n2,5000.0\n4,0.0\n";
+        assert!(found(golden, "npi,k\n2,5000.000000001\n4,1e-12\n").is_empty());
+        assert!(found("e_percent\n1e-7\n", "e_percent\n1.5e-7\n").is_empty());
+        assert_eq!(found("e_percent\n1e-7\n", "e_percent\n3e-7\n").len(), 1);
+        assert_eq!(
+            found(golden, "npi,k\n2,5000.1\n4,0.0\n"),
+            ["t, row 1, column k: golden \"5000.0\", now \"5000.1\""]
+        );
+    }
+
+    #[test]
+    fn words_and_shapes_must_agree() {
+        assert_eq!(found("v\nto the digit\n", "v\nunexplained\n").len(), 1);
+        assert_eq!(found("v\n1\n", "v\n1\n2\n").len(), 1);
+        assert_eq!(found("v\n1\n", "v\n1,2\n").len(), 1);
+    }
+}

@@ -1,0 +1,72 @@
+//! Appendix B: estimates on records refined by straight lines.
+//!
+//! The text names neither the integrator nor what was interpolated. What stands here is the plain
+//! reading: Newmark, Nt = 128, displacement, velocity and force refined together. It does not give
+//! the printed numbers, nor does any other reading we tried.
+
+use mechid::estimate::Unknowns;
+use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::signal::resample::refine;
+use mechid::signal::{Interpolation, Record};
+
+use super::case::{Case, Machine};
+use super::cells::{Judged, Row};
+use super::published::{Cell, Method, Published};
+use super::simulate::{Sequences, correct};
+use super::verdict::Verdict;
+
+/// Tables B1 and B2.
+///
+/// # Errors
+/// The words of the estimation that fails.
+pub fn rows(table: &str, published: &Published) -> Result<Vec<Row>, String> {
+    let points = if table == "B1" { 1 } else { 2 };
+    published.table(table).map(|cell| row(cell, points)).collect()
+}
+
+fn row(cell: &Cell, points: usize) -> Result<Row, String> {
+    let npi = cell.npi.ok_or("tables B1 and B2 state NPI")?;
+    let case = Case { machine: Machine::SDOF, nt: 128, npi };
+    let sequences = correct(case, Method::Newmark)?;
+    let at = Machine::SDOF.parameters().iter().position(|p| *p == cell.parameter).unwrap_or(0);
+    let truth = Machine::SDOF.truth()[at];
+    let percent = |v: f64| 100.0 * ((v - truth) / truth).abs();
+    let euler = refined(&sequences, points + 1, Discretisation::Euler)?[at];
+    let best = refined(&sequences, 1, Discretisation::FirstOrderHold)?[at];
+    let judged = |printed: &str, value| Judged {
+        printed: printed.to_owned(),
+        value,
+        verdict: Verdict::Unexplained,
+        reason: None,
+    };
+    Ok(Row {
+        cell: cell.clone(),
+        estimate: judged(&cell.estimate, euler),
+        error: judged(&cell.error_percent, percent(euler)),
+        correct: euler,
+        correct_error: percent(euler),
+        best,
+        best_error: percent(best),
+    })
+}
+
+fn refined(
+    sequences: &Sequences,
+    factor: usize,
+    discretisation: Discretisation,
+) -> Result<Vec<f64>, String> {
+    let words = |e: mechid::signal::SignalError| e.to_string();
+    let line = |r: &Record| refine(r, factor, Interpolation::Linear).map_err(words);
+    let unknowns =
+        Unknowns::known_mass(sequences.machine.system().mass()).map_err(|e| e.to_string())?;
+    let fit = TimeDomain::new(discretisation, Extent::Open)
+        .fit(
+            &line(sequences.response.displacement())?,
+            &line(sequences.response.velocity())?,
+            &line(&sequences.force)?,
+            &unknowns,
+        )
+        .map_err(|e| e.to_string())?;
+    let estimate = fit.estimate();
+    Ok(sequences.machine.listed(&estimate.stiffness(), &estimate.damping()))
+}

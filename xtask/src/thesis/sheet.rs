@@ -1,0 +1,56 @@
+//! A table on its way to CSV and Markdown.
+
+use std::fmt::Write as _;
+
+/// Rows of text under named columns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Sheet {
+    /// Column names.
+    pub header: Vec<&'static str>,
+    /// Cells, as many per row as there are columns.
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Sheet {
+    /// A table without rows.
+    pub fn new(header: &[&'static str]) -> Self {
+        Self { header: header.to_vec(), rows: Vec::new() }
+    }
+
+    /// Comma-separated, quoted where a cell needs it.
+    pub fn to_csv(&self) -> String {
+        let mut writer = csv::Writer::from_writer(Vec::new());
+        writer.write_record(&self.header).expect("memory takes all");
+        for row in &self.rows {
+            writer.write_record(row).expect("as many cells as columns");
+        }
+        let bytes = writer.into_inner().expect("memory takes all");
+        String::from_utf8(bytes).expect("written from strings")
+    }
+
+    /// A pipe table.
+    pub fn to_markdown(&self) -> String {
+        let mut text = format!("| {} |\n|", self.header.join(" | "));
+        text.push_str(&"---|".repeat(self.header.len()));
+        text.push('\n');
+        for row in &self.rows {
+            let _ = writeln!(text, "| {} |", row.join(" | ").replace('\n', " "));
+        }
+        text
+    }
+}
+
+/// Every digit of a number, for the files a comparison reads; empty where there is none.
+pub fn exact(value: f64) -> String {
+    if value.is_finite() { format!("{value:?}") } else { String::new() }
+}
+
+/// Enough digits to read beside a printed number; a dash where there is none.
+pub fn short(value: f64) -> String {
+    match value.abs() {
+        v if !v.is_finite() => "–".to_owned(),
+        v if v >= 1000.0 => format!("{value:.2}"),
+        v if v >= 1.0 => format!("{value:.3}"),
+        _ => format!("{value:.4}"),
+    }
+}
