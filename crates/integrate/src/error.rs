@@ -126,15 +126,11 @@ pub enum IntegrateError {
         /// Degree of freedom, counted from 1.
         component: usize,
     },
-    /// A damping ratio or a step that no accuracy analysis can use.
-    #[error("{what} must be finite and at least {least}, got {value}")]
-    Analysis {
-        /// The quantity.
-        what: &'static str,
-        /// Smallest value allowed.
-        least: f64,
-        /// The value given.
-        value: f64,
+    /// An accuracy analysis needs a motion that oscillates.
+    #[error("the damping ratio must be at least 0 and less than 1, got {damping_ratio}")]
+    DampingRatio {
+        /// The ratio given.
+        damping_ratio: f64,
     },
     /// A system is not usable.
     #[error(transparent)]

@@ -33,7 +33,9 @@
 //! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
 //! fail nor allocate. [`integrate()`] and [`integrate_periodic`] run it over a sampled force,
 //! [`integrate_function`] and [`integrate_periodic_function`] over a function of time.
+//! [`spectral_radius`], [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
+mod accuracy;
 mod central_difference;
 mod driver;
 mod effective;
@@ -45,10 +47,11 @@ mod periodic;
 mod run;
 mod runge_kutta;
 mod scheme;
-pub mod stability;
+mod stability;
 mod transition;
 mod wilson_theta;
 
+pub use accuracy::{Accuracy, accuracy};
 pub use central_difference::{CentralDifference, CentralDifferenceStart};
 pub use driver::{integrate, integrate_function};
 pub use error::IntegrateError;
@@ -58,5 +61,6 @@ pub use newmark::Newmark;
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, Stepper};
+pub use stability::{critical_step, spectral_radius};
 pub use transition::Transition;
 pub use wilson_theta::{WilsonLoad, WilsonTheta};

@@ -6,6 +6,7 @@
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
+use nalgebra::{Complex, DVector, Schur};
 
 use crate::{IntegrateError, Scheme, Stepper, Transition};
 
@@ -14,8 +15,9 @@ use crate::{IntegrateError, Scheme, Stepper, Transition};
 /// million steps to grow by a factor e.
 const TOLERATED: f64 = 1e-6;
 
-/// Growth per step above which a step lies beyond the critical one, where rounding permits.
-const SHARP: f64 = 1e-10;
+/// Growth per step above which a step lies beyond the critical one, unless the system has a double
+/// eigenvalue that rounding splits further: well above what rounding makes of a double one nearby.
+const SHARP: f64 = 1e-9;
 
 /// Spectral radius of the amplification matrix of `scheme` on `system` at a step of `dt` seconds.
 ///
@@ -27,7 +29,34 @@ pub fn spectral_radius(
     dt: f64,
 ) -> Result<f64, IntegrateError> {
     let mut stepper = scheme.prepare_unchecked(system, dt)?;
-    Ok(growth(&Transition::of(stepper.as_mut()), f64::NEG_INFINITY).exp())
+    Ok(radius(&Transition::of(stepper.as_mut())))
+}
+
+/// Spectral radius of I + D: from the eigenvalues of D, which keep their digits where two of them
+/// nearly coincide, or from [`growth`] should the QR iteration not converge.
+pub(crate) fn radius(transition: &Transition) -> f64 {
+    match eigenvalues(transition) {
+        Some(eigenvalues) => {
+            eigenvalues.iter().map(|mu| (0.5 * log_square(*mu)).exp()).fold(0.0, f64::max)
+        }
+        None => growth(transition, f64::NEG_INFINITY).exp(),
+    }
+}
+
+/// ln |1 + μ|² without the cancellation that |1 + μ| ≈ 1 would bring.
+pub(crate) fn log_square(mu: Complex<f64>) -> f64 {
+    (2.0 * mu.re + mu.norm_sqr()).ln_1p()
+}
+
+/// The eigenvalues μ of D; those of the amplification matrix are 1 + μ.
+pub(crate) fn eigenvalues(transition: &Transition) -> Option<DVector<Complex<f64>>> {
+    let mut change = transition.change.clone();
+    if change.iter().any(|v| !v.is_finite()) {
+        return None;
+    }
+    balance_parlett_reinsch(&mut change);
+    let iterations = 1000 * change.nrows();
+    Some(Schur::try_new(change, f64::EPSILON, iterations)?.complex_eigenvalues())
 }
 
 /// The largest step at which `scheme` does not make the motion of `system` grow, in seconds;
@@ -64,7 +93,9 @@ fn limit(
     let excess = |dt: f64, tolerated: f64| -> Result<f64, IntegrateError> {
         let mut stepper = prepare(dt)?;
         let allowed = tolerated + 2.0 * own_growth * dt;
-        Ok(growth(&Transition::of(stepper.as_mut()), allowed) - allowed)
+        let transition = Transition::of(stepper.as_mut());
+        let bound = growth(&transition, allowed);
+        Ok(if bound <= allowed { bound } else { radius(&transition).ln() } - allowed)
     };
     let smallest = 1e-3 / fastest;
     let sharp = excess(smallest, SHARP)? <= 0.0;
@@ -121,8 +152,8 @@ pub(crate) fn refuse_unstable(
 /// ln ρ(A), or any bound of it from above that is not greater than `enough`.
 ///
 /// ‖A^m‖^(1/m) falls to ρ for m = 1, 2, 4 … (Gelfand's formula), each power being the square of
-/// the one before, scaled. It stays right where eigenvalues are defective, as at every stability
-/// limit, and where QR iterations do not converge.
+/// the one before, scaled. A damped motion is found to be one after a few products of matrices,
+/// long before eigenvalues are, and there is nothing that could fail to converge.
 fn growth(transition: &Transition, enough: f64) -> f64 {
     let mut power = transition.amplification();
     if power.iter().any(|v| !v.is_finite()) {
