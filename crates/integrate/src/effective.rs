@@ -1,7 +1,7 @@
 //! The one linear solve behind every implicit scheme: M̂ a = F − C v̂ − K x̂.
 
 use mechid_model::SecondOrderSystem;
-use nalgebra::{DMatrix, DVectorView, DVectorViewMut, Dyn, LU};
+use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut, Dyn, LU};
 
 use crate::IntegrateError;
 
@@ -25,14 +25,22 @@ impl Effective {
         gamma_hat: f64,
         beta_hat: f64,
     ) -> Result<Self, IntegrateError> {
-        let matrix = system.mass() + system.damping() * gamma_hat + system.stiffness() * beta_hat;
-        let factored = matrix.lu();
-        let pivots = factored.u().diagonal().abs();
-        let (smallest, largest) = (pivots.min(), pivots.max());
-        // Below ε·largest a pivot is rounding of a zero. NaN (from overflow) fails the test too.
-        if !(smallest > f64::EPSILON * largest && largest.is_finite()) {
-            return Err(IntegrateError::SingularEffectiveMass { scheme, dt, smallest, largest });
+        let terms =
+            [(1.0, system.mass()), (gamma_hat, system.damping()), (beta_hat, system.stiffness())];
+        let n = system.dof();
+        let matrix = DMatrix::from_fn(n, n, |i, j| terms.iter().map(|(s, t)| s * t[(i, j)]).sum());
+        // Rows divided by the size of the terms they are sums of: a pivot of ε is rounding of a
+        // zero, however far apart the masses and stiffnesses lie.
+        let sizes = DVector::from_fn(n, |i, _| {
+            terms.iter().map(|(s, t)| s * t.row(i).abs().sum()).sum::<f64>()
+        });
+        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / sizes[i]);
+        let smallest = scaled.lu().u().diagonal().abs().min();
+        // NaN (from overflow) fails the test too.
+        if !(smallest > f64::EPSILON && sizes.iter().all(|s| s.is_finite())) {
+            return Err(IntegrateError::SingularEffectiveMass { scheme, dt, smallest });
         }
+        let factored = matrix.lu();
         Ok(Self {
             factored,
             damping: system.damping().clone(),
@@ -58,14 +66,4 @@ impl Effective {
         // Cannot fail: the pivots were checked when M̂ was factored.
         self.factored.solve_mut(&mut rhs);
     }
-}
-
-/// The consistent acceleration at t = 0, M a = F(0) − C v − K x, in place of `force`.
-pub(crate) fn consistent_acceleration(
-    mass: &Effective,
-    displacement: &[f64],
-    velocity: &[f64],
-    force: &mut [f64],
-) {
-    mass.solve(velocity, displacement, force);
 }

@@ -68,17 +68,15 @@ pub enum IntegrateError {
     },
     /// The matrix the scheme has to solve with is singular.
     #[error(
-        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivots {smallest:.1e} and {largest:.1e})"
+        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)"
     )]
     SingularEffectiveMass {
         /// Which scheme.
         scheme: &'static str,
         /// Time step, in seconds.
         dt: f64,
-        /// Smallest pivot of its factorisation.
+        /// Smallest pivot of its factorisation, rows divided by the size of their terms.
         smallest: f64,
-        /// Largest pivot.
-        largest: f64,
     },
     /// The step makes the free motion of a stable system grow.
     #[error(

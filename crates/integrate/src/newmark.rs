@@ -2,7 +2,7 @@
 
 use mechid_model::{InitialState, SecondOrderSystem};
 
-use crate::effective::{Effective, consistent_acceleration};
+use crate::effective::Effective;
 use crate::scheme::check_step;
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
 
@@ -173,7 +173,7 @@ impl Stepper for NewmarkStepper {
     }
 }
 
-/// `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, into `state`.
+/// `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, M ẍ = F − C ẋ − K x, into `state`.
 pub(crate) fn start_consistently(
     mass: &Effective,
     initial: &InitialState,
@@ -184,7 +184,7 @@ pub(crate) fn start_consistently(
     x.copy_from_slice(initial.displacement().as_slice());
     v.copy_from_slice(initial.velocity().as_slice());
     a.copy_from_slice(force);
-    consistent_acceleration(mass, x, v, a);
+    mass.solve(v, x, a);
 }
 
 /// The three parts of a motion in `n` degrees of freedom.

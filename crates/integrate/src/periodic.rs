@@ -2,7 +2,6 @@
 
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::Sampling;
-use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::driver::Sampled;
@@ -30,7 +29,7 @@ pub fn integrate_periodic<'a>(
     let (samples, dof) = (table.sampling().len(), system.dof());
     let mut stepper = scheme.prepare(system, table.sampling().dt())?;
     let period = Period::of(&Transition::of(stepper.as_mut()), table.sampling())?;
-    let mut run = Run::new(stepper);
+    let mut run = Run::new(stepper, table.sampling().dt());
     let mut motion = Motion::zeros(samples, dof);
     run.advance(&table, 0, samples, &mut motion);
     let scale = period.norm(&run.state);
@@ -78,7 +77,11 @@ struct Period {
 impl Period {
     fn of(transition: &Transition, sampling: Sampling) -> Result<Self, IntegrateError> {
         let mut change = transition.change.clone();
-        let scales = balance_parlett_reinsch(&mut change);
+        let scales = Transition::balance(&mut change).ok_or(IntegrateError::NoPeriodicState {
+            period: sampling.duration(),
+            reciprocal_condition: 0.0,
+            rounding: f64::EPSILON,
+        })?;
         let steps = sampling.len();
         let over_period = -power_less_identity(&change, steps);
         // Each step's matrix is known to ε of its change, each product to ε of its result.

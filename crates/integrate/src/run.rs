@@ -63,9 +63,11 @@ pub(crate) struct Run {
 const FIXED_SIZE_DOF: usize = 2;
 
 impl Run {
-    pub(crate) fn new(mut stepper: Box<dyn Stepper>) -> Self {
+    pub(crate) fn new(mut stepper: Box<dyn Stepper>, dt: f64) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
-        let transition = (n <= FIXED_SIZE_DOF).then(|| Transition::of(stepper.as_mut()));
+        let transition = (n <= FIXED_SIZE_DOF)
+            .then(|| Transition::of(stepper.as_mut()))
+            .filter(|transition| resolves(transition, dt, n));
         let rows = [(); 4].map(|()| vec![0.0; n]);
         Self { stepper, transition, state: vec![0.0; len], change: vec![0.0; len], rows }
     }
@@ -129,6 +131,9 @@ impl Run {
         }
         let steps = streams.iter().map(|s| s.len()).min().unwrap_or(0).min(to - from);
         let steps = steps.min((motion.parts[0].nrows() - 1).saturating_sub(from));
+        if steps == 0 {
+            return from;
+        }
         let mut columns = motion.columns(from + 1, steps);
         let state = &mut self.state;
         match (state.len(), streams.len(), n) {
@@ -142,6 +147,15 @@ impl Run {
         }
         from + steps
     }
+}
+
+/// Whether the step is small against every period, (ωΔt)² below about 1.
+///
+/// The entries of D are rounded, each once and for all, and of the order of (ωΔt)²: beyond that
+/// limit a motion without damping would grow or decay by up to ε in every step. The stepper rounds
+/// anew each time and keeps the energy.
+fn resolves(transition: &Transition, dt: f64, n: usize) -> bool {
+    (0..n).all(|i| (dt * transition.change[(n + i, i)]).abs() <= 1.0)
 }
 
 /// `steps` steps z += D z + B w of a state of `S` numbers under `W` loads, the first `O` numbers of

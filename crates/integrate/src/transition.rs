@@ -1,6 +1,7 @@
 //! The linear map of one step, read off the stepping code by unit states and unit loads.
 
-use nalgebra::DMatrix;
+use nalgebra::linalg::balancing::balance_parlett_reinsch;
+use nalgebra::{DMatrix, DVector};
 
 use crate::{Instant, Loads, Stepper};
 
@@ -49,6 +50,14 @@ impl Transition {
             loads.push((instant, matrix));
         }
         Self { change, loads }
+    }
+
+    /// Scales `matrix`, a D or an A, to comparable rows and columns by powers of two; the scales s
+    /// with which z = s ∘ (balanced z). `None` if entries are too large for their squares to be
+    /// numbers, for which balancing has no end.
+    pub(crate) fn balance(matrix: &mut DMatrix<f64>) -> Option<DVector<f64>> {
+        let representable = matrix.iter().all(|v| v.abs() < 1e150);
+        representable.then(|| balance_parlett_reinsch(matrix))
     }
 
     /// The amplification matrix A = I + D.

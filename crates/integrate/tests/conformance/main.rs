@@ -1,6 +1,10 @@
 //! What every scheme must do: the suite that defines the word.
 
+mod bad_input;
 mod charts;
 mod common;
+mod definitions;
+mod invariances;
 mod order;
 mod periodic;
+mod random_stability;
