@@ -149,7 +149,7 @@ impl Multisine {
 
     fn scaled(mut self, wanted: f64, now: f64) -> Result<Self, SignalError> {
         positive("present level", now).map_err(|_| SignalError::Silent { channel: 0 })?;
-        self.amplitudes.iter_mut().for_each(|a| *a *= wanted / now);
+        self.amplitudes.iter_mut().for_each(|a| *a = *a / now * wanted);
         check_amplitudes(&self.amplitudes)?;
         Ok(self)
     }
