@@ -245,10 +245,11 @@ fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
 /// Largest |value| near the middle one of three equidistant samples: the top of their parabola
 /// if the middle one stands out, the middle one itself otherwise.
 fn parabola_top(before: f64, middle: f64, after: f64) -> f64 {
-    let bend = before - 2.0 * middle + after;
-    let stands_out = (middle - before) * (middle - after) >= 0.0 && bend * middle < 0.0;
-    if !stands_out {
-        return middle.abs();
+    // Towards the top counted positive; no products, which could leave the range of numbers.
+    let [b, m, a] = [before, middle, after].map(|v| v * middle.signum());
+    let bend = b - 2.0 * m + a;
+    if m < b || m < a || bend >= 0.0 {
+        return m;
     }
-    (middle - (after - before).powi(2) / (8.0 * bend)).abs()
+    m - (a - b) * ((a - b) / (8.0 * bend))
 }
