@@ -82,9 +82,9 @@ pub enum PlotError {
         /// Upper end asked for.
         high: f64,
     },
-    /// The figure is too small for its axes and legends, or its size is not a finite positive number.
+    /// The figure is too small for its axes and legends, or not of a finite size.
     #[error(
-        "{width} × {height} px leaves no room to draw in; the labels alone need {needed_width:.0} × {needed_height:.0} px"
+        "{width} × {height} px is no size to draw in; the labels alone need {needed_width:.0} × {needed_height:.0} px"
     )]
     Size {
         /// Width of the figure, px.

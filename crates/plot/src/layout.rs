@@ -9,7 +9,7 @@ use crate::legend::{self, Entry};
 use crate::panel::{Legend, Panel};
 use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
-use crate::trace::{self, Mappings};
+use crate::trace::{self, Mappings, Segment};
 
 /// Length of a tick and the distance of its label.
 pub(crate) const TICK: f64 = 4.0;
@@ -107,6 +107,11 @@ impl<'a> Planner<'a> {
             (width, height + title + legend::strip_height(&strip, width - 2.0 * EDGE))
         });
         let ranges = ranges(figure, columns)?;
+        if !(size.0.is_finite() && size.1.is_finite()) {
+            let (width, height) = size;
+            let (needed_width, needed_height) = LEAST_FRAME;
+            return Err(PlotError::Size { width, height, needed_width, needed_height });
+        }
         Ok(Planner { figure, size, columns, rows, ranges, strip })
     }
 
@@ -345,26 +350,24 @@ fn x_ticks(panel: &Panel, (low, high): (f64, f64), width: f64) -> Ticks {
     }
 }
 
-/// Every pixel a legend must not hide.
+/// Everything a legend must not hide.
 fn footprint(
     panel: &Panel,
     maps: Mappings,
     corner: Point,
     size: Point,
     y_range: (f64, f64),
-) -> Vec<Point> {
+) -> Vec<Segment> {
     let base = trace::stem_base(maps, panel.y.scale, y_range);
-    let mut drawn: Vec<Point> =
-        panel.curves.iter().flat_map(|curve| trace::footprint(curve, maps, base, size.0)).collect();
-    for reference in &panel.references {
-        let steps = (0..=200).map(|step| f64::from(step) / 200.0);
+    let curves = panel.curves.iter().flat_map(|curve| trace::footprint(curve, maps, base, size.0));
+    let references = panel.references.iter().map(|reference| {
         if reference.horizontal {
             let y = maps.y.pixel(reference.value);
-            drawn.extend(steps.map(|part| (corner.0 + part * size.0, y)));
+            ((corner.0, y), (corner.0 + size.0, y))
         } else {
             let x = maps.x.pixel(reference.value);
-            drawn.extend(steps.map(|part| (x, corner.1 + part * size.1)));
+            ((x, corner.1), (x, corner.1 + size.1))
         }
-    }
-    drawn
+    });
+    curves.chain(references).collect()
 }

@@ -6,6 +6,7 @@ use crate::draw::{self, LABEL_SIZE};
 use crate::panel::Panel;
 use crate::style::{Color, Resolved};
 use crate::text::{Weight, text_width};
+use crate::trace::{Segment, meets};
 
 const ROW: f64 = 18.0;
 /// Length of a sample with a line in it, and of one without.
@@ -100,7 +101,7 @@ pub(crate) fn free_place(
     corner: Point,
     size: Point,
     legend: Point,
-    drawn: &[Point],
+    drawn: &[Segment],
 ) -> Option<Point> {
     const INSET: f64 = 9.0;
     const CLEARANCE: f64 = 6.0;
@@ -125,9 +126,9 @@ pub(crate) fn free_place(
             (corner.0 + INSET + across * free_x, corner.1 + INSET + down * free_y)
         })
         .find(|(left, top)| {
-            let columns = left - CLEARANCE..=left + legend.0 + CLEARANCE;
-            let rows = top - CLEARANCE..=top + legend.1 + CLEARANCE;
-            !drawn.iter().any(|(x, y)| columns.contains(x) && rows.contains(y))
+            let low = (left - CLEARANCE, top - CLEARANCE);
+            let high = (left + legend.0 + CLEARANCE, top + legend.1 + CLEARANCE);
+            !drawn.iter().any(|segment| meets(*segment, low, high))
         })
 }
 

@@ -75,37 +75,48 @@ pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
         .collect()
 }
 
-/// Pixels close together along everything a curve draws.
-pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Point> {
+/// A straight piece of something drawn.
+pub(crate) type Segment = (Point, Point);
+
+/// Everything a curve draws, as straight pieces; a marker is a piece without length.
+pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Segment> {
+    let chain = |points: Vec<Point>| -> Vec<Segment> {
+        let points = thin_out(points, width);
+        // The first point counts alone, or a curve of one point would draw nothing.
+        let first = points.first().map(|&point| (point, point));
+        first.into_iter().chain(points.windows(2).map(|pair| (pair[0], pair[1]))).collect()
+    };
     let lower = map(maps, &curve.x, &curve.y);
     match curve.kind {
-        Kind::Points => thin_markers(lower),
-        Kind::Line | Kind::MarkedLine => {
-            dense(thin_out(lower, width).windows(2).map(|pair| (pair[0], pair[1])))
-        }
+        Kind::Points => thin_markers(lower).into_iter().map(|point| (point, point)).collect(),
+        Kind::Line | Kind::MarkedLine => chain(lower),
         Kind::Stems => {
-            dense(thin_stems(&lower, base).into_iter().map(|(x, y)| ((x, base), (x, y))))
+            thin_stems(&lower, base).into_iter().map(|(x, y)| ((x, base), (x, y))).collect()
         }
-        Kind::Band => {
-            let upper = map(maps, &curve.x, &curve.upper);
-            dense(lower.windows(2).chain(upper.windows(2)).map(|pair| (pair[0], pair[1])))
-        }
+        Kind::Band => [chain(lower), chain(map(maps, &curve.x, &curve.upper))].concat(),
     }
 }
 
-/// Points on segments, at most four pixels apart.
-fn dense(segments: impl Iterator<Item = (Point, Point)>) -> Vec<Point> {
-    segments
-        .flat_map(|(from, to)| {
-            let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-            // A segment that leaves the panel by far needs no more points than a screen has.
-            let pieces = (dx.hypot(dy) / 4.0).ceil().clamp(1.0, 4000.0) as usize;
-            (0..=pieces).map(move |piece| {
-                let part = piece as f64 / pieces as f64;
-                (from.0 + part * dx, from.1 + part * dy)
-            })
-        })
-        .collect()
+/// Whether a straight piece has a point in the rectangle from `low` to `high`.
+///
+/// # Source
+/// Y.-D. Liang and B. A. Barsky, "A new concept and method for line clipping", ACM Transactions on
+/// Graphics 3(1), 1984.
+pub(crate) fn meets((from, to): Segment, low: Point, high: Point) -> bool {
+    let (mut enter, mut leave) = (0.0f64, 1.0f64);
+    for (start, end, low, high) in [(from.0, to.0, low.0, high.0), (from.1, to.1, low.1, high.1)] {
+        let run = end - start;
+        if run == 0.0 {
+            if start < low || start > high {
+                return false;
+            }
+            continue;
+        }
+        let (first, second) = ((low - start) / run, (high - start) / run);
+        enter = enter.max(first.min(second));
+        leave = leave.min(first.max(second));
+    }
+    enter <= leave
 }
 
 #[cfg(test)]
@@ -141,6 +152,22 @@ mod tests {
         assert_eq!(kept.len(), 20, "ten pixels have twenty halves");
         assert!(kept.iter().all(|(_, y)| *y == -3.0));
         assert_eq!(thin_markers(points).len(), 20 * 7);
+    }
+
+    #[test]
+    fn pieces_meet_a_rectangle_when_a_point_of_theirs_lies_in_it() {
+        let (low, high) = ((2.0, 3.0), (6.0, 5.0));
+        let ends =
+            [(0.0, 0.0), (4.0, 4.0), (9.0, 4.0), (4.0, 9.0), (1.0, 5.5), (7.0, 2.0), (2.0, 3.0)];
+        for from in ends {
+            for to in ends {
+                let inside = (0..=10_000).map(|k| f64::from(k) * 1e-4).any(|part| {
+                    let (x, y) = (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
+                    (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&y)
+                });
+                assert_eq!(meets((from, to), low, high), inside, "{from:?} to {to:?}");
+            }
+        }
     }
 
     #[test]

@@ -193,6 +193,8 @@ fn wrong_input_is_named() {
     assert!(matches!(draw(panel(huge)), PlotError::Range { .. }));
     let tiny = Figure::new("F").panel(panel(good())).size(50.0, 30.0).to_svg();
     assert!(matches!(tiny, Err(PlotError::Size { .. })));
+    let endless = Figure::new("F").panel(panel(good())).size(f64::INFINITY, 300.0).to_svg();
+    assert!(matches!(endless, Err(PlotError::Size { .. })));
 }
 
 #[test]
@@ -284,5 +286,35 @@ proptest! {
         );
         let svg = figure.to_svg().expect("finite numbers draw");
         prop_assert!(coordinates(&svg).iter().all(|value| value.is_finite() && value.abs() <= 1e6 * PI));
+    }
+
+    /// Whatever numbers come, a figure is drawn or an error says why not.
+    #[test]
+    fn no_numbers_make_it_panic(
+        points in prop::collection::vec((prop::num::f64::ANY, prop::num::f64::ANY), 0..12),
+        scales in any::<(bool, bool)>(),
+        range in prop::option::of((prop::num::f64::ANY, prop::num::f64::ANY)),
+        step in prop::option::of(prop::num::f64::ANY),
+        size in prop::option::of((prop::num::f64::ANY, prop::num::f64::ANY)),
+    ) {
+        let axis = |log: bool| if log { Axis::log10("q", "u") } else { Axis::linear("q", "u") };
+        let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+        let mut ordinate = axis(scales.1);
+        if let Some((low, high)) = range {
+            ordinate = ordinate.range(low, high);
+        }
+        if let Some(step) = step {
+            ordinate = ordinate.step(step);
+        }
+        let panel = Panel::new(axis(scales.0), ordinate)
+            .curve(Curve::line("line", &x, &y))
+            .curve(Curve::points("points", &x, &y));
+        let mut figure = Figure::new("f").panel(panel);
+        if let Some((width, height)) = size {
+            figure = figure.size(width, height);
+        }
+        if let Ok(svg) = figure.to_svg() {
+            prop_assert!(coordinates(&svg).iter().all(|value| value.is_finite()));
+        }
     }
 }
