@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::published::Published;
 use super::results::Results;
-use super::{golden, tables};
+use super::{audit, golden, tables};
 use crate::{drawing, figures};
 
 /// One table or figure: its data, and how a reader sees it.
@@ -80,7 +80,8 @@ pub fn all(root: &Path, tick: impl Fn() + Sync) -> Result<Reproduction, String> 
         let csv = Some(figures::table(&made.figure)?);
         artefacts.push(Artefact { name, csv, view: View::Svg(svg) });
     }
-    let pages = vec![("README.md", index(&artefacts))];
+    let audit = audit::page(&published, &results)?;
+    let pages = vec![("README.md", index(&artefacts)), ("audit.md", audit)];
     Ok(Reproduction { artefacts, pages })
 }
 
@@ -107,7 +108,8 @@ fn index(artefacts: &[Artefact]) -> String {
     let mut text = String::from(
         "# The dissertation, reproduced\n\n\
          Every table and figure of V. Mariano (UFPB, 1998), computed by this workspace.\n\
-         Made by `cargo xtask reproduce-thesis`; do not edit.\n\n",
+         Made by `cargo xtask reproduce-thesis`; do not edit.\n\n\
+         - **[What the audit found](audit.md)**\n",
     );
     for artefact in artefacts {
         let (kind, number) = artefact.name.split_once('-').unwrap_or(("", &artefact.name));
