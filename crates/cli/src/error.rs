@@ -102,10 +102,10 @@ pub enum CliError {
         /// Highest line with force.
         last: usize,
     },
-    /// The equation of motion needs all three motions.
+    /// The time domain needs the whole state.
     #[error(
-        "in the time domain --displacement, --velocity and --acceleration are all needed (in the \
-         frequency domain one of them is enough)"
+        "in the time domain --displacement and --velocity are both needed (in the frequency domain \
+         one kind of motion is enough)"
     )]
     TimeDomainMotions,
     /// No receptance can be read off the record.

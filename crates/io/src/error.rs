@@ -125,9 +125,11 @@ pub enum IoError {
     },
     /// The instants of the time column are not equally spaced.
     #[error(
-        "{file}: the time steps are not uniform: {step} s up to line {line}, where the usual step is \
-         {usual} s (resample the record, or give the sample rate instead of the time column if the \
-         times are only rounded)"
+        "{file}: the time steps are not uniform: {} s up to line {line}, where the usual step is \
+         {} s (resample the record, or give the sample rate instead of the time column if the \
+         times are only rounded)",
+        six_digits(*step),
+        six_digits(*usual)
     )]
     NonUniformTime {
         /// The file.
@@ -207,4 +209,9 @@ pub enum IoError {
         /// Samples in the period.
         len: usize,
     },
+}
+
+/// A number without the digits that rounding left behind.
+fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
 }

@@ -5,8 +5,9 @@ use mechid::estimate::frequency_domain::{
     FrequencyData, Lines, Motion, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
 };
-use mechid::estimate::{EquationOfMotion, Estimate, Unknowns};
-use mechid::model::SecondOrderSystem;
+use mechid::estimate::time_domain::{self, Discretisation, Extent, TimeDomain};
+use mechid::estimate::{Estimate, Unknowns};
+use mechid::model::{Response, SecondOrderSystem};
 use mechid::signal::Record;
 
 use super::measurement::Measurement;
@@ -22,6 +23,17 @@ pub enum Method {
     /// Maximum likelihood on the motion, weighted by the noise that the periods show; not biased,
     /// of least scatter
     MaximumLikelihood,
+}
+
+/// What leads from one sample to the next, in the time domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BetweenSamples {
+    /// Euler's rule, the dissertation's; biased in proportion to the step
+    Euler,
+    /// The force is held, as a digital converter drives a shaker; then exact
+    Held,
+    /// The force is linear; then exact
+    Linear,
 }
 
 /// An estimate and how it came about.
@@ -100,23 +112,54 @@ pub fn frequency_domain(
     })
 }
 
-/// Fits the equation of motion at every instant of the window.
-pub fn time_domain(measured: &Measurement, unknowns: &Unknowns) -> Result<Fitted, CliError> {
-    let all = (&measured.displacement, &measured.velocity, &measured.acceleration);
-    let (Some(x), Some(v), Some(a)) = all else {
+/// Fits the samples of the window: the equation of motion itself where the acceleration is measured
+/// and nothing else is asked for, otherwise what leads from one sample to the next.
+pub fn time_domain(
+    measured: &Measurement,
+    unknowns: &Unknowns,
+    between: Option<BetweenSamples>,
+) -> Result<Fitted, CliError> {
+    let (Some(x), Some(v)) = (&measured.displacement, &measured.velocity) else {
         return Err(CliError::TimeDomainMotions);
     };
-    let mut rows = EquationOfMotion::new(x.channels());
-    let [a, v, x, f] = [a, v, x, &measured.force].map(|record| record.data().as_view());
-    rows.push_rows(a, v, x, f)?;
-    Ok(Fitted {
-        domain: "time",
-        estimator: "least squares on the equation of motion, instant by instant",
-        estimate: rows.solve(unknowns)?,
-        equations: rows.rows(),
-        frequency: None,
-        remarks: Vec::new(),
-    })
+    let force = &measured.force;
+    let (estimator, estimate, equations) = match (between, &measured.acceleration) {
+        (None, Some(a)) => {
+            let response = Response::new(x.clone(), v.clone(), a.clone())?;
+            let found = time_domain::equation_of_motion(&response, force, unknowns)?;
+            ("least squares on the equation of motion, sample by sample", found, force.len())
+        }
+        (between, _) => {
+            let between = between.unwrap_or(BetweenSamples::Linear);
+            let method = TimeDomain::new(between.discretisation(), Extent::Open);
+            let fit = method.fit(x, v, force, unknowns)?;
+            (between.estimator(), fit.into_estimate(), force.len() - 1)
+        }
+    };
+    let remarks = Vec::new();
+    Ok(Fitted { domain: "time", estimator, estimate, equations, frequency: None, remarks })
+}
+
+impl BetweenSamples {
+    fn discretisation(self) -> Discretisation {
+        match self {
+            BetweenSamples::Euler => Discretisation::Euler,
+            BetweenSamples::Held => Discretisation::ZeroOrderHold,
+            BetweenSamples::Linear => Discretisation::FirstOrderHold,
+        }
+    }
+
+    fn estimator(self) -> &'static str {
+        match self {
+            BetweenSamples::Euler => "least squares from sample to sample, Euler's rule",
+            BetweenSamples::Held => {
+                "least squares from sample to sample, the force held between them"
+            }
+            BetweenSamples::Linear => {
+                "least squares from sample to sample, the force linear between them"
+            }
+        }
+    }
 }
 
 impl Fitted {

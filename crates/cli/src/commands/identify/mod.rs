@@ -4,7 +4,6 @@ mod excited;
 mod fit;
 mod mass;
 mod measurement;
-mod modes;
 mod picture;
 mod report;
 
@@ -14,10 +13,10 @@ use mechid::io::{LineSpec, SystemMatrices};
 
 use self::excited::Band;
 use self::excited::choose_lines;
-use self::fit::{Fitted, Method};
+use self::fit::{BetweenSamples, Fitted, Method};
 use self::mass::KnownMass;
 use self::measurement::{ChannelArgs, Measurement};
-use self::report::{Fit, Lines, ParameterRow, Report, Uncertain, Window};
+use self::report::{CONFIDENCE, Fit, Lines, ModeRow, ParameterRow, Report, Uncertain, Window};
 use crate::error::CliError;
 use crate::options::{PlotArgs, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
@@ -25,8 +24,9 @@ use crate::outcome::Outcome;
 /// Find mass, damping and stiffness from a measured force and response
 ///
 /// In the frequency domain (the default) the window must hold whole periods of a periodic
-/// excitation; the periods are averaged. In the time domain displacement, velocity and acceleration
-/// are needed, and any record will do.
+/// excitation, and one kind of motion is enough; the periods are averaged. In the time domain any
+/// record will do: displacement, velocity and acceleration for the equation of motion itself, or
+/// displacement and velocity with an assumption on the force between the samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
@@ -51,6 +51,10 @@ pub struct IdentifyArgs {
     /// How to find the parameters from the spectra
     #[arg(long, value_name = "METHOD", value_enum, default_value_t = Method::LeastSquares)]
     method: Method,
+    /// What is assumed of the force between samples, in the time domain [default: the equation of
+    /// motion at the samples if the acceleration is measured, else linear]
+    #[arg(long, value_name = "ASSUMPTION", value_enum)]
+    between_samples: Option<BetweenSamples>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row); or unknown
     #[arg(
         long,
@@ -74,9 +78,6 @@ enum Domain {
     Time,
 }
 
-/// Level of the confidence intervals.
-const CONFIDENCE: f64 = 0.95;
-
 /// Unexplained motion above which the user is warned.
 const CONSPICUOUS: f64 = 0.05;
 
@@ -91,7 +92,7 @@ impl IdentifyArgs {
                 let lines = choose_lines(&force, self.lines.as_ref(), self.band_hz)?;
                 fit::frequency_domain(&measured, &unknowns, lines, self.method)?
             }
-            Domain::Time => fit::time_domain(&measured, &unknowns)?,
+            Domain::Time => fit::time_domain(&measured, &unknowns, self.between_samples)?,
         };
         let report = report(&measured, &fitted)?;
         Outcome::new(report.text(), &report)?.with_plot(&self.plot, || {
@@ -120,7 +121,7 @@ fn report(measured: &Measurement, fitted: &Fitted) -> Result<Report, CliError> {
         lines: fitted.frequency.as_ref().map(|(lines, _)| Lines::of(lines)),
         confidence: CONFIDENCE,
         parameters: parameters(fitted)?,
-        modes: modes::rows(estimate, CONFIDENCE)?,
+        modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
         fit: Fit {
             nrmse: fitted.nrmse(),
             unexplained_motion,
@@ -144,7 +145,7 @@ fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, CliError> {
     for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
         let value = match found(parameter) {
-            Some(p) => Uncertain::new(p.value, p.standard_error, estimate, CONFIDENCE)?,
+            Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
             None => {
                 Uncertain::known(estimate.unknowns().fixed(matrix, row, column).unwrap_or_default())
             }

@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
-use mechid::estimate::{Estimate, Estimated, frequency_domain};
+use mechid::estimate::{self, IdentifiedMode, frequency_domain};
 use mechid::io::SystemMatrices;
 use serde::Serialize;
 
 use crate::error::CliError;
 use crate::text_table::{compact, significant, text_table};
+
+/// Level of the confidence intervals.
+pub const CONFIDENCE: f64 = 0.95;
 
 /// Everything `mechid identify` has to say.
 #[derive(Debug, Serialize)]
@@ -74,7 +77,7 @@ pub struct ParameterRow {
 pub struct ModeRow {
     pub oscillates: bool,
     pub natural_frequency_hz: Uncertain,
-    pub damped_frequency_hz: f64,
+    pub damped_frequency_hz: Uncertain,
     pub damping_ratio: Uncertain,
 }
 
@@ -190,6 +193,18 @@ impl Report {
     }
 }
 
+impl ModeRow {
+    /// Frequencies and damping of an identified mode.
+    pub fn of(found: &IdentifiedMode) -> Result<Self, CliError> {
+        Ok(Self {
+            oscillates: found.mode.oscillates(),
+            natural_frequency_hz: Uncertain::of(&found.natural_frequency_hz)?,
+            damped_frequency_hz: Uncertain::of(&found.damped_frequency_hz)?,
+            damping_ratio: Uncertain::of(&found.damping_ratio)?,
+        })
+    }
+}
+
 impl Lines {
     /// The first, the last and the number of the lines used.
     pub fn of(used: &frequency_domain::Lines) -> Self {
@@ -202,16 +217,13 @@ impl Lines {
 }
 
 impl Uncertain {
-    /// A value with the interval that the degrees of freedom of an estimate give.
-    pub fn new(
-        value: f64,
-        standard_error: f64,
-        estimate: &Estimate,
-        level: f64,
-    ) -> Result<Self, CliError> {
-        let Some(any) = estimate.parameters().next() else { return Ok(Self::known(value)) };
-        let interval = Estimated { value, standard_error, ..any }.interval(level)?;
-        Ok(Self { value, standard_error: Some(standard_error), interval: Some(interval) })
+    /// A value that was estimated.
+    pub fn new(value: f64, standard_error: f64, interval: [f64; 2]) -> Self {
+        Self { value, standard_error: Some(standard_error), interval: Some(interval) }
+    }
+
+    fn of(found: &estimate::Uncertain) -> Result<Self, CliError> {
+        Ok(Self::new(found.value, found.standard_error, found.interval(CONFIDENCE)?))
     }
 
     /// A value that was given.

@@ -1,0 +1,250 @@
+//! Whatever is wrong with the input: one clear message, exit code 2, and nothing written.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+
+/// A record of 32 samples, 4 ms apart: force on line 3, a displacement that answers to it.
+fn good() -> String {
+    record(|k| {
+        let turn = std::f64::consts::TAU * 3.0 * f64::from(k) / 32.0;
+        (0.004 * f64::from(k), turn.cos(), 1e-3 * turn.sin())
+    })
+}
+
+fn record(sample: impl Fn(u8) -> (f64, f64, f64)) -> String {
+    let mut text = String::from("time,force,x\n");
+    for (time, force, x) in (0..32).map(sample) {
+        writeln!(text, "{time},{force},{x}").unwrap();
+    }
+    text
+}
+
+/// Runs `mechid` on a file of this content in an empty folder, where it must fail with a message
+/// that holds all of `parts`, print nothing, and leave the folder as it was.
+fn refused(content: &str, arguments: &str, parts: &[&str]) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), content).unwrap();
+    let output = Command::cargo_bin("mechid")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+    assert!(message.starts_with("error: "), "{arguments}: {message}");
+    for part in parts {
+        assert!(message.contains(part), "{arguments}: \"{part}\" is missing in: {message}");
+    }
+    assert!(output.stdout.is_empty(), "{arguments} printed something");
+    assert_eq!(files(folder.path()), ["a.csv"], "{arguments} left something behind");
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let name = |entry: std::io::Result<fs::DirEntry>| entry.unwrap().file_name().into_string();
+    fs::read_dir(folder).unwrap().map(|entry| name(entry).unwrap()).collect()
+}
+
+/// `identify` on the file with its own columns, a plot asked for, and some more arguments.
+fn identify(content: &str, more: &str, parts: &[&str]) {
+    let common = "identify a.csv --force force --displacement x --plot out.svg";
+    refused(content, &format!("{common} {more}"), parts);
+}
+
+/// The good record with one line replaced.
+fn with_line(number: usize, line: &str) -> String {
+    let text = good();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[number - 1] = line;
+    lines.join("\n")
+}
+
+#[test]
+fn missing_file() {
+    refused("", "identify b.csv --force 1 --displacement 2", &["cannot read b.csv: "]);
+    refused("", "info b.csv", &["cannot read b.csv: "]);
+    refused("", "simulate b.json --output out.csv", &["cannot read b.json: "]);
+}
+
+#[test]
+fn missing_column_lists_those_there_are() {
+    let parts = ["a.csv has no column \"F\"", "1 \"time\", 2 \"force\", 3 \"x\""];
+    refused(&good(), "identify a.csv --force F --displacement x", &parts);
+    refused(&good(), "identify a.csv --force 4 --displacement x", &["no column \"4\"", "3 \"x\""]);
+    refused(&good(), "info a.csv --columns F", &parts);
+}
+
+#[test]
+fn duplicate_column_lists_those_there_are() {
+    let twice = good().replacen("time,force,x", "time,x,x", 1);
+    let arguments = "identify a.csv --force 2 --displacement x";
+    refused(&twice, arguments, &["several columns \"x\"", "1 \"time\", 2 \"x\", 3 \"x\""]);
+    let parts = ["column 2 of a.csv is used twice, as \"force\" and as \"2\"", "3 \"x\""];
+    refused(&good(), "identify a.csv --force force --displacement 2", &parts);
+}
+
+#[test]
+fn text_where_a_number_is_needed() {
+    let text = with_line(7, "0.02,1.0,overload");
+    identify(&text, "", &["a.csv, line 7, column 3 \"x\": \"overload\" is not a number"]);
+    identify(&with_line(9, "0.028,,0"), "", &["line 9, column 2 \"force\": the field is empty"]);
+}
+
+#[test]
+fn nan_and_infinity() {
+    identify(
+        &with_line(5, "0.012,NaN,0"),
+        "",
+        &["line 5, column 2 \"force\": NaN is not a finite"],
+    );
+    identify(&with_line(5, "0.012,1,-inf"), "", &["line 5, column 3 \"x\": -inf is not a finite"]);
+}
+
+#[test]
+fn ragged_rows() {
+    identify(
+        &with_line(20, "0.072,1"),
+        "",
+        &["a.csv, line 20: 2 fields where the first line has 3"],
+    );
+    identify(&with_line(20, "0.072,1,2,3"), "", &["a.csv, line 20: 4 fields"]);
+}
+
+#[test]
+fn empty_record() {
+    identify("", "", &["a.csv holds no data: it is empty"]);
+    identify("time,force,x\n", "", &["a.csv holds no data: there is a header and nothing below"]);
+}
+
+#[test]
+fn uneven_time_steps() {
+    let text = with_line(18, "0.0615,1,0");
+    identify(&text, "", &["not uniform: 0.0065 s up to line 19, where the usual step is 0.004 s"]);
+}
+
+#[test]
+fn no_time_axis() {
+    let text = good().replacen("time", "clock", 1);
+    identify(&text, "", &["--time", "--sample-rate", "1 \"clock\", 2 \"force\""]);
+    identify(&good(), "--sample-rate 0", &["sample rate must be a positive"]);
+    identify(&good(), "--sample-rate -5", &["sample rate must be a positive"]);
+}
+
+#[test]
+fn window_past_the_end() {
+    let part = "the window needs samples 9 to 40 (counted from 1), a.csv has 32";
+    identify(&good(), "--start 9 --period 32", &[part]);
+    identify(&good(), "--period 16 --periods 3", &["samples 1 to 48"]);
+    identify(&good(), "--start 33", &["a.csv has 32"]);
+    refused(&good(), "info a.csv --start 9 --period 32", &[part]);
+    identify(&good(), "--start 0", &["counted from 1"]);
+    identify(&good(), "--periods 2", &["--period"]);
+}
+
+#[test]
+fn no_excited_line() {
+    // Line 3 of 128 ms stands at 23.4375 Hz.
+    identify(&good(), "--band-hz 30:60", &["no excited line between 30 and 60 Hz", "23.4375"]);
+    identify(&good(), "--lines even", &["no excited line among even"]);
+    identify(&good(), "--lines 1:20", &["line 20 is not between 1 and 15"]);
+    identify(&good(), "--lines 5:1", &["\"5:1\" is no choice of lines", "first:step:last"]);
+    identify(&good(), "--band-hz 60:30", &["low:high"]);
+}
+
+#[test]
+fn a_force_that_is_zero() {
+    let text = record(|k| (0.004 * f64::from(k), 0.0, f64::from(k)));
+    identify(&text, "", &["a.csv: the force (column force) is zero throughout the window"]);
+    // A constant is no excitation either.
+    let text = record(|k| (0.004 * f64::from(k), 0.1, f64::from(k % 5)));
+    identify(&text, "", &["no excited line"]);
+}
+
+#[test]
+fn a_mass_no_body_has() {
+    identify(&good(), "--mass -3", &["a mass must be positive and finite, got -3 kg"]);
+    identify(&good(), "--mass 0", &["got 0 kg"]);
+    identify(&good(), "--mass NaN", &["got NaN kg"]);
+    identify(&good(), "--mass 1,2,3", &["--mass gives 3 values, the record has 1 degrees"]);
+    identify(&good(), "--mass heavy", &["\"heavy\" is not a number"]);
+}
+
+#[test]
+fn too_few_rows_for_the_unknowns() {
+    // One line is two real equations; mass, damping and stiffness are three unknowns.
+    identify(&good(), "", &["2 equations do not determine 3 unknowns"]);
+    let common = "identify a.csv --force 2 --displacement 3 --velocity 4 --acceleration 5";
+    let arguments = format!("{common} --domain time --period 2 --periods 1 --sample-rate 1");
+    let text = "t,f,x,v,a\n0,1,2,3,4\n1,2,3,4,6\n2,1,1,1,1\n";
+    refused(text, &arguments, &["2 equations do not determine 3 unknowns"]);
+}
+
+#[test]
+fn a_singular_fit_names_what_the_data_do_not_excite() {
+    // A static test: the machine never moves, so mass and damping do not matter.
+    let mut text = String::from("time,f,x,v,a\n");
+    for k in 0..20 {
+        writeln!(text, "{k},{k},{},0,0", 0.5 * f64::from(k)).unwrap();
+    }
+    let common = "identify a.csv --force f --displacement x --velocity v --acceleration a";
+    refused(&text, &format!("{common} --domain time"), &["the data do not determine m, c:"]);
+    // A sensor that is not connected.
+    let text = record(|k| {
+        let t = f64::from(k);
+        (0.004 * t, (t * t).sin(), 0.0)
+    });
+    identify(&text, "", &["the data do not determine m, c, k"]);
+}
+
+#[test]
+fn columns_that_do_not_pair_up() {
+    refused(&good(), "identify a.csv --force force", &["--displacement, --velocity or"]);
+    refused(
+        &good(),
+        "identify a.csv --force 2,0 --displacement 3",
+        &["names 1 columns and --force 2"],
+    );
+    identify(&good(), "--domain time", &["in the time domain"]);
+    refused(&good(), "identify a.csv --displacement x", &["--force"]);
+}
+
+#[test]
+fn instruments_need_two_periods() {
+    identify(&good(), "--method instrumental", &["2"]);
+}
+
+#[test]
+fn files_that_cannot_be_written() {
+    let common = "identify a.csv --force force --displacement x --mass 1 --plot";
+    refused(&good(), &format!("{common} out.pdf"), &["must end in .svg or .png"]);
+    refused(&good(), &format!("{common} no/such/folder/out.svg"), &["cannot write no/such/folder"]);
+}
+
+#[test]
+fn descriptions_that_describe_nothing() {
+    let common = "simulate a.csv --output out.csv";
+    refused("{ \"system\": 3 }", common, &["a.csv: invalid type: integer `3`", "line 1 column"]);
+    let text = |system: &str, more: &str| {
+        format!(
+            "{{ \"system\": {system}, \"sampling\": {{ \"samples\": 16, \"rate_hz\": 16 }}, \
+             \"excitation\": [{{ \"lines\": \"1:3\", \"amplitude\": 1 }}] {more} }}"
+        )
+    };
+    let sdof = "{ \"mass\": 1, \"damping\": 0.1, \"stiffness\": 40 }";
+    let scheme = |more: &str| text(sdof, &format!(", \"scheme\": {{ \"name\": {more} }}"));
+    refused(&text(sdof, ", \"perods\": 3"), common, &["unknown field `perods`"]);
+    refused(&scheme("\"newmark\", \"beta\": -1"), common, &["-1"]);
+    refused(&scheme("\"wilson-theta\", \"theta\": 0.5"), common, &["0.5"]);
+    let from_rest = text(sdof, ", \"response\": \"from-rest\"");
+    refused(&from_rest, common, &["gives the periodic response only"]);
+    // ωΔt = 4 where central difference allows 2.
+    let stiff = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 4096 }";
+    let scheme = ", \"scheme\": { \"name\": \"central-difference\" }";
+    refused(&text(stiff, scheme), common, &["central difference is unstable", "3.125000e-2 s"]);
+    // Driven exactly where nothing holds it.
+    let resonant = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 39.47841760435743 }";
+    refused(&text(resonant, ""), common, &["6.28"]);
+}

@@ -1,0 +1,30 @@
+//! Reads the example record and finds mass, damping and stiffness, as `mechid identify` does.
+//!
+//! `cargo run --package mechid --example 01_identify_a_record`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+use std::error::Error;
+
+use mechid::estimate::Unknowns;
+use mechid::estimate::frequency_domain::{Lines, Motion, RepeatedPeriods, equation_error};
+use mechid::io::{Table, TimeAxis};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+    let table = Table::read(file)?;
+    let time = TimeAxis::Column("time");
+    let force = table.record(&time, &["force"])?;
+    let displacement = table.record(&time, &["displacement"])?;
+
+    // Two periods of 256 samples; the excitation drives lines 4 to 60.
+    let period = force.sampling().with_len(256)?;
+    let lines = Lines::new(period, 4..=60)?;
+    let periods = RepeatedPeriods::new(&lines, &force, &displacement, Motion::Displacement)?;
+    let found = equation_error(&periods.mean()?, &Unknowns::unknown_mass(1)?)?;
+    print!("{found}");
+
+    let mode = &found.system()?.modes()?[0];
+    let frequency_hz = mode.natural_frequency() / std::f64::consts::TAU;
+    println!("{frequency_hz:.3} Hz, damping ratio {:.4}", mode.damping_ratio());
+    Ok(())
+}

@@ -1,0 +1,49 @@
+//! What five time-stepping schemes make of one machine: the natural frequency that each of them
+//! gives it, against the exact response.
+//!
+//! `cargo run --package mechid --example 02_compare_schemes`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+use std::error::Error;
+
+use mechid::estimate::Unknowns;
+use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::integrate::{
+    CentralDifference, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta, integrate_periodic,
+};
+use mechid::model::{Response, Sdof, SecondOrderSystem};
+use mechid::signal::{Multisine, Phases, Record, Sampling};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // Ten samples per natural period.
+    let machine = Sdof::from_modal(10.0, 0.05, 10.0)?.system();
+    let sampling = Sampling::new(std::f64::consts::TAU / 100.0, 512)?;
+    let force = Multisine::flat(20..=90, 1.0, Phases::Schroeder)?.sample(sampling)?;
+    println!("true natural frequency: 10 rad/s, damping ratio 0.05");
+
+    show("exact", &force, &mechid::exact_periodic(&machine, &force)?)?;
+    let wilson = WilsonTheta::new(1.4)?;
+    let schemes: [&dyn Scheme; 5] = [
+        &Newmark::AVERAGE_ACCELERATION,
+        &CentralDifference::default(),
+        &Houbolt::default(),
+        &wilson,
+        &RungeKutta4::LINEAR,
+    ];
+    for scheme in schemes {
+        show(&scheme.name(), &force, &integrate_periodic(scheme, &machine, &force)?)?;
+    }
+    Ok(())
+}
+
+/// The machine that explains the displacement best.
+fn show(name: &str, force: &Record, response: &Response) -> Result<(), Box<dyn Error>> {
+    let lines = 20..=90;
+    let motion = response.displacement();
+    let data = FrequencyData::from_records(force, motion, Motion::Displacement, lines)?;
+    let system: SecondOrderSystem = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
+    let mode = &system.modes()?[0];
+    let (omega, ratio) = (mode.natural_frequency(), mode.damping_ratio());
+    println!("{name:<36} {omega:8.4} rad/s   {ratio:.5}");
+    Ok(())
+}

@@ -1,0 +1,32 @@
+//! Identifies a machine in one experiment, then finds an unknown force from another response.
+//!
+//! `cargo run --package mechid --example 03_find_the_force`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+use std::error::Error;
+
+use mechid::estimate::Unknowns;
+use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::model::Sdof;
+use mechid::signal::{Multisine, Phases, Sampling};
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let machine = Sdof::new(10.0, 180.0, 5000.0)?.system();
+    let sampling = Sampling::new(0.01, 512)?;
+
+    // The experiment: a known multisine.
+    let excitation = Multisine::flat(1..=120, 5.0, Phases::Schroeder)?.sample(sampling)?;
+    let response = mechid::exact_periodic(&machine, &excitation)?;
+    let motion = response.displacement();
+    let data = FrequencyData::from_records(&excitation, motion, Motion::Displacement, 1..=120)?;
+    let identified = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
+
+    // At work: an unbalance on line 40, which nobody measures.
+    let unbalance = Multisine::flat([40], 30.0, Phases::Zero)?.sample(sampling)?;
+    let at_work = mechid::exact_periodic(&machine, &unbalance)?;
+    let found = mechid::force::continuous(&identified, &at_work)?;
+    let error = mechid::force::relative_error(found.record(), &unbalance)?;
+    let peak = found.record().column(0).amax();
+    println!("a force of {peak:.3} N found where 30 N acted; relative error {error:.1e}");
+    Ok(())
+}

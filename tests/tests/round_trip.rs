@@ -1,0 +1,113 @@
+//! Several rooms at once: simulate, write, read back, identify; exact responses from elsewhere judge.
+
+use mechid::estimate::Unknowns;
+use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::io::{Experiment, Table, TimeAxis, csv_text};
+use mechid::model::{KyxSign, SecondOrderSystem};
+use mechid::signal::{Record, lines};
+use mechid_problems::{
+    dissertation_bearing, dissertation_sdof, exact_foh_periodic, exact_harmonic_periodic,
+};
+use nalgebra::DMatrix;
+use serde_json::json;
+
+/// The description of an experiment on a system, every degree of freedom driven on its own lines.
+fn experiment(
+    system: &SecondOrderSystem,
+    scheme: &str,
+    samples: usize,
+    rate_hz: f64,
+) -> Experiment {
+    let dof = system.dof();
+    let excitation: Vec<_> = (0..dof)
+        .map(|d| json!({ "dof": d + 1, "lines": format!("{}:{dof}:60", d + 1), "amplitude": 10 }))
+        .collect();
+    let description = json!({
+        "system": mechid::io::SystemMatrices::from(system),
+        "sampling": { "samples": samples, "rate_hz": rate_hz },
+        "excitation": excitation,
+        "scheme": { "name": scheme },
+    });
+    Experiment::parse("experiment", &description.to_string()).unwrap()
+}
+
+fn largest_difference(a: &DMatrix<f64>, b: &DMatrix<f64>) -> f64 {
+    (a - b).amax() / b.amax()
+}
+
+/// The exact response against one that knows no receptance: the matrix exponential over samples
+/// 32 times as dense, between which the force is taken as linear.
+#[test]
+fn exact_responses_agree_with_the_matrix_exponential() {
+    const DENSER: usize = 32;
+    for system in [dissertation_sdof().system(), dissertation_bearing(KyxSign::Minus).system()] {
+        let ours = mechid::simulate(&experiment(&system, "exact", 256, 200.0)).unwrap().response;
+        let dense = experiment(&system, "exact", 256 * DENSER, 200.0 * DENSER as f64);
+        let judge = exact_foh_periodic(&system, &dense.force().unwrap()).unwrap();
+        for (ours, other) in [
+            (ours.displacement(), judge.displacement()),
+            (ours.velocity(), judge.velocity()),
+            (ours.acceleration(), judge.acceleration()),
+        ] {
+            let other = DMatrix::from_fn(256, system.dof(), |k, c| other.data()[(DENSER * k, c)]);
+            // The line between samples misses the cosine by (ωΔt)²/8, 2.7e-4 at line 60.
+            assert!(largest_difference(ours.data(), &other) < 3e-4);
+        }
+    }
+}
+
+/// Simulation to text to table to estimate, with another room's exact response as the record.
+#[test]
+fn an_exact_record_goes_through_a_file_to_the_machine() {
+    for system in [dissertation_sdof().system(), dissertation_bearing(KyxSign::Plus).system()] {
+        let dof = system.dof();
+        let force = experiment(&system, "exact", 256, 200.0).force().unwrap();
+        let response = exact_harmonic_periodic(&system, &force).unwrap();
+        let columns: Vec<(String, &[f64])> = (0..dof)
+            .map(|d| (format!("f{d}"), force.channel(d)))
+            .chain((0..dof).map(|d| (format!("x{d}"), response.displacement().channel(d))))
+            .collect();
+        let text = csv_text(force.sampling(), &columns);
+        let table = Table::parse("record.csv", text.as_bytes()).unwrap();
+        let read = |letter: &str| -> Record {
+            let names: Vec<String> = (0..dof).map(|d| format!("{letter}{d}")).collect();
+            table.record(&TimeAxis::Column("time"), &names).unwrap()
+        };
+        let data =
+            FrequencyData::from_records(&read("f"), &read("x"), Motion::Displacement, 1..=60)
+                .unwrap();
+        let found = equation_error(&data, &Unknowns::unknown_mass(dof).unwrap()).unwrap();
+        let found = found.system().unwrap();
+        // Rounding of the transform times the condition of the fit, below 1e4 here.
+        assert!(largest_difference(found.mass(), system.mass()) < 1e-9);
+        assert!(largest_difference(found.damping(), system.damping()) < 1e-9);
+        assert!(largest_difference(found.stiffness(), system.stiffness()) < 1e-9);
+    }
+}
+
+/// A time-stepping scheme leaves its own error in the record, and identification shows it: Newmark's
+/// average acceleration is the trapezoidal rule, so the machine found at ω is the true one at
+/// Ω = (2/Δt) tan(ωΔt/2).
+#[test]
+fn newmark_is_identified_as_the_trapezoidal_rule() {
+    let system = dissertation_sdof().system();
+    let simulation = mechid::simulate(&experiment(&system, "newmark", 256, 40.0)).unwrap();
+    let sampling = simulation.force.sampling();
+    let used: Vec<usize> = lines::full(sampling).into_iter().filter(|n| *n <= 60).collect();
+    let data = FrequencyData::from_records(
+        &simulation.force,
+        simulation.response.displacement(),
+        Motion::Displacement,
+        used,
+    )
+    .unwrap();
+    for (row, omega) in data.omega().iter().enumerate() {
+        let warped = 2.0 / sampling.dt() * (0.5 * omega * sampling.dt()).tan();
+        let expected = system.receptance(warped).unwrap()[(0, 0)];
+        let measured = data.displacement()[(row, 0)] / data.force()[(row, 0)];
+        assert!((measured - expected).norm() < 1e-10 * expected.norm(), "line {}", row + 1);
+    }
+    // Up to 1.47 rad per step the warping is not small: it must show.
+    let found = equation_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
+    assert!((found.mass()[0] / 10.0 - 1.0).abs() > 0.01);
+}
