@@ -74,12 +74,13 @@ impl EquationOfMotion {
             ("channels of the displacement", "displacement", displacement),
             ("channels of the force", "force", force),
         ];
-        for (channels, what, part) in parts {
+        for (channels, _, part) in parts {
             size(channels, self.dof, part.ncols())?;
             size("rows", displacement.nrows(), part.nrows())?;
-            finite(what, part)?;
         }
-        self.factor.push(&[acceleration, velocity, displacement, force]);
+        if !self.factor.push(&[acceleration, velocity, displacement, force]) {
+            parts.into_iter().try_for_each(|(_, what, part)| finite(what, part))?;
+        }
         Ok(())
     }
 
@@ -147,13 +148,13 @@ impl EquationOfMotion {
     /// Rows \[ẍ | ẋ | x | F\] that stand for `rows` original ones with the same Gram matrix.
     pub(crate) fn from_compressed(
         dof: usize,
-        parts: [DMatrixView<'_, f64>; 4],
+        [acceleration, velocity, displacement, force]: [DMatrixView<'_, f64>; 4],
         rows: usize,
-    ) -> Self {
+    ) -> Result<Self, EstimateError> {
         let mut equations = Self::new(dof);
-        equations.factor.push(&parts);
+        equations.push_rows(acceleration, velocity, displacement, force)?;
         equations.factor.stand_for(rows);
-        equations
+        Ok(equations)
     }
 
     /// The compressed columns \[ẋ | x | F\], side by side.

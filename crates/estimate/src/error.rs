@@ -111,6 +111,33 @@ pub enum EstimateError {
         /// Step of the other, in seconds.
         got: f64,
     },
+    /// A sliding polynomial cannot be fitted, or has no such derivative.
+    #[error(
+        "a polynomial of order {order} through {samples} samples: the window must have more samples \
+         than the order, and the order must be at least that of the derivative"
+    )]
+    Window {
+        /// Samples of the window.
+        samples: usize,
+        /// Order of the polynomial.
+        order: usize,
+    },
+    /// A record is too short for what is asked of it.
+    #[error("the record has {samples} samples where at least {needed} are needed")]
+    TooShort {
+        /// Samples of the record.
+        samples: usize,
+        /// Samples needed.
+        needed: usize,
+    },
+    /// The machine has no motion of that period.
+    #[error(
+        "the identified machine has no steady state of period {period} s: it is undamped or unstable"
+    )]
+    NoSteadyState {
+        /// The period, in seconds.
+        period: f64,
+    },
     /// The motion from sample to sample belongs to no continuous machine.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \

@@ -95,9 +95,10 @@ impl LeastSquares {
         size("columns of the regressors", self.unknowns, regressors.ncols())?;
         size("columns of the right-hand side", self.targets, targets.ncols())?;
         size("rows of the right-hand side", regressors.nrows(), targets.nrows())?;
-        finite("regressors", regressors)?;
-        finite("right-hand side", targets)?;
-        self.factor.push(&[regressors, targets]);
+        if !self.factor.push(&[regressors, targets]) {
+            finite("regressors", regressors)?;
+            finite("right-hand side", targets)?;
+        }
         Ok(())
     }
 

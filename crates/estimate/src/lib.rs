@@ -21,6 +21,8 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
+pub mod checks;
+pub mod derivatives;
 mod equation_of_motion;
 mod error;
 mod estimate;
@@ -30,8 +32,10 @@ mod least_squares;
 mod logarithm;
 mod modal;
 mod noise_spectrum;
+mod prediction;
 mod quasi_triangular;
 mod real_schur;
+mod sweep;
 pub mod time_domain;
 mod triangular;
 mod unknowns;
@@ -43,4 +47,6 @@ pub use frf::{Frf, FrfEstimator, Segments};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
 pub use modal::{IdentifiedMode, Uncertain};
+pub use prediction::{fit_percent, predict};
+pub use sweep::{Sweep, SweepPoint, sweep};
 pub use unknowns::{Parameter, Unknowns};

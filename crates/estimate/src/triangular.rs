@@ -1,9 +1,16 @@
 //! Any number of rows reduced to one small triangle, block by block.
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DMatrixView};
+use rayon::prelude::*;
 
 /// Rows reduced at a time: a block of a dozen columns stays in the first-level cache.
 const BLOCK_ROWS: usize = 256;
+
+/// Rows that one thread reduces on its own. Fixed, so that the numbers do not depend on how many
+/// threads there are.
+const SEGMENT_ROWS: usize = 16_384;
 
 /// The triangular factor R of A = Q R, built from row blocks of A; Q is never formed.
 ///
@@ -40,28 +47,49 @@ impl TriangularFactor {
     }
 
     /// Takes rows whose columns are spread over several matrices side by side.
-    pub(crate) fn push(&mut self, parts: &[DMatrixView<'_, f64>]) {
+    ///
+    /// False, and nothing taken, if a value is not finite.
+    #[must_use]
+    pub(crate) fn push(&mut self, parts: &[DMatrixView<'_, f64>]) -> bool {
         let rows = parts.first().map_or(0, |part| part.nrows());
         debug_assert_eq!(self.columns, parts.iter().map(|part| part.ncols()).sum::<usize>());
-        let mut start = 0;
-        while start < rows {
-            let len = BLOCK_ROWS.min(rows - start);
+        if rows <= SEGMENT_ROWS {
+            return self.push_range(parts, 0..rows);
+        }
+        let segment = |start: usize| {
+            let mut own = Self::new(self.columns);
+            let range = start..rows.min(start + SEGMENT_ROWS);
+            own.push_range(parts, range).then_some(own)
+        };
+        let starts = (0..rows.div_ceil(SEGMENT_ROWS)).into_par_iter().map(|s| s * SEGMENT_ROWS);
+        let Some(segments) = starts.map(segment).collect::<Option<Vec<_>>>() else { return false };
+        segments.iter().for_each(|segment| self.merge(segment));
+        true
+    }
+
+    fn push_range(&mut self, parts: &[DMatrixView<'_, f64>], rows: Range<usize>) -> bool {
+        let before = self.r.clone();
+        for start in rows.clone().step_by(BLOCK_ROWS) {
+            let len = BLOCK_ROWS.min(rows.end - start);
             let columns = parts.iter().flat_map(|part| part.column_iter());
             for (target, column) in self.block.chunks_exact_mut(len).zip(columns) {
-                for (to, from) in target.iter_mut().zip(column.rows(start, len).iter()) {
-                    *to = *from;
-                }
+                target.copy_from_slice(&column.as_slice()[start..start + len]);
+            }
+            if !all_finite(&self.block[..len * self.columns]) {
+                self.r = before;
+                return false;
             }
             self.absorb(len);
-            start += len;
         }
-        self.rows += rows;
+        self.rows += rows.len();
+        true
     }
 
     /// Takes everything another factor has seen.
     pub(crate) fn merge(&mut self, other: &Self) {
         let rows = self.rows + other.rows;
-        self.push(&[other.r.as_view()]);
+        let finite = self.push_range(&[other.r.as_view()], 0..other.columns);
+        debug_assert!(finite, "a factor of finite rows");
         self.stand_for(rows);
     }
 
@@ -70,29 +98,76 @@ impl TriangularFactor {
         self.rows = rows;
     }
 
-    /// Rotates the first `len` rows of the block buffer into R.
+    /// Rotates the first `len` rows of the block buffer into R, two columns in one sweep.
     fn absorb(&mut self, len: usize) {
-        let (r, n) = (&mut self.r, self.columns);
-        let mut rest = &mut self.block[..len * n];
-        for j in 0..n {
-            let (x, others) = rest.split_at_mut(len);
+        let columns = self.columns;
+        let mut rest = &mut self.block[..len * columns];
+        let mut j = 0;
+        while j + 1 < columns {
+            let (pair, others) = rest.split_at_mut(2 * len);
+            let (x1, x2) = pair.split_at_mut(len);
             rest = others;
-            let square = dot(x, x);
-            if square == 0.0 {
-                continue;
-            }
-            let alpha = r[(j, j)];
-            // H = I − τ u uᵀ with u = [1; x·scale], opposite sign against cancellation.
-            let beta = -alpha.signum() * (alpha * alpha + square).sqrt();
-            let (tau, scale) = ((beta - alpha) / beta, 1.0 / (alpha - beta));
-            r[(j, j)] = beta;
+            let first = Reflection::new(&mut self.r, j, x1);
+            let d = dot(x1, x2);
+            let w = first.apply(&mut self.r, j + 1, d);
+            subtract(x2, w, x1, 0.0, x1);
+            let second = Reflection::new(&mut self.r, j + 1, x2);
+            // x1ᵀx2 after the change of x2, for the columns that see both reflections at once.
+            let across = dot(x1, x2);
             for (k, y) in rest.chunks_exact_mut(len).enumerate() {
-                let w = tau * (r[(j, j + 1 + k)] + scale * dot(x, y));
-                r[(j, j + 1 + k)] -= w;
-                subtract(y, w * scale, x);
+                let [d1, d2] = dots(x1, x2, y);
+                let w1 = first.apply(&mut self.r, j + 2 + k, d1);
+                let w2 = second.apply(&mut self.r, j + 2 + k, d2 - w1 * across);
+                subtract(y, w1, x1, w2, x2);
             }
+            j += 2;
+        }
+        if j < columns {
+            Reflection::new(&mut self.r, j, rest);
         }
     }
+}
+
+/// H = I − τ u uᵀ with u = \[1; scale·x\], which clears x under the diagonal entry of R.
+struct Reflection {
+    row: usize,
+    tau: f64,
+    scale: f64,
+}
+
+impl Reflection {
+    /// Makes it for column `row` and puts the new diagonal entry into R.
+    fn new(r: &mut DMatrix<f64>, row: usize, x: &[f64]) -> Self {
+        let square = dot(x, x);
+        if square == 0.0 {
+            return Self { row, tau: 0.0, scale: 0.0 };
+        }
+        let alpha = r[(row, row)];
+        // The opposite sign, against cancellation.
+        let beta = -(alpha * alpha + square).sqrt().copysign(alpha);
+        r[(row, row)] = beta;
+        Self { row, tau: (beta - alpha) / beta, scale: 1.0 / (alpha - beta) }
+    }
+
+    /// Changes R in `column`, whose block part has the product `dot` with x; returns the multiple
+    /// of x to be taken from that part.
+    fn apply(&self, r: &mut DMatrix<f64>, column: usize, dot: f64) -> f64 {
+        let w = self.tau * (r[(self.row, column)] + self.scale * dot);
+        r[(self.row, column)] -= w;
+        w * self.scale
+    }
+}
+
+/// Whether no value is NaN or infinite: 0·v is 0 then, and NaN otherwise.
+fn all_finite(values: &[f64]) -> bool {
+    let mut sums = [0.0; 8];
+    let (chunks, rest) = values.as_chunks::<8>();
+    for chunk in chunks {
+        for lane in 0..8 {
+            sums[lane] += 0.0 * chunk[lane];
+        }
+    }
+    sums.iter().chain(rest).map(|v| 0.0 * v).sum::<f64>() == 0.0
 }
 
 /// xᵀy with eight partial sums, so that the processor's vector units are used.
@@ -109,10 +184,26 @@ fn dot(x: &[f64], y: &[f64]) -> f64 {
     sums.iter().sum::<f64>() + rest
 }
 
-/// y ← y − factor·x.
-fn subtract(y: &mut [f64], factor: f64, x: &[f64]) {
-    for (a, b) in y.iter_mut().zip(x) {
-        *a -= factor * b;
+/// x1ᵀy and x2ᵀy in one sweep.
+fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
+    let (mut first, mut second) = ([0.0; 4], [0.0; 4]);
+    let (x1s, x1_rest) = x1.as_chunks::<4>();
+    let (x2s, x2_rest) = x2.as_chunks::<4>();
+    let (ys, y_rest) = y.as_chunks::<4>();
+    for ((a1, a2), b) in x1s.iter().zip(x2s).zip(ys) {
+        for lane in 0..4 {
+            first[lane] += a1[lane] * b[lane];
+            second[lane] += a2[lane] * b[lane];
+        }
+    }
+    let rest = |x: &[f64]| x.iter().zip(y_rest).map(|(a, b)| a * b).sum::<f64>();
+    [first.iter().sum::<f64>() + rest(x1_rest), second.iter().sum::<f64>() + rest(x2_rest)]
+}
+
+/// y ← y − f1·x1 − f2·x2.
+fn subtract(y: &mut [f64], f1: f64, x1: &[f64], f2: f64, x2: &[f64]) {
+    for ((y, x1), x2) in y.iter_mut().zip(x1).zip(x2) {
+        *y -= f1 * x1 + f2 * x2;
     }
 }
 
@@ -134,11 +225,11 @@ mod tests {
             (cut, a) in (1usize..700).prop_flat_map(|rows| (0..rows, matrix(rows, 5)))
         ) {
             let mut whole = TriangularFactor::new(5);
-            whole.push(&[a.columns(0, 2), a.columns(2, 3)]);
+            prop_assert!(whole.push(&[a.columns(0, 2), a.columns(2, 3)]));
             let mut parts = TriangularFactor::new(5);
-            parts.push(&[a.rows(0, cut)]);
+            prop_assert!(parts.push(&[a.rows(0, cut)]));
             let mut second = TriangularFactor::new(5);
-            second.push(&[a.rows(cut, a.nrows() - cut)]);
+            prop_assert!(second.push(&[a.rows(cut, a.nrows() - cut)]));
             parts.merge(&second);
             prop_assert_eq!(parts.rows(), a.nrows());
             for factor in [whole, parts] {

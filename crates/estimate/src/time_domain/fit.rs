@@ -26,11 +26,7 @@ pub struct TimeDomainFit {
 /// The least-squares answer in terms of the state equations.
 struct Fitted<'a> {
     rows: &'a Transitions,
-    /// Forces that are not identically zero.
-    forces: Vec<usize>,
-    /// Coefficients of the force at the next sample, too.
-    two_forces: bool,
-    solution: Solution,
+    regression: Regression,
     continuous: Continuous,
 }
 
@@ -46,18 +42,21 @@ impl TimeDomainFit {
         discretisation: Discretisation,
         unknowns: &Unknowns,
     ) -> Result<Self, EstimateError> {
-        let (fitted, coefficients) = Fitted::new(rows, discretisation)?;
+        let regression = regression(rows, discretisation)?;
+        let change = regression.change(rows.dof());
+        let continuous = Continuous::new(&change, rows.dt(), discretisation)?;
+        let fitted = Fitted { rows, regression, continuous };
         let (mut findings, sensitivities) = fitted.parameters(unknowns)?;
         let [mass, _, _] = unknowns.assemble(&findings.values);
         findings.covariance = fitted.covariance(&mass, &sensitivities)?;
         let n = rows.dof();
-        findings.residual_nrmse = fitted.solution.residual_nrmse[n..].to_vec();
-        findings.degrees_of_freedom = fitted.solution.degrees_of_freedom;
-        findings.condition = fitted.solution.condition;
+        findings.residual_nrmse = fitted.regression.solution.residual_nrmse[n..].to_vec();
+        findings.degrees_of_freedom = fitted.regression.solution.degrees_of_freedom;
+        findings.condition = fitted.regression.solution.condition;
         Ok(Self {
             estimate: Estimate::new(findings),
             discretisation,
-            change: fitted.all_forces(&coefficients),
+            change: fitted.regression.all_forces(n),
             state_matrix: fitted.continuous.value.columns(0, 2 * n).into_owned(),
             dt: rows.dt(),
         })
@@ -138,33 +137,66 @@ impl TimeDomainFit {
     }
 }
 
-impl<'a> Fitted<'a> {
-    /// With the coefficients (regressors × 2n), the smallest of those that fit equally well.
-    fn new(
-        rows: &'a Transitions,
-        discretisation: Discretisation,
-    ) -> Result<(Self, DMatrix<f64>), EstimateError> {
-        let n = rows.dof();
-        let force_columns = rows.columns(2);
-        let forces: Vec<usize> = (0..n).filter(|j| force_columns.column(*j).norm() > 0.0).collect();
-        let two_forces = discretisation == Discretisation::FirstOrderHold;
-        let mut regressors: Vec<_> =
-            (0..2 * n).map(|at| rows.columns(at / n).column(at % n).into_owned()).collect();
-        for kind in 2..if two_forces { 4 } else { 3 } {
-            let columns = rows.columns(kind);
-            regressors.extend(forces.iter().map(|j| columns.column(*j).into_owned()));
+/// The increments regressed on states and forces.
+pub(super) struct Regression {
+    /// Forces that are not identically zero.
+    forces: Vec<usize>,
+    /// Coefficients of the force at the next sample, too.
+    two_forces: bool,
+    pub(super) solution: Solution,
+    /// Regressors × 2n: the smallest of those that fit equally well.
+    coefficients: DMatrix<f64>,
+}
+
+pub(super) fn regression(
+    rows: &Transitions,
+    discretisation: Discretisation,
+) -> Result<Regression, EstimateError> {
+    let n = rows.dof();
+    let column = |kind: usize, at: usize| rows.columns(kind).column(at).into_owned();
+    let state = |kind: usize| (0..2 * n).map(move |at| column(kind + at / n, at % n));
+    let forces: Vec<usize> = (0..n).filter(|j| rows.columns(2).column(*j).norm() > 0.0).collect();
+    let two_forces = discretisation == Discretisation::FirstOrderHold;
+    let mut regressors: Vec<_> = state(0).collect();
+    for kind in 2..if two_forces { 4 } else { 3 } {
+        regressors.extend(forces.iter().map(|j| column(kind, *j)));
+    }
+    let regressors = DMatrix::from_columns(&regressors);
+    let targets = DMatrix::from_columns(&state(4).collect::<Vec<_>>());
+    let solution = solve_compressed(regressors.as_view(), targets.as_view(), rows.rows())?;
+    let coefficients = &solution.inverse * targets;
+    Ok(Regression { forces, two_forces, solution, coefficients })
+}
+
+impl Regression {
+    /// \[Φ − I, Γ₀ + Γ₁\].
+    pub(super) fn change(&self, dof: usize) -> DMatrix<f64> {
+        let (states, forces) = (2 * dof, self.forces.len());
+        let mut change = self.coefficients.rows(0, states + forces).transpose();
+        if self.two_forces {
+            let next = self.coefficients.rows(states + forces, forces).transpose();
+            let mut total = change.columns_mut(states, forces);
+            total += next;
         }
-        let increments: Vec<_> =
-            (0..2 * n).map(|at| rows.columns(4 + at / n).column(at % n).into_owned()).collect();
-        let (regressors, targets) =
-            (DMatrix::from_columns(&regressors), DMatrix::from_columns(&increments));
-        let solution = solve_compressed(regressors.as_view(), targets.as_view(), rows.rows())?;
-        let coefficients = &solution.inverse * targets;
-        let change = joined(&coefficients, 2 * n, forces.len());
-        let continuous = Continuous::new(&change, rows.dt(), discretisation)?;
-        Ok((Self { rows, forces, two_forces, solution, continuous }, coefficients))
+        change
     }
 
+    /// \[Φ − I, Γ(, Γ⁺)\] with zeros for the forces left out.
+    fn all_forces(&self, n: usize) -> DMatrix<f64> {
+        let groups = if self.two_forces { 2 } else { 1 };
+        let mut change = DMatrix::zeros(2 * n, (2 + groups) * n);
+        change.columns_mut(0, 2 * n).copy_from(&self.coefficients.rows(0, 2 * n).transpose());
+        for group in 0..groups {
+            for (at, force) in self.forces.iter().enumerate() {
+                let row = self.coefficients.row(2 * n + group * self.forces.len() + at);
+                change.set_column((2 + group) * n + force, &row.transpose());
+            }
+        }
+        change
+    }
+}
+
+impl Fitted<'_> {
     /// The values, and how they follow from the state equations.
     fn parameters(
         &self,
@@ -215,7 +247,7 @@ impl<'a> Fitted<'a> {
         place: impl Fn(&Parameter) -> usize,
     ) -> Vec<Undetermined> {
         let mut found = Vec::new();
-        for direction in &self.solution.undetermined {
+        for direction in &self.regression.solution.undetermined {
             for equation in 0..self.rows.dof() {
                 let own = free.iter().filter(|p| p.row() == equation);
                 let terms: Vec<_> = own
@@ -243,17 +275,18 @@ impl<'a> Fitted<'a> {
         let lower = self.continuous.value.rows(n, n);
         let mut acceleration =
             x * lower.columns(0, n).transpose() + v * lower.columns(n, n).transpose();
-        for (at, force) in self.forces.iter().enumerate() {
+        for (at, force) in self.regression.forces.iter().enumerate() {
             acceleration += f.column(*force) * lower.column(2 * n + at).transpose();
         }
         let parts = [acceleration.as_view(), v, x, f];
-        let equations = EquationOfMotion::from_compressed(n, parts, rows.rows());
+        let equations = EquationOfMotion::from_compressed(n, parts, rows.rows())?;
         let (findings, inverse) = equations.findings(unknowns)?;
         let motion = equations.motion_and_force();
         let sensitivity = |(at, p): (usize, &Parameter)| {
             // Back from the order ẋ, x, F to x, ẋ, and the forces that act.
             let all = inverse.row(at) * motion;
-            let order = (n..2 * n).chain(0..n).chain(self.forces.iter().map(|j| 2 * n + j));
+            let order =
+                (n..2 * n).chain(0..n).chain(self.regression.forces.iter().map(|j| 2 * n + j));
             let weight: Vec<f64> = order.map(|column| all[column]).collect();
             Sensitivity { equation: p.row(), weight: RowDVector::from_vec(weight) }
         };
@@ -269,8 +302,8 @@ impl<'a> Fitted<'a> {
         sensitivities: &[Sensitivity],
     ) -> Result<DMatrix<f64>, EstimateError> {
         let n = self.rows.dof();
-        let (states, forces) = (2 * n, self.forces.len());
-        let regressors = self.solution.inverse.nrows();
+        let (states, forces) = (2 * n, self.regression.forces.len());
+        let regressors = self.regression.solution.inverse.nrows();
         let mut gradients = vec![DMatrix::zeros(regressors, states); sensitivities.len()];
         for row in 0..states {
             for column in 0..states + forces {
@@ -281,7 +314,7 @@ impl<'a> Fitted<'a> {
                 for (gradient, s) in gradients.iter_mut().zip(sensitivities) {
                     let value = -by_equation.row(s.equation).dot(&s.weight);
                     gradient[(column, row)] = value;
-                    if self.two_forces && column >= states {
+                    if self.regression.two_forces && column >= states {
                         gradient[(column + forces, row)] = value;
                     }
                 }
@@ -289,7 +322,11 @@ impl<'a> Fitted<'a> {
         }
         let weighted: Vec<_> = gradients
             .iter()
-            .map(|g| &self.solution.unscaled_covariance * g * &self.solution.residual_covariance)
+            .map(|g| {
+                &self.regression.solution.unscaled_covariance
+                    * g
+                    * &self.regression.solution.residual_covariance
+            })
             .collect();
         let count = sensitivities.len();
         Ok(DMatrix::from_fn(count, count, |p, q| {
@@ -298,33 +335,4 @@ impl<'a> Fitted<'a> {
             weighted[p].dot(&gradients[q])
         }))
     }
-
-    /// \[Φ − I, Γ(, Γ⁺)\] with zeros for the forces left out.
-    fn all_forces(&self, coefficients: &DMatrix<f64>) -> DMatrix<f64> {
-        let (n, forces) = (self.rows.dof(), self.forces.len());
-        let groups = if self.two_forces { 2 } else { 1 };
-        let mut change = DMatrix::zeros(2 * n, (2 + groups) * n);
-        for state in 0..2 * n {
-            change.set_column(state, &coefficients.row(state).transpose());
-        }
-        for group in 0..groups {
-            for (at, force) in self.forces.iter().enumerate() {
-                let from = coefficients.row(2 * n + group * forces + at).transpose();
-                change.set_column((2 + group) * n + force, &from);
-            }
-        }
-        change
-    }
-}
-
-/// \[Φ − I, Γ₀ + Γ₁\] from the coefficients (regressors × states).
-fn joined(coefficients: &DMatrix<f64>, states: usize, forces: usize) -> DMatrix<f64> {
-    let mut joined = coefficients.rows(0, states + forces).transpose();
-    let groups = coefficients.nrows().saturating_sub(states).checked_div(forces).unwrap_or(1);
-    for group in 1..groups {
-        let next = coefficients.rows(states + group * forces, forces).transpose();
-        let mut total = joined.columns_mut(states, forces);
-        total += next;
-    }
-    joined
 }

@@ -81,7 +81,8 @@ impl Transitions {
         for start in (0..pairs).step_by(BLOCK) {
             let len = BLOCK.min(pairs - start);
             self.fill(&mut block, quantities, start, len);
-            self.factor.push(&[block.rows(0, len)]);
+            let finite = self.factor.push(&[block.rows(0, len)]);
+            debug_assert!(finite, "records are finite");
         }
         Ok(())
     }
@@ -120,6 +121,25 @@ impl Transitions {
     ) -> Result<TimeDomainFit, EstimateError> {
         size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         TimeDomainFit::new(self, discretisation, unknowns)
+    }
+
+    /// Condition number of the scaled regressors, and how many directions they leave open.
+    pub(crate) fn condition(
+        &self,
+        discretisation: Discretisation,
+    ) -> Result<(f64, usize), EstimateError> {
+        let solution = super::fit::regression(self, discretisation)?.solution;
+        Ok((solution.condition, solution.undetermined.len()))
+    }
+
+    /// A of ż = A z + B F: 2n × 2n.
+    pub(crate) fn state_matrix(
+        &self,
+        discretisation: Discretisation,
+    ) -> Result<DMatrix<f64>, EstimateError> {
+        let change = super::fit::regression(self, discretisation)?.change(self.dof);
+        let continuous = super::continuous::Continuous::new(&change, self.dt, discretisation)?;
+        Ok(continuous.value.columns(0, 2 * self.dof).into_owned())
     }
 
     fn fill(

@@ -1,0 +1,60 @@
+//! Before a fit: will these data do? After it: is what is left over noise?
+//!
+//! Every [`Check`] says in words and numbers what was looked at and what it means.
+
+mod after;
+mod before;
+
+use std::fmt;
+
+pub use after::{Correlation, cross_correlation, whiteness};
+pub use before::before_fit;
+
+/// How a check came out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Verdict {
+    /// Nothing to worry about.
+    Good,
+    /// The fit can be done; the number says how far to trust it.
+    Doubtful,
+    /// The fit will fail or mislead.
+    Bad,
+}
+
+/// What a check looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Subject {
+    /// Whether the force excites enough for the unknowns.
+    Excitation,
+    /// Whether the data tell the unknowns apart.
+    Conditioning,
+    /// Whether the record is the period it is said to be.
+    Periodicity,
+    /// Whether the step suits the fastest mode and the discretisation.
+    Step,
+}
+
+/// One thing looked at, in words with numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Check {
+    /// What was looked at.
+    pub subject: Subject,
+    /// How it came out.
+    pub verdict: Verdict,
+    /// The number behind the verdict; the text says of what.
+    pub value: f64,
+    /// One sentence.
+    pub text: String,
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let verdict = match self.verdict {
+            Verdict::Good => "good",
+            Verdict::Doubtful => "doubtful",
+            Verdict::Bad => "bad",
+        };
+        write!(f, "{verdict}: {}", self.text)
+    }
+}

@@ -1,0 +1,163 @@
+//! Whether a record will do for a time-domain fit.
+
+use mechid_signal::measures::persistent_excitation_order;
+use mechid_signal::{Record, Spectrum};
+
+use super::{Check, Subject, Verdict};
+use crate::EstimateError;
+use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+
+/// Lines weaker than this share of the strongest do not count as excitation.
+const LINE_FLOOR: f64 = 1e-4;
+
+/// Condition number beyond which a noise of 1 % leaves nothing of some combination of parameters.
+const DOUBTFUL_CONDITION: f64 = 1e4;
+
+/// A step across the seam this many times the usual one is no rounding and hardly chance.
+const DOUBTFUL_SEAM: f64 = 5.0;
+const BAD_SEAM: f64 = 20.0;
+
+/// Looks at excitation, conditioning, periodicity (if claimed) and step before a time-domain fit
+/// of displacement (m), velocity (m/s) and force (N).
+///
+/// # Errors
+/// As [`Transitions::push`], and [`EstimateError::TooFewRows`].
+pub fn before_fit(
+    method: TimeDomain,
+    displacement: &Record,
+    velocity: &Record,
+    force: &Record,
+) -> Result<Vec<Check>, EstimateError> {
+    let dof = displacement.channels();
+    let mut rows = Transitions::new(dof, displacement.sampling().dt())?;
+    rows.push(displacement, velocity, force, method.extent())?;
+    let mut checks = excitation(method.discretisation(), force, dof);
+    checks.push(conditioning(&rows, method.discretisation())?);
+    if method.extent() == Extent::WholePeriod {
+        checks.push(periodicity(displacement));
+    }
+    checks.push(step(&rows, method.discretisation())?);
+    Ok(checks)
+}
+
+/// The order of persistent excitation of each force against the states and inputs it must tell
+/// apart.
+fn excitation(discretisation: Discretisation, force: &Record, dof: usize) -> Vec<Check> {
+    let spectrum = Spectrum::of(force);
+    let needed = 2 * dof + if discretisation == Discretisation::FirstOrderHold { 2 } else { 1 };
+    let one = |channel: usize| {
+        let number = channel + 1;
+        let order = persistent_excitation_order(&spectrum, channel, LINE_FLOOR).unwrap_or(0);
+        let (verdict, text) = match order {
+            0 => (
+                Verdict::Doubtful,
+                format!("force {number} is zero: it is left out, and no mass follows from it"),
+            ),
+            _ if order < needed => (
+                Verdict::Bad,
+                format!(
+                    "force {number} is persistently exciting of order {order} only, {needed} are \
+                     needed: excite more lines"
+                ),
+            ),
+            _ => (
+                Verdict::Good,
+                format!(
+                    "force {number} is persistently exciting of order {order}, {needed} needed"
+                ),
+            ),
+        };
+        Check { subject: Subject::Excitation, verdict, value: order as f64, text }
+    };
+    (0..dof).map(one).collect()
+}
+
+fn conditioning(
+    rows: &Transitions,
+    discretisation: Discretisation,
+) -> Result<Check, EstimateError> {
+    let (condition, lost) = rows.condition(discretisation)?;
+    let (verdict, text) = if lost > 0 {
+        let text = format!(
+            "{lost} combinations of displacements, velocities and forces do not vary in the data: \
+             some parameters will stay undetermined"
+        );
+        (Verdict::Bad, text)
+    } else if condition > DOUBTFUL_CONDITION {
+        let text = format!(
+            "the regressors have the condition number {condition:.1e}: relative noise is amplified \
+             up to that much in the worst combination of parameters"
+        );
+        (Verdict::Doubtful, text)
+    } else {
+        (Verdict::Good, format!("the regressors have the condition number {condition:.1e}"))
+    };
+    Ok(Check { subject: Subject::Conditioning, verdict, value: condition, text })
+}
+
+/// The curvature across the seam, where the last sample is followed by the first, against the
+/// usual curvature: a period has nothing special there.
+fn periodicity(displacement: &Record) -> Check {
+    let len = displacement.len();
+    let ratio = |channel: usize| {
+        let x = displacement.channel(channel);
+        let curvature = |k: usize| x[(k + len - 1) % len] - 2.0 * x[k] + x[(k + 1) % len];
+        let inside: f64 = (1..len.saturating_sub(1)).map(|k| curvature(k).powi(2)).sum();
+        let usual = (inside / len.saturating_sub(2).max(1) as f64).sqrt();
+        let seam = curvature(0).abs().max(curvature(len - 1).abs());
+        if seam == 0.0 { 0.0 } else { seam / usual }
+    };
+    let value = (0..displacement.channels()).map(ratio).fold(0.0, f64::max);
+    let (verdict, meaning) = match value {
+        v if v < DOUBTFUL_SEAM => (Verdict::Good, "as a whole period should"),
+        v if v < BAD_SEAM => (Verdict::Doubtful, "hardly a steady state over one whole period"),
+        _ => (Verdict::Bad, "this is no period: fit it as an open record"),
+    };
+    let text = format!(
+        "from the last sample back to the first the displacement bends {value:.1} times as much as \
+         usual: {meaning}"
+    );
+    Check { subject: Subject::Periodicity, verdict, value, text }
+}
+
+/// The eigenvalues the data suggest (force held between samples), against the step.
+fn step(rows: &Transitions, discretisation: Discretisation) -> Result<Check, EstimateError> {
+    let subject = Subject::Step;
+    let exact = match rows.state_matrix(Discretisation::ZeroOrderHold) {
+        Ok(matrix) => matrix,
+        Err(reason @ EstimateError::NoLogarithm { .. }) => {
+            let (verdict, text) = (Verdict::Bad, format!("the step does not suit: {reason}"));
+            return Ok(Check { subject, verdict, value: f64::INFINITY, text });
+        }
+        Err(other) => return Err(other),
+    };
+    let eigenvalues = exact.complex_eigenvalues();
+    let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
+    let turn = fastest * rows.dt();
+    let samples = std::f64::consts::TAU / turn;
+    let hz = fastest / std::f64::consts::TAU;
+    let mode = format!("the fastest mode, near {hz:.4} Hz, has {samples:.1} samples per period");
+    if discretisation == Discretisation::Euler {
+        let n = rows.dof();
+        let euler = rows.state_matrix(Discretisation::Euler)?;
+        let bias = (euler.rows(n, n) - exact.rows(n, n)).norm() / exact.rows(n, n).norm();
+        let verdict = grade(bias, 0.01, 0.1);
+        let text = format!("{mode}; Euler's first-order bias here is about {:.1} %", 100.0 * bias);
+        return Ok(Check { subject, verdict, value: bias, text });
+    }
+    let verdict = grade(turn, 1.0, 2.5);
+    let meaning = match verdict {
+        Verdict::Good => "",
+        Verdict::Doubtful => "; few, so what the force does between samples matters",
+        Verdict::Bad => "; at two or fewer it cannot be told from a slower one",
+    };
+    Ok(Check { subject, verdict, value: samples, text: mode + meaning })
+}
+
+fn grade(value: f64, doubtful: f64, bad: f64) -> Verdict {
+    match value {
+        v if v < doubtful => Verdict::Good,
+        v if v < bad => Verdict::Doubtful,
+        _ => Verdict::Bad,
+    }
+}

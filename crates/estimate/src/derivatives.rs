@@ -1,0 +1,159 @@
+//! Velocity and acceleration when only one of displacement and acceleration was measured.
+//!
+//! Differentiation amplifies noise in proportion to frequency, twice for the acceleration. How it is
+//! done is the caller's choice, because each way assumes something:
+//!
+//! | Function | Assumes | Costs |
+//! |---|---|---|
+//! | [`spectral_from_displacement`] | the record is whole periods | nothing; exact up to Nyquist |
+//! | [`spectral_from_acceleration`] | the same, and no interest in the mean | the static displacement |
+//! | [`SavitzkyGolay::motion`] | smooth over a window | the ends of the record, and the highest frequencies |
+//! | [`SavitzkyGolay::twice_differentiated`] | the same, of force and acceleration | as above, and noise four orders up |
+
+use mechid_model::Response;
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use crate::EstimateError;
+
+/// x, ẋ and ẍ of a displacement (m) recorded over whole periods, by multiplying its lines by iω.
+///
+/// The Nyquist line (even length) has no velocity at the samples.
+///
+/// # Errors
+/// [`EstimateError::Model`] if a derivative overflows.
+///
+/// # Source
+/// Dissertation eqs. (4.6.2)–(4.6.3).
+pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, EstimateError> {
+    let spectrum = Spectrum::of(displacement);
+    let velocity = times(&spectrum, |i_omega| i_omega);
+    let acceleration = times(&spectrum, |i_omega| i_omega * i_omega);
+    Ok(Response::new(displacement.clone(), velocity, acceleration)?)
+}
+
+/// x, ẋ and ẍ of an acceleration (m/s²) recorded over whole periods.
+///
+/// The mean of a periodic acceleration is zero and that of the displacement is lost: take the mean
+/// off the force too before fitting, [`Record::without_mean`].
+///
+/// # Errors
+/// [`EstimateError::Model`] if an integral overflows.
+pub fn spectral_from_acceleration(acceleration: &Record) -> Result<Response, EstimateError> {
+    let acceleration = acceleration.without_mean();
+    let spectrum = Spectrum::of(&acceleration);
+    let over = |power: i32| {
+        times(&spectrum, |i_omega| match i_omega.im {
+            0.0 => Complex::ZERO,
+            _ => i_omega.powi(-power),
+        })
+    };
+    Ok(Response::new(over(2), over(1), acceleration)?)
+}
+
+fn times(spectrum: &Spectrum, factor: impl Fn(Complex<f64>) -> Complex<f64>) -> Record {
+    let mut lines = spectrum.lines().clone();
+    for (n, mut row) in lines.row_iter_mut().enumerate() {
+        let factor = factor(Complex::new(0.0, spectrum.omega(n)));
+        row.iter_mut().for_each(|line| *line *= factor);
+    }
+    Spectrum::from_lines(spectrum.sampling(), lines).to_record()
+}
+
+/// A sliding polynomial fit: 2·half_width + 1 samples, a polynomial of some order through them.
+///
+/// Exact for polynomials of that order. At the ends the first and last windows are used off their
+/// centres, with more noise.
+///
+/// # Source
+/// Savitzky & Golay (1964), Analytical Chemistry 36, 1627–1639.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SavitzkyGolay {
+    half_width: usize,
+    order: usize,
+    /// Least-squares inverse of the powers (k/half_width)^p: (order + 1) × window.
+    inverse: DMatrix<f64>,
+}
+
+impl SavitzkyGolay {
+    /// A polynomial of `order` through `2 * half_width + 1` samples.
+    ///
+    /// # Errors
+    /// [`EstimateError::Window`] unless order ≤ 2·half_width and half_width > 0.
+    pub fn new(half_width: usize, order: usize) -> Result<Self, EstimateError> {
+        if half_width == 0 || order > 2 * half_width {
+            return Err(EstimateError::Window { samples: 2 * half_width + 1, order });
+        }
+        let h = half_width as f64;
+        let powers = DMatrix::from_fn(2 * half_width + 1, order + 1, |k, p| {
+            ((k as f64 - h) / h).powi(p as i32)
+        });
+        let (q, r) = powers.qr().unpack();
+        let inverse = r
+            .solve_upper_triangular(&q.transpose())
+            .ok_or(EstimateError::Window { samples: 2 * half_width + 1, order })?;
+        Ok(Self { half_width, order, inverse })
+    }
+
+    /// The `times`-th derivative of every channel (0 smooths).
+    ///
+    /// # Errors
+    /// [`EstimateError::TooShort`] if the record is shorter than the window,
+    /// [`EstimateError::Window`] if the polynomial has no such derivative.
+    pub fn differentiate(&self, record: &Record, times: usize) -> Result<Record, EstimateError> {
+        let window = 2 * self.half_width + 1;
+        if record.len() < window {
+            return Err(EstimateError::TooShort { samples: record.len(), needed: window });
+        }
+        if times > self.order {
+            return Err(EstimateError::Window { samples: window, order: self.order });
+        }
+        let scale = (self.half_width as f64 * record.sampling().dt()).powi(-(times as i32));
+        let kernels: Vec<Vec<f64>> =
+            (0..window).map(|place| self.kernel(place, times, scale)).collect();
+        let (half, len) = (self.half_width, record.len());
+        let data = DMatrix::from_fn(len, record.channels(), |k, channel| {
+            let start = k.saturating_sub(half).min(len - window);
+            let values = &record.channel(channel)[start..start + window];
+            values.iter().zip(&kernels[k - start]).map(|(v, w)| v * w).sum()
+        });
+        Ok(Record::new(record.sampling(), data)?)
+    }
+
+    /// Smoothed x, ẋ and ẍ of a displacement (m).
+    ///
+    /// # Errors
+    /// As [`SavitzkyGolay::differentiate`]; the order must be at least 2.
+    pub fn motion(&self, displacement: &Record) -> Result<Response, EstimateError> {
+        let derivative = |times| self.differentiate(displacement, times);
+        Ok(Response::new(derivative(0)?, derivative(1)?, derivative(2)?)?)
+    }
+
+    /// For an acceleration without displacement: M, C and K hold between the acceleration's
+    /// derivatives and those of the force as they do between the motion and the force,
+    /// M ẍ″ + C ẍ′ + K ẍ = F″, without integrating and without its drift.
+    ///
+    /// Returns (ẍ, ẍ′, ẍ″) in the places of displacement, velocity and acceleration, and F″ in that
+    /// of the force, for [`crate::time_domain::equation_of_motion`].
+    ///
+    /// # Errors
+    /// As [`SavitzkyGolay::motion`].
+    pub fn twice_differentiated(
+        &self,
+        acceleration: &Record,
+        force: &Record,
+    ) -> Result<(Response, Record), EstimateError> {
+        Ok((self.motion(acceleration)?, self.differentiate(force, 2)?))
+    }
+
+    /// Weights of the samples of a window for a derivative at its `place`-th sample.
+    fn kernel(&self, place: usize, times: usize, scale: f64) -> Vec<f64> {
+        let t = place as f64 / self.half_width as f64 - 1.0;
+        // The derivative of t^p is p (p − 1) … (p − times + 1) t^(p − times).
+        let factor = |p: usize| (p + 1 - times..=p).map(|i| i as f64).product::<f64>();
+        let weights = (times..=self.order)
+            .map(|p| self.inverse.row(p) * (factor(p) * t.powi((p - times) as i32) * scale));
+        let zero = self.inverse.row(0) * 0.0;
+        weights.fold(zero, |sum, row| sum + row).iter().copied().collect()
+    }
+}

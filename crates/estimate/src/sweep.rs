@@ -1,0 +1,113 @@
+//! One estimator over a range of settings, such as time steps, and which of them is best.
+
+use mechid_model::SecondOrderSystem;
+use rayon::prelude::*;
+
+use crate::Estimate;
+
+/// What came out at one setting.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepPoint<S, E> {
+    /// The setting, such as an NPI.
+    pub setting: S,
+    /// The estimate with its intervals, or why there is none.
+    pub outcome: Result<Estimate, E>,
+    /// How good it is, the smaller the better; `None` if there is no complete estimate.
+    ///
+    /// With a reference: the largest error of an entry of M, C or K relative to the largest entry
+    /// of that matrix. Without: the same of the standard errors, which say nothing of bias.
+    pub error: Option<f64>,
+}
+
+/// All points of a sweep, in the order of the settings.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sweep<S, E> {
+    points: Vec<SweepPoint<S, E>>,
+}
+
+/// Runs `estimate` at every setting, in parallel, and rates what it finds.
+///
+/// The result does not depend on the number of threads. `progress` is called after every setting,
+/// from any thread, with the number of settings done.
+///
+/// ```
+/// use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+/// use mechid_estimate::{Unknowns, sweep};
+/// use mechid_model::npi_sampling;
+/// use mechid_problems::{dissertation_sdof, exact_zoh_periodic};
+/// use mechid_signal::{Multisine, Phases};
+///
+/// let machine = dissertation_sdof();
+/// let system = machine.system();
+/// let unknowns = Unknowns::known_mass(system.mass())?;
+/// let euler = TimeDomain::new(Discretisation::Euler, Extent::WholePeriod);
+/// let settings: Vec<f64> = (1..=8).map(f64::from).collect();
+/// let found = sweep(&settings, Some(&system), |npi| {
+///     let sampling = npi_sampling(*npi, 256, machine.natural_frequency())?;
+///     let force = Multisine::flat(1..=127, 50.0, Phases::Schroeder)?.sample(sampling)?;
+///     let motion = exact_zoh_periodic(&system, &force)?;
+///     let fit = euler.fit(motion.displacement(), motion.velocity(), &force, &unknowns)?;
+///     Ok::<_, Box<dyn std::error::Error + Send + Sync>>(fit.into_estimate())
+/// }, |_done| {});
+/// assert_eq!(found.best().map(|point| point.setting), Some(1.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn sweep<S, E>(
+    settings: &[S],
+    reference: Option<&SecondOrderSystem>,
+    estimate: impl Fn(&S) -> Result<Estimate, E> + Sync,
+    progress: impl Fn(usize) + Sync,
+) -> Sweep<S, E>
+where
+    S: Clone + Send + Sync,
+    E: Send,
+{
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let point = |setting: &S| {
+        let outcome = estimate(setting);
+        let error = outcome.as_ref().ok().and_then(|found| rate(found, reference));
+        progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
+        SweepPoint { setting: setting.clone(), outcome, error }
+    };
+    Sweep { points: settings.par_iter().map(point).collect() }
+}
+
+impl<S, E> Sweep<S, E> {
+    /// Every setting, in the order given.
+    pub fn points(&self) -> &[SweepPoint<S, E>] {
+        &self.points
+    }
+
+    /// The setting with the smallest error; the first of equals. `None` if nothing was found.
+    pub fn best(&self) -> Option<&SweepPoint<S, E>> {
+        let rated = self.points.iter().filter_map(|point| Some((point, point.error?)));
+        rated.min_by(|(_, a), (_, b)| a.total_cmp(b)).map(|(point, _)| point)
+    }
+}
+
+fn rate(found: &Estimate, reference: Option<&SecondOrderSystem>) -> Option<f64> {
+    found.system().ok()?;
+    let [mass, damping, stiffness] = [found.mass(), found.damping(), found.stiffness()];
+    let error = match reference {
+        Some(system) => {
+            [(&mass, system.mass()), (&damping, system.damping()), (&stiffness, system.stiffness())]
+                .iter()
+                .map(|(found, known)| {
+                    (*found - *known).amax() / known.amax().max(f64::MIN_POSITIVE)
+                })
+                .fold(0.0, f64::max)
+        }
+        None => found
+            .parameters()
+            .map(|p| {
+                let whole = match p.parameter.matrix() {
+                    mechid_model::Matrix::Mass => &mass,
+                    mechid_model::Matrix::Damping => &damping,
+                    mechid_model::Matrix::Stiffness => &stiffness,
+                };
+                p.standard_error / whole.amax().max(f64::MIN_POSITIVE)
+            })
+            .fold(0.0, f64::max),
+    };
+    error.is_finite().then_some(error)
+}
