@@ -88,8 +88,9 @@ pub(super) fn minimise(
 fn triangle(jacobian: &DMatrix<f64>, residual: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
     let columns = jacobian.ncols();
     let mut factor = TriangularFactor::new(columns + 1);
-    factor.push(&[jacobian.as_view(), residual.as_view()]);
-    let mut upper = factor.r().clone();
+    let finite = factor.push(&[jacobian.as_view(), residual.as_view()]);
+    // A point where the model overflows has no step: NaN says so to whoever solves for one.
+    let mut upper = if finite { factor.r().clone() } else { factor.r().map(|_| f64::NAN) };
     let mut scale = DVector::from_element(columns, 1.0);
     for (length, mut column) in scale.iter_mut().zip(upper.column_iter_mut()) {
         // A rotation keeps lengths: those of R are those of J.

@@ -158,7 +158,9 @@ fn finish(
 ) -> Result<OutputErrorFit, EstimateError> {
     let sensitivity = misfit.sensitivity();
     let mut factor = TriangularFactor::new(sensitivity.ncols());
-    factor.push(&[sensitivity.as_view()]);
+    if !factor.push(&[sensitivity.as_view()]) {
+        crate::least_squares::finite("sensitivity of the motion", sensitivity.as_view())?;
+    }
     let none = DMatrix::zeros(sensitivity.ncols(), 1);
     let linear = solve_compressed(factor.r().as_view(), none.as_view(), factor.rows())?;
     let errors = misfit.errors();
