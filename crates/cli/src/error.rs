@@ -116,6 +116,16 @@ pub enum CliError {
     /// There are no spectra to draw.
     #[error("--plot draws receptances: it needs --domain frequency")]
     PlotNeedsSpectra,
+    /// A covariance names a parameter the machine does not have.
+    #[error("{file}: the covariance names \"{name}\"; the parameters of this machine are {known}")]
+    UnknownParameter {
+        /// The report.
+        file: String,
+        /// The name found.
+        name: String,
+        /// The names there can be.
+        known: String,
+    },
     /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] mechid::plot::PlotError),

@@ -46,7 +46,7 @@ pub use estimate::{Estimate, Estimated, Undetermined};
 pub use frf::{Frf, FrfEstimator, Segments};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
-pub use modal::{IdentifiedMode, Uncertain};
+pub use modal::{IdentifiedMode, Uncertain, identified_modes};
 pub use prediction::{fit_percent, predict};
 pub use sweep::{Sweep, SweepPoint, sweep};
 pub use unknowns::{Parameter, Unknowns};

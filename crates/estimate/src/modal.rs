@@ -1,10 +1,11 @@
 //! Natural frequencies, damping ratios and mode shapes of an identified machine, with what the
 //! uncertainty of its matrices makes of them.
 
-use mechid_model::{Matrix, Mode};
+use mechid_model::{Matrix, Mode, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::estimate::student_interval;
+use crate::least_squares::size;
 use crate::{Estimate, EstimateError, Parameter};
 
 /// A value with its standard error.
@@ -76,16 +77,47 @@ impl Estimate {
     /// Dissertation, Appendix E; derivatives after Nelson (1976), AIAA Journal 14, 1201–1205,
     /// here bordered and with damping.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, EstimateError> {
-        let system = self.system()?;
-        let matrices = [system.mass(), system.damping(), system.stiffness()];
         let parameters: Vec<Parameter> = self.parameters().map(|p| p.parameter).collect();
-        let identify = |mode: Mode| {
-            let sensitivity = Sensitivity::of(&mode, matrices, &parameters);
-            self.propagate(mode, &sensitivity)
-        };
-        Ok(system.modes()?.into_iter().map(identify).collect())
+        let of = self.degrees_of_freedom();
+        identified_modes(&self.system()?, &parameters, self.covariance(), of)
     }
+}
 
+/// The modes of a machine whose `parameters` have this covariance, as [`Estimate::modes`]: for
+/// matrices identified elsewhere or read back from a file.
+///
+/// # Errors
+/// [`EstimateError::Size`] if the covariance has not one row and column per parameter,
+/// [`EstimateError::NoSuchEntry`] for a parameter the machine does not have,
+/// [`EstimateError::Model`] if the eigenvalues do not converge.
+pub fn identified_modes(
+    system: &SecondOrderSystem,
+    parameters: &[Parameter],
+    covariance: &DMatrix<f64>,
+    degrees_of_freedom: usize,
+) -> Result<Vec<IdentifiedMode>, EstimateError> {
+    size("rows of the covariance", parameters.len(), covariance.nrows())?;
+    size("columns of the covariance", parameters.len(), covariance.ncols())?;
+    let dof = system.dof();
+    if let Some(p) = parameters.iter().find(|p| p.row() >= dof || p.column() >= dof) {
+        let (matrix, row, column) = (p.matrix(), p.row() + 1, p.column() + 1);
+        return Err(EstimateError::NoSuchEntry { matrix, row, column, dof });
+    }
+    let spread = Spread { covariance, degrees_of_freedom };
+    let identify = |mode: Mode| {
+        let sensitivity = Sensitivity::of(&mode, system, parameters);
+        spread.propagate(mode, &sensitivity)
+    };
+    Ok(system.modes()?.into_iter().map(identify).collect())
+}
+
+/// What is known of the scatter of the parameters.
+struct Spread<'a> {
+    covariance: &'a DMatrix<f64>,
+    degrees_of_freedom: usize,
+}
+
+impl Spread<'_> {
     fn propagate(&self, mode: Mode, sensitivity: &Sensitivity) -> IdentifiedMode {
         let (lambda, size) = (mode.eigenvalue(), mode.natural_frequency());
         let tau = std::f64::consts::TAU;
@@ -96,7 +128,7 @@ impl Estimate {
         let uncertain = |value: f64, gradient: DVector<f64>| Uncertain {
             value,
             standard_error: self.deviation(&gradient),
-            degrees_of_freedom: self.degrees_of_freedom(),
+            degrees_of_freedom: self.degrees_of_freedom,
         };
         let shape = sensitivity.shape.row_iter().map(|row| {
             let row = row.transpose();
@@ -119,7 +151,7 @@ impl Estimate {
         if gradient.iter().any(|g| !g.is_finite()) {
             return f64::INFINITY;
         }
-        gradient.dot(&(self.covariance() * gradient)).max(0.0).sqrt()
+        gradient.dot(&(self.covariance * gradient)).max(0.0).sqrt()
     }
 }
 
@@ -140,7 +172,8 @@ impl Sensitivity {
     /// ```
     ///
     /// The bordered matrix is regular for every simple eigenvalue, M, C and K of any symmetry.
-    fn of(mode: &Mode, [m, c, k]: [&DMatrix<f64>; 3], parameters: &[Parameter]) -> Self {
+    fn of(mode: &Mode, system: &SecondOrderSystem, parameters: &[Parameter]) -> Self {
+        let (m, c, k) = (system.mass(), system.damping(), system.stiffness());
         let (n, lambda, shape) = (mode.shape().len(), mode.eigenvalue(), mode.shape());
         let pencil =
             DMatrix::from_fn(n, n, |i, j| lambda * (lambda * m[(i, j)] + c[(i, j)]) + k[(i, j)]);

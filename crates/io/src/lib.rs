@@ -16,6 +16,7 @@
 //! # Ok::<(), mechid_io::IoError>(())
 //! ```
 
+mod covariance;
 mod csv_text;
 mod error;
 mod experiment;
@@ -26,6 +27,7 @@ mod system;
 mod table;
 mod time_axis;
 
+pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::csv_text;
 pub use error::IoError;
 pub use experiment::{

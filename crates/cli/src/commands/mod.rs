@@ -7,6 +7,7 @@
 
 mod identify;
 mod info;
+mod modal;
 mod multisine;
 mod simulate;
 
@@ -35,6 +36,7 @@ pub struct Cli {
 pub enum Command {
     Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
+    Modal(modal::ModalArgs),
     Multisine(multisine::MultisineArgs),
     Simulate(simulate::SimulateArgs),
 }
@@ -45,6 +47,7 @@ impl Command {
         match self {
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
+            Command::Modal(args) => args.run(),
             Command::Multisine(args) => args.run(),
             Command::Simulate(args) => args.run(),
         }
@@ -55,6 +58,7 @@ impl Command {
         match self {
             Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
+            Command::Modal(args) => &args.report,
             Command::Multisine(args) => &args.report,
             Command::Simulate(args) => &args.report,
         }

@@ -5,11 +5,11 @@ mod fit;
 mod mass;
 mod measurement;
 mod picture;
-mod report;
+pub(super) mod report;
 
 use clap::{Args, ValueEnum};
-use mechid::estimate::{Parameter, Unknowns};
-use mechid::io::{LineSpec, SystemMatrices};
+use mechid::estimate::{Estimate, Parameter, Unknowns};
+use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
 
 use self::excited::Band;
 use self::excited::choose_lines;
@@ -131,6 +131,7 @@ fn report(measured: &Measurement, fitted: &Fitted) -> Result<Report, CliError> {
         },
         remarks: Vec::new(),
         system: SystemMatrices::from(&system),
+        covariance: covariance(estimate),
     };
     report.remarks = remarks(fitted, &report);
     Ok(report)
@@ -161,6 +162,11 @@ fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, CliError> {
         });
     }
     Ok(rows)
+}
+
+fn covariance(estimate: &Estimate) -> ParameterCovariance {
+    let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
+    ParameterCovariance::new(names, estimate.covariance(), estimate.degrees_of_freedom())
 }
 
 fn remarks(fitted: &Fitted, report: &Report) -> Vec<String> {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mechid::estimate::{self, IdentifiedMode, frequency_domain};
-use mechid::io::SystemMatrices;
+use mechid::io::{ParameterCovariance, SystemMatrices};
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -29,6 +29,8 @@ pub struct Report {
     pub remarks: Vec<String>,
     /// M, C and K, as `mechid force --system` and others read them back.
     pub system: SystemMatrices,
+    /// Of the parameters found, for what is derived from them (`mechid modal`).
+    pub covariance: ParameterCovariance,
 }
 
 /// The samples used, counted from 1.
@@ -222,7 +224,8 @@ impl Uncertain {
         Self { value, standard_error: Some(standard_error), interval: Some(interval) }
     }
 
-    fn of(found: &estimate::Uncertain) -> Result<Self, CliError> {
+    /// A value derived from what was estimated.
+    pub fn of(found: &estimate::Uncertain) -> Result<Self, CliError> {
         Ok(Self::new(found.value, found.standard_error, found.interval(CONFIDENCE)?))
     }
 
@@ -232,7 +235,7 @@ impl Uncertain {
     }
 
     /// Value, standard error and interval; the error tells how many digits the value deserves.
-    fn cells(&self) -> [String; 3] {
+    pub fn cells(&self) -> [String; 3] {
         let (Some(error), Some([low, high])) = (self.standard_error, self.interval) else {
             return [significant(self.value, 6), "known".into(), String::new()];
         };

@@ -1,0 +1,71 @@
+//! The covariance of identified parameters, so that what is derived from them can have one too.
+
+use std::path::Path;
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use crate::IoError;
+
+/// The `covariance` of the report that `mechid identify --json` prints, which
+/// [`read_covariance`] reads back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterCovariance {
+    /// Names of the parameters, such as `k12`.
+    pub parameters: Vec<String>,
+    /// One row and one column per parameter, in products of their SI units.
+    pub matrix: Vec<Vec<f64>>,
+    /// Degrees of freedom of the variance behind it.
+    pub degrees_of_freedom: usize,
+}
+
+impl ParameterCovariance {
+    /// From a square matrix.
+    pub fn new(parameters: Vec<String>, matrix: &DMatrix<f64>, degrees_of_freedom: usize) -> Self {
+        let matrix = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
+        Self { parameters, matrix, degrees_of_freedom }
+    }
+
+    /// The matrix.
+    ///
+    /// # Panics
+    /// If the rows are not as many and as long as the parameters, which [`read_covariance`] checks.
+    pub fn matrix(&self) -> DMatrix<f64> {
+        let n = self.parameters.len();
+        DMatrix::from_fn(n, n, |row, column| self.matrix[row][column])
+    }
+}
+
+/// The covariance in a JSON report, if it has one.
+///
+/// # Errors
+/// [`IoError::Read`], [`IoError::Json`], and [`IoError::Description`] if it is not one row and one
+/// column per parameter with positive variances.
+pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovariance>, IoError> {
+    #[derive(Deserialize)]
+    struct Described {
+        covariance: Option<ParameterCovariance>,
+    }
+    let file = path.as_ref().display().to_string();
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(source) => return Err(IoError::Read { file, source }),
+    };
+    let described: Described = match serde_json::from_str(&text) {
+        Ok(described) => described,
+        Err(source) => return Err(IoError::Json { file, source }),
+    };
+    let Some(covariance) = described.covariance else { return Ok(None) };
+    let n = covariance.parameters.len();
+    let wrong = |what: String| IoError::Description { file: file.clone(), what };
+    if covariance.matrix.len() != n || covariance.matrix.iter().any(|row| row.len() != n) {
+        return Err(wrong(format!("the covariance of {n} parameters must be a {n}×{n} matrix")));
+    }
+    for (row, name) in covariance.parameters.iter().enumerate() {
+        let variance = covariance.matrix[row][row];
+        if variance < 0.0 {
+            return Err(wrong(format!("the variance of {name} is {variance}, less than zero")));
+        }
+    }
+    Ok(Some(covariance))
+}
