@@ -129,6 +129,9 @@ pub enum CliError {
     /// A figure cannot be drawn.
     #[error(transparent)]
     Plot(#[from] mechid::plot::PlotError),
+    /// A time-stepping scheme refuses.
+    #[error(transparent)]
+    Integrate(#[from] mechid::integrate::IntegrateError),
     /// The simulation failed.
     #[error(transparent)]
     Simulate(#[from] mechid::SimulateError),

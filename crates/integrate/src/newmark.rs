@@ -76,7 +76,8 @@ impl Scheme for Newmark {
         .iter()
         .find(|(known, _)| known == self)
         .map_or("", |(_, name)| name);
-        format!("Newmark ({member}β = {:.6}, γ = {:.6})", self.beta, self.gamma)
+        let rounded = |value: f64| (value * 1e6).round() / 1e6;
+        format!("Newmark ({member}β = {}, γ = {})", rounded(self.beta), rounded(self.gamma))
     }
 
     fn conventions(&self) -> Vec<Convention> {

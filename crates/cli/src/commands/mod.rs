@@ -10,6 +10,7 @@ mod info;
 mod modal;
 mod multisine;
 mod simulate;
+mod stability;
 
 use clap::{Parser, Subcommand};
 
@@ -39,6 +40,7 @@ pub enum Command {
     Modal(modal::ModalArgs),
     Multisine(multisine::MultisineArgs),
     Simulate(simulate::SimulateArgs),
+    Stability(stability::StabilityArgs),
 }
 
 impl Command {
@@ -50,6 +52,7 @@ impl Command {
             Command::Modal(args) => args.run(),
             Command::Multisine(args) => args.run(),
             Command::Simulate(args) => args.run(),
+            Command::Stability(args) => args.run(),
         }
     }
 
@@ -61,6 +64,7 @@ impl Command {
             Command::Modal(args) => &args.report,
             Command::Multisine(args) => &args.report,
             Command::Simulate(args) => &args.report,
+            Command::Stability(args) => &args.report,
         }
     }
 }
