@@ -44,6 +44,6 @@ fn show(name: &str, force: &Record, response: &Response) -> Result<(), Box<dyn E
     let system: SecondOrderSystem = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
     let mode = &system.modes()?[0];
     let (omega, ratio) = (mode.natural_frequency(), mode.damping_ratio());
-    println!("{name:<36} {omega:8.4} rad/s   {ratio:.5}");
+    println!("{name:<60} {omega:8.4} rad/s   {ratio:.5}");
     Ok(())
 }

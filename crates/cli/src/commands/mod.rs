@@ -3,7 +3,7 @@
 //! To add one: a file with an arguments struct (`#[derive(clap::Args)]`, help texts with units and
 //! an example) and a method `run(&self) -> Result<Outcome, CliError>`; then a variant of
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
-//! [`CliError`](crate::error::CliError).
+//! [`CliError`].
 
 mod identify;
 mod info;
