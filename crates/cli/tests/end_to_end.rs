@@ -84,6 +84,11 @@ fn a_closed_form_record_gives_its_oscillator() {
     let report = mechid(folder.path(), &format!("{common} --mass 2 --band-hz 1:6"));
     assert_eq!(report["parameters"][0]["known"], true);
     assert_eq!(report["fit"]["unknowns"], 2);
+    // The machine found is read back by whoever needs it.
+    let path = folder.path().join("found.json");
+    fs::write(&path, report.to_string()).unwrap();
+    let found = mechid::io::read_system(&path).unwrap();
+    assert_eq!((found.mass()[0], found.stiffness()[0]), (2.0, parameter(&report, "k").0));
     assert_close(&report, "k", truth.k, 1e-10 * truth.k);
 }
 

@@ -23,7 +23,6 @@ use crate::outcome::Outcome;
 #[command(
     name = "mechid",
     version,
-    about,
     max_term_width = 100,
     after_help = "Numbers are in SI units. Columns are chosen by header name or by number, counted from 1.\n\
                   Every failure prints one message, writes no file, and exits with code 2."

@@ -74,7 +74,7 @@ pub struct IdentifyArgs {
 enum Domain {
     /// Spectral lines of whole periods
     Frequency,
-    /// The equation of motion, instant by instant
+    /// Sample by sample, any record
     Time,
 }
 
