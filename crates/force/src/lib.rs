@@ -5,7 +5,7 @@
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
 //! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
-//! | [`regularised`] | any channels, a period or up to a thousand samples | they are not, or there is no period |
+//! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
 //! | [`kalman`] | any channels, any length | the record is long |
 //!
 //! [`with_uncertain_system`] adds to any of them what the covariance of an identified machine means

@@ -9,7 +9,7 @@ use crate::state_space::Machine;
 use crate::{ForceError, Measurement, Start};
 
 /// Most unknowns (samples × forces) of an open record: the dense problem then takes seconds.
-pub const OPEN_UNKNOWNS: usize = 1024;
+pub const OPEN_UNKNOWNS: usize = 512;
 
 pub(crate) struct OpenOperator {
     components: Components,
