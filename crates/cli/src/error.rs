@@ -51,6 +51,38 @@ pub enum CliError {
         /// Columns that `--force` names.
         forces: usize,
     },
+    /// Not one motion column per degree of freedom of the machine.
+    #[error(
+        "{option} names {got} columns, the machine has {dofs} degrees of freedom: name one for \
+         each, 0 where it was not measured"
+    )]
+    MotionCount {
+        /// The option with the wrong number of columns.
+        option: &'static str,
+        /// Columns it names.
+        got: usize,
+        /// Degrees of freedom of the machine.
+        dofs: usize,
+    },
+    /// An equation of motion needs all its terms.
+    #[error(
+        "this method needs displacement, velocity{} of every degree of freedom: measure them, or \
+         choose another --method",
+        if *with_acceleration { " and acceleration" } else { "" }
+    )]
+    ForceMotions {
+        /// Whether accelerations are needed too.
+        with_acceleration: bool,
+    },
+    /// Lines belong to whole periods.
+    #[error("the frequency domain needs whole periods: say how long one is with --period")]
+    ForceNeedsPeriods,
+    /// The smoother knows no periods.
+    #[error("the Kalman smoother takes an open record: leave --period and --lines out")]
+    KalmanIsOpen,
+    /// The reconstruction failed.
+    #[error(transparent)]
+    Force(#[from] mechid::force::ForceError),
     /// The force does nothing.
     #[error(
         "{file}: the force (column {columns}) is zero throughout the window: nothing drives the machine"

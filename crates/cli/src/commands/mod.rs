@@ -5,6 +5,7 @@
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
 //! [`CliError`].
 
+mod force;
 mod identify;
 mod info;
 mod modal;
@@ -34,6 +35,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Force(force::ForceArgs),
     Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
     Modal(modal::ModalArgs),
@@ -46,6 +48,7 @@ impl Command {
     /// What the command found; nothing is printed or written yet.
     pub fn run(&self) -> Result<Outcome, CliError> {
         match self {
+            Command::Force(args) => args.run(),
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
             Command::Modal(args) => args.run(),
@@ -58,6 +61,7 @@ impl Command {
     /// How the user wants to be told.
     pub fn report(&self) -> &ReportArgs {
         match self {
+            Command::Force(args) => &args.report,
             Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
             Command::Modal(args) => &args.report,

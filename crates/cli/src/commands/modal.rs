@@ -88,7 +88,7 @@ impl ModalArgs {
 }
 
 /// The parameters of the machine that a covariance names.
-fn parameters(
+pub fn parameters(
     file: &str,
     system: &SecondOrderSystem,
     covariance: &ParameterCovariance,

@@ -1,0 +1,264 @@
+//! The methods, which of them suits a record, and what it finds.
+
+use clap::ValueEnum;
+use mechid::force::{
+    Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Noise, OPEN_UNKNOWNS, Rule,
+    Start, Tuning, continuous, discretised, frequency_domain, inner_lines, kalman, regularised,
+    with_uncertain_system,
+};
+use mechid::model::SecondOrderSystem;
+
+use super::machine::Machine;
+use super::motion::Motion;
+use crate::error::CliError;
+use crate::text_table::significant;
+
+/// How to find the force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Method {
+    /// What suits the record
+    Auto,
+    /// Equation of motion, sample by sample: displacement, velocity, acceleration of everything
+    Continuous,
+    /// From each sample to the next, the force linear between them: displacement and velocity
+    Discretised,
+    /// Dynamic stiffness, line by line: whole periods
+    FrequencyDomain,
+    /// Each part of the force as likely as the record makes it: whole periods, or a short record
+    Shrinkage,
+    /// Tikhonov regularisation: whole periods, or a short record
+    Tikhonov,
+    /// Truncated singular values: whole periods, or a short record
+    TruncatedSvd,
+    /// Augmented Kalman filter and smoother: an open record of any length
+    Kalman,
+}
+
+/// How to choose the regularisation parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Choice {
+    /// Nearest to the mean of the force given the measurement
+    Likelihood,
+    /// Generalised cross-validation
+    Gcv,
+    /// Corner of the L-curve
+    LCurve,
+}
+
+/// Everything the user said about the reconstruction.
+pub struct Request {
+    pub method: Method,
+    /// Degrees of freedom with an unknown force, counted from 0.
+    pub forced: Vec<usize>,
+    pub lines: Option<Vec<usize>>,
+    pub periodic: bool,
+    pub start: Start,
+    pub rule: Rule,
+    /// Standard deviation of each measured channel; empty if not known.
+    pub noise: Vec<f64>,
+}
+
+/// A force and how it was found.
+pub struct Found {
+    pub force: IdentifiedForce,
+    pub method: &'static str,
+    pub why: String,
+    /// Whether the standard error counts the noise of the record.
+    pub counts_noise: bool,
+    /// Parameters that were chosen, with their units.
+    pub chosen: Vec<(String, f64, &'static str)>,
+}
+
+/// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
+const SHORT: usize = OPEN_UNKNOWNS / 2;
+
+/// The method for this record and the reason for it.
+pub fn choose(request: &Request, motion: &Motion, dofs: usize) -> (Method, String) {
+    if request.method != Method::Auto {
+        return (request.method, "it was asked for".into());
+    }
+    let samples = motion.measured.sampling().len();
+    let unknowns = samples * request.forced.len();
+    let (method, why) = if request.periodic && request.lines.is_some() {
+        (Method::FrequencyDomain, "whole periods, and the lines with force are given".into())
+    } else if motion.response(dofs, true).is_some() && request.forced.len() == dofs {
+        (
+            Method::Continuous,
+            "displacement, velocity and acceleration of every degree of freedom are there".into(),
+        )
+    } else if request.periodic {
+        (Method::Shrinkage, "whole periods, the lines with force not given".into())
+    } else if unknowns <= SHORT {
+        (Method::Tikhonov, format!("an open record of {unknowns} unknowns, at most {SHORT}"))
+    } else {
+        (Method::Kalman, format!("an open record of {unknowns} unknowns, more than {SHORT}"))
+    };
+    (method, why)
+}
+
+/// Finds the force, with the uncertainty of the machine if that is known.
+pub fn find(request: &Request, machine: &Machine, motion: &Motion) -> Result<Found, CliError> {
+    let (method, why) = choose(request, motion, machine.system.dof());
+    match method {
+        Method::Continuous | Method::Discretised => equation(request, machine, motion, method, why),
+        Method::FrequencyDomain => lines(request, machine, motion, why),
+        Method::Kalman => smoothed(request, machine, motion, why),
+        Method::Auto | Method::Shrinkage => {
+            filtered(request, machine, motion, Filter::Shrinkage, why)
+        }
+        Method::Tikhonov => filtered(request, machine, motion, Filter::Tikhonov(request.rule), why),
+        Method::TruncatedSvd => {
+            filtered(request, machine, motion, Filter::TruncatedSvd(request.rule), why)
+        }
+    }
+}
+
+type Finder<'a> = dyn Fn(&SecondOrderSystem) -> Result<IdentifiedForce, ForceError> + 'a;
+
+fn with_machine(machine: &Machine, find: &Finder<'_>) -> Result<IdentifiedForce, CliError> {
+    Ok(match &machine.covariance {
+        Some(covariance) => with_uncertain_system(&machine.system, covariance, find)?,
+        None => find(&machine.system)?,
+    })
+}
+
+fn noise(request: &Request, unknown: Noise) -> Noise {
+    if request.noise.is_empty() { unknown } else { Noise::PerChannel(request.noise.clone()) }
+}
+
+fn equation(
+    request: &Request,
+    machine: &Machine,
+    motion: &Motion,
+    method: Method,
+    why: String,
+) -> Result<Found, CliError> {
+    let with_acceleration = method == Method::Continuous;
+    let response = motion
+        .response(machine.system.dof(), with_acceleration)
+        .ok_or(CliError::ForceMotions { with_acceleration })?;
+    let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
+    let (name, force) = if with_acceleration {
+        let find = |system: &SecondOrderSystem| continuous(system, &response);
+        ("equation of motion, sample by sample", with_machine(machine, &find)?)
+    } else {
+        let find = |system: &SecondOrderSystem| {
+            discretised(system, &response, Discretisation::ExactLinear, ends)
+        };
+        let name = "equation of motion from sample to sample, the force linear between them";
+        (name, with_machine(machine, &find)?)
+    };
+    Ok(Found { force, method: name, why, counts_noise: false, chosen: Vec::new() })
+}
+
+fn lines(
+    request: &Request,
+    machine: &Machine,
+    motion: &Motion,
+    why: String,
+) -> Result<Found, CliError> {
+    if !request.periodic {
+        return Err(CliError::ForceNeedsPeriods);
+    }
+    let measured = &motion.measured;
+    let all = inner_lines(measured);
+    let lines = request.lines.clone().unwrap_or_else(|| all.clone());
+    // Where nothing was driven the record shows its own noise.
+    let enough = all.len() >= lines.len() + mechid::force::MIN_OUTSIDE_LINES;
+    let noise = noise(request, if enough { Noise::OutsideLines } else { Noise::Unknown });
+    let find = |system: &SecondOrderSystem| {
+        frequency_domain(system, measured, &request.forced, &lines, &noise)
+    };
+    let force = with_machine(machine, &find)?;
+    let chosen = vec![("lines used".into(), lines.len() as f64, "")];
+    let counts_noise = noise != Noise::Unknown;
+    Ok(Found { force, method: "dynamic stiffness, line by line", why, counts_noise, chosen })
+}
+
+fn filtered(
+    request: &Request,
+    machine: &Machine,
+    motion: &Motion,
+    filter: Filter,
+    why: String,
+) -> Result<Found, CliError> {
+    let (measured, forced) = (&motion.measured, &request.forced);
+    let extent = match (&request.lines, request.periodic) {
+        (Some(lines), true) => Extent::PeriodLines(lines.clone()),
+        (None, true) => Extent::Period,
+        (_, false) => Extent::Open(request.start),
+    };
+    let noise = noise(request, Noise::Unknown);
+    let found = regularised(&machine.system, measured, forced, &extent, filter, &noise)?;
+    // The machine is moved with the parameter that was chosen, not with another choice.
+    let fixed = match (filter, found.parameter) {
+        (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
+        (Filter::TruncatedSvd(_), Some(lambda)) => Filter::TruncatedSvd(Rule::Given(lambda)),
+        _ => filter,
+    };
+    let find = |system: &SecondOrderSystem| {
+        regularised(system, measured, forced, &extent, fixed, &noise).map(|found| found.force)
+    };
+    let force = match machine.covariance {
+        Some(_) => with_machine(machine, &find)?,
+        None => found.force,
+    };
+    let mut chosen = Vec::new();
+    if let Some(lambda) = found.parameter {
+        chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
+    }
+    chosen.push(("unknowns let through".into(), found.unknowns, ""));
+    for (channel, level) in (1..).zip(&found.noise) {
+        chosen.push((format!("noise of channel {channel}"), *level, ""));
+    }
+    let method = match filter {
+        Filter::Tikhonov(_) => "Tikhonov regularisation",
+        Filter::TruncatedSvd(_) => "truncated singular value decomposition",
+        _ => "mean of the force given the measurement (shrinkage)",
+    };
+    Ok(Found { force, method, why, counts_noise: true, chosen })
+}
+
+fn smoothed(
+    request: &Request,
+    machine: &Machine,
+    motion: &Motion,
+    why: String,
+) -> Result<Found, CliError> {
+    if request.periodic {
+        return Err(CliError::KalmanIsOpen);
+    }
+    let (measured, forced) = (&motion.measured, &request.forced);
+    let tuning = match request.noise.as_slice() {
+        [] => Tuning::Likelihood,
+        level => Tuning::NoiseKnown(level.to_vec()),
+    };
+    let found = kalman(&machine.system, measured, forced, request.start, &tuning)?;
+    let fixed = Tuning::Given { noise: found.noise.clone(), walk: found.walk.clone() };
+    let find = |system: &SecondOrderSystem| {
+        kalman(system, measured, forced, request.start, &fixed).map(|found| found.force)
+    };
+    let force = match machine.covariance {
+        Some(_) => with_machine(machine, &find)?,
+        None => found.force,
+    };
+    let mut chosen = Vec::new();
+    for (dof, walk) in forced.iter().zip(&found.walk) {
+        chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
+    }
+    for (channel, level) in (1..).zip(&found.noise) {
+        chosen.push((format!("noise of channel {channel}"), *level, ""));
+    }
+    let method = "augmented Kalman filter and smoother, tuned by likelihood";
+    Ok(Found { force, method, why, counts_noise: true, chosen })
+}
+
+/// A chosen parameter as a person reads it.
+pub fn told(value: f64, unit: &str) -> String {
+    let number = if value.fract() == 0.0 && value.abs() < 1e6 {
+        format!("{value}")
+    } else {
+        significant(value, 4)
+    };
+    format!("{number} {unit}").trim_end().into()
+}

@@ -1,0 +1,163 @@
+//! `mechid force`: the force that drove a known machine.
+
+mod machine;
+mod method;
+mod motion;
+mod report;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::force::{Rule, Start};
+use mechid::io::{LineSpec, csv_text};
+
+use self::machine::Machine;
+use self::method::{Choice, Found, Method, Request};
+use self::motion::{Motion, MotionArgs};
+use self::report::{Chosen, Force, Report};
+use crate::error::CliError;
+use crate::options::{PlotArgs, RecordArgs, ReportArgs, at_least_one};
+use crate::outcome::Outcome;
+
+/// Find the force that drove a known machine from its measured motion
+///
+/// The window is one or more whole periods if --period or --lines is given (they are averaged), an
+/// open record otherwise. Where the machine comes from `mechid identify --json`, its uncertainty
+/// counts in the standard error of the force.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid identify record.csv --force force --displacement displacement --json > machine.json
+  mechid force run.csv --system machine.json --displacement displacement --output force.csv
+  mechid force run.csv --system rotor.json --displacement x,0 --forced 2 --period 256 \\
+      --lines 1:40 --output force.csv --spectrum lines.csv --plot force.svg")]
+pub struct ForceArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    /// The machine: a report of `mechid identify --json`, or a description with a system
+    #[arg(long, value_name = "IDENTIFIED.json")]
+    system: PathBuf,
+    #[command(flatten)]
+    motion: MotionArgs,
+    /// Degrees of freedom on which a force acts, counted from 1 [default: all]
+    #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
+    forced: Vec<usize>,
+    /// How to find the force
+    #[arg(long, value_name = "METHOD", value_enum, default_value_t = Method::Auto)]
+    method: Method,
+    /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
+    #[arg(long, value_name = "LINES")]
+    lines: Option<LineSpec>,
+    /// An open record begins at rest
+    #[arg(long)]
+    at_rest: bool,
+    /// Standard deviation of the noise in each measured column, in its unit [default: found]
+    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
+    noise: Vec<f64>,
+    /// How to choose the regularisation parameter
+    #[arg(long, value_name = "RULE", value_enum, default_value_t = Choice::Likelihood)]
+    rule: Choice,
+    /// The regularisation parameter, instead of a rule
+    #[arg(long, value_name = "LAMBDA", allow_negative_numbers = true, conflicts_with = "rule")]
+    parameter: Option<f64>,
+    /// Where the force goes: time, force and standard error, in s and N
+    #[arg(long, short, value_name = "FORCE.csv", help_heading = "Output")]
+    output: Option<PathBuf>,
+    /// Where its spectrum goes: frequency in Hz, amplitude in N, phase in degrees
+    #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
+    spectrum: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl ForceArgs {
+    /// Reads, reconstructs, and tells.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let machine = Machine::read(&self.system)?;
+        let dofs = machine.system.dof();
+        let periodic = self.input.period.is_some() || self.lines.is_some();
+        let motion = self.motion.read(&self.input, dofs, periodic)?;
+        let request = self.request(&motion, dofs, periodic)?;
+        let found = method::find(&request, &machine, &motion)?;
+        let report = self.describe(&machine, &motion, &request, &found);
+        let mut outcome = Outcome::new(report.text(), &report)?;
+        let force = &found.force;
+        if let Some(path) = &self.output {
+            let text = csv_text(force.record().sampling(), &report::columns(force));
+            outcome = outcome.with_file(path, text);
+        }
+        if let Some(path) = &self.spectrum {
+            outcome = outcome.with_file(path, report::spectrum_text(force));
+        }
+        outcome.with_plot(&self.plot, || Ok(report::figure(found.method, force, &request.forced)))
+    }
+
+    fn request(&self, motion: &Motion, dofs: usize, periodic: bool) -> Result<Request, CliError> {
+        let lines = self.lines.as_ref().map(|spec| spec.lines(motion.measured.sampling()));
+        let rule = match (self.parameter, self.rule) {
+            (Some(lambda), _) => Rule::Given(lambda),
+            (None, Choice::Likelihood) => Rule::Likelihood,
+            (None, Choice::Gcv) => Rule::Gcv,
+            (None, Choice::LCurve) => Rule::LCurve,
+        };
+        Ok(Request {
+            method: self.method,
+            forced: match self.forced.as_slice() {
+                [] => (0..dofs).collect(),
+                some => some.iter().map(|dof| dof - 1).collect(),
+            },
+            lines: lines.transpose()?,
+            periodic,
+            start: if self.at_rest { Start::FromRest } else { Start::InMotion },
+            rule,
+            noise: self.noise.clone(),
+        })
+    }
+
+    fn describe(
+        &self,
+        machine: &Machine,
+        motion: &Motion,
+        request: &Request,
+        found: &Found,
+    ) -> Report {
+        let dofs = machine.system.dof();
+        // The equations of motion give a force everywhere, asked for or not.
+        let everywhere = found.force.record().data().column_iter().map(|c| c.amax() > 0.0);
+        let sought: Vec<bool> = everywhere
+            .enumerate()
+            .map(|(dof, found)| found || request.forced.contains(&dof))
+            .collect();
+        let mut remarks = Vec::new();
+        if machine.covariance.is_some() && !found.counts_noise {
+            remarks.push(
+                "the standard error counts the uncertainty of the machine, not the noise of the \
+                 record: this method does not know it"
+                    .to_owned(),
+            );
+        }
+        if machine.covariance.is_none() {
+            remarks.push(
+                "the machine is taken as exactly known: its file has no covariance".to_owned(),
+            );
+        }
+        Report {
+            file: motion.file.clone(),
+            machine: self.system.display().to_string(),
+            method: found.method,
+            why: found.why.clone(),
+            samples: found.force.record().len(),
+            periods: request.periodic.then_some(motion.periods),
+            sample_rate_hz: motion.measured.sampling().rate_hz(),
+            machine_uncertainty: machine.covariance.is_some(),
+            chosen: found
+                .chosen
+                .iter()
+                .map(|(name, value, unit)| Chosen { name: name.clone(), value: *value, unit })
+                .collect(),
+            forces: (0..dofs).map(|dof| Force::of(&found.force, dof, sought[dof])).collect(),
+            remarks,
+        }
+    }
+}

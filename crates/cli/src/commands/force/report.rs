@@ -1,0 +1,183 @@
+//! The force that was found, for people, for programs and as files.
+
+use std::fmt::Write as _;
+
+use mechid::force::IdentifiedForce;
+use mechid::plot::{Axis, Color, Curve, Figure, Panel};
+use serde::Serialize;
+
+use super::method::told;
+use crate::text_table::{compact, significant, text_table};
+
+/// Everything `mechid force` has to say.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub file: String,
+    pub machine: String,
+    pub method: &'static str,
+    pub why: String,
+    pub samples: usize,
+    /// Periods averaged; nothing for an open record.
+    pub periods: Option<usize>,
+    pub sample_rate_hz: f64,
+    /// Whether the standard errors count the machine's own uncertainty.
+    pub machine_uncertainty: bool,
+    pub chosen: Vec<Chosen>,
+    pub forces: Vec<Force>,
+    pub remarks: Vec<String>,
+}
+
+/// A parameter that the method chose.
+#[derive(Debug, Serialize)]
+pub struct Chosen {
+    pub name: String,
+    pub value: f64,
+    pub unit: &'static str,
+}
+
+/// The force on one degree of freedom.
+#[derive(Debug, Serialize)]
+pub struct Force {
+    /// Counted from 1.
+    pub dof: usize,
+    pub sought: bool,
+    pub rms: f64,
+    pub peak: f64,
+    /// RMS of the standard error over the record; nothing where it is not known.
+    pub standard_error: Option<f64>,
+    pub strongest_hz: f64,
+    /// Amplitude of the strongest line, in N.
+    pub strongest_amplitude: f64,
+}
+
+impl Force {
+    pub fn of(force: &IdentifiedForce, dof: usize, sought: bool) -> Self {
+        let (record, spectrum) = (force.record(), force.spectrum());
+        let size = (record.len() as f64).sqrt();
+        let strongest = (0..spectrum.len())
+            .max_by(|a, b| {
+                let [a, b] = [a, b].map(|n| spectrum.line(*n, dof).norm());
+                a.total_cmp(&b)
+            })
+            .unwrap_or(0);
+        Self {
+            dof: dof + 1,
+            sought,
+            rms: record.column(dof).norm() / size,
+            peak: record.column(dof).amax(),
+            standard_error: force.standard_error().map(|error| error.column(dof).norm() / size),
+            strongest_hz: spectrum.frequency_hz(strongest),
+            strongest_amplitude: spectrum.line(strongest, dof).norm(),
+        }
+    }
+}
+
+impl Report {
+    /// The report as a person reads it.
+    pub fn text(&self) -> String {
+        let rate = compact(self.sample_rate_hz, 8);
+        let extent = match self.periods {
+            None => "open record".into(),
+            Some(1) => "one period".into(),
+            Some(n) => format!("mean of {n} periods"),
+        };
+        let mut text = format!("{}: {} samples at {rate} Hz, {extent}\n", self.file, self.samples);
+        let _ = writeln!(text, "machine: {}", self.machine);
+        let _ = writeln!(text, "method: {}\n  because: {}", self.method, self.why);
+        for Chosen { name, value, unit } in &self.chosen {
+            let _ = writeln!(text, "  {name}: {}", told(*value, unit));
+        }
+        let header = ["force", "RMS (N)", "standard error (N)", "peak (N)", "strongest line"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for force in &self.forces {
+            let error = match force.standard_error {
+                Some(error) if force.sought => significant(error, 2),
+                _ => "not known".into(),
+            };
+            let strongest = format!(
+                "{} N at {} Hz",
+                significant(force.strongest_amplitude, 4),
+                compact(force.strongest_hz, 5)
+            );
+            rows.push(if force.sought {
+                let [rms, peak] = [force.rms, force.peak].map(|value| significant(value, 4));
+                vec![format!("{}", force.dof), rms, error, peak, strongest]
+            } else {
+                vec![format!("{}", force.dof), "taken as zero".into()]
+            });
+        }
+        let _ = write!(text, "\n{}", text_table(&rows));
+        for remark in &self.remarks {
+            let _ = write!(text, "\nnote: {remark}\n");
+        }
+        text
+    }
+}
+
+/// `base`, or `base_1`, `base_2` … where there are several.
+fn name(base: &str, dof: usize, dofs: usize) -> String {
+    if dofs == 1 { base.into() } else { format!("{base}_{}", dof + 1) }
+}
+
+/// The record as columns: force and, where known, its standard error.
+pub fn columns(force: &IdentifiedForce) -> Vec<(String, &[f64])> {
+    let dofs = force.record().channels();
+    let mut columns: Vec<(String, &[f64])> =
+        (0..dofs).map(|dof| (name("force", dof, dofs), force.record().channel(dof))).collect();
+    if let Some(error) = force.standard_error() {
+        columns
+            .extend((0..dofs).map(|dof| (name("standard_error", dof, dofs), error.channel(dof))));
+    }
+    columns
+}
+
+/// The spectrum as text: frequency in Hz, then amplitude in N and phase in degrees of each force.
+pub fn spectrum_text(force: &IdentifiedForce) -> String {
+    let spectrum = force.spectrum();
+    let dofs = spectrum.channels();
+    let mut text = String::from("frequency_hz");
+    for dof in 0..dofs {
+        let [amplitude, phase] = ["amplitude", "phase_deg"].map(|base| name(base, dof, dofs));
+        let _ = write!(text, ",{amplitude},{phase}");
+    }
+    text.push('\n');
+    for n in 0..spectrum.len() {
+        let _ = write!(text, "{:?}", spectrum.frequency_hz(n));
+        for dof in 0..dofs {
+            let line = spectrum.line(n, dof);
+            let _ = write!(text, ",{:?},{:?}", line.norm(), line.arg().to_degrees());
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Every sought force against time, with twice its standard error, above its spectrum.
+pub fn figure(title: &str, force: &IdentifiedForce, sought: &[usize]) -> Figure {
+    let (record, spectrum) = (force.record(), force.spectrum());
+    let times: Vec<f64> = record.sampling().times().collect();
+    let frequencies: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
+    let mut figure = Figure::new(title).columns(sought.len());
+    for &dof in sought {
+        let values = record.channel(dof);
+        let label = name("Force", dof, record.channels());
+        let mut panel = Panel::new(Axis::linear("Time", "s"), Axis::linear(label, "N"));
+        if let Some(error) = force.standard_error() {
+            let error = error.channel(dof);
+            let bound = |side: f64| -> Vec<f64> {
+                values.iter().zip(error).map(|(f, e)| f + side * 2.0 * e).collect()
+            };
+            panel =
+                panel.curve(Curve::band("± 2 standard errors", &times, &bound(-1.0), &bound(1.0)));
+        }
+        figure = figure.panel(panel.curve(Curve::line("", &times, values).width(1.2)));
+    }
+    for &dof in sought {
+        let lines: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.line(n, dof).norm()).collect();
+        let label = name("Force amplitude", dof, record.channels());
+        let panel = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear(label, "N"));
+        let stems = Curve::stems("", &frequencies, &lines).color(Color::VERMILION);
+        figure = figure.panel(panel.curve(stems));
+    }
+    figure
+}

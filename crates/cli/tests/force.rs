@@ -1,0 +1,148 @@
+//! The `force` subcommand from outside: simulate, identify, reconstruct.
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::cargo::cargo_bin_cmd;
+use serde_json::Value;
+
+/// Runs the program in a folder; the report, or the message of a failure with exit code 2.
+fn mechid(folder: &Path, arguments: &str) -> Result<Vec<u8>, String> {
+    let output = cargo_bin_cmd!("mechid")
+        .current_dir(folder)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    match output.status.code() {
+        Some(0) => Ok(output.stdout),
+        code => {
+            assert_eq!(code, Some(2), "{arguments}");
+            Err(String::from_utf8_lossy(&output.stderr).into_owned())
+        }
+    }
+}
+
+fn report(folder: &Path, arguments: &str) -> Value {
+    serde_json::from_slice(&mechid(folder, &format!("{arguments} --json")).unwrap()).unwrap()
+}
+
+/// A folder with a record of the example machine and what was identified from it.
+fn experiment() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let example = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.json");
+    std::fs::copy(example, folder.path().join("experiment.json")).unwrap();
+    mechid(folder.path(), "simulate experiment.json --output run.csv").unwrap();
+    let identified = mechid(
+        folder.path(),
+        "identify run.csv --force force --displacement displacement --period 256 --json",
+    );
+    std::fs::write(folder.path().join("machine.json"), identified.unwrap()).unwrap();
+    folder
+}
+
+fn column(path: &Path, name: &str) -> Vec<f64> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut rows = text.lines().map(|row| row.split(','));
+    let at = rows.next().unwrap().position(|header| header == name).unwrap();
+    rows.map(|mut row| row.nth(at).unwrap().parse().unwrap()).collect()
+}
+
+fn error(found: &[f64], truth: &[f64]) -> f64 {
+    let square = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>();
+    let difference = square(&mut found.iter().zip(truth).map(|(a, b)| a - b));
+    (difference / square(&mut truth[..found.len()].iter().copied())).sqrt()
+}
+
+#[test]
+fn the_force_of_the_record_comes_back() {
+    let folder = experiment();
+    let folder = folder.path();
+    let truth = column(&folder.join("run.csv"), "force");
+    let found = report(
+        folder,
+        "force run.csv --system machine.json --displacement displacement --period 256 --lines 4:60 \
+         --output force.csv --spectrum lines.csv --plot force.svg",
+    );
+    assert_eq!(found["method"], "dynamic stiffness, line by line");
+    assert_eq!(
+        (found["periods"].as_u64(), found["machine_uncertainty"].as_bool()),
+        (Some(2), Some(true))
+    );
+    let force = column(&folder.join("force.csv"), "force");
+    assert_eq!(force.len(), 256);
+    let seen = error(&force, &truth[..256]);
+    let stated = column(&folder.join("force.csv"), "standard_error");
+    let stated = (stated.iter().map(|e| e * e).sum::<f64>() / 256.0).sqrt();
+    let size = (truth.iter().map(|f| f * f).sum::<f64>() / truth.len() as f64).sqrt();
+    // Noise of 1 % on the displacement, more at the lines far above the resonance; what is seen
+    // is within what is stated, give or take one draw.
+    assert!(seen < 3.0 * stated / size, "seen {seen:.3}, stated {:.3}", stated / size);
+    let amplitude = column(&folder.join("lines.csv"), "amplitude");
+    assert!((amplitude[10] - 2.0).abs() < 0.2, "{}", amplitude[10]);
+    assert_eq!(amplitude.len(), 129);
+    assert!(amplitude[70] < 1e-12, "a line that was not chosen: {}", amplitude[70]);
+    let drawing = std::fs::read_to_string(folder.join("force.svg")).unwrap();
+    assert!(drawing.starts_with("<svg") && drawing.contains("Frequency"));
+}
+
+#[test]
+fn the_method_follows_the_record_and_says_why() {
+    let folder = experiment();
+    let folder = folder.path();
+    let truth = column(&folder.join("run.csv"), "force");
+    let displacement = "--displacement displacement";
+    let all = "--displacement displacement --velocity velocity --acceleration acceleration";
+    let period = format!("{displacement} --period 256");
+    let short = format!("{displacement} --period 128 --method shrinkage");
+    let open = format!("{displacement} --method kalman");
+    for (arguments, method, largest) in [
+        (all, "equation of motion, sample by sample", 0.3),
+        (&period, "mean of the force given the measurement (shrinkage)", 0.6),
+        (displacement, "augmented Kalman filter and smoother, tuned by likelihood", 0.9),
+        (&open, "augmented Kalman filter and smoother, tuned by likelihood", 0.9),
+        (&short, "mean of the force given the measurement (shrinkage)", f64::INFINITY),
+    ] {
+        let arguments = format!("force run.csv --system machine.json {arguments} --output f.csv");
+        let found = report(folder, &arguments);
+        assert_eq!(found["method"], method, "{arguments}");
+        assert!(!found["why"].as_str().unwrap().is_empty());
+        let seen = error(&column(&folder.join("f.csv"), "force"), &truth);
+        assert!(seen < largest, "{arguments}: {seen:.3}");
+    }
+    let told = mechid(folder, &format!("force run.csv --system machine.json {period}")).unwrap();
+    let told = String::from_utf8(told).unwrap();
+    for words in ["because: whole periods, the lines with force not given", "standard error (N)"] {
+        assert!(told.contains(words), "{told}");
+    }
+}
+
+#[test]
+fn bad_requests_say_what_to_change() {
+    let folder = experiment();
+    let folder = folder.path();
+    let displacement = "--displacement displacement";
+    for (arguments, words) in [
+        ("", "the motion is missing"),
+        ("--displacement displacement,velocity", "the machine has 1 degrees of freedom"),
+        ("--displacement displacement --forced 2", "degree of freedom 1 (counted from 0)"),
+        ("--displacement displacement --method continuous", "velocity and acceleration"),
+        ("--displacement displacement --method frequency-domain", "--period"),
+        ("--displacement displacement --period 256 --method kalman", "open record"),
+        ("--velocity velocity --period 256 --lines 200", "line"),
+        ("--displacement displacement --period 256 --noise 0", "must be positive"),
+        ("--displacement displacement --method tikhonov", "more than the 512"),
+    ] {
+        let arguments = format!("force run.csv --system machine.json {arguments}");
+        let long = arguments.contains("tikhonov");
+        if long {
+            // Two periods are 512 samples: one more is too many.
+            let experiment = std::fs::read_to_string(folder.join("experiment.json")).unwrap();
+            let three = experiment.replace("\"periods\": 2", "\"periods\": 3");
+            std::fs::write(folder.join("experiment.json"), three).unwrap();
+            mechid(folder, "simulate experiment.json --output run.csv").unwrap();
+        }
+        let message = mechid(folder, &arguments).unwrap_err();
+        assert!(message.contains(words), "{arguments}: {message}");
+    }
+    let missing = format!("force run.csv --system nowhere.json {displacement}");
+    assert!(mechid(folder, &missing).unwrap_err().contains("nowhere.json"));
+}
