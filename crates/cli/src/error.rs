@@ -109,6 +109,12 @@ pub enum CliError {
         /// Degrees of freedom.
         dof: usize,
     },
+    /// There is no line at all.
+    #[error("no excited line: over a period of {period} samples the force does not vary")]
+    StillForce {
+        /// Samples in the period.
+        period: usize,
+    },
     /// No line of the band is driven.
     #[error(
         "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \

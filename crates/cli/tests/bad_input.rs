@@ -152,6 +152,7 @@ fn no_excited_line() {
     identify(&good(), "--lines 1:20", &["line 20 is not between 1 and 15"]);
     identify(&good(), "--lines 5:1", &["\"5:1\" is no choice of lines", "first:step:last"]);
     identify(&good(), "--band-hz 60:30", &["low:high"]);
+    identify(&good(), "--period 2", &["over a period of 2 samples the force does not vary"]);
 }
 
 #[test]
@@ -160,7 +161,7 @@ fn a_force_that_is_zero() {
     identify(&text, "", &["a.csv: the force (column force) is zero throughout the window"]);
     // A constant is no excitation either.
     let text = record(|k| (0.004 * f64::from(k), 0.1, f64::from(k % 5)));
-    identify(&text, "", &["no excited line"]);
+    identify(&text, "", &["no excited line: over a period of 32 samples the force does not vary"]);
 }
 
 #[test]

@@ -39,7 +39,8 @@ const ROUNDING: f64 = 1e-12;
 /// excited lines (of the band).
 ///
 /// # Errors
-/// [`CliError::NoExcitedLine`], [`CliError::EmptyBand`] if no chosen line is excited.
+/// [`CliError::StillForce`] if there is no excited line at all, [`CliError::NoExcitedLine`] and
+/// [`CliError::EmptyBand`] if no chosen line is excited.
 pub fn choose_lines(
     force: &Record,
     spec: Option<&LineSpec>,
@@ -47,8 +48,9 @@ pub fn choose_lines(
 ) -> Result<Vec<usize>, CliError> {
     let sampling = force.sampling();
     let excited = excited_lines(force);
-    let (first, last) = (excited.first().copied(), excited.last().copied());
-    let (first, last) = (first.unwrap_or(0), last.unwrap_or(0));
+    let (Some(&first), Some(&last)) = (excited.first(), excited.last()) else {
+        return Err(CliError::StillForce { period: force.len() });
+    };
     if let Some(spec) = spec {
         let chosen = spec.lines(sampling)?;
         if !chosen.iter().any(|n| excited.binary_search(n).is_ok()) {
@@ -57,9 +59,6 @@ pub fn choose_lines(
         return Ok(chosen);
     }
     let Some(Band { low_hz, high_hz }) = band else {
-        if excited.is_empty() {
-            return Err(CliError::NoExcitedLine { lines: "all lines".into(), first, last });
-        }
         return Ok(excited);
     };
     let inside = lines::band(sampling, low_hz, high_hz);
