@@ -115,6 +115,38 @@ fn the_method_follows_the_record_and_says_why() {
     }
 }
 
+/// The bearing driven in y, its displacement measured in x alone.
+#[test]
+fn one_sensor_finds_the_force_in_the_other_direction() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let experiment = r#"{
+        "system": { "mass": [[14.8, 0], [0, 14.8]], "damping": [[20, 10], [10, 30]],
+                    "stiffness": [[40, 50], [-20, 60]] },
+        "sampling": { "samples": 256, "rate_hz": 7.5 },
+        "excitation": [{ "dof": 2, "lines": "1:20", "amplitude": 100, "phases": "schroeder" }],
+        "scheme": { "name": "exact" }, "response": "periodic", "periods": 2
+    }"#;
+    std::fs::write(folder.join("rotor.json"), experiment).unwrap();
+    mechid(folder, "simulate rotor.json --output run.csv").unwrap();
+    let arguments = "force run.csv --system rotor.json --displacement displacement_1,0 --forced 2 \
+                     --period 256 --lines 1:20 --output f.csv --plot f.png";
+    let found = report(folder, arguments);
+    assert_eq!(found["machine_uncertainty"], false);
+    assert_eq!(
+        (&found["forces"][0]["sought"], &found["forces"][1]["sought"]),
+        (&false.into(), &true.into())
+    );
+    let truth = column(&folder.join("run.csv"), "force_2");
+    let seen = error(&column(&folder.join("f.csv"), "force_2"), &truth);
+    assert!(seen < 1e-9, "{seen:.1e}");
+    let picture = std::fs::read(folder.join("f.png")).unwrap();
+    assert_eq!(&picture[1..4], b"PNG");
+    // Two forces cannot be told apart with one sensor.
+    let both = arguments.replace("--forced 2", "");
+    assert!(mechid(folder, &both).unwrap_err().contains("name fewer forced ones"));
+}
+
 #[test]
 fn bad_requests_say_what_to_change() {
     let folder = experiment();

@@ -57,7 +57,7 @@ pub struct RegularisedForce {
 /// [`Filter::TruncatedSvd`] counts the noise only.
 ///
 /// Cost: a period takes one small SVD per line; an open record of N samples and p forces takes
-/// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`] unknowns. Longer open
+/// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`](crate::OPEN_UNKNOWNS) unknowns. Longer open
 /// records are for [`kalman`](crate::kalman()), linear in their length.
 ///
 /// # Errors
