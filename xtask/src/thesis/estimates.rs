@@ -97,7 +97,8 @@ pub fn best(sequences: &Sequences) -> Listed {
     fit_in_time(sequences, Discretisation::FirstOrderHold)
 }
 
-fn fit_in_time(sequences: &Sequences, discretisation: Discretisation) -> Listed {
+/// Least squares over a whole period in the time domain.
+pub fn fit_in_time(sequences: &Sequences, discretisation: Discretisation) -> Listed {
     let machine = sequences.machine;
     let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
     let (x, v) = (sequences.response.displacement(), sequences.response.velocity());

@@ -113,6 +113,21 @@ impl View<'_> {
         self.column(table, method).filter_map(|r| Some((r.cell.npi?, r.best_error))).collect()
     }
 
+    /// Printed errors in % of a table that names no integrator.
+    pub fn unspecified(&self, table: &str, parameter: &str) -> Vec<f64> {
+        let cells = self.evidence.published.table(table);
+        cells
+            .filter(|c| c.method == Method::Unspecified && c.parameter == parameter)
+            .filter_map(|c| c.error_percent.parse().ok())
+            .collect()
+    }
+
+    /// Printed errors in % of one column of a table that cannot be replayed.
+    pub fn printed_errors(&self, table: &str, method: Method) -> Vec<f64> {
+        let cells = self.evidence.published.table(table).filter(|c| c.method == method);
+        cells.filter_map(|c| c.error_percent.parse().ok()).collect()
+    }
+
     /// The error in % of one cell.
     ///
     /// Not a number where the table has no such cell: every comparison with it is false.

@@ -2,7 +2,10 @@
 
 /// A Markdown table.
 pub fn table(head: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
-    let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+    let line = |cells: &[String]| {
+        let cells: Vec<String> = cells.iter().map(|c| c.replace('|', "\\|")).collect();
+        format!("| {} |\n", cells.join(" | "))
+    };
     let head: Vec<String> = head.iter().map(|h| (*h).to_owned()).collect();
     let mut text = line(&head) + &line(&vec!["---".to_owned(); head.len()]);
     for row in rows {

@@ -1,9 +1,12 @@
 //! The audit page: what was checked in the dissertation, what came out, what one learns.
 
+mod appendices;
+pub mod claims;
 mod counts;
 mod evidence;
 pub mod markdown;
 pub mod misprints;
+mod rerun;
 mod slips;
 
 use evidence::Evidence;
@@ -22,6 +25,7 @@ pub fn page(published: &Published, results: &Results) -> Result<String, String> 
         counts::section(&evidence),
         slips::section(&evidence)?,
         misprints::section(&evidence)?,
+        claims::section(&claims::judge_all(&evidence)?),
     ];
     Ok(sections.join("\n"))
 }

@@ -1,0 +1,214 @@
+//! Simulations and estimates that no printed table asks for.
+
+use mechid::force::{Discretisation, Ends, continuous, discretised, spectrum_ratio};
+use mechid::model::SecondOrderSystem;
+use mechid::signal::Spectrum;
+use nalgebra::DMatrix;
+
+use super::super::case::{Case, Machine};
+use super::super::estimates;
+use super::super::published::Method;
+use super::super::simulate::{self, Sequences};
+use super::evidence::Source;
+use super::markdown::number;
+
+/// One period of motion and force, with the slips or without.
+///
+/// # Errors
+/// The integrator's own words.
+pub fn sequences(source: Source, case: Case, method: Method) -> Result<Sequences, String> {
+    match source {
+        Source::Printed => simulate::slipped(case, method),
+        Source::Corrected => simulate::correct(case, method),
+    }
+}
+
+/// Time or frequency domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    /// Eqs. (4.5.12), (4.5.28).
+    Time,
+    /// Eqs. (4.6.12), (4.6.31).
+    Frequency,
+}
+
+/// Estimates in the order of `Machine::parameters`.
+///
+/// # Errors
+/// The words of the integrator or the estimator.
+pub fn identified(
+    source: Source,
+    case: Case,
+    method: Method,
+    domain: Domain,
+) -> Result<Vec<f64>, String> {
+    let sequences = sequences(source, case, method)?;
+    let single = matches!(case.machine, Machine::SingleDof { .. });
+    let free_force = single && matches!(method, Method::Rk4 | Method::CentralDifference);
+    match (domain, source) {
+        (Domain::Time, _) => estimates::time(&sequences),
+        (Domain::Frequency, Source::Corrected) => estimates::frequency(&sequences),
+        (Domain::Frequency, Source::Printed) if free_force => {
+            estimates::frequency_offset_free_force(&sequences)
+        }
+        (Domain::Frequency, Source::Printed) => estimates::frequency_offset(&sequences),
+    }
+}
+
+/// Errors of [`identified`] in per cent.
+///
+/// # Errors
+/// As [`identified`].
+pub fn errors(
+    source: Source,
+    case: Case,
+    method: Method,
+    domain: Domain,
+) -> Result<Vec<f64>, String> {
+    Ok(percent(&identified(source, case, method, domain)?, case.machine))
+}
+
+/// |estimate − truth| in per cent of the truth.
+pub fn percent(estimates: &[f64], machine: Machine) -> Vec<f64> {
+    let pairs = estimates.iter().zip(machine.truth());
+    pairs.map(|(e, t)| 100.0 * ((e - t) / t).abs()).collect()
+}
+
+/// The machine an estimate describes.
+fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String> {
+    let mass = machine.system().mass().clone();
+    let n = mass.nrows();
+    let mut listed = listed.to_vec();
+    if let Machine::Bearing { kyx } = machine {
+        listed[2] *= kyx.factor();
+    }
+    let (stiffness, damping) = listed.split_at(n * n);
+    let matrix = |values: &[f64]| DMatrix::from_row_slice(n, n, values);
+    SecondOrderSystem::new(mass, matrix(damping), matrix(stiffness)).map_err(|e| e.to_string())
+}
+
+/// With which machine a force is sought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parameters {
+    /// The true one.
+    Exact,
+    /// The one identified from the same data.
+    From(Domain),
+}
+
+/// How a force is sought.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Equation {
+    /// Sample by sample, eq. (4.8.1).
+    Continuous,
+    /// Step by step, eqs. (4.7.1)–(4.7.3) or better.
+    Discretised(Discretisation),
+}
+
+/// The dissertation's discretised equation.
+pub const EULER: Equation = Equation::Discretised(Discretisation::Euler);
+
+/// |F̂_n|/|F_n| of the driven degree of freedom at every excited line: 1 is perfect.
+#[derive(Debug, Clone)]
+pub struct Ratios {
+    omega0: f64,
+    ratios: Vec<f64>,
+}
+
+impl Ratios {
+    /// Of a force sought in given sequences.
+    ///
+    /// # Errors
+    /// The words of the force equation.
+    pub fn of(
+        sequences: &Sequences,
+        machine: &SecondOrderSystem,
+        equation: Equation,
+    ) -> Result<Self, String> {
+        let found = match equation {
+            Equation::Continuous => continuous(machine, &sequences.response),
+            Equation::Discretised(d) => {
+                discretised(machine, &sequences.response, d, Ends::Periodic)
+            }
+        }
+        .map_err(|e| e.to_string())?;
+        let sampling = sequences.force.sampling();
+        let lines: Vec<usize> = (1..sampling.len().div_ceil(2)).collect();
+        let driven = machine.dof() - 1;
+        let truth = Spectrum::of(&sequences.force);
+        let ratios =
+            spectrum_ratio(found.spectrum(), &truth, driven, &lines).map_err(|e| e.to_string())?;
+        Ok(Self { omega0: sampling.omega0(), ratios })
+    }
+
+    /// Smallest and largest.
+    pub fn range(&self) -> [f64; 2] {
+        let pick = |f: fn(f64, f64) -> f64, from| self.ratios.iter().copied().fold(from, f);
+        [pick(f64::min, f64::INFINITY), pick(f64::max, f64::NEG_INFINITY)]
+    }
+
+    /// Largest minus smallest.
+    pub fn spread(&self) -> f64 {
+        let [low, high] = self.range();
+        high - low
+    }
+
+    /// Root mean square of the distance from 1.
+    pub fn rms(&self) -> f64 {
+        let squares: f64 = self.ratios.iter().map(|r| (r - 1.0).powi(2)).sum();
+        (squares / self.ratios.len() as f64).sqrt()
+    }
+
+    /// Largest distance from 1 over lines above a frequency, in rad/s.
+    pub fn worst_above(&self, omega: f64) -> f64 {
+        let lines = self.ratios.iter().enumerate();
+        lines
+            .filter(|(at, _)| (at + 1) as f64 * self.omega0 > omega)
+            .map(|(_, r)| (r - 1.0).abs())
+            .fold(0.0, f64::max)
+    }
+
+    /// The range, in words.
+    pub fn words(&self) -> String {
+        let [low, high] = self.range();
+        format!("{}–{}", number(low), number(high))
+    }
+
+    /// Root mean square of the distance between two spectra.
+    pub fn distance(&self, other: &Self) -> f64 {
+        let pairs = self.ratios.iter().zip(&other.ratios);
+        let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / self.ratios.len() as f64).sqrt()
+    }
+}
+
+/// The force of one case, sought with one machine and one equation.
+///
+/// # Errors
+/// The words of the integrator, the estimator or the force equation.
+pub fn force(
+    source: Source,
+    case: Case,
+    method: Method,
+    parameters: Parameters,
+    equation: Equation,
+) -> Result<Ratios, String> {
+    let sequences = sequences(source, case, method)?;
+    let machine = match parameters {
+        Parameters::Exact => sequences.machine.system(),
+        Parameters::From(domain) => {
+            system(&identified(source, case, method, domain)?, sequences.machine)?
+        }
+    };
+    Ratios::of(&sequences, &machine, equation)
+}
+
+/// The single degree of freedom at 256 samples.
+pub fn sdof(npi: f64) -> Case {
+    Case { machine: Machine::SDOF, nt: 256, npi }
+}
+
+/// The bearing.
+pub fn bearing(nt: usize, npi: f64) -> Case {
+    Case { machine: Machine::Bearing { kyx: mechid::model::KyxSign::Minus }, nt, npi }
+}
