@@ -31,8 +31,8 @@ fn row(cell: &Cell, points: usize) -> Result<Row, String> {
     let at = Machine::SDOF.parameters().iter().position(|p| *p == cell.parameter).unwrap_or(0);
     let truth = Machine::SDOF.truth()[at];
     let percent = |v: f64| 100.0 * ((v - truth) / truth).abs();
-    let euler = refined(&sequences, points + 1, Discretisation::Euler)?[at];
-    let best = refined(&sequences, 1, Discretisation::FirstOrderHold)?[at];
+    let euler = refined(&sequences, points + 1, Interpolation::Linear, Discretisation::Euler)?[at];
+    let best = refined(&sequences, 1, Interpolation::Linear, Discretisation::FirstOrderHold)?[at];
     let judged = |printed: &str, value| Judged {
         printed: printed.to_owned(),
         value,
@@ -50,20 +50,25 @@ fn row(cell: &Cell, points: usize) -> Result<Row, String> {
     })
 }
 
-fn refined(
+/// Estimates on records with `factor − 1` further instants in every interval.
+///
+/// # Errors
+/// The words of the interpolation or the estimation that fails.
+pub fn refined(
     sequences: &Sequences,
     factor: usize,
+    interpolation: Interpolation,
     discretisation: Discretisation,
 ) -> Result<Vec<f64>, String> {
     let words = |e: mechid::signal::SignalError| e.to_string();
-    let line = |r: &Record| refine(r, factor, Interpolation::Linear).map_err(words);
+    let fine = |r: &Record| refine(r, factor, interpolation).map_err(words);
     let unknowns =
         Unknowns::known_mass(sequences.machine.system().mass()).map_err(|e| e.to_string())?;
     let fit = TimeDomain::new(discretisation, Extent::Open)
         .fit(
-            &line(sequences.response.displacement())?,
-            &line(sequences.response.velocity())?,
-            &line(&sequences.force)?,
+            &fine(sequences.response.displacement())?,
+            &fine(sequences.response.velocity())?,
+            &fine(&sequences.force)?,
             &unknowns,
         )
         .map_err(|e| e.to_string())?;

@@ -6,7 +6,7 @@
 use mechid::estimate::Unknowns;
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
 use mechid::integrate::{Newmark, RungeKutta4, Scheme, integrate_periodic};
-use mechid::model::{Mode, SecondOrderSystem, npi_sampling};
+use mechid::model::{Mode, Response, SecondOrderSystem, npi_sampling};
 use mechid::signal::{Multisine, Phases, Record, lines};
 use mechid_problems::steffen_rade;
 use nalgebra::{Complex, DMatrix};
@@ -61,7 +61,7 @@ pub fn rows(table: &str, published: &Published) -> Result<Vec<ModalRow>, String>
 }
 
 /// Damped frequency (Hz), damping ratio and y2/y1 of both modes, slower first.
-type Modal = [[Complex<f64>; 3]; 2];
+pub type Modal = [[Complex<f64>; 3]; 2];
 
 fn modal(system: &SecondOrderSystem) -> Result<Modal, String> {
     let modes = system.modes().map_err(|e| e.to_string())?;
@@ -77,20 +77,52 @@ fn modal(system: &SecondOrderSystem) -> Result<Modal, String> {
 }
 
 fn identify(scheme: &dyn Scheme, discretisation: Discretisation) -> Result<Modal, String> {
+    let (force, motion) = simulate(scheme, 20.0)?;
+    identified(&force, motion.displacement(), motion.velocity(), discretisation)
+}
+
+/// The true modal parameters.
+///
+/// # Errors
+/// The eigenvalue solver's own words.
+pub fn theory() -> Result<Modal, String> {
+    modal(&steffen_rade())
+}
+
+/// The force on the first mass and the motion it causes, with the settings of [`SETTING`] but for
+/// NPI.
+///
+/// # Errors
+/// The integrator's own words.
+pub fn simulate(scheme: &dyn Scheme, npi: f64) -> Result<(Record, Response), String> {
     let system = steffen_rade();
     let words = |e: &dyn std::fmt::Display| e.to_string();
     let modes = system.modes().map_err(|e| words(&e))?;
     let fastest = modes.iter().map(Mode::damped_frequency).fold(0.0, f64::max);
-    let sampling = npi_sampling(20.0, 2048, fastest).map_err(|e| words(&e))?;
+    let sampling = npi_sampling(npi, 2048, fastest).map_err(|e| words(&e))?;
     let signal = Multisine::flat(lines::full(sampling), 1.0, Phases::SchroederBinary)
         .and_then(|m| m.sample(sampling))
         .map_err(|e| words(&e))?;
     let data = DMatrix::from_fn(2048, 2, |k, c| if c == 0 { signal.channel(0)[k] } else { 0.0 });
     let force = Record::new(sampling, data).map_err(|e| words(&e))?;
     let motion = integrate_periodic(scheme, &system, &force).map_err(|e| words(&e))?;
-    let unknowns = Unknowns::known_mass(system.mass()).map_err(|e| words(&e))?;
+    Ok((force, motion))
+}
+
+/// The modal parameters that least squares over the whole period find.
+///
+/// # Errors
+/// The estimator's own words.
+pub fn identified(
+    force: &Record,
+    displacement: &Record,
+    velocity: &Record,
+    discretisation: Discretisation,
+) -> Result<Modal, String> {
+    let words = |e: &dyn std::fmt::Display| e.to_string();
+    let unknowns = Unknowns::known_mass(steffen_rade().mass()).map_err(|e| words(&e))?;
     let fit = TimeDomain::new(discretisation, Extent::WholePeriod)
-        .fit(motion.displacement(), motion.velocity(), &force, &unknowns)
+        .fit(displacement, velocity, force, &unknowns)
         .map_err(|e| words(&e))?;
     modal(&fit.estimate().system().map_err(|e| words(&e))?)
 }

@@ -8,6 +8,8 @@ pub mod markdown;
 pub mod misprints;
 mod rerun;
 mod slips;
+mod story;
+mod suggestions;
 
 use evidence::Evidence;
 
@@ -20,12 +22,22 @@ use super::results::Results;
 /// The words of the first computation that fails.
 pub fn page(published: &Published, results: &Results) -> Result<String, String> {
     let evidence = Evidence::new(published, results);
+    let judged = claims::judge_all(&evidence)?;
     let sections = [
-        "# Audit of the dissertation\n".to_owned(),
+        story::section(&evidence, &judged)?,
         counts::section(&evidence),
         slips::section(&evidence)?,
+        claims::section(&judged),
+        suggestions::section()?,
         misprints::section(&evidence)?,
-        claims::section(&claims::judge_all(&evidence)?),
     ];
     Ok(sections.join("\n"))
+}
+
+/// Every claim with both verdicts.
+///
+/// # Errors
+/// The words of the first rerun that fails.
+pub fn verdicts(published: &Published, results: &Results) -> Result<Vec<claims::Judged>, String> {
+    claims::judge_all(&Evidence::new(published, results))
 }

@@ -1,5 +1,7 @@
 //! Simulations and estimates that no printed table asks for.
 
+use mechid::estimate::Unknowns;
+use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
 use mechid::force::{Discretisation, Ends, continuous, discretised, spectrum_ratio};
 use mechid::model::SecondOrderSystem;
 use mechid::signal::Spectrum;
@@ -66,6 +68,23 @@ pub fn errors(
     domain: Domain,
 ) -> Result<Vec<f64>, String> {
     Ok(percent(&identified(source, case, method, domain)?, case.machine))
+}
+
+/// Errors in per cent of least squares on the lines 1 … `last` of a motion without slips.
+///
+/// # Errors
+/// The estimator's own words.
+pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, String> {
+    let words = |e: mechid::estimate::EstimateError| e.to_string();
+    let machine = sequences.machine;
+    let displacement = sequences.response.displacement();
+    let lines = 1..last + 1;
+    let data =
+        FrequencyData::from_records(&sequences.force, displacement, Motion::Displacement, lines)
+            .map_err(words)?;
+    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
+    let found = equation_error(&data, &unknowns).map_err(words)?;
+    Ok(percent(&machine.listed(&found.stiffness(), &found.damping()), machine))
 }
 
 /// |estimate − truth| in per cent of the truth.
