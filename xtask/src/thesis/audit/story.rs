@@ -99,7 +99,10 @@ fn lessons(evidence: &Evidence) -> Result<String, String> {
         [Rk4, Newmark, CentralDifference].map(|m| mean_of("5.2.2", m)).to_vec();
     let exact: Vec<String> = [Rk4, Newmark, CentralDifference].map(|m| best("5.2.2", m)).to_vec();
     let houbolt = [2.0, 20.0].map(|npi| number(corrected.error("5.3.2", Houbolt, npi)));
-    let light = errors(super::evidence::Source::Corrected, sdof(2.0), Rk4, Domain::Frequency)?;
+    let motion = correct(sdof(20.0), Rk4)?;
+    let lines = motion.force.sampling().len() / 2;
+    let [all, low] = [lines - 1, lines / 4].map(|last| frequency_up_to(&motion, last));
+    let (all, low) = (all?, low?);
     let [x, y] = ["5.6.6", "5.6.8"].map(|t| number(corrected.mean(t, Rk4)));
     Ok(format!(
         "## What one learns for practice\n\n\
