@@ -118,7 +118,7 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
 fn lines_the_machine_does_not_transmit_are_named() {
     let (_, [x, v, a]) = harmonic(&rotor(), [3.0, 100.0]);
     let unknown = Noise::Unknown;
-    for (quantity, record) in [(Quantity::Velocity, v), (Quantity::Acceleration, a)] {
+    for (quantity, record) in [(Quantity::Velocity, v.clone()), (Quantity::Acceleration, a)] {
         let measured = Measurement::of_all(quantity, record);
         for forced in [&[0, 1][..], &[1]] {
             let error =
@@ -150,6 +150,12 @@ fn lines_the_machine_does_not_transmit_are_named() {
     .unwrap();
     // With everything measured the dynamic stiffness is used as it is, zero at the resonance.
     assert!(frequency_domain(&undamped, &velocity, &[0], &[2], &unknown).is_ok());
+    // With more channels than forces its inverse is needed, and there is none.
+    let both = Record::new(period(), v.data().clone()).unwrap();
+    let twice = vec![Channel { dof: 0, quantity: Quantity::Velocity }; 2];
+    let twice = Measurement::new(both, twice).unwrap();
+    let error = frequency_domain(&undamped, &twice, &[0], &[2], &unknown).unwrap_err();
+    assert!(matches!(error, ForceError::Resonance { line: 2, .. }), "{error}");
 }
 
 #[test]

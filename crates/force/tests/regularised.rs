@@ -199,6 +199,47 @@ fn the_standard_error_is_what_is_seen() {
 }
 
 #[test]
+fn without_noise_every_rule_gives_the_force() {
+    let system = random_stable(2, 5);
+    for (len, extent) in [(63, Extent::Period), (48, Extent::Open(Start::InMotion))] {
+        let truth = force(len, 2, &[1], wobble);
+        let response = match extent {
+            Extent::Period => exact_harmonic_periodic(&system, &truth).unwrap(),
+            _ => exact_foh(&system, &truth, &InitialState::rest(2)).unwrap(),
+        };
+        let measured = measure(&response);
+        for filter in [
+            Filter::Tikhonov(Rule::Likelihood),
+            Filter::Tikhonov(Rule::Gcv),
+            Filter::TruncatedSvd(Rule::Likelihood),
+            Filter::Shrinkage,
+        ] {
+            let noise = Noise::Unknown;
+            let found = regularised(&system, &measured, &[1], &extent, filter, &noise).unwrap();
+            let error = relative_error(found.force.record(), &truth).unwrap();
+            // The grid of λ ends eight decades below the largest singular value.
+            assert!(error < 1e-3, "{extent:?}, {filter:?}: {error:.1e}");
+        }
+    }
+}
+
+#[test]
+fn velocities_leave_the_mean_force_at_zero() {
+    let system = random_stable(2, 5);
+    let truth = force(63, 2, &[1], |k, i| 3.0 + wobble(k, i));
+    let response = exact_harmonic_periodic(&system, &truth).unwrap();
+    let measured = Measurement::of_all(Quantity::Velocity, response.velocity().clone());
+    for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::TruncatedSvd(Rule::Gcv)] {
+        let noise = Noise::Unknown;
+        let found = regularised(&system, &measured, &[1], &Extent::Period, filter, &noise).unwrap();
+        let (found, expected) = (found.force.record().column(1), truth.column(1));
+        assert!(found.mean().abs() < 1e-9, "{filter:?}: {}", found.mean());
+        let moving = expected.add_scalar(-expected.mean());
+        assert!((found - &moving).norm() < 1e-3 * moving.norm(), "{filter:?}");
+    }
+}
+
+#[test]
 fn bad_requests_are_refused_with_their_numbers() {
     let system = random_stable(2, 5);
     let record = |len: usize, value: f64| {
