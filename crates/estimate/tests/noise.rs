@@ -5,10 +5,10 @@ mod common;
 use common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, Motion, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods,
-    instrumental_variables, output_error,
+    equation_error, instrumental_variables, output_error,
 };
 use mechid_estimate::{EstimateError, Unknowns};
-use mechid_model::SecondOrderSystem;
+use mechid_model::{Matrix, SecondOrderSystem};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -194,6 +194,57 @@ fn a_model_that_is_wrong_shows_in_the_misfit() {
     let data = periods.mean_with_noise(Pooling::AllLines).unwrap();
     let fit = output_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
     assert!(fit.misfit_ratio > 100.0, "{}", fit.misfit_ratio);
+}
+
+/// Only the stiffness of the first equation is unknown; the second has nothing to be found.
+#[test]
+fn a_single_unknown_is_found_by_all() {
+    let system = bearing();
+    let setup = setup(&system, 4, Motion::Displacement);
+    let periods = setup.measure(0.001, 0.0, 3);
+    let (first, second) = periods.halves().unwrap();
+    let mut unknowns = Unknowns::known_mass(system.mass()).unwrap();
+    for matrix in [Matrix::Damping, Matrix::Stiffness] {
+        for at in 0..4 {
+            let value = system.matrix(matrix)[(at / 2, at % 2)];
+            unknowns = unknowns.fix(matrix, at / 2, at % 2, value).unwrap();
+        }
+    }
+    unknowns = unknowns.release(Matrix::Stiffness, 0, 1).unwrap();
+    for found in [
+        equation_error(&first, &unknowns).unwrap(),
+        instrumental_variables(&first, &second, &unknowns).unwrap(),
+        output_error(&first, &unknowns).unwrap().estimate,
+    ] {
+        let k12 = found.parameter("k12").unwrap();
+        assert!((k12.value - 50.0).abs() < 4.0 * k12.standard_error, "{k12}");
+        assert!((k12.value - 50.0).abs() < 0.5, "{k12}");
+    }
+}
+
+#[test]
+fn parameters_that_are_not_excited_are_named() {
+    // The second mass stands still: its columns of C and K cannot be known.
+    let setup = setup(&oscillator(), 2, Motion::Displacement);
+    let still = |r: &Record| {
+        let zero = vec![0.0; r.len()];
+        Record::from_channels(r.sampling(), &[r.channel(0), &zero[..]]).unwrap()
+    };
+    let (force, motion) = (still(&setup.force), still(&setup.motion));
+    let periods =
+        RepeatedPeriods::new(&setup.lines, &force, &motion, Motion::Displacement).unwrap();
+    let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 10.0)).unwrap();
+    // The second equation then says 0 = 0; a mass of its own would have to move.
+    let unknowns = unknowns.fix(Matrix::Mass, 1, 0, 1.0).unwrap();
+    let (first, second) = periods.halves().unwrap();
+    let refused = [
+        output_error(&periods.mean().unwrap(), &unknowns).unwrap_err(),
+        instrumental_variables(&first, &second, &unknowns).unwrap_err(),
+    ];
+    for e in refused {
+        let EstimateError::Undetermined { parameters, .. } = e else { panic!("{e}") };
+        assert_eq!(parameters, "c12, c22, k12, k22");
+    }
 }
 
 #[test]

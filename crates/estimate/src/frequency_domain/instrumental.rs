@@ -119,18 +119,8 @@ impl Equation {
         let (upper, lower) = (first.target(unknowns, dof), second.target(unknowns, dof));
         let target =
             DVector::from_iterator(regressors.nrows(), upper.iter().chain(lower.iter()).copied());
-        let scale: Vec<f64> = regressors.column_iter().map(|c| c.norm()).collect();
-        let scaled = |mut m: DMatrix<f64>| {
-            m.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
-            m
-        };
-        // Zᵀ = RᵀQᵀ, and R drops out of ZᵀΦ θ = Zᵀy: no product of ill-scaled matrices.
-        let q = scaled(instruments).qr().q();
-        let projected = q.tr_mul(&scaled(regressors.clone()));
-        let singular_values = projected.singular_values();
-        let solver = projected.lu().solve(&q.transpose()).ok_or_else(|| open(own))?;
-        let mut influence = solver;
-        influence.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row /= *s);
+        let (influence, condition) =
+            influence(&regressors, instruments).ok_or_else(|| open(own))?;
         let values = &influence * &target;
         if values.iter().any(|v| !v.is_finite()) {
             return Err(open(own));
@@ -144,11 +134,7 @@ impl Equation {
             scores,
             rows: target.len(),
             residual_nrmse: residual.norm() / target.norm(),
-            condition: if own.is_empty() {
-                1.0
-            } else {
-                singular_values.max() / singular_values.min()
-            },
+            condition,
         })
     }
 
@@ -156,6 +142,26 @@ impl Equation {
     fn degrees_of_freedom(&self) -> usize {
         self.rows.saturating_sub(self.own.len())
     }
+}
+
+/// (ZᵀΦ)⁻¹Zᵀ, unknowns × rows, and the condition number of its scaled projection.
+fn influence(
+    regressors: &DMatrix<f64>,
+    mut instruments: DMatrix<f64>,
+) -> Option<(DMatrix<f64>, f64)> {
+    if regressors.ncols() == 0 {
+        return Some((instruments.transpose(), 1.0));
+    }
+    let scale: Vec<f64> = regressors.column_iter().map(|c| c.norm()).collect();
+    instruments.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
+    // Zᵀ = RᵀQᵀ, and R drops out of ZᵀΦ θ = Zᵀy: no product of ill-scaled matrices.
+    let q = instruments.qr().q();
+    let mut projected = q.tr_mul(regressors);
+    projected.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
+    let singular_values = projected.singular_values();
+    let mut influence = projected.lu().solve(&q.transpose())?;
+    influence.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row /= *s);
+    Some((influence, singular_values.max() / singular_values.min()))
 }
 
 fn open(own: &[Parameter]) -> EstimateError {

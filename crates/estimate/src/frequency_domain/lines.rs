@@ -20,6 +20,9 @@ pub struct Lines {
     plan: Arc<dyn RealToComplex<f64>>,
 }
 
+/// Lines below this part of the largest sample are rounding.
+const ROUNDING: f64 = 1e-12;
+
 impl fmt::Debug for Lines {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Lines")
@@ -61,7 +64,11 @@ impl Lines {
     pub fn excited(force: &Record, threshold: f64) -> Result<Self, EstimateError> {
         let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
         let amplitudes = all.read(force)?.map(|z| z.norm());
-        let largest: Vec<f64> = amplitudes.column_iter().map(|c| c.max()).collect();
+        // A constant has a spectrum too: its rounding.
+        let rounding = |c: usize| ROUNDING * force.column(c).amax();
+        let largest = amplitudes.column_iter().map(|c| c.max()).enumerate();
+        let largest: Vec<f64> =
+            largest.map(|(c, max)| if max > rounding(c) { max } else { 0.0 }).collect();
         let lines: Vec<usize> = amplitudes
             .row_iter()
             .enumerate()
@@ -183,7 +190,7 @@ mod tests {
     fn excited_lines_are_found() {
         assert_eq!(Lines::excited(&record(16), 0.1).unwrap().as_slice(), [2, 3]);
         assert_eq!(Lines::excited(&record(16), 0.5).unwrap().as_slice(), [3]);
-        let still = Record::from_channel(Sampling::new(0.1, 8).unwrap(), vec![1.0; 8]).unwrap();
+        let still = Record::from_channel(Sampling::new(0.1, 7).unwrap(), vec![0.1; 7]).unwrap();
         assert_eq!(Lines::excited(&still, 0.1).unwrap_err(), EstimateError::NoExcitedLine);
     }
 }

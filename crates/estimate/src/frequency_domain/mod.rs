@@ -1,4 +1,44 @@
-//! Estimators in the frequency domain.
+//! Estimators that work line by line on the spectra of whole periods.
+//!
+//! Forces and motions are read at chosen [`Lines`] into [`FrequencyData`], of one record or of
+//! [`RepeatedPeriods`], whose scatter shows the noise. Then there are three estimators:
+//!
+//! | Estimator | Noise | Cost |
+//! |---|---|---|
+//! | [`equation_error`] | biases it | one small least-squares problem |
+//! | [`instrumental_variables`] | no bias, but scatter | the same, twice |
+//! | [`output_error`] | no bias, the least scatter, intervals that hold | some Gauss–Newton steps |
+//!
+//! ```
+//! use mechid_estimate::Unknowns;
+//! use mechid_estimate::frequency_domain::{Lines, Motion, Pooling, RepeatedPeriods, output_error};
+//! use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+//!
+//! // Eight periods of 10 ẍ + 180 ẋ + 5000 x = F under five cosines, x measured with 1 % noise.
+//! let period = Sampling::new(0.02, 64)?;
+//! let whole = period.with_len(8 * 64)?;
+//! let (mut force, mut x) = (vec![0.0; 512], vec![0.0; 512]);
+//! for n in [1.0, 3.0, 5.0, 7.0, 9.0] {
+//!     let w = n * period.omega0();
+//!     let (re, im) = (5000.0 - 10.0 * w * w, 180.0 * w);
+//!     for (k, t) in whole.times().enumerate() {
+//!         let (sin, cos) = (w * t + n * n).sin_cos();
+//!         force[k] += 50.0 * cos;
+//!         x[k] += 50.0 * (re * cos + im * sin) / (re * re + im * im);
+//!     }
+//! }
+//! let force = Record::from_channel(whole, force)?;
+//! let x = noise::add_white(&Record::from_channel(whole, x)?, NoiseLevel::FractionOfRms(0.01), 1)?;
+//!
+//! let lines = Lines::new(period, [1, 3, 5, 7, 9])?;
+//! let periods = RepeatedPeriods::new(&lines, &force, &x, Motion::Displacement)?;
+//! let data = periods.mean_with_noise(Pooling::AllLines)?;
+//! let fit = output_error(&data, &Unknowns::unknown_mass(1)?)?;
+//! let stiffness = fit.estimate.parameter("k")?;
+//! assert!((stiffness.value - 5000.0).abs() < 4.0 * stiffness.standard_error);
+//! assert!(stiffness.standard_error < 50.0);
+//! # Ok::<(), mechid_estimate::EstimateError>(())
+//! ```
 
 mod data;
 mod equation_error;

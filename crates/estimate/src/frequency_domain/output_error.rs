@@ -26,6 +26,8 @@ pub struct OutputErrorFit {
 
 /// Relative change of the noise levels below which another round of weighting is useless.
 const WEIGHT_TOLERANCE: f64 = 1e-3;
+/// A residual this small against the motion is rounding.
+const ROUNDING: f64 = 1e-12;
 /// Rounds of weighting; the second is nearly always the last but one.
 const MAX_ROUNDS: usize = 10;
 
@@ -98,7 +100,8 @@ fn with_white_noise(
     unknowns: &Unknowns,
     mut theta: DVector<f64>,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let mut levels = measured_size(data, data.displacement());
+    let measured = measured_size(data, data.displacement());
+    let mut levels = measured.clone();
     let mut steps = 0;
     for _ in 0..MAX_ROUNDS {
         let mut misfit = Misfit::new(data, unknowns, Noise::Output(white_weights(data, &levels)));
@@ -109,7 +112,9 @@ fn with_white_noise(
         let common = found[0] / levels[0];
         let settled =
             found.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
-        if settled || data.dof() == 1 {
+        // Rounding has no level that could settle.
+        let exact = found.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
+        if settled || exact || data.dof() == 1 {
             fit.steps = steps;
             let spare = spare(data, &fit.theta);
             return finish(
