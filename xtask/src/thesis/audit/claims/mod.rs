@@ -166,11 +166,6 @@ pub fn judge_all(evidence: &Evidence) -> Result<Vec<Judged>, String> {
 
 /// The section of the page.
 pub fn section(judged: &[Judged]) -> String {
-    let changed: Vec<String> = judged
-        .iter()
-        .filter(|j| j.printed.holds() != j.corrected.holds())
-        .map(|j| j.claim.number.to_string())
-        .collect();
     let count = |of: fn(&Judged) -> &Finding, holds| {
         judged.iter().filter(|j| of(j).holds() == holds).count()
     };
@@ -187,12 +182,12 @@ pub fn section(judged: &[Judged]) -> String {
          the printed numbers; where there are only figures, or nothing, on the computation with \
          every slip replayed. \"Corrected\" is the same estimator and scheme on the same data \
          without slips. Errors are in per cent of the true value; a mean is over the NPI of a \
-         table.\n\n{}\nThe correction changes the verdict of claims {}.\n",
+         table.\n\n{}\nWhat the correction makes of them:\n\n{}",
         table(
             &["", "holds", "mostly", "hardly", "fails"],
             [line("as printed", |j| &j.printed), line("corrected", |j| &j.corrected)]
         ),
-        changed.join(", ")
+        table(&["as printed", "corrected", "claims"], changes(judged))
     );
     let mut rest = judged.iter();
     for (title, claims) in GROUPS {
@@ -203,6 +198,23 @@ pub fn section(judged: &[Judged]) -> String {
         );
     }
     text
+}
+
+/// Which claims go from which verdict to which.
+fn changes(judged: &[Judged]) -> Vec<Vec<String>> {
+    let all = [Holds::Yes, Holds::Mostly, Holds::Hardly, Holds::No];
+    let pairs = all.iter().flat_map(|from| all.iter().map(move |to| (*from, *to)));
+    pairs
+        .filter_map(|(from, to)| {
+            let numbers: Vec<String> = judged
+                .iter()
+                .filter(|j| j.printed.holds() == from && j.corrected.holds() == to)
+                .map(|j| format!("[{0}](#claim-{0})", j.claim.number))
+                .collect();
+            let words = [from.word(), to.word()].map(str::to_owned).to_vec();
+            (!numbers.is_empty()).then(|| [words, vec![numbers.join(", ")]].concat())
+        })
+        .collect()
 }
 
 fn row(judged: &Judged) -> Vec<String> {
