@@ -173,6 +173,14 @@ pub enum CliError {
     /// The simulation failed.
     #[error(transparent)]
     Simulate(#[from] mechid::SimulateError),
+    /// No setting of a sweep gave an estimate.
+    #[error("no setting gave an estimate; at the first one, {setting}: {reason}")]
+    EmptySweep {
+        /// The first setting.
+        setting: f64,
+        /// What went wrong there.
+        reason: String,
+    },
     /// More numbers than can be held.
     #[error(
         "a record of {numbers} numbers is too large, {largest} is the limit: fewer --samples, \

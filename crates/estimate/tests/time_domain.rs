@@ -8,10 +8,10 @@ use mechid_model::{
     InitialState, KyxSign, Matrix, Response, Sdof, SecondOrderSystem, npi_sampling,
 };
 use mechid_problems::{
-    dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic, exact_zoh,
-    exact_zoh_periodic, random_stable,
+    dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic,
+    exact_harmonic_periodic, exact_zoh, exact_zoh_periodic, random_stable,
 };
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Interpolation, Multisine, Phases, Record, Sampling};
 use nalgebra::{DMatrix, dmatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -163,6 +163,38 @@ fn the_bias_of_euler_is_that_of_one_plus_a_dt_and_shrinks_with_npi() {
         // At NPI = 1 a period of 256 samples: of the order of ωn Δt = 2π/256.
         assert!((1e-3..0.1).contains(&last));
     }
+}
+
+/// Intermediate points of a band-limited period are the samples a faster recorder had taken.
+#[test]
+fn a_refined_record_is_as_good_as_a_faster_one() {
+    let system = dissertation_bearing(KyxSign::Minus).system();
+    let known = Unknowns::known_mass(system.mass()).unwrap();
+    let measured = |samples: usize| {
+        let sampling = npi_sampling(8.0, samples, 1.799248).unwrap();
+        let channel = |seed| {
+            let multisine = Multisine::flat(1..=60, 5.0, Phases::Random { seed }).unwrap();
+            multisine.sample(sampling).unwrap().channel(0).to_vec()
+        };
+        let force = Record::from_channels(sampling, &[channel(1), channel(2)]).unwrap();
+        (exact_harmonic_periodic(&system, &force).unwrap(), force)
+    };
+    let (motion, force) = measured(256);
+    let (faster, faster_force) = measured(8 * 256);
+    let wanted = fit(Euler, Extent::WholePeriod, &faster, &faster_force, &known);
+    let refined = |factor, interpolation| {
+        let records = [motion.displacement(), motion.velocity(), &force];
+        let euler = TimeDomain::new(Euler, Extent::WholePeriod);
+        euler.fit_refined(records, &known, factor, interpolation).unwrap().into_estimate()
+    };
+    let gap = |a: &Estimate, b: &Estimate| {
+        (a.stiffness() - b.stiffness()).amax() / system.stiffness().amax()
+    };
+    assert!(gap(&refined(8, Interpolation::BandLimited), &wanted) < 1e-9);
+    // The highest line has 4 samples a cycle, where a spline is a few per cent off.
+    assert!(gap(&refined(8, Interpolation::NotAKnotSpline), &wanted) < 0.1);
+    let once = refined(1, Interpolation::BandLimited);
+    assert!(error(&wanted, &system) < error(&once, &system) / 4.0);
 }
 
 #[test]

@@ -272,6 +272,17 @@ impl Experiment {
         &self.file
     }
 
+    /// The same experiment at another sampling rate, in Hz: the period is so much longer or shorter.
+    pub fn with_rate_hz(mut self, rate_hz: f64) -> Self {
+        self.sampling.rate_hz = rate_hz;
+        self
+    }
+
+    /// Samples in one period.
+    pub fn samples(&self) -> usize {
+        self.sampling.samples
+    }
+
     /// The system described.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ mod modal;
 mod multisine;
 mod simulate;
 mod stability;
+mod sweep;
 
 use clap::{Parser, Subcommand};
 
@@ -42,6 +43,7 @@ pub enum Command {
     Multisine(multisine::MultisineArgs),
     Simulate(simulate::SimulateArgs),
     Stability(stability::StabilityArgs),
+    Sweep(sweep::SweepArgs),
 }
 
 impl Command {
@@ -55,6 +57,7 @@ impl Command {
             Command::Multisine(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
+            Command::Sweep(args) => args.run(),
         }
     }
 
@@ -68,6 +71,7 @@ impl Command {
             Command::Multisine(args) => &args.report,
             Command::Simulate(args) => &args.report,
             Command::Stability(args) => &args.report,
+            Command::Sweep(args) => &args.report,
         }
     }
 }
