@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::force::ForceTable;
 use crate::transition::Transition;
-use crate::{Instant, IntegrateError, Loads, Stepper};
+use crate::{IntegrateError, Loads, Stepper};
 
 /// Displacement, velocity and acceleration, samples × degrees of freedom.
 #[derive(Debug)]
@@ -56,6 +56,7 @@ pub(crate) struct Run {
     transition: Option<Transition>,
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
+    /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
 }
 
@@ -194,6 +195,3 @@ fn fixed<const S: usize, const W: usize, const O: usize>(
     }
     state.copy_from_slice(&z);
 }
-
-/// Which of the four rows an instant is kept in.
-const _: () = assert!(Instant::Now as usize == 0 && Instant::Beyond as usize == 3);

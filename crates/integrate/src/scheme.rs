@@ -117,11 +117,6 @@ pub enum Instant {
     Beyond,
 }
 
-impl Instant {
-    /// All four, in the order of time.
-    pub const ALL: [Self; 4] = [Self::Now, Self::Middle, Self::Next, Self::Beyond];
-}
-
 /// The forces of one step from t to t + Δt, in N, one entry per degree of freedom.
 ///
 /// A scheme reads those of [`Stepper::instants`] only; the others may be anything.

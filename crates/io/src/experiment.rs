@@ -158,6 +158,8 @@ pub enum MiddleLoad {
     Held,
     /// The mean of both ends.
     Linear,
+    /// That of the multisines themselves.
+    Exact,
 }
 
 /// The displacement before the first sample, for central difference.
@@ -298,6 +300,18 @@ impl Experiment {
     /// [`IoError::Description`] for a degree of freedom that the system does not have,
     /// [`IoError::LineOutside`], [`IoError::Signal`], and those of [`Experiment::system`].
     pub fn force(&self) -> Result<Record, IoError> {
+        self.sampled(false)
+    }
+
+    /// The same half a step later: sample k belongs to t = (k + ½) Δt.
+    ///
+    /// # Errors
+    /// As [`Experiment::force`].
+    pub fn mid_step_force(&self) -> Result<Record, IoError> {
+        self.sampled(true)
+    }
+
+    fn sampled(&self, mid_step: bool) -> Result<Record, IoError> {
         let dof = self.system()?.dof();
         let signal = |source| IoError::Signal { file: self.file.clone(), source };
         if self.periods == 0 {
@@ -326,9 +340,16 @@ impl Experiment {
             }
             let lines = excitation.lines.lines(sampling)?;
             let multisine = Multisine::flat(lines, excitation.amplitude, excitation.phases());
-            let record = multisine.and_then(|m| m.sample(sampling)).map_err(signal)?;
+            let multisine = multisine.map_err(signal)?;
             let mut channel = force.column_mut(excitation.dof - 1);
-            channel += record.column(0);
+            if mid_step {
+                for (k, force) in channel.iter_mut().enumerate() {
+                    let time = (k as f64 + 0.5) * sampling.dt();
+                    *force += multisine.value(time, sampling.omega0());
+                }
+            } else {
+                channel += multisine.sample(sampling).map_err(signal)?.column(0);
+            }
         }
         Record::new(sampling, force).map_err(signal)
     }

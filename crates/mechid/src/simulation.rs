@@ -2,7 +2,7 @@
 
 use mechid_integrate::{
     AllowUnstable, CentralDifference, CentralDifferenceStart, Convention, Houbolt, HouboltStart,
-    IntegrateError, Newmark, RungeKutta4, Scheme, WilsonLoad, WilsonTheta, integrate,
+    IntegrateError, Newmark, RungeKutta4, SampledForce, Scheme, WilsonLoad, WilsonTheta, integrate,
     integrate_periodic,
 };
 use mechid_io::{
@@ -63,10 +63,18 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         Some(scheme) => {
             let unguarded = AllowUnstable(&**scheme);
             let scheme = if experiment.allow_unstable { &unguarded } else { &**scheme };
+            let middle = match scheme.needs_mid_step_force() {
+                true => Some(experiment.mid_step_force()?),
+                false => None,
+            };
             match experiment.response {
-                ResponseKind::Periodic => integrate_periodic(scheme, &system, &period)?,
+                ResponseKind::Periodic => {
+                    integrate_periodic(scheme, &system, with_middle(&period, middle.as_ref()))?
+                }
                 ResponseKind::FromRest => {
-                    integrate(scheme, &system, &force, &InitialState::rest(system.dof()))?
+                    let rest = InitialState::rest(system.dof());
+                    let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
+                    integrate(scheme, &system, with_middle(&force, middle.as_ref()), &rest)?
                 }
             }
         }
@@ -180,9 +188,14 @@ fn scheme(choice: SchemeChoice) -> Result<Option<Box<dyn Scheme>>, IntegrateErro
         SchemeChoice::RungeKutta4 { load } => Box::new(match load {
             MiddleLoad::Held => RungeKutta4::HELD,
             MiddleLoad::Linear => RungeKutta4::LINEAR,
+            MiddleLoad::Exact => RungeKutta4::SUPPLIED,
         }),
         _ => return Ok(None),
     }))
+}
+
+fn with_middle<'a>(force: &'a Record, middle: Option<&'a Record>) -> SampledForce<'a> {
+    middle.map_or(SampledForce::from(force), |m| SampledForce::with_mid_step(force, m))
 }
 
 /// A record of so many periods.
@@ -206,4 +219,33 @@ fn map(
         change(1, response.velocity())?,
         change(2, response.acceleration())?,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Largest displacement error against the receptance, relative, for a scheme as JSON.
+    fn error(scheme: &str, samples: usize) -> f64 {
+        let text = format!(
+            r#"{{ "system": {{ "mass": 10, "damping": 180, "stiffness": 5000 }},
+                 "sampling": {{ "samples": {samples}, "rate_hz": {samples} }},
+                 "excitation": [{{ "lines": "1:5", "amplitude": 5 }}],
+                 "scheme": {scheme} }}"#
+        );
+        let simulation = simulate(&Experiment::parse("test.json", &text).unwrap()).unwrap();
+        let truth = exact_periodic(&simulation.system, &simulation.force).unwrap();
+        let (truth, found) =
+            (truth.displacement().data(), simulation.response.displacement().data());
+        (found - truth).amax() / truth.amax()
+    }
+
+    #[test]
+    fn runge_kutta_is_of_fourth_order_where_it_knows_the_force_at_mid_step() {
+        let exact = r#"{ "name": "runge-kutta-4", "load": "exact" }"#;
+        let linear = r#"{ "name": "runge-kutta-4", "load": "linear" }"#;
+        let order = |scheme: &str| (error(scheme, 128) / error(scheme, 256)).log2();
+        assert!((order(exact) - 4.0).abs() < 0.2, "{}", order(exact));
+        assert!((order(linear) - 2.0).abs() < 0.2, "{}", order(linear));
+    }
 }

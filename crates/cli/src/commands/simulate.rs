@@ -26,7 +26,8 @@ use crate::text_table::{compact, significant, text_table};
 ///               of each line in N, phases (schroeder, schroeder-binary, random with seed, zero)
 ///
 ///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, runge-kutta-4) and
-///               its parameters (beta, gamma; start; start; theta, load; load)
+///               its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
+///               central-difference; theta, load: projected, interpolated; load: held, linear, exact)
 ///
 ///   response    periodic (the steady state) or from-rest
 ///
