@@ -60,7 +60,8 @@ impl EquationOfMotion {
     /// each rows × degrees of freedom.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] and [`EstimateError::NotFinite`]; then nothing is added.
+    /// [`EstimateError::Size`], [`EstimateError::NotFinite`] and [`EstimateError::Overflow`]; then
+    /// nothing is added.
     pub fn push_rows(
         &mut self,
         acceleration: DMatrixView<'_, f64>,
@@ -80,6 +81,7 @@ impl EquationOfMotion {
         }
         if !self.factor.push(&[acceleration, velocity, displacement, force]) {
             parts.into_iter().try_for_each(|(_, what, part)| finite(what, part))?;
+            return Err(EstimateError::Overflow);
         }
         Ok(())
     }

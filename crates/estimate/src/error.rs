@@ -84,6 +84,9 @@ pub enum EstimateError {
         /// The value found.
         value: f64,
     },
+    /// Squares of the data are beyond the largest number.
+    #[error("the squares of the data overflow: use other units, values below 1e150")]
+    Overflow,
     /// An equation of motion without force and without known entry fixes ratios only.
     #[error(
         "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \

@@ -86,7 +86,8 @@ impl LeastSquares {
     /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] and [`EstimateError::NotFinite`]; then nothing is added.
+    /// [`EstimateError::Size`], [`EstimateError::NotFinite`] and [`EstimateError::Overflow`]; then
+    /// nothing is added.
     pub fn push_rows(
         &mut self,
         regressors: DMatrixView<'_, f64>,
@@ -98,6 +99,7 @@ impl LeastSquares {
         if !self.factor.push(&[regressors, targets]) {
             finite("regressors", regressors)?;
             finite("right-hand side", targets)?;
+            return Err(EstimateError::Overflow);
         }
         Ok(())
     }

@@ -48,7 +48,7 @@ impl TriangularFactor {
 
     /// Takes rows whose columns are spread over several matrices side by side.
     ///
-    /// False, and nothing taken, if a value is not finite.
+    /// False, and nothing taken, if a value is not finite or its square overflows.
     #[must_use]
     pub(crate) fn push(&mut self, parts: &[DMatrixView<'_, f64>]) -> bool {
         let rows = parts.first().map_or(0, |part| part.nrows());
@@ -75,11 +75,12 @@ impl TriangularFactor {
             for (target, column) in self.block.chunks_exact_mut(len).zip(columns) {
                 target.copy_from_slice(&column.as_slice()[start..start + len]);
             }
-            if !all_finite(&self.block[..len * self.columns]) {
-                self.r = before;
-                return false;
-            }
             self.absorb(len);
+        }
+        // NaN and infinity do not leave a sum of squares: R shows them, and overflow, too.
+        if !self.r.iter().all(|v| v.is_finite()) {
+            self.r = before;
+            return false;
         }
         self.rows += rows.len();
         true
@@ -156,18 +157,6 @@ impl Reflection {
         r[(self.row, column)] -= w;
         w * self.scale
     }
-}
-
-/// Whether no value is NaN or infinite: 0·v is 0 then, and NaN otherwise.
-fn all_finite(values: &[f64]) -> bool {
-    let mut sums = [0.0; 8];
-    let (chunks, rest) = values.as_chunks::<8>();
-    for chunk in chunks {
-        for lane in 0..8 {
-            sums[lane] += 0.0 * chunk[lane];
-        }
-    }
-    sums.iter().chain(rest).map(|v| 0.0 * v).sum::<f64>() == 0.0
 }
 
 /// xᵀy with eight partial sums, so that the processor's vector units are used.

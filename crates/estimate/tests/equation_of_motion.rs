@@ -137,6 +137,10 @@ fn hopeless_data_are_refused_in_words() {
         rows.push_rows(data.a.as_view(), data.v.as_view(), data.x.as_view(), data.f.as_view());
     assert!(matches!(refused, Err(EstimateError::NotFinite { what: "displacement", row: 4, .. })));
     assert_eq!(rows.rows(), 0);
+    data.x[(4, 1)] = 1e200;
+    let refused =
+        rows.push_rows(data.a.as_view(), data.v.as_view(), data.x.as_view(), data.f.as_view());
+    assert_eq!((refused, rows.rows()), (Err(EstimateError::Overflow), 0));
 }
 
 #[test]

@@ -165,6 +165,7 @@ fn finish(
     let mut factor = TriangularFactor::new(sensitivity.ncols());
     if !factor.push(&[sensitivity.as_view()]) {
         crate::least_squares::finite("sensitivity of the motion", sensitivity.as_view())?;
+        return Err(EstimateError::Overflow);
     }
     let none = DMatrix::zeros(sensitivity.ncols(), 1);
     let linear = solve_compressed(factor.r().as_view(), none.as_view(), factor.rows())?;

@@ -55,7 +55,8 @@ impl Transitions {
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if they lie on different time axes, [`EstimateError::Size`] for a
-    /// wrong number of channels, [`EstimateError::Step`] for another step than the first record's.
+    /// wrong number of channels, [`EstimateError::Step`] for another step than the first record's,
+    /// [`EstimateError::Overflow`].
     pub fn push(
         &mut self,
         displacement: &Record,
@@ -81,8 +82,9 @@ impl Transitions {
         for start in (0..pairs).step_by(BLOCK) {
             let len = BLOCK.min(pairs - start);
             self.fill(&mut block, quantities, start, len);
-            let finite = self.factor.push(&[block.rows(0, len)]);
-            debug_assert!(finite, "records are finite");
+            if !self.factor.push(&[block.rows(0, len)]) {
+                return Err(EstimateError::Overflow);
+            }
         }
         Ok(())
     }
