@@ -2,7 +2,9 @@
 //!
 //! The text names neither the integrator nor what was interpolated. What stands here is the plain
 //! reading: Newmark, Nt = 128, displacement, velocity and force refined together. It does not give
-//! the printed numbers, nor does any other reading we tried.
+//! the printed numbers, nor does any other reading we tried. The shape of the printed columns, K and
+//! C falling steeply from NPI 6 to 10, belongs to a first period from rest, not to the periodic
+//! steady state of the other tables; no such run gave the digits either.
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};

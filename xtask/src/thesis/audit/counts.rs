@@ -6,16 +6,17 @@ use super::super::verdict::Verdict;
 use super::evidence::Evidence;
 use super::markdown::table;
 
-/// Numbers by verdict, and those whose settings the text does not state.
+/// Numbers by verdict.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counts {
     verdicts: [usize; 4],
-    open: usize,
 }
 
 impl Counts {
-    fn of<'a>(judged: impl Iterator<Item = &'a Judged>, open: usize) -> Self {
-        let mut counts = Self { open, ..Self::default() };
+    /// Numbers whose settings the text does not state, `unstated` of them, are unexplained.
+    fn of<'a>(judged: impl Iterator<Item = &'a Judged>, unstated: usize) -> Self {
+        let mut counts = Self::default();
+        counts.verdicts[Verdict::Unexplained as usize] = unstated;
         for j in judged.filter(|j| !j.printed.is_empty()) {
             counts.verdicts[j.verdict as usize] += 1;
         }
@@ -29,33 +30,32 @@ impl Counts {
 
     /// All numbers.
     pub fn total(&self) -> usize {
-        self.verdicts.iter().sum::<usize>() + self.open
+        self.verdicts.iter().sum()
     }
 
     fn plus(mut self, other: Self) -> Self {
         for (sum, more) in self.verdicts.iter_mut().zip(other.verdicts) {
             *sum += more;
         }
-        self.open += other.open;
         self
     }
 
     fn cells(&self) -> Vec<String> {
         let shown = |n: usize| if n == 0 { "·".to_owned() } else { n.to_string() };
-        self.verdicts.iter().copied().chain([self.open]).map(shown).collect()
+        self.verdicts.iter().copied().map(shown).collect()
     }
 }
 
 /// Estimates, errors and mean rows of one table.
 pub fn of_table(evidence: &Evidence, table: &str) -> [Counts; 3] {
     let (rows, means) = (evidence.rows(table), evidence.means(table));
-    let open = |printed: fn(&Cell) -> &str| {
+    let unstated = |printed: fn(&Cell) -> &str| {
         let cells = evidence.published.table(table);
         cells.filter(|c| c.method == Method::Unspecified && !printed(c).is_empty()).count()
     };
     [
-        Counts::of(rows.iter().map(|r| &r.estimate), open(|c| &c.estimate)),
-        Counts::of(rows.iter().map(|r| &r.error), open(|c| &c.error_percent)),
+        Counts::of(rows.iter().map(|r| &r.estimate), unstated(|c| &c.estimate)),
+        Counts::of(rows.iter().map(|r| &r.error), unstated(|c| &c.error_percent)),
         Counts::of(means.iter().map(|m| &m.printed), 0),
     ]
 }
@@ -87,18 +87,17 @@ pub fn section(evidence: &Evidence) -> String {
          A number comes out *to the digit* when rounding or cutting ours to the printed decimals \
          gives the printed string. *Rounding* is one unit in the last place, from rounding twice or \
          from computing with other printed numbers. A *misprint* is believed only where the number \
-         that should stand there is the one we compute. *Open* are numbers whose settings the \
-         dissertation does not state (Appendix B names no integrator).\n\n\
-         Of {} printed estimates {} come out to the digit, {} within a rounding, {} are misprints, \
-         {} are unexplained and {} are open. Each group of five columns reads: to the digit, \
-         rounding, misprint, unexplained, open; first for the estimates, then for their errors in \
+         that should stand there is the one we compute. What is *unexplained* stands in Appendix B, \
+         which names neither the integrator nor what was interpolated.\n\n\
+         Of {} printed estimates {} come out to the digit, {} within a rounding, {} are misprints \
+         and {} are unexplained. Each group of four columns reads: to the digit, \
+         rounding, misprint, unexplained; first for the estimates, then for their errors in \
          per cent, then for the mean-error row.\n\n{}",
         estimates.total(),
         estimates.with(Verdict::ToTheDigit),
         estimates.with(Verdict::Rounding),
         estimates.with(Verdict::Misprint),
         estimates.with(Verdict::Unexplained),
-        estimates.open,
         table(
             &[
                 "Table",
@@ -106,17 +105,14 @@ pub fn section(evidence: &Evidence) -> String {
                 "≈",
                 "misprint",
                 "?",
-                "open",
                 "error ✓",
                 "≈",
                 "misprint",
                 "?",
-                "open",
                 "mean ✓",
                 "≈",
                 "misprint",
                 "?",
-                "open",
             ],
             rows
         )
