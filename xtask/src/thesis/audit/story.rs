@@ -66,7 +66,7 @@ fn outcome(evidence: &Evidence, judged: &[Judged]) -> Result<String, String> {
     Ok(format!(
         "**What came out.**\n\n\
          - Of {} printed estimates {} come out to the printed digit, {} within a rounding and {} \
-         are misprints; {} cannot be checked, their settings are not stated.\n\
+         are misprints; {} are unexplained, their settings are not stated.\n\
          - The frequency domain was given each harmonic at the frequency of the next one ({offset} \
          estimates need that slip). Newmark's error in K, printed {} % at NPI 2 and {} % at NPI 20, \
          is really {} % and {} %. The rule that the two domains want opposite steps is that slip: \
@@ -82,7 +82,7 @@ fn outcome(evidence: &Evidence, judged: &[Judged]) -> Result<String, String> {
         estimates.with(Verdict::ToTheDigit),
         estimates.with(Verdict::Rounding),
         estimates.with(Verdict::Misprint),
-        estimates.total() - Verdict::ALL.iter().map(|v| estimates.with(*v)).sum::<usize>(),
+        estimates.with(Verdict::Unexplained),
         at_two[0],
         at_twenty[0],
         at_two[1],
