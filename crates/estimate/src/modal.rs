@@ -59,7 +59,8 @@ impl Estimate {
     /// let force = DMatrix::from_element(3, 1, Complex::new(50.0, 0.0));
     /// let displacement = DMatrix::from_fn(3, 1, |row, _| {
     ///     let w = omega[row];
-    ///     let x = force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w);
+    ///     let x: Complex<f64> =
+    ///         force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w);
     ///     Complex::new((x.re * 1e6).round() * 1e-6, (x.im * 1e6).round() * 1e-6)
     /// });
     /// let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)?;

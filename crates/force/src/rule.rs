@@ -77,6 +77,10 @@ const STANDING_STILL: f64 = 1e-3;
 /// a few that happen to be small would look like a perfect fit.
 const LEFT_TO_JUDGE: f64 = 0.1;
 
+/// Costs that differ by less than this share of themselves are equal: what is left to judge by
+/// is a difference, cancelled down to 1e-9 of the data before it is no longer used.
+const TIE: f64 = 1e-6;
+
 /// The λ that a rule chooses; infinity means that no force at all is nearest.
 pub(crate) fn choose(filter: Filter, components: &Components) -> Option<f64> {
     let (rule, candidates) = match filter {
@@ -135,8 +139,13 @@ fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     }))
 }
 
+/// The first candidate, the most regularised one, whose cost is the least but for rounding.
+///
+/// Where the cost levels out towards λ = 0 only rounding would tell the candidates apart.
 fn least(costs: impl Iterator<Item = f64>) -> usize {
-    costs.enumerate().min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i)
+    let costs: Vec<f64> = costs.collect();
+    let least = costs.iter().copied().fold(f64::INFINITY, f64::min);
+    costs.iter().position(|cost| *cost <= least * (1.0 + TIE)).unwrap_or(0)
 }
 
 /// The point of greatest curvature near the noise level, which is taken where GCV is least.
