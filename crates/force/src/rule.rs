@@ -77,8 +77,11 @@ const STANDING_STILL: f64 = 1e-3;
 /// a few that happen to be small would look like a perfect fit.
 const LEFT_TO_JUDGE: f64 = 0.1;
 
-/// Costs that differ by less than this share of themselves are equal: what is left to judge by
-/// is a difference, cancelled down to 1e-9 of the data before it is no longer used.
+/// Tikhonov's factors leave at least this share of the data: below it the residual of data
+/// without noise sinks to rounding, and rounding would choose.
+const LEFT_BY_TIKHONOV: f64 = 1e-4;
+
+/// Costs that differ by less than this share of themselves are equal.
 const TIE: f64 = 1e-6;
 
 /// The λ that a rule chooses; infinity means that no force at all is nearest.
@@ -132,7 +135,8 @@ fn thresholds(components: &Components) -> Vec<f64> {
 
 /// Least residual²/left², where enough is left to judge by.
 fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
-    let share = if matches!(filter, Filter::TruncatedSvd(_)) { LEFT_TO_JUDGE } else { 1e-9 };
+    let share =
+        if matches!(filter, Filter::TruncatedSvd(_)) { LEFT_TO_JUDGE } else { LEFT_BY_TIKHONOV };
     least(fits.iter().map(|fit| {
         let left = components.data() - fit.unknowns;
         if left < share * components.data() { f64::INFINITY } else { fit.residual / (left * left) }
