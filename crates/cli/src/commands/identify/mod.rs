@@ -10,6 +10,7 @@ pub(super) mod report;
 use clap::{Args, ValueEnum};
 use mechid::estimate::{Estimate, Parameter, Unknowns};
 use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
+use mechid::plot::Figure;
 
 use self::excited::Band;
 use self::excited::choose_lines;
@@ -35,7 +36,18 @@ use crate::outcome::Outcome;
   mechid identify rotor.csv --force fx,fy --displacement x,y --mass 14.8,14.8 --band-hz 20:90 --json")]
 pub struct IdentifyArgs {
     #[command(flatten)]
-    input: RecordArgs,
+    identification: Identification,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+/// Which record, what in it, and how to find the machine.
+#[derive(Debug, Args)]
+pub struct Identification {
+    #[command(flatten)]
+    pub input: RecordArgs,
     #[command(flatten)]
     channels: ChannelArgs,
     /// Where to look
@@ -63,10 +75,13 @@ pub struct IdentifyArgs {
         allow_hyphen_values = true
     )]
     mass: KnownMass,
-    #[command(flatten)]
-    plot: PlotArgs,
-    #[command(flatten)]
-    pub report: ReportArgs,
+}
+
+/// A machine found, and how.
+#[derive(Debug)]
+pub struct Identified {
+    pub fitted: Fitted,
+    pub report: Report,
 }
 
 /// Where to look for the parameters.
@@ -84,6 +99,16 @@ const CONSPICUOUS: f64 = 0.05;
 impl IdentifyArgs {
     /// Reads, identifies, and tells.
     pub fn run(&self) -> Result<Outcome, CliError> {
+        let found = self.identification.identify()?;
+        let report = &found.report;
+        Outcome::new(report.text(), report)?
+            .with_plot(&self.plot, || found.picture(&report.title()))
+    }
+}
+
+impl Identification {
+    /// Reads and identifies.
+    pub fn identify(&self) -> Result<Identified, CliError> {
         let measured = self.channels.measure(&self.input)?;
         let unknowns = self.mass.unknowns(measured.force.channels())?;
         let fitted = match self.domain {
@@ -95,10 +120,18 @@ impl IdentifyArgs {
             Domain::Time => fit::time_domain(&measured, &unknowns, self.between_samples)?,
         };
         let report = report(&measured, &fitted)?;
-        Outcome::new(report.text(), &report)?.with_plot(&self.plot, || {
-            let (_, data) = fitted.frequency.as_ref().ok_or(CliError::PlotNeedsSpectra)?;
-            picture::receptance(&report.title(), data, &fitted.estimate.system()?)
-        })
+        Ok(Identified { fitted, report })
+    }
+}
+
+impl Identified {
+    /// Measured and identified receptance.
+    ///
+    /// # Errors
+    /// [`CliError::PlotNeedsSpectra`] in the time domain, [`CliError::NothingToDraw`].
+    pub fn picture(&self, title: &str) -> Result<Figure, CliError> {
+        let (_, data) = self.fitted.frequency.as_ref().ok_or(CliError::PlotNeedsSpectra)?;
+        picture::receptance(title, data, &self.fitted.estimate.system()?)
     }
 }
 
