@@ -102,6 +102,11 @@ impl Transitions {
         Ok(())
     }
 
+    /// From now on the pairs seen count as so many independent ones.
+    pub(super) fn count_as(&mut self, pairs: usize) {
+        self.factor.stand_for(pairs);
+    }
+
     /// M, C and K from all pairs so far.
     ///
     /// With M known and C and K free they are K̂ = −M A₂₁ and Ĉ = −M A₂₂ from the lower half of
