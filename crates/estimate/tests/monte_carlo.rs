@@ -61,7 +61,7 @@ fn row(experiment: &Experiment, scatter: &Scatter, name: &str) -> String {
     )
 }
 
-/// The comparison in `docs/estimators.md`, computed.
+/// The comparison in the book (`choose/estimators.md`), computed.
 fn table() -> Vec<String> {
     let mut rows = Vec::new();
     for (machine, runs) in [("oscillator", 2000), ("bearing", 400)] {
@@ -84,8 +84,8 @@ fn table() -> Vec<String> {
 /// Set the variable `MECHID_BLESS` to rewrite the table.
 #[test]
 fn the_table_in_the_documentation_is_what_comes_out() {
-    let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/estimators.md");
-    let text = std::fs::read_to_string(place).expect("docs/estimators.md");
+    let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/choose/estimators.md");
+    let text = std::fs::read_to_string(place).expect("choose/estimators.md");
     let (start, end) = ("<!-- table -->\n", "<!-- end of table -->\n");
     let from = text.find(start).expect("start of the table") + start.len();
     let to = text.find(end).expect("end of the table");

@@ -1,4 +1,4 @@
-//! Prints the tables of `docs/force.md`:
+//! Prints the tables of `docs/book/src/choose/force.md`:
 //! `cargo run --release -p mechid-force --example noise_study`.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 

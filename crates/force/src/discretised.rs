@@ -42,7 +42,7 @@ pub enum Ends {
 ///
 /// The result amplifies noise in the velocity by M/Δt (held), and in the displacement by
 /// 6M/Δt² (linear); Euler's rule is exact for no motion at all: at a line ω it returns the force
-/// times M(e^{iωΔt} − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see `docs/force.md`.
+/// times M(e^{iωΔt} − 1)/Δt + C + K/(iω) over M iω + C + K/(iω), see the book, `choose/force.md`.
 ///
 /// Cost: one exponential of order 4n, then one product of samples × 2n by 2n × n.
 ///

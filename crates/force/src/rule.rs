@@ -16,7 +16,7 @@ pub enum Rule {
     /// That mean needs the variances of force and noise, the share of components that are driven
     /// and how far down the singular values they reach; all four are taken where the measurement
     /// is most likely. It is the rule to use: the only one here that looks at the error of the
-    /// force and not at the fit of the response. See `docs/force.md` for how the others compare.
+    /// force and not at the fit of the response. The book (`choose/force.md`) compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
     ///

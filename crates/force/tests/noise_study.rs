@@ -1,4 +1,4 @@
-//! The promises of `docs/force.md`, and that its tables are the ones the study gives.
+//! The promises of the book (`choose/force.md`), and that its tables are the ones the study gives.
 
 mod study;
 
@@ -26,7 +26,7 @@ fn tokens(text: &str) -> Vec<Result<f64, String>> {
 
 /// The tables of the book, from the one that starts with `header` on.
 fn printed(header: &str) -> String {
-    let book = include_str!("../../../docs/force.md");
+    let book = include_str!("../../../docs/book/src/choose/force.md");
     let start = book.find(header).expect("the book has the study's tables");
     book[start..]
         .lines()
@@ -45,7 +45,10 @@ fn assert_printed(header: &str, found: &str) {
             (Ok(old), Ok(new)) => (old - new).abs() <= 0.03 * new.abs() + 0.002,
             (old, new) => old == new,
         };
-        assert!(same, "docs/force.md says {old:?}, the study {new:?}: run the example noise_study");
+        assert!(
+            same,
+            "choose/force.md says {old:?}, the study {new:?}: run the example noise_study"
+        );
     }
 }
 

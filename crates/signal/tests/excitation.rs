@@ -37,7 +37,7 @@ fn flat_multisine_is_as_white_as_its_lines_allow() {
     }
 }
 
-/// The table of docs/excitations.md: a period of 1023 samples, 1 s long, of which lines 1 to 400
+/// The table of the book, choose/excitation.md: a period of 1023 samples, 1 s long, of which lines 1 to 400
 /// matter, and a largest force of 1 N.
 #[test]
 fn excitations_side_by_side() {

@@ -1,4 +1,4 @@
-//! The noise study of `docs/force.md`: displacement only, noise of 1 % and 5 %, every method.
+//! The noise study of the book (`choose/force.md`): displacement only, noise of 1 % and 5 %, every method.
 //!
 //! Used by the example that writes the tables and by the test that checks them.
 
@@ -257,7 +257,7 @@ fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> 
     (1..points.len() - 1).max_by(|a, b| curvature(*a).total_cmp(&curvature(*b))).unwrap()
 }
 
-/// The first two tables of `docs/force.md`: excited lines known, and not known.
+/// The first two tables of the book (`choose/force.md`): excited lines known, and not known.
 pub fn tables() -> [String; 2] {
     let cases = cases();
     let table = |methods: &[Method], floor: bool| {
@@ -296,7 +296,7 @@ pub fn rule_rows() -> Vec<RuleRow> {
     rows
 }
 
-/// The third table of `docs/force.md`.
+/// The third table of the book (`choose/force.md`).
 pub fn rule_table(rows: &[RuleRow]) -> String {
     let mut out = String::from(
         "| Excited | Noise | Filter | likelihood | GCV | L-curve | textbook corner |\n\

@@ -33,9 +33,10 @@ fn noise() -> Vec<String> {
         "`mechid::estimate::frequency_domain`: `instrumental_variables` and the maximum-likelihood \
          `output_error`, with the noise level from repeated periods (`RepeatedPeriods`); \
          `mechid::signal` adds white and coloured noise. Bias, scatter and coverage of thousands of \
-         experiments against the bound no estimator can beat: [estimators](../estimators.md). Least \
-         squares is biased there, instrumental variables is not, maximum likelihood is both \
-         unbiased and nearly the best possible."
+         experiments against the bound no estimator can beat: \
+         the book, “Which estimator”. Least squares is biased there, \
+         instrumental variables is not, maximum likelihood is both unbiased and nearly the best \
+         possible."
             .to_owned(),
     )
 }
@@ -54,7 +55,7 @@ fn taylor() -> Result<Vec<String>, String> {
              `ExactLinear`. More terms alone do not help: on Runge-Kutta data at NPI 3.4 the rms \
              deviation of |F̂/F| is {} with one term, {} with eight, {} with the exact exponential \
              for a force that is linear over a step, as it was. See [claim 24](#claim-24) and \
-             [forces](../force.md).",
+             the book, “Which force method”.",
             rms(Discretisation::Euler)?,
             rms(Discretisation::Taylor(8))?,
             rms(Discretisation::ExactLinear)?
@@ -84,7 +85,7 @@ fn spectra() -> Result<Vec<String>, String> {
              the relative error is {}, all of it the integrator's; the continuous equation needs \
              displacement, velocity and acceleration, and with the machine identified by Euler's \
              rule deviates by {} rms. With noise `regularised` and `kalman` follow: \
-             [forces](../force.md).",
+             the book, “Which force method”.",
             number(spectral),
             number(stepped.rms())
         ),

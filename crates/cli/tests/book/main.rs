@@ -1,0 +1,260 @@
+//! What the README and the book show is what the program prints, draws and compiles, and every
+//! link leads somewhere.
+//!
+//! A page's `console` blocks are followed in order; a chapter and the pages nested below it in the
+//! book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book` writes
+//! the answers and pictures anew.
+
+mod markdown;
+mod pictures;
+mod session;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use markdown::Page;
+use session::{Session, Step, fits};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().unwrap()
+}
+
+fn bless() -> bool {
+    std::env::var_os("MECHID_BLESS").is_some()
+}
+
+fn read(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A page with what it includes.
+fn whole(path: &Path) -> String {
+    let text = read(path);
+    let includes = Page::parse(&text).includes;
+    includes
+        .iter()
+        .fold(text.clone(), |text, file| text + &read(&path.parent().unwrap().join(file)))
+}
+
+/// The book's pages, those that share a folder together: a chapter with what is nested in it.
+fn chapters() -> Vec<Vec<PathBuf>> {
+    let source = root().join("docs/book/src");
+    let mut chapters: Vec<Vec<PathBuf>> = Vec::new();
+    for (depth, target) in Page::parse(&read(&source.join("SUMMARY.md"))).links {
+        match chapters.last_mut() {
+            Some(chapter) if depth > 1 => chapter.push(source.join(target)),
+            _ => chapters.push(vec![source.join(target)]),
+        }
+    }
+    chapters
+}
+
+/// The README and every page below docs.
+fn documents() -> Vec<PathBuf> {
+    let mut documents = vec![root().join("README.md")];
+    let mut folders = vec![root().join("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "md") {
+                documents.push(path);
+            }
+        }
+    }
+    documents
+}
+
+/// What is wrong with the pages.
+#[derive(Default)]
+struct Findings {
+    /// Answers and pictures that are others today; blessing writes them anew.
+    stale: Vec<String>,
+    /// What only an author can mend.
+    wrong: Vec<String>,
+}
+
+/// Follows a page; gives its text with the answers of today.
+fn follow(page: &Path, session: &mut Session, findings: &mut Findings) -> String {
+    let text = read(page);
+    let (mut today, mut copied) = (String::new(), 0);
+    for block in Page::parse(&text).blocks {
+        let content = &text[block.range.clone()];
+        if block.language() == "sh" && content.lines().any(|line| line.starts_with("mechid ")) {
+            let place = page.display();
+            findings
+                .wrong
+                .push(format!("{place}: commands of mechid belong into `console`\n{content}"));
+        }
+        if let Some(file) = block.file() {
+            session.write(file, content);
+        }
+        if block.language() != "console" {
+            continue;
+        }
+        today.push_str(&text[copied..block.range.start]);
+        copied = block.range.end;
+        for step in Step::all(content) {
+            today.push_str(&step.typed);
+            let place = format!("{}\n{}", page.display(), step.typed);
+            match session.run(&step.command()) {
+                Ok(answer) if !fits(&step.shown, &answer) => {
+                    findings.stale.push(format!("{place}shows\n{}is\n{answer}", step.shown));
+                    today.push_str(&answer);
+                }
+                Ok(_) => today.push_str(&step.shown),
+                Err(why) => {
+                    findings.wrong.push(format!("{place}{why}"));
+                    today.push_str(&step.shown);
+                }
+            }
+        }
+    }
+    today + &text[copied..]
+}
+
+/// Holds a page's pictures to those that its commands drew.
+fn look(page: &Path, session: &Session, findings: &mut Findings) {
+    for image in Page::parse(&read(page)).images {
+        let committed = page.parent().unwrap().join(&image);
+        let name = committed.file_name().unwrap().to_string_lossy();
+        match session.read(&name) {
+            Some(drawn) if committed.exists() && pictures::alike(&drawn, &read(&committed)) => {}
+            Some(drawn) if bless() => fs::write(&committed, drawn).unwrap(),
+            Some(_) => findings.stale.push(format!("{} is drawn otherwise", committed.display())),
+            None if image.contains("thesis/") => {}
+            None => findings.wrong.push(format!("{}: nothing draws {image}", page.display())),
+        }
+    }
+}
+
+#[test]
+fn commands_print_and_draw_what_the_pages_show() {
+    let mut findings = Findings::default();
+    for chapter in [vec![vec![root().join("README.md")]], chapters()].concat() {
+        let mut session = Session::new(&root());
+        for page in &chapter {
+            let today = follow(page, &mut session, &mut findings);
+            if bless() && today != read(page) {
+                fs::write(page, today).unwrap();
+            }
+        }
+        for page in &chapter {
+            look(page, &session, &mut findings);
+        }
+    }
+    assert!(findings.wrong.is_empty(), "{}", findings.wrong.join("\n"));
+    let stale = findings.stale.join("\n");
+    assert!(bless() || stale.is_empty(), "{stale}\nMECHID_BLESS=1 writes the pages anew");
+}
+
+#[test]
+fn every_link_leads_somewhere() {
+    let mut broken = Vec::new();
+    for document in documents() {
+        let page = Page::parse(&read(&document));
+        let targets = page.links.iter().map(|(_, target)| target);
+        let targets = targets.chain(&page.images).chain(&page.includes);
+        for target in targets.filter(|target| !target.contains("://")) {
+            let (file, anchor) = target.split_once('#').unwrap_or((target, ""));
+            let path = match file {
+                "" => document.clone(),
+                _ => document.parent().unwrap().join(file),
+            };
+            let known = |path: &Path| Page::parse(&whole(path)).anchors.contains(anchor);
+            if !path.exists() || !(anchor.is_empty() || known(&path)) {
+                broken.push(format!("{}: {target}", document.display()));
+            }
+        }
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[test]
+fn every_page_can_be_found() {
+    let summary: BTreeSet<PathBuf> =
+        chapters().concat().iter().map(|page| page.canonicalize().unwrap()).collect();
+    let source = root().join("docs/book/src");
+    let mut linked = BTreeSet::from([root().join("README.md"), source.join("SUMMARY.md")]);
+    for document in documents() {
+        for (_, target) in Page::parse(&read(&document)).links {
+            let file = target.split('#').next().unwrap();
+            linked.extend(document.parent().unwrap().join(file).canonicalize().ok());
+        }
+    }
+    for document in documents() {
+        let shelf = if document.starts_with(&source) { &summary } else { &linked };
+        assert!(
+            shelf.contains(&document) || document.ends_with("SUMMARY.md"),
+            "no way leads to {}",
+            document.display()
+        );
+    }
+}
+
+/// `cargo test --doc` compiles and runs the Rust of the pages that the facade names.
+#[test]
+fn the_rust_of_every_page_is_compiled() {
+    let facade = read(&root().join("crates/mechid/src/lib.rs"));
+    for document in documents() {
+        let rust =
+            Page::parse(&read(&document)).blocks.iter().any(|block| block.language() == "rust");
+        let name = document.strip_prefix(root()).unwrap().display().to_string();
+        assert!(
+            !rust || facade.contains(&format!("\"../../../{name}\"")),
+            "crates/mechid/src/lib.rs does not name {name}"
+        );
+    }
+}
+
+#[test]
+fn the_reference_has_every_subcommand() {
+    let help = Command::cargo_bin("mechid").unwrap().arg("--help").output().unwrap().stdout;
+    let help = String::from_utf8(help).unwrap();
+    let list = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let page = read(&root().join("docs/book/src/reference/commands.md"));
+    let mut commands = 0;
+    // Names stand two blanks in, their descriptions further.
+    for line in list.lines().filter(|line| !line.starts_with("   ")) {
+        let name = line.split_whitespace().next().unwrap();
+        assert!(name == "help" || page.contains(&format!("$ mechid {name} --help\n")), "{name}");
+        commands += 1;
+    }
+    assert!(commands > 8, "{list}");
+}
+
+/// The sentence is the generated audit's.
+#[test]
+fn the_book_counts_as_the_audit_does() {
+    let audit = read(&root().join("docs/thesis/audit.md"));
+    let count = audit.lines().find(|line| line.starts_with("Of ") && line.contains("estimates"));
+    let sentence = count.unwrap().split_inclusive('.').next().unwrap();
+    let page = read(&root().join("docs/book/src/reproduction.md"));
+    assert!(page.contains(sentence), "{sentence}");
+}
+
+/// The committed record is what its description gives, to rounding.
+#[test]
+fn the_example_record_is_that_of_its_description() {
+    let examples = root().join("examples");
+    let experiment = mechid::io::Experiment::read(examples.join("machine.json")).unwrap();
+    let simulation = mechid::simulate(&experiment).unwrap();
+    let table = mechid::io::Table::read(examples.join("machine.csv")).unwrap();
+    let measured = &simulation.measured_response;
+    for (name, record) in [
+        ("force", &simulation.measured_force),
+        ("displacement", measured.displacement()),
+        ("velocity", measured.velocity()),
+        ("acceleration", measured.acceleration()),
+    ] {
+        let column = table.column(name).unwrap();
+        let size = record.column(0).amax();
+        for (read, made) in column.iter().zip(record.channel(0)) {
+            // Other machines' sine and cosine may differ in the last digit.
+            assert!((read - made).abs() < 1e-12 * size, "{name}: {read} {made}");
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! A reader at a terminal: follows a page's commands in a folder of its own.
+
+use std::fs;
+use std::path::Path;
+
+use assert_cmd::Command;
+use tempfile::TempDir;
+
+/// How the program is started where it is installed, and from a fresh clone.
+const PROGRAM: [&str; 2] = ["mechid", "cargo run --package mechid-cli --"];
+
+/// A folder with the repository's examples, and what the commands so far have left there.
+pub struct Session {
+    folder: TempDir,
+    /// Exit code of the last command; one that is not 0 must be asked for by `echo $?`.
+    code: i32,
+}
+
+impl Session {
+    pub fn new(root: &Path) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("examples")).unwrap();
+        for file in ["machine.json", "machine.csv"] {
+            let name = Path::new("examples").join(file);
+            fs::copy(root.join(&name), folder.path().join(&name)).unwrap();
+        }
+        Self { folder, code: 0 }
+    }
+
+    /// Writes a file that a page shows.
+    pub fn write(&self, name: &str, text: &str) {
+        fs::write(self.folder.path().join(name), text).unwrap();
+    }
+
+    /// A file that the reader would find, if it is there.
+    pub fn read(&self, name: &str) -> Option<String> {
+        fs::read_to_string(self.folder.path().join(name)).ok()
+    }
+
+    /// What the terminal shows after a command.
+    pub fn run(&mut self, command: &str) -> Result<String, String> {
+        if command == "echo $?" {
+            return Ok(format!("{}\n", std::mem::take(&mut self.code)));
+        }
+        if self.code != 0 {
+            return Err(format!("exit code {} before it; show it by `echo $?`", self.code));
+        }
+        let (command, to) = match command.split_once(" > ") {
+            Some((command, file)) => (command, Some(file.trim())),
+            None => (command, None),
+        };
+        let words: Vec<&str> = command.split_whitespace().collect();
+        let shown = match words[..] {
+            ["cat", file] => self.read(file).ok_or(format!("no file {file}"))?,
+            ["head", lines, file] => {
+                let text = self.read(file).ok_or(format!("no file {file}"))?;
+                let lines =
+                    lines.trim_start_matches('-').parse().map_err(|_| "head -LINES FILE")?;
+                text.split_inclusive('\n').take(lines).collect()
+            }
+            _ => self.start(&words.join(" "))?,
+        };
+        match to {
+            Some(file) if self.code == 0 => {
+                self.write(file, &shown);
+                Ok(String::new())
+            }
+            _ => Ok(shown),
+        }
+    }
+
+    fn start(&mut self, command: &str) -> Result<String, String> {
+        let arguments = PROGRAM
+            .iter()
+            .find_map(|program| command.strip_prefix(program)?.strip_prefix(' '))
+            .ok_or_else(|| format!("`{command}` is none of the commands a page may show"))?;
+        let output = Command::cargo_bin("mechid")
+            .unwrap()
+            .current_dir(self.folder.path())
+            // The width of the developer's terminal is not the reader's.
+            .env_remove("COLUMNS")
+            .args(arguments.split(' '))
+            .output()
+            .unwrap();
+        self.code = output.status.code().ok_or("killed by a signal")?;
+        let text = if self.code == 0 { output.stdout } else { output.stderr };
+        String::from_utf8(text).map_err(|error| error.to_string())
+    }
+}
+
+/// A command and the terminal's answer to it.
+#[derive(Debug, PartialEq)]
+pub struct Step {
+    /// As the page has it: with prompt, over several lines.
+    pub typed: String,
+    pub shown: String,
+}
+
+impl Step {
+    /// The steps of a `console` block: a line that begins with `$` is typed, a backslash at its end
+    /// continues it, everything else is answer.
+    pub fn all(block: &str) -> Vec<Self> {
+        let mut steps: Vec<Self> = Vec::new();
+        let mut typing = false;
+        for line in block.split_inclusive('\n') {
+            if line.starts_with("$ ") {
+                steps.push(Self { typed: line.into(), shown: String::new() });
+            } else if let Some(step) = steps.last_mut() {
+                if typing { step.typed.push_str(line) } else { step.shown.push_str(line) }
+            }
+            typing = (typing || line.starts_with("$ ")) && line.trim_end().ends_with('\\');
+        }
+        steps
+    }
+
+    /// On one line, without the prompt.
+    pub fn command(&self) -> String {
+        let line = self.typed.trim_start_matches("$ ").replace("\\\n", " ");
+        line.split_whitespace().collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// Whether the answer is the one shown, in which a line `...` stands for any lines and `[..]` for
+/// any part of one line.
+pub fn fits(shown: &str, answer: &str) -> bool {
+    let lines: Vec<&str> = answer.lines().collect();
+    fits_lines(&shown.lines().collect::<Vec<_>>(), &lines)
+}
+
+fn fits_lines(shown: &[&str], answer: &[&str]) -> bool {
+    match shown.split_first() {
+        None => answer.is_empty(),
+        Some((&"...", rest)) => {
+            (0..=answer.len()).any(|skipped| fits_lines(rest, &answer[skipped..]))
+        }
+        Some((line, rest)) => answer
+            .split_first()
+            .is_some_and(|(first, others)| fits_line(line, first) && fits_lines(rest, others)),
+    }
+}
+
+fn fits_line(shown: &str, answer: &str) -> bool {
+    match shown.split_once("[..]") {
+        None => shown == answer,
+        Some((start, rest)) => answer.strip_prefix(start).is_some_and(|others| {
+            others
+                .char_indices()
+                .map(|(at, _)| at)
+                .chain([others.len()])
+                .any(|at| fits_line(rest, &others[at..]))
+        }),
+    }
+}
+
+#[test]
+fn steps_are_commands_with_their_answers() {
+    let steps = Step::all("$ mechid info \\\n    a.csv\nfirst\nsecond\n$ echo $?\n0\n");
+    assert_eq!(steps.len(), 2);
+    assert_eq!(steps[0].command(), "mechid info a.csv");
+    assert_eq!(steps[0].shown, "first\nsecond\n");
+    assert_eq!((steps[1].command().as_str(), steps[1].shown.as_str()), ("echo $?", "0\n"));
+}
+
+#[test]
+fn dots_stand_for_what_is_left_out() {
+    let answer = "one 1\ntwo 2\nthree 3\n";
+    for shown in [answer, "...\n", "one 1\n...\n", "...\nthree 3\n", "one [..]\ntwo 2\nth[..]3\n"] {
+        assert!(fits(shown, answer), "{shown}");
+    }
+    for shown in
+        ["", "one 1\n", "...\ntwo 2\n", "one [..]\n...\nthree 4\n", "one 1\ntwo 2\nthree 3\n4\n"]
+    {
+        assert!(!fits(shown, answer), "{shown}");
+    }
+}
