@@ -4,11 +4,13 @@
 
 mod after;
 mod before;
+mod spectral;
 
 use std::fmt;
 
-pub use after::{Correlation, cross_correlation, whiteness};
-pub use before::before_fit;
+pub use after::{Correlation, after_fit, cross_correlation, whiteness};
+pub use before::{before_equation_of_motion, before_fit, periodicity};
+pub use spectral::before_spectral_fit;
 
 /// How a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,6 +35,10 @@ pub enum Subject {
     Periodicity,
     /// Whether the step suits the fastest mode and the discretisation.
     Step,
+    /// Whether the residual is white.
+    Whiteness,
+    /// Whether the residual has anything in common with the force.
+    CrossCorrelation,
 }
 
 /// One thing looked at, in words with numbers.
@@ -48,13 +54,31 @@ pub struct Check {
     pub text: String,
 }
 
-impl fmt::Display for Check {
+impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let verdict = match self.verdict {
+        f.pad(match self {
             Verdict::Good => "good",
             Verdict::Doubtful => "doubtful",
             Verdict::Bad => "bad",
-        };
-        write!(f, "{verdict}: {}", self.text)
+        })
+    }
+}
+
+impl fmt::Display for Subject {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Subject::Excitation => "excitation",
+            Subject::Conditioning => "conditioning",
+            Subject::Periodicity => "periodicity",
+            Subject::Step => "step",
+            Subject::Whiteness => "whiteness",
+            Subject::CrossCorrelation => "cross-correlation",
+        })
+    }
+}
+
+impl fmt::Display for Check {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.verdict, self.text)
     }
 }

@@ -109,7 +109,7 @@ impl EquationOfMotion {
     /// # Source
     /// Dissertation eqs. (4.4.1)–(4.4.6), (4.6.12), (4.6.31).
     pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, EstimateError> {
-        Ok(Estimate::new(self.findings(unknowns)?.0))
+        Estimate::new(self.findings(unknowns)?.0)
     }
 
     /// The estimate to be, and for every parameter how it follows from the right-hand side of its

@@ -106,6 +106,23 @@ pub enum EstimateError {
         /// The combinations of parameters on which the data say nothing.
         directions: String,
     },
+    /// Values beyond the largest number stand behind a parameter.
+    #[error(
+        "{parameter} or its standard error is beyond the largest number: a known value or the data are \
+         far too large"
+    )]
+    Unbounded {
+        /// Name of the parameter.
+        parameter: String,
+    },
+    /// Segments that do not move on, or leave samples out.
+    #[error("segments of {len} samples cannot start {hop} samples apart: from 1 to {len}")]
+    Hop {
+        /// Samples of a segment.
+        len: usize,
+        /// Samples from one start to the next.
+        hop: usize,
+    },
     /// Records that are to be fitted together have different steps.
     #[error("the records have different time steps: {expected} s and {got} s")]
     Step {

@@ -58,7 +58,10 @@ pub struct Undetermined {
 }
 
 impl Estimate {
-    pub(crate) fn new(mut found: Findings) -> Self {
+    /// # Errors
+    /// [`EstimateError::Unbounded`] if numbers beyond the largest one leave a parameter without a
+    /// finite value or standard error, though there are equations enough for both.
+    pub(crate) fn new(mut found: Findings) -> Result<Self, EstimateError> {
         let parameters = found.unknowns.free();
         for undetermined in &found.undetermined {
             for (parameter, _) in &undetermined.terms {
@@ -69,7 +72,17 @@ impl Estimate {
                 found.covariance[(at, at)] = f64::INFINITY;
             }
         }
-        Self {
+        let open = |p: &Parameter| {
+            found.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
+        };
+        for (at, p) in parameters.iter().enumerate().filter(|(_, p)| !open(p)) {
+            let unbounded =
+                !found.values[at].is_finite() || !found.covariance[(at, at)].is_finite();
+            if unbounded && found.degrees_of_freedom > 0 {
+                return Err(EstimateError::Unbounded { parameter: p.to_string() });
+            }
+        }
+        Ok(Self {
             unknowns: found.unknowns,
             parameters,
             values: found.values,
@@ -78,7 +91,7 @@ impl Estimate {
             residual_nrmse: found.residual_nrmse,
             condition: found.condition,
             undetermined: found.undetermined,
-        }
+        })
     }
 
     /// What was free and what was known.

@@ -1,23 +1,17 @@
 //! Frequency response functions and coherence from measured forces and motions.
 
+mod cross_spectra;
+mod segments;
+
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use self::cross_spectra::CrossSpectra;
+pub use self::segments::{Segments, Window};
 use crate::EstimateError;
 use crate::frequency_domain::{FrequencyData, Lines, Motion, NoiseSpectrum};
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
-
-/// How a record is cut into pieces to average over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Segments {
-    /// Whole periods of so many samples, for a periodic excitation in steady state: no
-    /// window, no leakage.
-    Periods(usize),
-    /// Pieces of so many samples, half overlapping, their means removed, under a Hann
-    /// window, for a random excitation (Welch's method).
-    Hann(usize),
-}
 
 /// Which signal is believed where force and motion disagree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -43,15 +37,8 @@ pub struct Frf {
     averages: f64,
 }
 
-/// Averaged cross-spectra of one line.
-struct CrossSpectra {
-    force: ComplexMatrix,
-    motion_force: ComplexMatrix,
-    motion: ComplexMatrix,
-}
-
-/// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
-const FORCE_TOLERANCE: f64 = 1e-10;
+/// No coherence is known closer to 1 than this: the rounding of the sums behind it.
+const COHERENCE_ROUNDING: f64 = 1e-14;
 
 impl Frf {
     /// Frequency responses at some lines of the segments, from all segments of the records.
@@ -60,7 +47,7 @@ impl Frf {
     ///
     /// # Errors
     /// [`EstimateError::TooFewAverages`] unless there are more segments than forces,
-    /// [`EstimateError::DependentForces`] at a line where the forces are zero or
+    /// [`EstimateError::Hop`], [`EstimateError::DependentForces`] at a line where the forces are zero or
     /// proportional to one another in all segments, [`EstimateError::Size`] for H2 with
     /// several forces and another number of motions, and what [`Lines::new`] refuses.
     ///
@@ -80,12 +67,9 @@ impl Frf {
             let what = "channels of the motion, for H2";
             return Err(EstimateError::Size { what, expected: inputs, got: outputs });
         }
-        let len = match segments {
-            Segments::Periods(len) | Segments::Hann(len) => len,
-        };
-        let lines = Lines::new(force.window(0, len)?.sampling(), lines)?;
-        let (forces, averages) = amplitudes(&lines, force, segments);
-        let (motions, _) = amplitudes(&lines, motion, segments);
+        let lines = Lines::new(force.window(0, segments.samples())?.sampling(), lines)?;
+        let (forces, averages) = segments.amplitudes(&lines, force)?;
+        let (motions, _) = segments.amplitudes(&lines, motion)?;
         if forces.len() <= inputs {
             return Err(EstimateError::TooFewAverages { got: forces.len(), needed: inputs + 1 });
         }
@@ -143,7 +127,8 @@ impl Frf {
             .map(|(h, coherence)| {
                 DMatrix::from_fn(h.nrows(), h.ncols(), |o, _| {
                     let power = h.row(o).norm_squared();
-                    power * (1.0 / coherence[o] - 1.0) / (averages - inputs as f64)
+                    let unexplained = (1.0 / coherence[o] - 1.0).max(COHERENCE_ROUNDING);
+                    power * unexplained / (averages - inputs as f64)
                 })
             })
             .collect();
@@ -168,17 +153,25 @@ impl Frf {
                 if total > 0.0 { (explained[(o, o)].re / total).clamp(0.0, 1.0) } else { 0.0 };
             self.coherence[(line, o)] = share;
             for i in 0..inputs {
-                let unexplained = (1.0 - share) * total * inverse[(i, i)].re;
-                variance[(o, i)] = unexplained / (self.averages - inputs as f64);
+                let unexplained = (1.0 - share).max(COHERENCE_ROUNDING) * total;
+                variance[(o, i)] =
+                    unexplained * inverse[(i, i)].re / (self.averages - inputs as f64);
             }
         }
-        self.response.push(match estimator {
-            FrfEstimator::H1 => h1,
+        let response = match estimator {
+            FrfEstimator::H1 => h1.clone(),
             FrfEstimator::H2 => {
                 spectra.h2().ok_or(EstimateError::IncoherentMotion { frequency_hz })?
             }
             FrfEstimator::Hv => spectra.hv(),
-        });
+        };
+        // What one estimator is larger than another it scatters more.
+        for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {
+            if h1.norm_sqr() > 0.0 {
+                *v *= h.norm_sqr() / h1.norm_sqr();
+            }
+        }
+        self.response.push(response);
         self.variance.push(variance);
         Ok(())
     }
@@ -262,130 +255,4 @@ impl Frf {
     pub fn averages(&self) -> f64 {
         self.averages
     }
-}
-
-impl CrossSpectra {
-    fn new(line: usize, forces: &[ComplexMatrix], motions: &[ComplexMatrix]) -> Self {
-        let (inputs, outputs) = (forces[0].ncols(), motions[0].ncols());
-        let mut spectra = Self {
-            force: DMatrix::zeros(inputs, inputs),
-            motion_force: DMatrix::zeros(outputs, inputs),
-            motion: DMatrix::zeros(outputs, outputs),
-        };
-        for (force, motion) in forces.iter().zip(motions) {
-            let (f, x) = (force.row(line).transpose(), motion.row(line).transpose());
-            spectra.force += &f * f.adjoint();
-            spectra.motion_force += &x * f.adjoint();
-            spectra.motion += &x * x.adjoint();
-        }
-        let count = Complex::new(forces.len() as f64, 0.0);
-        spectra.force /= count;
-        spectra.motion_force /= count;
-        spectra.motion /= count;
-        spectra
-    }
-
-    /// S_FF⁻¹, refused where the forces do not act independently.
-    fn inverse_force(&self, frequency_hz: f64) -> Result<ComplexMatrix, EstimateError> {
-        let inputs = self.force.nrows();
-        let size = self.force.diagonal().map(|s| s.re.sqrt());
-        let scaled =
-            DMatrix::from_fn(inputs, inputs, |i, j| self.force[(i, j)] / (size[i] * size[j]));
-        let eigenvalues = if size.min() > 0.0 {
-            scaled.clone().symmetric_eigenvalues()
-        } else {
-            DVector::from_element(1, 0.0)
-        };
-        let ratio = eigenvalues.min() / eigenvalues.max();
-        if ratio.is_nan() || ratio < FORCE_TOLERANCE {
-            let reciprocal_condition = if ratio.is_nan() { 0.0 } else { ratio.max(0.0) };
-            return Err(EstimateError::DependentForces { frequency_hz, reciprocal_condition });
-        }
-        let mut inverse = DMatrix::identity(inputs, inputs);
-        scaled.lu().solve_mut(&mut inverse);
-        Ok(DMatrix::from_fn(inputs, inputs, |i, j| inverse[(i, j)] / (size[i] * size[j])))
-    }
-
-    fn h2(&self) -> Option<ComplexMatrix> {
-        if self.force.nrows() == 1 {
-            let h = DMatrix::from_fn(self.motion.nrows(), 1, |o, _| {
-                self.motion[(o, o)] / self.motion_force[(o, 0)].conj()
-            });
-            return h.iter().all(|z| z.is_finite()).then_some(h);
-        }
-        // H S_FX = S_XX, transposed for a solution from the left.
-        let solution = self.motion_force.map(|z| z.conj()).lu().solve(&self.motion.transpose());
-        solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
-    }
-
-    /// Per motion, the eigenvector of least power of the cross-spectra of forces and motion.
-    fn hv(&self) -> ComplexMatrix {
-        let (outputs, inputs) = self.motion_force.shape();
-        let mut h = DMatrix::zeros(outputs, inputs);
-        for o in 0..outputs {
-            let power = self.motion[(o, o)].re;
-            if power == 0.0 {
-                continue;
-            }
-            let size = |i: usize| if i < inputs { self.force[(i, i)].re } else { power }.sqrt();
-            let all = DMatrix::from_fn(inputs + 1, inputs + 1, |i, j| {
-                let s = match (i < inputs, j < inputs) {
-                    (true, true) => self.force[(i, j)],
-                    (false, true) => self.motion_force[(o, j)],
-                    (true, false) => self.motion_force[(o, i)].conj(),
-                    (false, false) => self.motion[(o, o)],
-                };
-                s / (size(i) * size(j))
-            });
-            let eigen = all.symmetric_eigen();
-            let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
-            for i in 0..inputs {
-                // aᴴ z = 0 for the scaled z = (forces, motion).
-                h[(o, i)] = -(least[i] / least[inputs]).conj() * size(inputs) / size(i);
-            }
-        }
-        h
-    }
-}
-
-/// Amplitudes of every segment (lines × channels), and how many independent ones they are worth.
-fn amplitudes(lines: &Lines, record: &Record, segments: Segments) -> (Vec<ComplexMatrix>, f64) {
-    let len = lines.sampling().len();
-    match segments {
-        Segments::Periods(_) => {
-            let count = record.len() / len;
-            ((0..count).map(|p| lines.read_window(record, p * len)).collect(), count as f64)
-        }
-        Segments::Hann(_) => {
-            let window: Vec<f64> = (0..len).map(|k| hann(k, len)).collect();
-            let hop = len.div_ceil(2);
-            let count = (record.len() - len) / hop + 1;
-            let pieces = (0..count).map(|p| windowed(lines, record, p * hop, &window)).collect();
-            (pieces, count as f64 / overlap_loss(&window, hop, count))
-        }
-    }
-}
-
-fn windowed(lines: &Lines, record: &Record, start: usize, window: &[f64]) -> ComplexMatrix {
-    let mut piece = record.data().rows(start, window.len()).into_owned();
-    for mut column in piece.column_iter_mut() {
-        let mean = column.mean();
-        column.iter_mut().zip(window).for_each(|(x, w)| *x = (*x - mean) * w);
-    }
-    let piece = Record::new(lines.sampling(), piece).expect("finite, of the window's length");
-    lines.read_window(&piece, 0)
-}
-
-fn hann(k: usize, len: usize) -> f64 {
-    0.5 - 0.5 * (std::f64::consts::TAU * k as f64 / len as f64).cos()
-}
-
-/// Variance of an average of overlapping windowed segments over that of independent ones.
-///
-/// # Source
-/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
-fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
-    let power: f64 = window.iter().map(|w| w * w).sum();
-    let shared: f64 = window.iter().zip(&window[hop.min(window.len())..]).map(|(a, b)| a * b).sum();
-    1.0 + 2.0 * (shared / power).powi(2) * (count - 1) as f64 / count as f64
 }

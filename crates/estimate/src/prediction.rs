@@ -1,5 +1,11 @@
 //! What an identified machine would do: for validation on a record that was not fitted.
 
+mod periodic;
+mod start;
+
+pub use self::periodic::predict_periodic;
+pub use self::start::fitted_start;
+
 use mechid_model::{InitialState, Response, SecondOrderSystem};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};

@@ -1,8 +1,16 @@
 //! Whether residuals are noise: white, and unrelated to the input.
 
+use mechid_signal::Record;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::{Check, Subject, Verdict};
 use crate::EstimateError;
+
+/// A residual smaller than this share of what was fitted is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Noise has a larger statistic in one record of a hundred.
+const SIGNIFICANT: f64 = 0.01;
 
 /// Correlations at a number of lags, and how likely pure noise has as much of them.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,6 +75,65 @@ pub fn cross_correlation(
     let count = e.len() as f64;
     let statistic = count * coefficients.iter().map(|c| c * c).sum::<f64>();
     Ok(judged(coefficients, statistic, count))
+}
+
+/// Whether every channel of a residual is white and has nothing in common with the forces that act,
+/// in words; `fitted` is what the residual is left over from, on the same time axis.
+///
+/// A residual of rounding is good whatever its colour.
+///
+/// # Errors
+/// As [`whiteness`], and [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not
+/// belong together.
+pub fn after_fit(
+    residual: &Record,
+    fitted: &Record,
+    force: &Record,
+    lags: usize,
+) -> Result<Vec<Check>, EstimateError> {
+    residual.check_same_sampling(fitted)?;
+    residual.check_same_sampling(force)?;
+    crate::least_squares::size("channels of the residual", fitted.channels(), residual.channels())?;
+    let mut checks = Vec::new();
+    for channel in 0..residual.channels() {
+        let (e, number) = (residual.channel(channel), channel + 1);
+        let size = fitted.column(channel).norm();
+        let rounding = residual.column(channel).norm() <= ROUNDING * size;
+        let white = whiteness(e, lags)?;
+        checks.push(white.check(Subject::Whiteness, rounding, &format!("residual {number}")));
+        let acts =
+            |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
+        for input in (0..force.channels()).filter(acts) {
+            let cross = cross_correlation(e, force.channel(input), lags)?;
+            let name = format!("residual {number} with force {}", input + 1);
+            checks.push(cross.check(Subject::CrossCorrelation, rounding, &name));
+        }
+    }
+    Ok(checks)
+}
+
+impl Correlation {
+    fn check(&self, subject: Subject, rounding: bool, name: &str) -> Check {
+        let (outside, count) = (self.outside(), self.coefficients.len());
+        let found = format!(
+            "{name}: {outside} of {count} correlations beyond the 95 % bound of {:.3}, p = {:.2e}",
+            self.bound, self.p_value
+        );
+        let (verdict, meaning) = match (subject, self.p_value < SIGNIFICANT) {
+            _ if rounding => (Verdict::Good, "rounding, whatever its correlations"),
+            (Subject::Whiteness, true) => (
+                Verdict::Doubtful,
+                "not white: the noise is coloured, or the model misses something",
+            ),
+            (_, true) => {
+                (Verdict::Doubtful, "the model leaves some of the force's doing unexplained")
+            }
+            (Subject::Whiteness, false) => (Verdict::Good, "white, as noise is"),
+            (_, false) => (Verdict::Good, "nothing in common"),
+        };
+        let text = format!("{found}; {meaning}");
+        Check { subject, verdict, value: self.p_value, text }
+    }
 }
 
 fn judged(coefficients: Vec<f64>, statistic: f64, count: f64) -> Correlation {

@@ -1,14 +1,17 @@
 //! Whether a record will do for a time-domain fit.
 
+use std::f64::consts::TAU;
+
+use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
 use mechid_signal::{Record, Spectrum};
 
 use super::{Check, Subject, Verdict};
-use crate::EstimateError;
-use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions, equation_of_motion};
+use crate::{EstimateError, Unknowns};
 
 /// Lines weaker than this share of the strongest do not count as excitation.
-const LINE_FLOOR: f64 = 1e-4;
+pub(super) const LINE_FLOOR: f64 = 1e-4;
 
 /// Condition number beyond which a noise of 1 % leaves nothing of some combination of parameters.
 const DOUBTFUL_CONDITION: f64 = 1e4;
@@ -31,8 +34,10 @@ pub fn before_fit(
     let dof = displacement.channels();
     let mut rows = Transitions::new(dof, displacement.sampling().dt())?;
     rows.push(displacement, velocity, force, method.extent())?;
-    let mut checks = excitation(method.discretisation(), force, dof);
-    checks.push(conditioning(&rows, method.discretisation())?);
+    let next = usize::from(method.discretisation() == Discretisation::FirstOrderHold);
+    let mut checks = excitation(force, 2 * dof + 1 + next);
+    let (condition, lost) = rows.condition(method.discretisation())?;
+    checks.push(conditioning(condition, lost));
     if method.extent() == Extent::WholePeriod {
         checks.push(periodicity(displacement));
     }
@@ -40,11 +45,59 @@ pub fn before_fit(
     Ok(checks)
 }
 
-/// The order of persistent excitation of each force against the states and inputs it must tell
-/// apart.
-fn excitation(discretisation: Discretisation, force: &Record, dof: usize) -> Vec<Check> {
+/// Looks at excitation, conditioning, periodicity (if claimed) and step before the equation of motion
+/// is fitted sample by sample to a response (x, ẋ, ẍ) and a force (N).
+///
+/// # Errors
+/// As [`crate::EquationOfMotion::push_rows`] and [`crate::EquationOfMotion::solve`].
+pub fn before_equation_of_motion(
+    response: &Response,
+    force: &Record,
+    unknowns: &Unknowns,
+    extent: Extent,
+) -> Result<Vec<Check>, EstimateError> {
+    let estimate = equation_of_motion(response, force, unknowns)?;
+    let mut checks = excitation(force, unknowns_of_an_equation(unknowns));
+    checks.push(conditioning(estimate.condition(), estimate.undetermined().len()));
+    if extent == Extent::WholePeriod {
+        checks.push(periodicity(response.displacement()));
+    }
+    if let Ok(system) = estimate.system() {
+        let (hz, samples) = fastest_mode(&system, force.sampling().dt())?;
+        let verdict = grade(1.0 / samples, 0.4, 0.5);
+        let meaning = match verdict {
+            Verdict::Good => "; the equation holds at each sample, whatever the step",
+            _ => "; at two or fewer it cannot be told from a slower one",
+        };
+        let text = format!(
+            "the fastest mode, near {hz:.4} Hz, has {samples:.1} samples per period{meaning}"
+        );
+        checks.push(Check { subject: Subject::Step, verdict, value: samples, text });
+    }
+    Ok(checks)
+}
+
+/// Unknowns of the equation of motion that has most of them.
+pub(super) fn unknowns_of_an_equation(unknowns: &Unknowns) -> usize {
+    let free = unknowns.free();
+    let of = |equation| free.iter().filter(|p| p.row() == equation).count();
+    (0..unknowns.dof()).map(of).max().unwrap_or(0)
+}
+
+/// Natural frequency (Hz) of the fastest mode, and samples in its period.
+pub(super) fn fastest_mode(
+    system: &SecondOrderSystem,
+    dt: f64,
+) -> Result<(f64, f64), EstimateError> {
+    let modes = system.modes()?;
+    let fastest = modes.iter().map(|mode| mode.natural_frequency()).fold(0.0, f64::max);
+    Ok((fastest / TAU, TAU / (fastest * dt)))
+}
+
+/// The order of persistent excitation of each force against the states and inputs, or the
+/// unknowns, it must tell apart.
+fn excitation(force: &Record, needed: usize) -> Vec<Check> {
     let spectrum = Spectrum::of(force);
-    let needed = 2 * dof + if discretisation == Discretisation::FirstOrderHold { 2 } else { 1 };
     let one = |channel: usize| {
         let number = channel + 1;
         let order = persistent_excitation_order(&spectrum, channel, LINE_FLOOR).unwrap_or(0);
@@ -69,14 +122,10 @@ fn excitation(discretisation: Discretisation, force: &Record, dof: usize) -> Vec
         };
         Check { subject: Subject::Excitation, verdict, value: order as f64, text }
     };
-    (0..dof).map(one).collect()
+    (0..force.channels()).map(one).collect()
 }
 
-fn conditioning(
-    rows: &Transitions,
-    discretisation: Discretisation,
-) -> Result<Check, EstimateError> {
-    let (condition, lost) = rows.condition(discretisation)?;
+pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
     let (verdict, text) = if lost > 0 {
         let text = format!(
             "{lost} combinations of displacements, velocities and forces do not vary in the data: \
@@ -92,29 +141,33 @@ fn conditioning(
     } else {
         (Verdict::Good, format!("the regressors have the condition number {condition:.1e}"))
     };
-    Ok(Check { subject: Subject::Conditioning, verdict, value: condition, text })
+    Check { subject: Subject::Conditioning, verdict, value: condition, text }
 }
 
-/// The curvature across the seam, where the last sample is followed by the first, against the
-/// usual curvature: a period has nothing special there.
-fn periodicity(displacement: &Record) -> Check {
-    let len = displacement.len();
+/// Whether a record is one whole period of a steady motion, of any kind: the curvature across the
+/// seam, where the last sample is followed by the first, against the usual curvature. A period has
+/// nothing special there.
+///
+/// The value is the ratio of the two for the channel where it is largest; up to 5 is good, beyond
+/// 20 bad.
+pub fn periodicity(motion: &Record) -> Check {
+    let len = motion.len();
     let ratio = |channel: usize| {
-        let x = displacement.channel(channel);
+        let x = motion.channel(channel);
         let curvature = |k: usize| x[(k + len - 1) % len] - 2.0 * x[k] + x[(k + 1) % len];
         let inside: f64 = (1..len.saturating_sub(1)).map(|k| curvature(k).powi(2)).sum();
         let usual = (inside / len.saturating_sub(2).max(1) as f64).sqrt();
         let seam = curvature(0).abs().max(curvature(len - 1).abs());
         if seam == 0.0 { 0.0 } else { seam / usual }
     };
-    let value = (0..displacement.channels()).map(ratio).fold(0.0, f64::max);
+    let value = (0..motion.channels()).map(ratio).fold(0.0, f64::max);
     let (verdict, meaning) = match value {
         v if v < DOUBTFUL_SEAM => (Verdict::Good, "as a whole period should"),
         v if v < BAD_SEAM => (Verdict::Doubtful, "hardly a steady state over one whole period"),
         _ => (Verdict::Bad, "this is no period: fit it as an open record"),
     };
     let text = format!(
-        "from the last sample back to the first the displacement bends {value:.1} times as much as \
+        "from the last sample back to the first the motion bends {value:.1} times as much as \
          usual: {meaning}"
     );
     Check { subject: Subject::Periodicity, verdict, value, text }
@@ -134,8 +187,7 @@ fn step(rows: &Transitions, discretisation: Discretisation) -> Result<Check, Est
     let eigenvalues = exact.complex_eigenvalues();
     let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
     let turn = fastest * rows.dt();
-    let samples = std::f64::consts::TAU / turn;
-    let hz = fastest / std::f64::consts::TAU;
+    let (samples, hz) = (TAU / turn, fastest / TAU);
     let mode = format!("the fastest mode, near {hz:.4} Hz, has {samples:.1} samples per period");
     if discretisation == Discretisation::Euler {
         let n = rows.dof();
@@ -154,7 +206,7 @@ fn step(rows: &Transitions, discretisation: Discretisation) -> Result<Check, Est
     Ok(Check { subject, verdict, value: samples, text: mode + meaning })
 }
 
-fn grade(value: f64, doubtful: f64, bad: f64) -> Verdict {
+pub(super) fn grade(value: f64, doubtful: f64, bad: f64) -> Verdict {
     match value {
         v if v < doubtful => Verdict::Good,
         v if v < bad => Verdict::Doubtful,

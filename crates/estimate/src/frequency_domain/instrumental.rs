@@ -50,7 +50,7 @@ pub fn instrumental_variables(
         let own: Vec<Parameter> = free.iter().filter(|p| p.row() == dof).copied().collect();
         equations.push(Equation::solve(&both, unknowns, dof, &own)?);
     }
-    Ok(assemble(&equations, unknowns, &free))
+    assemble(&equations, unknowns, &free)
 }
 
 /// Acceleration, velocity, displacement and force of one measurement, real and imaginary rows.
@@ -179,7 +179,11 @@ fn stack(upper: &DMatrix<f64>, lower: &DMatrix<f64>) -> DMatrix<f64> {
     both
 }
 
-fn assemble(equations: &[Equation], unknowns: &Unknowns, free: &[Parameter]) -> Estimate {
+fn assemble(
+    equations: &[Equation],
+    unknowns: &Unknowns,
+    free: &[Parameter],
+) -> Result<Estimate, EstimateError> {
     let places: Vec<(&Equation, usize)> = free
         .iter()
         .map(|p| {

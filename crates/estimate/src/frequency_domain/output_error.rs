@@ -184,7 +184,7 @@ fn finish(
         residual_nrmse,
         condition: linear.condition,
         undetermined: Vec::new(),
-    });
+    })?;
     Ok(OutputErrorFit { estimate, misfit_ratio: scale.misfit_ratio, steps: fit.steps })
 }
 

@@ -54,7 +54,7 @@ impl TimeDomainFit {
         findings.degrees_of_freedom = fitted.regression.solution.degrees_of_freedom;
         findings.condition = fitted.regression.solution.condition;
         Ok(Self {
-            estimate: Estimate::new(findings),
+            estimate: Estimate::new(findings)?,
             discretisation,
             change: fitted.regression.all_forces(n),
             state_matrix: fitted.continuous.value.columns(0, 2 * n).into_owned(),

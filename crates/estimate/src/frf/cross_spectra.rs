@@ -1,0 +1,100 @@
+//! Averaged cross-spectra of forces and motions, and the responses they give.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::ComplexMatrix;
+use crate::EstimateError;
+
+/// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
+const FORCE_TOLERANCE: f64 = 1e-10;
+
+/// Averaged cross-spectra of one line.
+pub(super) struct CrossSpectra {
+    force: ComplexMatrix,
+    pub(super) motion_force: ComplexMatrix,
+    pub(super) motion: ComplexMatrix,
+}
+
+impl CrossSpectra {
+    pub(super) fn new(line: usize, forces: &[ComplexMatrix], motions: &[ComplexMatrix]) -> Self {
+        let (inputs, outputs) = (forces[0].ncols(), motions[0].ncols());
+        let mut spectra = Self {
+            force: DMatrix::zeros(inputs, inputs),
+            motion_force: DMatrix::zeros(outputs, inputs),
+            motion: DMatrix::zeros(outputs, outputs),
+        };
+        for (force, motion) in forces.iter().zip(motions) {
+            let (f, x) = (force.row(line).transpose(), motion.row(line).transpose());
+            spectra.force += &f * f.adjoint();
+            spectra.motion_force += &x * f.adjoint();
+            spectra.motion += &x * x.adjoint();
+        }
+        let count = Complex::new(forces.len() as f64, 0.0);
+        spectra.force /= count;
+        spectra.motion_force /= count;
+        spectra.motion /= count;
+        spectra
+    }
+
+    /// S_FF⁻¹, refused where the forces do not act independently.
+    pub(super) fn inverse_force(&self, frequency_hz: f64) -> Result<ComplexMatrix, EstimateError> {
+        let inputs = self.force.nrows();
+        let size = self.force.diagonal().map(|s| s.re.sqrt());
+        let scaled =
+            DMatrix::from_fn(inputs, inputs, |i, j| self.force[(i, j)] / (size[i] * size[j]));
+        let eigenvalues = if size.min() > 0.0 {
+            scaled.clone().symmetric_eigenvalues()
+        } else {
+            DVector::from_element(1, 0.0)
+        };
+        let ratio = eigenvalues.min() / eigenvalues.max();
+        if ratio.is_nan() || ratio < FORCE_TOLERANCE {
+            let reciprocal_condition = if ratio.is_nan() { 0.0 } else { ratio.max(0.0) };
+            return Err(EstimateError::DependentForces { frequency_hz, reciprocal_condition });
+        }
+        let mut inverse = DMatrix::identity(inputs, inputs);
+        scaled.lu().solve_mut(&mut inverse);
+        Ok(DMatrix::from_fn(inputs, inputs, |i, j| inverse[(i, j)] / (size[i] * size[j])))
+    }
+
+    pub(super) fn h2(&self) -> Option<ComplexMatrix> {
+        if self.force.nrows() == 1 {
+            let h = DMatrix::from_fn(self.motion.nrows(), 1, |o, _| {
+                self.motion[(o, o)] / self.motion_force[(o, 0)].conj()
+            });
+            return h.iter().all(|z| z.is_finite()).then_some(h);
+        }
+        // H S_FX = S_XX, transposed for a solution from the left.
+        let solution = self.motion_force.map(|z| z.conj()).lu().solve(&self.motion.transpose());
+        solution.map(|h| h.transpose()).filter(|h| h.iter().all(|z| z.is_finite()))
+    }
+
+    /// Per motion, the eigenvector of least power of the cross-spectra of forces and motion.
+    pub(super) fn hv(&self) -> ComplexMatrix {
+        let (outputs, inputs) = self.motion_force.shape();
+        let mut h = DMatrix::zeros(outputs, inputs);
+        for o in 0..outputs {
+            let power = self.motion[(o, o)].re;
+            if power == 0.0 {
+                continue;
+            }
+            let size = |i: usize| if i < inputs { self.force[(i, i)].re } else { power }.sqrt();
+            let all = DMatrix::from_fn(inputs + 1, inputs + 1, |i, j| {
+                let s = match (i < inputs, j < inputs) {
+                    (true, true) => self.force[(i, j)],
+                    (false, true) => self.motion_force[(o, j)],
+                    (true, false) => self.motion_force[(o, i)].conj(),
+                    (false, false) => self.motion[(o, o)],
+                };
+                s / (size(i) * size(j))
+            });
+            let eigen = all.symmetric_eigen();
+            let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
+            for i in 0..inputs {
+                // aᴴ z = 0 for the scaled z = (forces, motion).
+                h[(o, i)] = -(least[i] / least[inputs]).conj() * size(inputs) / size(i);
+            }
+        }
+        h
+    }
+}

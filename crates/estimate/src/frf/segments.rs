@@ -1,0 +1,118 @@
+//! Records cut into pieces to average over.
+
+use std::f64::consts::TAU;
+
+use mechid_signal::Record;
+
+use super::ComplexMatrix;
+use crate::EstimateError;
+use crate::frequency_domain::Lines;
+
+/// How a record is cut into pieces to average over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Segments {
+    /// Whole periods of so many samples, for a periodic excitation in steady state: no
+    /// window, no leakage.
+    Periods(usize),
+    /// Pieces with their means removed under a window, for a random excitation (Welch's method).
+    Windowed {
+        /// Samples of a piece.
+        len: usize,
+        /// Samples from the start of one piece to that of the next, 1 to `len`.
+        hop: usize,
+        /// What the samples are weighted with.
+        window: Window,
+    },
+}
+
+/// What the samples of a piece are weighted with.
+///
+/// # Source
+/// Harris (1978), Proceedings of the IEEE 66, 51–83.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Window {
+    /// ½ − ½ cos: the usual choice for a random excitation.
+    Hann,
+    /// 0.54 − 0.46 cos: a narrower peak, more leakage from far away.
+    Hamming,
+    /// 0.42 − 0.5 cos + 0.08 cos 2: the least leakage, a wider peak.
+    Blackman,
+    /// All samples alike: for pieces that begin and end at rest, such as bursts.
+    Rectangular,
+}
+
+impl Window {
+    /// Weight of sample `k` of `len`.
+    fn weight(self, k: usize, len: usize) -> f64 {
+        let turn = TAU * k as f64 / len as f64;
+        match self {
+            Window::Hann => 0.5 - 0.5 * turn.cos(),
+            Window::Hamming => 0.54 - 0.46 * turn.cos(),
+            Window::Blackman => 0.42 - 0.5 * turn.cos() + 0.08 * (2.0 * turn).cos(),
+            Window::Rectangular => 1.0,
+        }
+    }
+}
+
+impl Segments {
+    /// Half overlapping pieces of `len` samples under Hann's window.
+    pub fn hann(len: usize) -> Self {
+        Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann }
+    }
+
+    /// Samples of a piece.
+    pub fn samples(self) -> usize {
+        match self {
+            Segments::Periods(len) | Segments::Windowed { len, .. } => len,
+        }
+    }
+
+    /// Amplitudes of every piece (lines × channels), and how many independent ones they are worth.
+    pub(super) fn amplitudes(
+        self,
+        lines: &Lines,
+        record: &Record,
+    ) -> Result<(Vec<ComplexMatrix>, f64), EstimateError> {
+        match self {
+            Segments::Periods(len) => {
+                let count = record.len() / len;
+                let pieces = (0..count).map(|p| lines.read_window(record, p * len));
+                Ok((pieces.collect(), count as f64))
+            }
+            Segments::Windowed { len, hop, .. } if hop == 0 || hop > len => {
+                Err(EstimateError::Hop { len, hop })
+            }
+            Segments::Windowed { len, hop, window } => {
+                let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
+                let count = (record.len() - len) / hop + 1;
+                let pieces = (0..count).map(|p| windowed(lines, record, p * hop, &weights));
+                Ok((pieces.collect(), count as f64 / overlap_loss(&weights, hop, count)))
+            }
+        }
+    }
+}
+
+fn windowed(lines: &Lines, record: &Record, start: usize, window: &[f64]) -> ComplexMatrix {
+    let mut piece = record.data().rows(start, window.len()).into_owned();
+    for mut column in piece.column_iter_mut() {
+        let mean = column.mean();
+        column.iter_mut().zip(window).for_each(|(x, w)| *x = (*x - mean) * w);
+    }
+    let piece = Record::new(lines.sampling(), piece).expect("finite, of the window's length");
+    lines.read_window(&piece, 0)
+}
+
+/// Variance of an average of overlapping windowed pieces over that of independent ones:
+/// 1 + 2 Σ (1 − j/count) ρ_j², with ρ_j the share two pieces j apart have in common.
+///
+/// # Source
+/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
+fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
+    let power: f64 = window.iter().map(|w| w * w).sum();
+    let common = |apart: usize| {
+        let shared = window.iter().zip(&window[apart * hop..]).map(|(a, b)| a * b).sum::<f64>();
+        (1.0 - apart as f64 / count as f64) * (shared / power).powi(2)
+    };
+    let overlapping = (1..count).take_while(|apart| apart * hop < window.len());
+    1.0 + 2.0 * overlapping.map(common).sum::<f64>()
+}

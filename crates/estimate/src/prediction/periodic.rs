@@ -1,0 +1,35 @@
+//! The steady state under a band-limited force, line by line.
+
+use mechid_model::{Response, SecondOrderSystem};
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use crate::EstimateError;
+use crate::least_squares::size;
+
+/// Displacement, velocity and acceleration of a machine in the steady state under the band-limited
+/// force (N) through the samples of whole periods: what a fit of spectra predicts.
+///
+/// Nothing is predicted at half the sampling rate (even length), where samples carry no phase.
+///
+/// # Errors
+/// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::Model`] if a line stands
+/// on an undamped resonance, DC included.
+pub fn predict_periodic(
+    system: &SecondOrderSystem,
+    force: &Record,
+) -> Result<Response, EstimateError> {
+    size("channels of the force", system.dof(), force.channels())?;
+    let forces = Spectrum::of(force);
+    let mut lines = [(); 3].map(|()| DMatrix::zeros(forces.len(), system.dof()));
+    for n in (0..forces.len()).filter(|n| 2 * n < force.len()) {
+        let omega = forces.omega(n);
+        let x = system.receptance(omega)? * forces.lines().row(n).transpose();
+        for (power, quantity) in lines.iter_mut().enumerate() {
+            let factor = Complex::new(0.0, omega).powi(power as i32);
+            quantity.set_row(n, &x.map(|z| z * factor).transpose());
+        }
+    }
+    let [x, v, a] = lines.map(|lines| Spectrum::from_lines(force.sampling(), lines).to_record());
+    Ok(Response::new(x, v, a)?)
+}
