@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
 /// Rows reduced at a time: a block of a dozen columns stays in the first-level cache.
@@ -100,7 +101,15 @@ impl TriangularFactor {
     }
 
     /// Rotates the first `len` rows of the block buffer into R, two columns in one sweep.
+    ///
+    /// Compiled once for every width of vector registers, and chosen as the processor allows; the
+    /// sums are split into the same lanes in each, so that the numbers do not depend on it.
     fn absorb(&mut self, len: usize) {
+        Arch::new().dispatch(Absorb { factor: self, len });
+    }
+
+    #[inline(always)]
+    fn reflect(&mut self, len: usize) {
         let columns = self.columns;
         let mut rest = &mut self.block[..len * columns];
         let mut j = 0;
@@ -129,6 +138,21 @@ impl TriangularFactor {
     }
 }
 
+/// The call that `pulp` compiles for each width of vector registers.
+struct Absorb<'a> {
+    factor: &'a mut TriangularFactor,
+    len: usize,
+}
+
+impl WithSimd for Absorb<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.factor.reflect(self.len);
+    }
+}
+
 /// H = I − τ u uᵀ with u = \[1; scale·x\], which clears x under the diagonal entry of R.
 struct Reflection {
     row: usize,
@@ -138,6 +162,7 @@ struct Reflection {
 
 impl Reflection {
     /// Makes it for column `row` and puts the new diagonal entry into R.
+    #[inline(always)]
     fn new(r: &mut DMatrix<f64>, row: usize, x: &[f64]) -> Self {
         let square = dot(x, x);
         if square == 0.0 {
@@ -152,6 +177,7 @@ impl Reflection {
 
     /// Changes R in `column`, whose block part has the product `dot` with x; returns the multiple
     /// of x to be taken from that part.
+    #[inline(always)]
     fn apply(&self, r: &mut DMatrix<f64>, column: usize, dot: f64) -> f64 {
         let w = self.tau * (r[(self.row, column)] + self.scale * dot);
         r[(self.row, column)] -= w;
@@ -159,37 +185,61 @@ impl Reflection {
     }
 }
 
-/// xᵀy with eight partial sums, so that the processor's vector units are used.
+/// Partial sums of a product: enough that none waits for the one before.
+const LANES: usize = 16;
+
+/// xᵀy.
+#[inline(always)]
 fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (xs, x_rest) = x.as_chunks::<8>();
-    let (ys, y_rest) = y.as_chunks::<8>();
+    let mut sums = [0.0; LANES];
+    let (xs, x_rest) = x.as_chunks::<LANES>();
+    let (ys, y_rest) = y.as_chunks::<LANES>();
     for (a, b) in xs.iter().zip(ys) {
-        for lane in 0..8 {
+        for lane in 0..LANES {
             sums[lane] += a[lane] * b[lane];
         }
     }
-    let rest: f64 = x_rest.iter().zip(y_rest).map(|(a, b)| a * b).sum();
-    sums.iter().sum::<f64>() + rest
+    total(sums) + rest(x_rest, y_rest)
 }
 
 /// x1ᵀy and x2ᵀy in one sweep.
+#[inline(always)]
 fn dots(x1: &[f64], x2: &[f64], y: &[f64]) -> [f64; 2] {
-    let (mut first, mut second) = ([0.0; 4], [0.0; 4]);
-    let (x1s, x1_rest) = x1.as_chunks::<4>();
-    let (x2s, x2_rest) = x2.as_chunks::<4>();
-    let (ys, y_rest) = y.as_chunks::<4>();
+    const HALF: usize = LANES / 2;
+    let (mut first, mut second) = ([0.0; HALF], [0.0; HALF]);
+    let (x1s, x1_rest) = x1.as_chunks::<HALF>();
+    let (x2s, x2_rest) = x2.as_chunks::<HALF>();
+    let (ys, y_rest) = y.as_chunks::<HALF>();
     for ((a1, a2), b) in x1s.iter().zip(x2s).zip(ys) {
-        for lane in 0..4 {
+        for lane in 0..HALF {
             first[lane] += a1[lane] * b[lane];
             second[lane] += a2[lane] * b[lane];
         }
     }
-    let rest = |x: &[f64]| x.iter().zip(y_rest).map(|(a, b)| a * b).sum::<f64>();
-    [first.iter().sum::<f64>() + rest(x1_rest), second.iter().sum::<f64>() + rest(x2_rest)]
+    [total(first) + rest(x1_rest, y_rest), total(second) + rest(x2_rest, y_rest)]
+}
+
+/// Sum of the lanes, half onto half.
+#[inline(always)]
+fn total<const N: usize>(mut sums: [f64; N]) -> f64 {
+    let mut half = N / 2;
+    while half > 0 {
+        for lane in 0..half {
+            sums[lane] += sums[lane + half];
+        }
+        half /= 2;
+    }
+    sums[0]
+}
+
+/// xᵀy of what does not fill the lanes.
+#[inline(always)]
+fn rest(x: &[f64], y: &[f64]) -> f64 {
+    x.iter().zip(y).map(|(a, b)| a * b).sum()
 }
 
 /// y ← y − f1·x1 − f2·x2.
+#[inline(always)]
 fn subtract(y: &mut [f64], f1: f64, x1: &[f64], f2: f64, x2: &[f64]) {
     for ((y, x1), x2) in y.iter_mut().zip(x1).zip(x2) {
         *y -= f1 * x1 + f2 * x2;
