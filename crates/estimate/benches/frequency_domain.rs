@@ -1,6 +1,7 @@
 //! Cost of identifying the bearing in the frequency domain, records included.
 
-#[path = "../tests/common/mod.rs"]
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../tests/suite/common/mod.rs"]
 mod common;
 
 use std::hint::black_box;

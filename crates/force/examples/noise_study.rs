@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 #[allow(dead_code, reason = "the test uses the rest")]
-#[path = "../tests/study/mod.rs"]
+#[path = "../tests/suite/study/mod.rs"]
 mod study;
 
 fn main() {

@@ -1,8 +1,8 @@
 //! Least squares in the frequency domain on exact steady states.
 
-mod common;
-
-use common::{bearing, displacements, forces, oscillator, relative_error, sampling, synthesise};
+use crate::common::{
+    bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
+};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, Motion, equation_error};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, SecondOrderSystem};

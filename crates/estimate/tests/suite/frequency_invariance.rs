@@ -1,9 +1,7 @@
 //! What must not matter: units, the order of the degrees of freedom, the direction of the axes,
 //! a second copy of the data.
 
-mod common;
-
-use common::{bearing, displacements, forces};
+use crate::common::{bearing, displacements, forces};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Motion, NoiseSpectrum, equation_error, instrumental_variables, output_error,
 };

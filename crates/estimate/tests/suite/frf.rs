@@ -1,8 +1,6 @@
 //! Frequency response functions: against the closed-form receptance, and what noise does to them.
 
-mod common;
-
-use common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
+use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{Motion, equation_error, output_error};
 use mechid_estimate::{EstimateError, Frf, FrfEstimator, Segments, Unknowns, Window};
 use mechid_problems::exact_harmonic_periodic;
@@ -308,7 +306,7 @@ fn coherence_weighs_the_lines() {
     let unknowns = Unknowns::unknown_mass(2).unwrap();
     let weighted = output_error(&frf.data(&[0, 1]).unwrap(), &unknowns).unwrap().estimate;
     assert!(relative_error(&weighted.stiffness(), system.stiffness()) < 0.05);
-    for (p, exact) in weighted.parameters().zip(common::all_entries(&system).iter()) {
+    for (p, exact) in weighted.parameters().zip(crate::common::all_entries(&system).iter()) {
         assert!((p.value - exact).abs() < 4.0 * p.standard_error, "{p}, exactly {exact}");
     }
 }

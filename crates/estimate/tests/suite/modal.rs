@@ -1,9 +1,7 @@
 //! Modes of identified matrices: a published case, derivatives, and intervals that hold.
 
-mod common;
-
-use common::monte_carlo::{Estimator, Experiment};
-use common::{bearing, displacements, forces, oscillator};
+use crate::common::monte_carlo::{Estimator, Experiment};
+use crate::common::{bearing, displacements, forces, oscillator};
 use mechid_estimate::frequency_domain::{FrequencyData, Motion, equation_error};
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{Mode, SecondOrderSystem};

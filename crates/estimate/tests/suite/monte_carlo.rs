@@ -1,9 +1,7 @@
 //! Thousands of experiments: do the intervals hold, and could any estimator do better?
 
-mod common;
-
-use common::monte_carlo::{Estimator, Experiment, Scatter};
-use common::{bearing, oscillator};
+use crate::common::monte_carlo::{Estimator, Experiment, Scatter};
+use crate::common::{bearing, oscillator};
 use mechid_estimate::Unknowns;
 use mechid_model::SecondOrderSystem;
 

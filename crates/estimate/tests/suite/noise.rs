@@ -1,8 +1,6 @@
 //! Noise spectra from repeated periods, and what maximum likelihood makes of them.
 
-mod common;
-
-use common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
+use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, Motion, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods,
     equation_error, instrumental_variables, output_error,

@@ -1,8 +1,6 @@
 //! The discretised equation against responses in closed form.
 
-mod common;
-
-use common::{Oscillator, mixed, response};
+use crate::common::{Oscillator, mixed, response};
 use mechid_force::{Discretisation, Ends, ForceError, channel_errors, discretised, relative_error};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Sampling};

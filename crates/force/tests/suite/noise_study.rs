@@ -1,9 +1,7 @@
 //! The promises of the book (`choose/force.md`), and that its tables are the ones the study gives.
 
-mod study;
-
+use crate::study::{Case, KNOWN, cases, rms_error, rule_rows, rule_table, tables};
 use mechid_force::{Filter, Rule};
-use study::{Case, KNOWN, cases, rms_error, rule_rows, rule_table, tables};
 
 #[test]
 fn the_excited_lines_stay_near_the_noise_floor() {
@@ -26,7 +24,7 @@ fn tokens(text: &str) -> Vec<Result<f64, String>> {
 
 /// The tables of the book, from the one that starts with `header` on.
 fn printed(header: &str) -> String {
-    let book = include_str!("../../../docs/book/src/choose/force.md");
+    let book = include_str!("../../../../docs/book/src/choose/force.md");
     let start = book.find(header).expect("the book has the study's tables");
     book[start..]
         .lines()

@@ -1,5 +1,4 @@
 //! Closed-form steady states: the judges of the estimators.
-#![allow(dead_code, reason = "every test file uses its own part")]
 
 pub mod monte_carlo;
 

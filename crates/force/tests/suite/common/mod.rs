@@ -1,5 +1,4 @@
 //! Responses in closed form, sharing no code with the crate under test.
-#![allow(dead_code, reason = "each test program uses its part")]
 
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};

@@ -1,0 +1,20 @@
+//! The estimators, judged by closed forms, exact discretisations and seeded experiments.
+//!
+//! One program of many modules: each test program of its own would compile nalgebra anew.
+
+mod checks;
+mod common;
+mod derivatives;
+mod equation_error;
+mod equation_of_motion;
+mod frequency_invariance;
+mod frf;
+mod logarithm;
+mod modal;
+mod monte_carlo;
+mod noise;
+mod refined;
+mod silverbox;
+mod time_domain;
+mod time_domain_invariance;
+mod validation;

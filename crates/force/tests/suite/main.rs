@@ -1,0 +1,14 @@
+//! Force identification, judged by closed forms and seeded experiments.
+//!
+//! One program of many modules: each test program of its own would compile nalgebra anew.
+
+mod common;
+mod discretised;
+mod dissertation;
+mod frequency_domain;
+mod kalman;
+mod linearity;
+mod noise_study;
+mod regularised;
+mod study;
+mod uncertainty;
