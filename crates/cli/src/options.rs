@@ -38,13 +38,17 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
 /// Which record, and which part of it.
 #[derive(Debug, Args)]
 pub struct RecordArgs {
-    /// The record: a table with one row per sample
+    /// The record: text with one row per sample, MATLAB .mat (up to -v7), or universal file (dataset
+    /// 58); also in gzip
     ///
-    /// Delimiter (comma, semicolon, tab, blanks) and header are found by themselves; lines starting
-    /// with # are left out.
-    #[arg(value_name = "RECORD.csv")]
+    /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
+    /// found too; lines starting with # are left out. MATLAB: a vector is a column, of a matrix
+    /// those called name[1], name[2] …, of a struct name.field. Universal file: a function of time
+    /// is a column called after its node and direction, such as 12+Z, and brings its time axis.
+    #[arg(value_name = "RECORD")]
     pub record: PathBuf,
-    /// Time column, in s: header name or number, counted from 1 [default: time, time_s or t]
+    /// Time column, in s: name or number, counted from 1 [default: the file's own time axis, or
+    /// time, time_s or t]
     #[arg(long, value_name = "COLUMN", help_heading = "Time and window")]
     pub time: Option<String>,
     /// Samples per second, in Hz, where there is no time column
@@ -99,11 +103,12 @@ impl RecordArgs {
         Ok(Table::read(&self.record)?)
     }
 
-    /// The time axis asked for, or the time column found by its name.
+    /// The time axis asked for, that of the file, or the time column found by its name.
     pub fn time_axis(&self, table: &Table) -> Option<TimeAxis<'_>> {
         match (self.sample_rate, &self.time) {
             (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
             (None, Some(column)) => Some(TimeAxis::Column(column)),
+            (None, None) if table.has_time_axis() => Some(TimeAxis::OfFile),
             (None, None) => TIME_COLUMNS
                 .into_iter()
                 .find(|name| table.names().iter().any(|n| n == name))
@@ -122,26 +127,27 @@ impl RecordArgs {
         if self.detrend == Some(Detrend::Mean) {
             record = record.without_mean();
         }
-        let (start, len) = self.span(table)?;
-        record.window(start, len).map_err(|_| self.outside(table, len))
+        let (start, len) = self.span(table.file(), record.len())?;
+        record.window(start, len).map_err(|_| self.outside(table.file(), len, record.len()))
     }
 
-    /// First sample, counted from 0, and number of samples of the window.
-    pub fn span(&self, table: &Table) -> Result<(usize, usize), CliError> {
+    /// First sample, counted from 0, and number of samples of the window into a record of so many
+    /// samples.
+    pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), CliError> {
         let start = self.start - 1;
-        let left = table.len().saturating_sub(start);
+        let left = samples.saturating_sub(start);
         let period = self.period.unwrap_or(left);
         let periods = self.periods.unwrap_or(left.checked_div(period).unwrap_or(0)).max(1);
         let len = period.max(1).saturating_mul(periods);
-        if len > left { Err(self.outside(table, len)) } else { Ok((start, len)) }
+        if len > left { Err(self.outside(file, len, samples)) } else { Ok((start, len)) }
     }
 
-    fn outside(&self, table: &Table, len: usize) -> CliError {
+    fn outside(&self, file: &str, len: usize, samples: usize) -> CliError {
         CliError::Window {
-            file: table.file().into(),
+            file: file.into(),
             first: self.start,
             last: self.start.saturating_add(len - 1),
-            len: table.len(),
+            len: samples,
         }
     }
 }

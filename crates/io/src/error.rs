@@ -3,6 +3,8 @@
 use mechid_model::ModelError;
 use mechid_signal::SignalError;
 
+use crate::Place;
+
 /// A file that cannot be read or written; every message names the file and the place in it.
 ///
 /// Lines and columns are counted from 1; lines as a text editor counts them.
@@ -24,6 +26,39 @@ pub enum IoError {
         file: String,
         /// What the operating system says.
         source: std::io::Error,
+    },
+    /// What the file is packed in is damaged.
+    #[error("{file} is damaged or cut short (gzip: {source})")]
+    Gzip {
+        /// The file.
+        file: String,
+        /// What the decompressor says.
+        source: std::io::Error,
+    },
+    /// The file is of a format that MATLAB writes, but not by default.
+    #[error("{file} is a MATLAB file of version 7.3 (HDF5): save it with -v7")]
+    Hdf5 {
+        /// The file.
+        file: String,
+    },
+    /// The file is binary, but of no format known.
+    #[error(
+        "{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7), \
+         universal file with datasets 58, or gzip around a record"
+    )]
+    UnknownFormat {
+        /// The file.
+        file: String,
+    },
+    /// The file breaks its format.
+    #[error("{file}, {at}: {what}")]
+    Malformed {
+        /// The file.
+        file: String,
+        /// Where.
+        at: Place,
+        /// How.
+        what: String,
     },
     /// The file has a text encoding this reader does not know.
     #[error("{file} is UTF-16 text; save it as UTF-8 (in a spreadsheet: \"CSV UTF-8\")")]
@@ -111,13 +146,23 @@ pub enum IoError {
         /// Number and name of the column.
         column: String,
     },
+    /// A column holds something else than real numbers.
+    #[error("{file}, column {column}: it holds {what}, a channel needs real numbers in time")]
+    NoNumbers {
+        /// The file.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+        /// What it holds.
+        what: String,
+    },
     /// A sample is NaN or infinite.
-    #[error("{file}, line {line}, column {column}: {value} is not a finite number")]
+    #[error("{file}, {at}, column {column}: {value} is not a finite number")]
     NotFinite {
         /// The file.
         file: String,
-        /// Line of the file.
-        line: u64,
+        /// Line of the file, or sample of the column.
+        at: Place,
         /// Number and name of the column.
         column: String,
         /// The value found.
@@ -125,7 +170,7 @@ pub enum IoError {
     },
     /// The instants of the time column are not equally spaced.
     #[error(
-        "{file}: the time steps are not uniform: {} s up to line {line}, where the usual step is \
+        "{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
          {} s (resample the record, or give the sample rate instead of the time column if the \
          times are only rounded)",
         six_digits(*step),
@@ -134,8 +179,8 @@ pub enum IoError {
     NonUniformTime {
         /// The file.
         file: String,
-        /// Line at which the worst step ends.
-        line: u64,
+        /// Where the worst step ends.
+        at: Place,
         /// The worst step, in seconds.
         step: f64,
         /// The median step, in seconds.
@@ -146,6 +191,58 @@ pub enum IoError {
     SingleSample {
         /// The file.
         file: String,
+    },
+    /// Columns of one record have different lengths.
+    #[error("{file}: the columns of a record need the same number of samples; column {lengths}")]
+    Lengths {
+        /// The file.
+        file: String,
+        /// The columns and their lengths.
+        lengths: String,
+    },
+    /// A column of which the file does not say when it was sampled.
+    #[error("{file} does not say when column {column} was sampled: give a time column or a rate")]
+    NoTimeAxis {
+        /// The file.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+    },
+    /// Columns of one record were sampled at different instants.
+    #[error(
+        "{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
+         s from {first_start} s, {second} of {second_step} s from {second_start} s"
+    )]
+    TimeAxes {
+        /// The file.
+        file: String,
+        /// Number and name of one column.
+        first: String,
+        /// Its first instant, in seconds.
+        first_start: f64,
+        /// Its step, in seconds.
+        first_step: f64,
+        /// Number and name of the other column.
+        second: String,
+        /// Its first instant, in seconds.
+        second_start: f64,
+        /// Its step, in seconds.
+        second_step: f64,
+    },
+    /// The rate given is not that of the file.
+    #[error(
+        "the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
+         the rate out)"
+    )]
+    RateContradicts {
+        /// The file.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+        /// The rate that the file gives it, in Hz.
+        own_hz: f64,
+        /// The rate given, in Hz.
+        rate_hz: f64,
     },
     /// The sampling rate is not usable.
     #[error("the sample rate must be a positive finite number of Hz, got {rate_hz}")]

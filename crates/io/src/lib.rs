@@ -21,11 +21,11 @@ mod csv_text;
 mod error;
 mod experiment;
 mod line_spec;
+mod mat;
 mod output;
-mod rows;
 mod system;
 mod table;
-mod time_axis;
+mod uff;
 
 pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::csv_text;
@@ -37,5 +37,4 @@ pub use experiment::{
 pub use line_spec::LineSpec;
 pub use output::{OutputFile, write_all};
 pub use system::{SystemMatrices, read_system};
-pub use table::Table;
-pub use time_axis::TimeAxis;
+pub use table::{Place, Table, TimeAxis};

@@ -64,7 +64,7 @@ impl InfoArgs {
     /// Reads the record and measures each of its columns.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let table = self.input.table()?;
-        let (start, len) = self.input.span(&table)?;
+        let (start, len) = self.input.span(table.file(), table.len())?;
         let (channels, not_numeric) = self.channels(&table, start, len)?;
         let sampling = match self.input.time_axis(&table) {
             None => None,
@@ -100,7 +100,7 @@ impl InfoArgs {
         let measure = |wanted: &str| -> Result<Channel, IoError> {
             let column = table.find(wanted)?;
             let values = table.column(wanted)?;
-            let offset = if detrend { mean(&values) } else { 0.0 };
+            let offset = if detrend { mean(values) } else { 0.0 };
             let window: Vec<f64> = values[start..start + len].iter().map(|v| v - offset).collect();
             Ok(Channel::of(column + 1, table.names()[column].clone(), &window))
         };

@@ -1,4 +1,8 @@
-//! Tables in every dialect, and what is said about those that are wrong.
+//! Tables in every dialect and format, and what is said about those that are wrong.
+
+mod matlab;
+mod packed;
+mod universal;
 
 use mechid_io::{IoError, Table, TimeAxis, csv_text};
 use mechid_signal::Sampling;

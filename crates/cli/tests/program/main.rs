@@ -1,0 +1,33 @@
+//! What every subcommand has in common: the records it takes, and how it talks.
+
+mod records;
+
+use std::path::Path;
+
+use assert_cmd::Command;
+
+/// Runs `mechid` in a folder; what it printed, on success.
+pub fn mechid(folder: &Path, arguments: &str) -> String {
+    let output = run(folder, arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments}: {message}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Runs `mechid` in a folder where it must fail with exit code 2; its message.
+pub fn refused(folder: &Path, arguments: &str) -> String {
+    let output = run(folder, arguments);
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+    assert!(output.stdout.is_empty(), "{arguments} printed something");
+    message
+}
+
+fn run(folder: &Path, arguments: &str) -> std::process::Output {
+    Command::cargo_bin("mechid")
+        .unwrap()
+        .current_dir(folder)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap()
+}

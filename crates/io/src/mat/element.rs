@@ -1,0 +1,152 @@
+//! The elements of which a MATLAB file is made: a type, a number of bytes, the bytes.
+
+/// A variable.
+pub(crate) const MATRIX: u32 = 14;
+
+/// A compressed variable.
+pub(crate) const COMPRESSED: u32 = 15;
+
+/// What is wrong with a file, and at which byte, counted from 0.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub at: usize,
+    pub what: String,
+}
+
+impl Fault {
+    pub fn new(at: usize, what: impl Into<String>) -> Self {
+        Self { at, what: what.into() }
+    }
+}
+
+/// Order of the bytes of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Endian {
+    Little,
+    Big,
+}
+
+impl Endian {
+    pub fn u16(self, bytes: [u8; 2]) -> u16 {
+        match self {
+            Endian::Little => u16::from_le_bytes(bytes),
+            Endian::Big => u16::from_be_bytes(bytes),
+        }
+    }
+
+    pub fn u32(self, bytes: [u8; 4]) -> u32 {
+        match self {
+            Endian::Little => u32::from_le_bytes(bytes),
+            Endian::Big => u32::from_be_bytes(bytes),
+        }
+    }
+
+    pub fn u64(self, bytes: [u8; 8]) -> u64 {
+        match self {
+            Endian::Little => u64::from_le_bytes(bytes),
+            Endian::Big => u64::from_be_bytes(bytes),
+        }
+    }
+}
+
+/// One element.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Element<'a> {
+    pub kind: u32,
+    pub data: &'a [u8],
+    /// Where its data begin in the file.
+    pub at: usize,
+}
+
+/// Elements one after the other.
+#[derive(Debug)]
+pub(crate) struct Elements<'a> {
+    bytes: &'a [u8],
+    /// Bytes read.
+    next: usize,
+    /// Where `bytes` begin in the file.
+    base: usize,
+    endian: Endian,
+}
+
+impl<'a> Elements<'a> {
+    pub fn new(bytes: &'a [u8], base: usize, endian: Endian) -> Self {
+        Self { bytes, next: 0, base, endian }
+    }
+
+    /// The next element inside a variable, or nothing at the end; each is padded to 8 bytes.
+    pub fn next(&mut self) -> Result<Option<Element<'a>>, Fault> {
+        self.padded(|_| true)
+    }
+
+    /// The next element of the file itself, where compressed ones are not padded.
+    pub fn next_at_top(&mut self) -> Result<Option<Element<'a>>, Fault> {
+        self.padded(|kind| kind != COMPRESSED)
+    }
+
+    /// The next element, which must be there.
+    pub fn required(&mut self, what: &str) -> Result<Element<'a>, Fault> {
+        let at = self.base + self.next;
+        self.next()?.ok_or_else(|| Fault::new(at, format!("a variable ends before its {what}")))
+    }
+
+    fn padded(&mut self, is_padded: impl Fn(u32) -> bool) -> Result<Option<Element<'a>>, Fault> {
+        let rest = self.bytes.get(self.next..).unwrap_or_default();
+        if rest.is_empty() {
+            return Ok(None);
+        }
+        let at = self.base + self.next;
+        let short = || Fault::new(at, "the file is cut short");
+        let (tag, rest) = rest.split_first_chunk::<4>().ok_or_else(short)?;
+        let (kind, small) = split(self.endian.u32(*tag));
+        if let Some(len) = small {
+            // Up to four bytes stand in the tag itself.
+            let data = rest.get(..4).ok_or_else(short)?.get(..len);
+            let data = data.ok_or_else(|| Fault::new(at, "an element has an impossible length"))?;
+            self.next += 8;
+            return Ok(Some(Element { kind, data, at: at + 4 }));
+        }
+        let (tag, rest) = rest.split_first_chunk::<4>().ok_or_else(short)?;
+        let len = self.endian.u32(*tag) as usize;
+        let data = rest.get(..len).ok_or_else(|| {
+            Fault::new(
+                at,
+                format!("an element of {len} bytes has {}: the file is cut short", rest.len()),
+            )
+        })?;
+        self.next += 8 + if is_padded(kind) { len.next_multiple_of(8) } else { len };
+        Ok(Some(Element { kind, data, at: at + 8 }))
+    }
+}
+
+/// Type and, for an element that fits in its tag, length.
+fn split(tag: u32) -> (u32, Option<usize>) {
+    match tag >> 16 {
+        0 => (tag, None),
+        len => (tag & 0xffff, Some(len as usize)),
+    }
+}
+
+impl Element<'_> {
+    /// The numbers of an element, whatever their type; nothing if it holds none.
+    pub fn numbers(&self, endian: Endian) -> Option<Vec<f64>> {
+        fn all<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
+            let (chunks, rest) = data.as_chunks::<N>();
+            rest.is_empty().then(|| chunks.iter().map(|chunk| number(*chunk)).collect())
+        }
+        let data = self.data;
+        match self.kind {
+            1 => all(data, |b| f64::from(i8::from_le_bytes(b))),
+            2 => all(data, |b| f64::from(u8::from_le_bytes(b))),
+            3 => all(data, |b| f64::from(endian.u16(b).cast_signed())),
+            4 => all(data, |b| f64::from(endian.u16(b))),
+            5 => all(data, |b| f64::from(endian.u32(b).cast_signed())),
+            6 => all(data, |b| f64::from(endian.u32(b))),
+            7 => all(data, |b| f64::from(f32::from_bits(endian.u32(b)))),
+            9 => all(data, |b| f64::from_bits(endian.u64(b))),
+            12 => all(data, |b| endian.u64(b).cast_signed() as f64),
+            13 => all(data, |b| endian.u64(b) as f64),
+            _ => None,
+        }
+    }
+}

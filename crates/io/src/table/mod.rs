@@ -1,0 +1,303 @@
+//! A table of columns as a measuring program writes it.
+
+mod column;
+mod dialect;
+mod source;
+mod text;
+mod time_axis;
+
+use std::path::Path;
+
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+
+pub use self::column::Place;
+pub(crate) use self::column::{Axis, Column, Lines};
+use self::source::{Kind, Source};
+pub use self::time_axis::TimeAxis;
+use crate::{IoError, mat, uff};
+
+/// The columns of a record file, whatever its format.
+///
+/// | Format | Known by | Columns |
+/// |---|---|---|
+/// | delimited text | nothing else | fields of a row |
+/// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, columns of matrices, fields of structs |
+/// | universal file, datasets 58 and 58b | `    -1` in its first line | functions of time, by node and direction |
+/// | gzip around any of them | its first two bytes | |
+///
+/// In text:
+///
+/// - The delimiter (comma, semicolon, tab, blanks) is found by itself; between semicolons or tabs a
+///   decimal comma is understood.
+/// - The first row names the columns if any of its fields is not a number; otherwise columns have
+///   numbers only.
+/// - Lines that start with `#`, and empty lines, are left out.
+///
+/// A column is chosen by its name, or by its number counted from 1; one that nobody asks for may
+/// hold anything. Only numbers are held, never the text.
+#[derive(Debug)]
+pub struct Table {
+    file: String,
+    gzip: bool,
+    names: Vec<String>,
+    contents: Contents,
+}
+
+/// What a format gives.
+#[derive(Debug, Default)]
+pub(crate) struct Contents {
+    /// What a person calls the format.
+    pub format: String,
+    pub columns: Vec<Column>,
+    /// Where the samples stand, for text.
+    pub lines: Lines,
+    /// How many samples most columns have.
+    pub samples: usize,
+    /// Single numbers beside the columns.
+    pub scalars: Vec<(String, f64)>,
+    /// What else the file says.
+    pub remarks: Vec<String>,
+}
+
+impl Table {
+    /// The table in a file.
+    ///
+    /// # Errors
+    /// [`IoError::Read`] if it cannot be read, otherwise as [`Table::parse`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        Self::from_source(Source::open(path.as_ref())?)
+    }
+
+    /// The table in the bytes of a file; `file` is how messages call it.
+    ///
+    /// # Errors
+    /// [`IoError::Empty`] without data, [`IoError::Ragged`] where the number of fields changes,
+    /// [`IoError::Encoding`] for UTF-16, [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
+    /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`].
+    pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
+        Self::from_source(Source::new(file.into(), bytes)?)
+    }
+
+    fn from_source(mut source: Source<'_>) -> Result<Self, IoError> {
+        let (file, gzip) = (source.file.clone(), source.gzip);
+        let contents = match source.kind() {
+            Kind::Text => text::read(source)?,
+            Kind::Mat5 => mat::read(&file, &source.bytes()?)?,
+            Kind::Uff => uff::read(&file, &source.bytes()?)?,
+            Kind::Utf16 => return Err(IoError::Encoding { file }),
+            Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
+            Kind::Unknown => return Err(IoError::UnknownFormat { file }),
+        };
+        let names = contents.columns.iter().map(|column| column.name.clone()).collect();
+        Ok(Self { file, gzip, names, contents })
+    }
+
+    /// How messages call the file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// What a person calls its format.
+    pub fn format(&self) -> String {
+        let around = if self.gzip { ", in gzip" } else { "" };
+        format!("{}{around}", self.contents.format)
+    }
+
+    /// Number of columns, nameless ones included.
+    pub fn width(&self) -> usize {
+        self.names.len()
+    }
+
+    /// Number of samples that most columns have; in text, all of them.
+    pub fn len(&self) -> usize {
+        self.contents.samples
+    }
+
+    /// Whether no column can be used, as in a universal file of spectra.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Names of the columns, empty where they have none.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// What the file says of a column beyond its name, by its index counted from 0.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn about(&self, column: usize) -> &str {
+        &self.contents.columns[column].about
+    }
+
+    /// Single numbers that the file holds beside its columns.
+    pub fn scalars(&self) -> &[(String, f64)] {
+        &self.contents.scalars
+    }
+
+    /// What the file says besides: its units, or what was left out of it.
+    pub fn remarks(&self) -> &[String] {
+        &self.contents.remarks
+    }
+
+    /// Whether columns bring their own time axis, [`TimeAxis::OfFile`].
+    pub fn has_time_axis(&self) -> bool {
+        self.contents.columns.iter().any(|column| column.axis != Axis::Unknown)
+    }
+
+    /// Indices, counted from 0, of the columns that have a name or a first value: not those that a
+    /// trailing delimiter leaves.
+    pub fn filled_columns(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.width()).filter(|c| self.contents.columns[*c].filled)
+    }
+
+    /// Where a sample, counted from 0, stands in the file.
+    pub fn place(&self, sample: usize) -> Place {
+        self.contents.lines.place(sample)
+    }
+
+    /// The columns there are, for a message: `1 "time", 2 "force"`.
+    pub fn available(&self) -> String {
+        let columns: Vec<String> = self.filled_columns().map(|c| self.label(c)).collect();
+        columns.join(", ")
+    }
+
+    /// Index, counted from 0, of the column with this name or, failing that, with this number
+    /// counted from 1.
+    ///
+    /// # Errors
+    /// [`IoError::MissingColumn`], [`IoError::AmbiguousColumn`].
+    pub fn find(&self, wanted: &str) -> Result<usize, IoError> {
+        let wanted = wanted.trim();
+        let width = self.width();
+        let mut named = (0..width).filter(|c| !wanted.is_empty() && self.names[*c] == wanted);
+        let (file, available) = (|| self.file.clone(), || self.available());
+        match (named.next(), named.next()) {
+            (Some(column), None) => Ok(column),
+            (Some(_), Some(_)) => Err(IoError::AmbiguousColumn {
+                file: file(),
+                wanted: wanted.into(),
+                available: available(),
+            }),
+            (None, _) => match wanted.parse::<usize>() {
+                Ok(n) if (1..=width).contains(&n) => Ok(n - 1),
+                _ => Err(IoError::MissingColumn {
+                    file: file(),
+                    wanted: wanted.into(),
+                    available: available(),
+                }),
+            },
+        }
+    }
+
+    /// The numbers of the column `wanted`, chosen as in [`Table::find`].
+    ///
+    /// # Errors
+    /// [`IoError::NotANumber`], [`IoError::EmptyField`] and [`IoError::NotFinite`] with the place of
+    /// the first one, [`IoError::NoNumbers`], and those of [`Table::find`].
+    pub fn column(&self, wanted: &str) -> Result<&[f64], IoError> {
+        self.values(self.find(wanted)?)
+    }
+
+    /// The time axis of the columns `wanted`, or, if none is named, of those that have as many
+    /// samples as most.
+    ///
+    /// # Errors
+    /// [`IoError::NonUniformTime`], [`IoError::SingleSample`], [`IoError::SampleRate`];
+    /// [`IoError::Lengths`] if the columns are not equally long; [`IoError::NoTimeAxis`],
+    /// [`IoError::TimeAxes`] and [`IoError::RateContradicts`] where columns bring their own time
+    /// axes; and those of [`Table::column`].
+    pub fn sampling(
+        &self,
+        time: &TimeAxis<'_>,
+        wanted: &[impl AsRef<str>],
+    ) -> Result<Sampling, IoError> {
+        let mut columns: Vec<usize> =
+            wanted.iter().map(|w| self.find(w.as_ref())).collect::<Result<_, _>>()?;
+        if columns.is_empty() {
+            let usual = |c: &usize| self.values(*c).is_ok_and(|v| v.len() == self.len());
+            columns = (0..self.width()).filter(usual).collect();
+        }
+        time.sampling(self, &columns)
+    }
+
+    /// A record of the columns `wanted`, one channel each, on the given time axis.
+    ///
+    /// # Errors
+    /// [`IoError::DuplicateColumn`] if a column is used twice (the time column included), and those
+    /// of [`Table::sampling`] and [`Table::column`].
+    pub fn record(
+        &self,
+        time: &TimeAxis<'_>,
+        wanted: &[impl AsRef<str>],
+    ) -> Result<Record, IoError> {
+        let mut used: Vec<&str> = Vec::new();
+        if let TimeAxis::Column(column) = time {
+            used.push(column);
+        }
+        used.extend(wanted.iter().map(AsRef::as_ref));
+        let columns = self.distinct(&used)?;
+        let sampling = self.sampling(time, wanted)?;
+        let channels: Vec<&[f64]> = columns[used.len() - wanted.len()..]
+            .iter()
+            .map(|c| self.values(*c))
+            .collect::<Result<_, _>>()?;
+        let mut data = DMatrix::zeros(sampling.len(), channels.len());
+        for (mut into, channel) in data.column_iter_mut().zip(channels) {
+            into.copy_from_slice(channel);
+        }
+        Record::new(sampling, data)
+            .map_err(|source| IoError::Signal { file: self.file.clone(), source })
+    }
+
+    /// The indices of columns, each used once.
+    fn distinct(&self, wanted: &[&str]) -> Result<Vec<usize>, IoError> {
+        let columns: Vec<usize> = wanted.iter().map(|w| self.find(w)).collect::<Result<_, _>>()?;
+        for (second, column) in columns.iter().enumerate() {
+            if let Some(first) = columns[..second].iter().position(|c| c == column) {
+                return Err(IoError::DuplicateColumn {
+                    file: self.file.clone(),
+                    column: column + 1,
+                    first: wanted[first].into(),
+                    second: wanted[second].into(),
+                    available: self.available(),
+                });
+            }
+        }
+        Ok(columns)
+    }
+
+    /// The numbers of a column, by its index.
+    pub(crate) fn values(&self, column: usize) -> Result<&[f64], IoError> {
+        match &self.contents.columns[column].values {
+            Ok(values) => Ok(values),
+            Err(why) => Err(why.error(&self.file, self.label(column))),
+        }
+    }
+
+    /// The instants that the file gives a column, by its index.
+    pub(crate) fn axis(&self, column: usize) -> Axis {
+        self.contents.columns[column].axis
+    }
+
+    /// Number and name of a column, by its index.
+    pub(crate) fn label(&self, column: usize) -> String {
+        match self.names[column].as_str() {
+            "" => format!("{}", column + 1),
+            name => format!("{} \"{name}\"", column + 1),
+        }
+    }
+}
+
+impl Contents {
+    /// Says how many samples most columns have, or the longest of as many.
+    pub fn with_usual_length(mut self) -> Self {
+        let lengths: Vec<usize> =
+            self.columns.iter().filter_map(|c| c.values.as_ref().ok()).map(Vec::len).collect();
+        let votes = |len: usize| (lengths.iter().filter(|l| **l == len).count(), len);
+        self.samples = lengths.iter().copied().max_by_key(|l| votes(*l)).unwrap_or(0);
+        self
+    }
+}

@@ -1,0 +1,119 @@
+//! The bytes of a file, out of their gzip if they are in one, and what format they are.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Cursor, Read as _};
+use std::path::Path;
+
+use flate2::bufread::MultiGzDecoder;
+
+use crate::IoError;
+
+/// Bytes asked of the operating system at a time.
+const CHUNK: usize = 1 << 16;
+
+/// Bytes by which a format is told.
+const HEAD: u64 = 512;
+
+/// A file being read.
+pub(crate) struct Source<'a> {
+    pub file: String,
+    /// Whether it is read through gzip.
+    pub gzip: bool,
+    /// Its first bytes, which stand in `reader` too.
+    head: Vec<u8>,
+    pub reader: Box<dyn BufRead + 'a>,
+}
+
+/// What a file is, by its first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Text,
+    Utf16,
+    /// MATLAB level 5, which its versions 5 to 7.2 write.
+    Mat5,
+    /// HDF5, which MATLAB writes since version 7.3 on request.
+    Hdf5,
+    Uff,
+    Unknown,
+}
+
+impl<'a> Source<'a> {
+    /// Opens a file.
+    pub fn open(path: &Path) -> Result<Source<'static>, IoError> {
+        let file = path.display().to_string();
+        match File::open(path) {
+            Ok(stream) => Source::new(file, BufReader::with_capacity(CHUNK, stream)),
+            Err(source) => Err(IoError::Read { file, source }),
+        }
+    }
+
+    /// Looks at the first bytes of a stream; `file` is how messages call it.
+    pub fn new(file: String, mut raw: impl BufRead + 'a) -> Result<Self, IoError> {
+        let (mut magic, mut gzip) = (Vec::new(), false);
+        let looked = raw.by_ref().take(2).read_to_end(&mut magic).and_then(|_| {
+            gzip = magic == [0x1f, 0x8b];
+            let whole = Cursor::new(magic).chain(raw);
+            let mut stream: Box<dyn BufRead + 'a> = if gzip {
+                Box::new(BufReader::with_capacity(CHUNK, MultiGzDecoder::new(whole)))
+            } else {
+                Box::new(whole)
+            };
+            let mut head = Vec::new();
+            stream.by_ref().take(HEAD).read_to_end(&mut head)?;
+            Ok((head, stream))
+        });
+        match looked {
+            Ok((head, rest)) => {
+                let reader = Box::new(Cursor::new(head.clone()).chain(rest));
+                Ok(Self { file, gzip, head, reader })
+            }
+            Err(source) => Err(failed(&file, gzip, source)),
+        }
+    }
+
+    /// What format the file has.
+    pub fn kind(&self) -> Kind {
+        let head = &self.head;
+        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
+            Kind::Utf16
+        } else if head.starts_with(b"MATLAB 5.0 MAT-file") {
+            Kind::Mat5
+        } else if head.starts_with(b"MATLAB 7.3 MAT-file") || head.starts_with(b"\x89HDF\r\n") {
+            Kind::Hdf5
+        } else if is_uff(head) {
+            Kind::Uff
+        } else if head.contains(&0) {
+            Kind::Unknown
+        } else {
+            Kind::Text
+        }
+    }
+
+    /// All that is left to read.
+    pub fn bytes(&mut self) -> Result<Vec<u8>, IoError> {
+        let mut bytes = Vec::new();
+        match self.reader.read_to_end(&mut bytes) {
+            Ok(_) => Ok(bytes),
+            Err(source) => Err(failed(&self.file, self.gzip, source)),
+        }
+    }
+}
+
+/// What a reading error says: of the file, or of the gzip around it.
+pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
+    let file = file.to_owned();
+    if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }
+}
+
+/// Whether the first line that is not empty holds -1 in its columns 5 and 6, and the next one the
+/// number of a dataset in its first six.
+fn is_uff(head: &[u8]) -> bool {
+    let mut lines =
+        head.split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end).skip_while(|line| line.is_empty());
+    let number = |line: &[u8]| {
+        let field = line.get(..6).unwrap_or(line).trim_ascii();
+        !field.is_empty() && field.iter().all(u8::is_ascii_digit)
+    };
+    lines.next() == Some(b"    -1")
+        && lines.next().is_some_and(|line| line.starts_with(b"  ") && number(line))
+}

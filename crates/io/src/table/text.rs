@@ -1,0 +1,253 @@
+//! Delimited text into columns of numbers, in one pass that holds no field as text.
+
+use std::io::{self, BufRead, Read};
+
+use csv::{ByteRecord, ReaderBuilder, Trim};
+
+use super::column::{Axis, Column, Lines, Place, Unusable};
+use super::source::{Source, failed};
+use super::{Contents, dialect};
+use crate::IoError;
+use dialect::{COMMENT, Delimiter, number};
+
+/// The table in a text.
+pub(crate) fn read(source: Source<'_>) -> Result<Contents, IoError> {
+    let Source { file, gzip, mut reader, .. } = source;
+    let wrong = |e| failed(&file, gzip, e);
+    let start = dialect::first_lines(&mut reader).map_err(wrong)?;
+    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
+    let delimiter = dialect::detect(text);
+    let mut stream = NumberedLines::new(text.chain(reader));
+    let mut rows = Rows::new(&file, delimiter);
+    match delimiter {
+        Delimiter::Blanks => {
+            while let Some((line, content)) = stream.next_line().map_err(wrong)? {
+                let words = content.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+                let fields: ByteRecord = words.collect();
+                if fields.get(0).is_some_and(|word| word[0] != COMMENT) {
+                    rows.push(line, &fields)?;
+                }
+            }
+        }
+        Delimiter::Byte(byte) => {
+            let mut reader = ReaderBuilder::new()
+                .has_headers(false)
+                .flexible(true)
+                .delimiter(byte)
+                .comment(Some(COMMENT))
+                .trim(Trim::All)
+                .from_reader(stream);
+            let mut fields = ByteRecord::new();
+            while reader.read_byte_record(&mut fields).map_err(|e| wrong(plain(e)))? {
+                let from = fields.position().map_or(0, csv::Position::line);
+                rows.push(reader.get_ref().row_from(from), &fields)?;
+            }
+        }
+    }
+    rows.finish(delimiter.name())
+}
+
+/// What the operating system or the decompressor said, without the csv reader's words around it.
+fn plain(error: csv::Error) -> io::Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(e) => e,
+        other => io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// A text whose lines are counted; all of them end with a line feed alone.
+struct NumberedLines<R> {
+    text: R,
+    line: Vec<u8>,
+    /// Bytes of `line` that were handed out.
+    given: usize,
+    /// Lines read so far.
+    count: u64,
+    /// First and last of each run of lines that hold no row: empty ones and comments.
+    idle: Vec<(u64, u64)>,
+}
+
+impl<R: BufRead> NumberedLines<R> {
+    fn new(text: R) -> Self {
+        Self { text, line: Vec::new(), given: 0, count: 0, idle: Vec::new() }
+    }
+
+    /// The next line and its number.
+    fn next_line(&mut self) -> io::Result<Option<(u64, &[u8])>> {
+        self.line.clear();
+        self.given = 0;
+        if self.text.read_until(b'\n', &mut self.line)? == 0 {
+            return Ok(None);
+        }
+        self.count += 1;
+        if self.line.ends_with(b"\r\n") {
+            self.line.pop();
+            self.line.pop();
+            self.line.push(b'\n');
+        }
+        if matches!(self.line[0], COMMENT | b'\n') {
+            match self.idle.last_mut() {
+                Some((_, last)) if *last + 1 == self.count => *last = self.count,
+                _ => self.idle.push((self.count, self.count)),
+            }
+        }
+        Ok(Some((self.count, &self.line)))
+    }
+
+    /// The first line from `line` on that holds a row.
+    fn row_from(&self, line: u64) -> u64 {
+        let after = self.idle.partition_point(|(first, _)| *first <= line);
+        match after.checked_sub(1).map(|run| self.idle[run]) {
+            Some((_, last)) if last >= line => last + 1,
+            _ => line,
+        }
+    }
+}
+
+impl<R: BufRead> Read for NumberedLines<R> {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let mut filled = 0;
+        while filled < into.len() {
+            if self.given == self.line.len() && self.next_line()?.is_none() {
+                break;
+            }
+            let some = (self.line.len() - self.given).min(into.len() - filled);
+            into[filled..filled + some].copy_from_slice(&self.line[self.given..self.given + some]);
+            self.given += some;
+            filled += some;
+        }
+        Ok(filled)
+    }
+}
+
+/// Columns that grow row by row.
+struct Rows<'a> {
+    file: &'a str,
+    delimiter: Delimiter,
+    /// Nothing before the first row.
+    shape: Option<Shape>,
+    columns: Vec<Column>,
+    has_header: bool,
+    samples: usize,
+    lines: Lines,
+    /// Rows of empty fields not yet followed by another one: line and number of fields. At the end
+    /// of the file they do not count.
+    empty: Vec<(u64, usize)>,
+}
+
+/// Fields of the first row: all of them, and up to the last that is not empty.
+#[derive(Debug, Clone, Copy)]
+struct Shape {
+    width: usize,
+    filled: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn new(file: &'a str, delimiter: Delimiter) -> Self {
+        Self {
+            file,
+            delimiter,
+            shape: None,
+            columns: Vec::new(),
+            has_header: false,
+            samples: 0,
+            lines: Lines::default(),
+            empty: Vec::new(),
+        }
+    }
+
+    /// One more row.
+    fn push(&mut self, line: u64, fields: &ByteRecord) -> Result<(), IoError> {
+        if fields.iter().all(<[u8]>::is_empty) {
+            self.empty.push((line, fields.len()));
+            return Ok(());
+        }
+        for (line, width) in std::mem::take(&mut self.empty) {
+            let blank: ByteRecord = std::iter::repeat_n("", width).collect();
+            self.take(line, &blank)?;
+        }
+        self.take(line, fields)
+    }
+
+    fn take(&mut self, line: u64, fields: &ByteRecord) -> Result<(), IoError> {
+        let filled = fields.iter().rposition(|field| !field.is_empty()).map_or(0, |last| last + 1);
+        match self.shape {
+            None => {
+                let shape = Shape { width: fields.len(), filled };
+                self.shape = Some(shape);
+                self.columns = (0..shape.width).map(|_| new_column()).collect();
+                if self.take_header(fields) {
+                    return Ok(());
+                }
+            }
+            // Fields beyond either end are forgiven where they are empty: rigs end some lines with
+            // a delimiter and others not.
+            Some(first) => {
+                let (got, expected) = (fields.len(), first.filled);
+                if got < expected || filled > first.width {
+                    return Err(IoError::Ragged { file: self.file.into(), line, got, expected });
+                }
+            }
+        }
+        for (c, column) in self.columns.iter_mut().enumerate() {
+            let field = fields.get(c).unwrap_or_default();
+            column.filled |= self.samples == 0 && !field.is_empty();
+            let Ok(values) = &mut column.values else { continue };
+            match value(line, field, self.delimiter) {
+                Ok(value) => values.push(value),
+                Err(wrong) => column.values = Err(wrong),
+            }
+        }
+        self.lines.push(self.samples, line);
+        self.samples += 1;
+        Ok(())
+    }
+
+    /// Takes the names of the columns, if the first row has any field that is no number.
+    fn take_header(&mut self, fields: &ByteRecord) -> bool {
+        self.has_header =
+            fields.iter().any(|field| !field.is_empty() && number(field, self.delimiter).is_none());
+        if self.has_header {
+            for (column, field) in self.columns.iter_mut().zip(fields) {
+                column.name = String::from_utf8_lossy(field).into_owned();
+                column.filled = !field.is_empty();
+            }
+        }
+        self.has_header
+    }
+
+    fn finish(self, format: &str) -> Result<Contents, IoError> {
+        if self.samples == 0 {
+            let found = match self.has_header {
+                true => "there is a header and nothing below it",
+                false => "it is empty",
+            };
+            return Err(IoError::Empty { file: self.file.into(), found });
+        }
+        Ok(Contents {
+            format: format.into(),
+            columns: self.columns,
+            lines: self.lines,
+            samples: self.samples,
+            ..Contents::default()
+        })
+    }
+}
+
+fn new_column() -> Column {
+    let (name, about) = (String::new(), String::new());
+    Column { name, filled: false, values: Ok(Vec::new()), axis: Axis::Unknown, about }
+}
+
+/// The number in a field, or what is wrong with it.
+fn value(line: u64, field: &[u8], delimiter: Delimiter) -> Result<f64, Unusable> {
+    match number(field, delimiter) {
+        Some(value) if value.is_finite() => Ok(value),
+        Some(value) => Err(Unusable::NotFinite { at: Place::Line(line), value }),
+        None if field.is_empty() => Err(Unusable::Empty { line }),
+        None => {
+            let text = String::from_utf8_lossy(field).chars().take(40).collect();
+            Err(Unusable::Text { line, text })
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Where the time axis of a table comes from.
+
+use mechid_signal::Sampling;
+
+use super::{Axis, Table};
+use crate::IoError;
+
+/// The time axis of columns of a [`Table`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeAxis<'a> {
+    /// A column of instants, in seconds, chosen by name or number.
+    Column(&'a str),
+    /// A known sampling rate, in Hz.
+    RateHz(f64),
+    /// The one that the file gives its columns.
+    OfFile,
+}
+
+/// Steps may differ from the median step by this part of it: printed times are rounded, and a
+/// hundredth of a step is a phase error of 1.8° at the Nyquist frequency.
+const STEP_TOLERANCE: f64 = 0.01;
+
+/// Rates and steps are the same if they differ by this part at most: universal files print them with
+/// six digits.
+const SAME_STEP: f64 = 1e-5;
+
+/// The instants of one column.
+#[derive(Debug, Clone, Copy)]
+struct Instants {
+    /// In s.
+    start: f64,
+    /// In s.
+    step: f64,
+}
+
+impl TimeAxis<'_> {
+    /// The time axis of columns, by their indices.
+    pub(super) fn sampling(&self, table: &Table, columns: &[usize]) -> Result<Sampling, IoError> {
+        let signal = |source| IoError::Signal { file: table.file().into(), source };
+        match *self {
+            TimeAxis::RateHz(rate_hz) if rate_hz > 0.0 && (1.0 / rate_hz).is_normal() => {
+                for column in columns {
+                    check_rate(table, *column, rate_hz)?;
+                }
+                Sampling::from_rate_hz(rate_hz, common_length(table, columns)?).map_err(signal)
+            }
+            TimeAxis::RateHz(rate_hz) => Err(IoError::SampleRate { rate_hz }),
+            TimeAxis::Column(column) => {
+                let column = table.find(column)?;
+                let dt = uniform_step(table, table.values(column)?)?;
+                let all: Vec<usize> = [&[column], columns].concat();
+                Sampling::new(dt, common_length(table, &all)?).map_err(signal)
+            }
+            TimeAxis::OfFile => {
+                let step = common_instants(table, columns)?.step;
+                Sampling::new(step, common_length(table, columns)?).map_err(signal)
+            }
+        }
+    }
+}
+
+/// The number of samples that all the columns have.
+fn common_length(table: &Table, columns: &[usize]) -> Result<usize, IoError> {
+    let mut lengths = Vec::new();
+    for column in columns {
+        lengths.push((*column, table.values(*column)?.len()));
+    }
+    let Some((_, len)) = lengths.first().copied() else { return Ok(table.len()) };
+    if lengths.iter().all(|(_, other)| *other == len) {
+        return Ok(len);
+    }
+    let told = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));
+    let lengths = told.collect::<Vec<_>>().join(", ");
+    Err(IoError::Lengths { file: table.file().into(), lengths })
+}
+
+/// The instants that the file gives all the columns.
+fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError> {
+    let mut common: Option<(usize, Instants)> = None;
+    for column in columns {
+        let Some(own) = own_instants(table, *column)? else {
+            let column = table.label(*column);
+            return Err(IoError::NoTimeAxis { file: table.file().into(), column });
+        };
+        let Some((first, instants)) = common else {
+            common = Some((*column, own));
+            continue;
+        };
+        // Starts may differ by as little as steps may.
+        let together = (own.start - instants.start).abs() <= STEP_TOLERANCE * instants.step
+            && same(own.step, instants.step);
+        if !together {
+            return Err(IoError::TimeAxes {
+                file: table.file().into(),
+                first: table.label(first),
+                first_start: instants.start,
+                first_step: instants.step,
+                second: table.label(*column),
+                second_start: own.start,
+                second_step: own.step,
+            });
+        }
+    }
+    common
+        .map(|(_, instants)| instants)
+        .ok_or_else(|| IoError::NoTimeAxis { file: table.file().into(), column: table.available() })
+}
+
+/// The instants that the file gives a column.
+fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoError> {
+    Ok(match table.axis(column) {
+        Axis::Unknown => None,
+        Axis::Even { start, step } => Some(Instants { start, step }),
+        Axis::Column(times) => {
+            let times = table.values(times)?;
+            Some(Instants { start: times[0], step: uniform_step(table, times)? })
+        }
+    })
+}
+
+fn same(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME_STEP * a.abs().max(b.abs())
+}
+
+/// An error if the file gives a column another rate.
+fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError> {
+    match own_instants(table, column)? {
+        Some(own) if !same(1.0 / own.step, rate_hz) => Err(IoError::RateContradicts {
+            file: table.file().into(),
+            column: table.label(column),
+            own_hz: 1.0 / own.step,
+            rate_hz,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// The mean step of instants that are equally spaced.
+fn uniform_step(table: &Table, times: &[f64]) -> Result<f64, IoError> {
+    let file = || table.file().to_owned();
+    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let middle = steps.len() / 2;
+    if steps.is_empty() {
+        return Err(IoError::SingleSample { file: file() });
+    }
+    let (_, &mut usual, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
+    let off = |k: usize| (times[k + 1] - times[k] - usual).abs();
+    let worst = (0..steps.len()).max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or_default();
+    // Also refuses time that stands still or runs backwards, and steps that overflow.
+    if usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual {
+        return Ok((times[times.len() - 1] - times[0]) / steps.len() as f64);
+    }
+    Err(IoError::NonUniformTime {
+        file: file(),
+        at: table.place(worst + 1),
+        step: times[worst + 1] - times[worst],
+        usual,
+    })
+}

@@ -1,0 +1,56 @@
+//! A dataset 58 as a column of a table.
+
+use super::header::Header;
+use super::lines::{Fault, Line, Lines};
+use super::values::{Binary, printed};
+use crate::table::{Axis, Column};
+
+/// Abscissa that is not time: frequency, and revolutions or orders of a shaft.
+const NOT_TIME: [u32; 3] = [18, 19, 20];
+
+/// Adds the columns of a dataset whose number stands on `id`: one or, for uneven instants, two.
+pub(crate) fn read(
+    lines: &mut Lines<'_>,
+    id: &Line<'_>,
+    columns: &mut Vec<Column>,
+) -> Result<(), Fault> {
+    let binary = Binary::of(id)?;
+    let header = Header::read(lines)?;
+    let values = match binary {
+        None => printed(&header, lines)?,
+        Some(binary) => binary.read(&header, lines)?,
+    };
+    if header.count == 0 {
+        return Err(Fault { at: header.form_at, what: "a function without values".into() });
+    }
+    add(header, values, columns);
+    Ok(())
+}
+
+fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
+    let name = match (&header.reference, header.function) {
+        (Some(reference), 2..) => format!("{}/{reference}", header.response),
+        _ => header.response.clone(),
+    };
+    let about: Vec<&str> = [header.title.as_str(), &header.quantity]
+        .into_iter()
+        .filter(|part| !part.is_empty())
+        .collect();
+    let about = about.join(", ");
+    let in_time = header.function <= 1 && !NOT_TIME.contains(&header.abscissa);
+    if !in_time || header.is_complex {
+        let what = if in_time { "complex numbers".into() } else { header.kind() };
+        columns.push(Column { about, ..Column::unusable(name, what) });
+        return;
+    }
+    if header.is_even {
+        let axis = Axis::Even { start: header.start, step: header.step };
+        columns.push(Column { about, axis, ..Column::of_numbers(name, values) });
+        return;
+    }
+    let (pairs, _) = values.as_chunks::<2>();
+    let (times, values) = pairs.iter().map(|[time, value]| (*time, *value)).unzip();
+    columns.push(Column::of_numbers(format!("{name} time"), times));
+    let axis = Axis::Column(columns.len() - 1);
+    columns.push(Column { about, axis, ..Column::of_numbers(name, values) });
+}

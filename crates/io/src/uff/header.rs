@@ -1,0 +1,167 @@
+//! The eleven lines that describe a function.
+
+use super::lines::{Fault, Line, Lines, number};
+
+/// What a dataset 58 says of its function.
+#[derive(Debug)]
+pub(crate) struct Header {
+    /// The first line, empty if it says NONE.
+    pub title: String,
+    /// 1 is a response in time, 4 a frequency response function.
+    pub function: u32,
+    /// Node and direction at which it was measured.
+    pub response: String,
+    /// Node and direction to which it refers, if any.
+    pub reference: Option<String>,
+    pub is_complex: bool,
+    pub is_double: bool,
+    /// Values, or pairs of instant and value.
+    pub count: usize,
+    pub is_even: bool,
+    /// First abscissa and increment, if even.
+    pub start: f64,
+    pub step: f64,
+    /// 17 is time, 18 frequency.
+    pub abscissa: u32,
+    /// What was measured, in words; empty if the file does not say.
+    pub quantity: String,
+    /// The line with the numbers, for messages.
+    pub form_at: usize,
+}
+
+impl Header {
+    pub fn read(lines: &mut Lines<'_>) -> Result<Self, Fault> {
+        let mut next =
+            || lines.required("a dataset 58 ends within its eleven lines of description");
+        let title = label(next()?.text);
+        for _ in 2..=5 {
+            next()?;
+        }
+        let (what, form, abscissa, ordinate) = (next()?, next()?, next()?, next()?);
+        for _ in 10..=11 {
+            next()?;
+        }
+        let point = |from: usize| -> Result<(i64, i64), Fault> {
+            Ok((whole(&what, from, 10)?, whole(&what, from + 10, 4)?))
+        };
+        let (response, reference) = (point(41)?, point(66)?);
+        let ordinate_type: u32 = whole(&form, 0, 10)?;
+        let spacing: u32 = whole(&form, 20, 10)?;
+        if !matches!(ordinate_type, 2 | 4 | 5 | 6) || spacing > 1 {
+            return Err(form.fault(format!(
+                "ordinate data type {ordinate_type} with spacing {spacing}: known are 2, 4, 5 and 6 \
+                 with 0 and 1"
+            )));
+        }
+        let is_even = spacing == 1;
+        Ok(Self {
+            title,
+            function: whole(&what, 0, 5)?,
+            response: degree_of_freedom(response, &what)?,
+            reference: (reference.0 != 0)
+                .then(|| degree_of_freedom(reference, &what))
+                .transpose()?,
+            is_complex: ordinate_type > 4,
+            is_double: matches!(ordinate_type, 4 | 6),
+            count: whole(&form, 10, 10)?,
+            is_even,
+            start: if is_even { real(&form, 30)? } else { 0.0 },
+            step: if is_even { real(&form, 43)? } else { 0.0 },
+            abscissa: whole(&abscissa, 0, 10)?,
+            quantity: quantity(&ordinate)?,
+            form_at: form.at,
+        })
+    }
+
+    /// What a person calls the kind of function.
+    pub fn kind(&self) -> String {
+        match self.function {
+            0 => "a function of unknown kind".into(),
+            1 => "a response in time".into(),
+            2 => "an auto spectrum".into(),
+            3 => "a cross spectrum".into(),
+            4 => "a frequency response function".into(),
+            5 => "a transmissibility".into(),
+            6 => "a coherence".into(),
+            7 => "an auto correlation".into(),
+            8 => "a cross correlation".into(),
+            9 => "a power spectral density".into(),
+            12 => "a spectrum".into(),
+            other => format!("a function of type {other}"),
+        }
+    }
+}
+
+/// A field of a line; what lies past the end is blank.
+fn field<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
+    let rest = line.text.get(from..).unwrap_or_default();
+    rest.get(..width).unwrap_or(rest).trim_ascii()
+}
+
+/// A whole number in a field, 0 if it is blank.
+fn whole<T: std::str::FromStr + Default>(
+    line: &Line<'_>,
+    from: usize,
+    width: usize,
+) -> Result<T, Fault> {
+    let text = field(line, from, width);
+    if text.is_empty() {
+        return Ok(T::default());
+    }
+    number(text).ok_or_else(|| wrong(line, from, width, "whole number"))
+}
+
+/// A real number in a field of 13 columns, 0 if it is blank.
+fn real(line: &Line<'_>, from: usize) -> Result<f64, Fault> {
+    let text = field(line, from, 13);
+    if text.is_empty() {
+        return Ok(0.0);
+    }
+    number(text).filter(|v: &f64| v.is_finite()).ok_or_else(|| wrong(line, from, 13, "number"))
+}
+
+fn wrong(line: &Line<'_>, from: usize, width: usize, kind: &str) -> Fault {
+    let text = String::from_utf8_lossy(field(line, from, width)).into_owned();
+    line.fault(format!("\"{text}\" in columns {} to {} is no {kind}", from + 1, from + width))
+}
+
+/// A label, empty if it says NONE.
+fn label(text: &[u8]) -> String {
+    match String::from_utf8_lossy(text.trim_ascii()) {
+        none if none.eq_ignore_ascii_case("none") => String::new(),
+        some => some.into_owned(),
+    }
+}
+
+/// Node and direction as engineers write them: `12+Z`, `3-RX`; a scalar is its node alone.
+fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<String, Fault> {
+    let sign = if direction < 0 { '-' } else { '+' };
+    let axis = match direction.unsigned_abs() {
+        0 => return Ok(node.to_string()),
+        1 => "X",
+        2 => "Y",
+        3 => "Z",
+        4 => "RX",
+        5 => "RY",
+        6 => "RZ",
+        _ => return Err(line.fault(format!("direction {direction} is not between -6 and 6"))),
+    };
+    Ok(format!("{node}{sign}{axis}"))
+}
+
+/// What the ordinate is: its label or, without one, its type, and its unit.
+fn quantity(line: &Line<'_>) -> Result<String, Fault> {
+    let kind: u32 = whole(line, 0, 10)?;
+    let (name, unit) = (label(field(line, 26, 20)), label(field(line, 47, 20)));
+    let name = match kind {
+        _ if !name.is_empty() => name,
+        8 => "displacement".into(),
+        9 => "reaction force".into(),
+        11 => "velocity".into(),
+        12 => "acceleration".into(),
+        13 => "excitation force".into(),
+        15 => "pressure".into(),
+        _ => String::new(),
+    };
+    Ok(if unit.is_empty() { name } else { format!("{name} in {unit}").trim_start().into() })
+}

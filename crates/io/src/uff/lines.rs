@@ -1,0 +1,88 @@
+//! Lines of a universal file, and numbers in Fortran's fields.
+
+/// What is wrong, and at which byte, counted from 0.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    pub at: usize,
+    pub what: String,
+}
+
+/// A line and where it begins.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line<'a> {
+    pub text: &'a [u8],
+    pub at: usize,
+}
+
+impl Line<'_> {
+    pub fn fault(&self, what: impl Into<String>) -> Fault {
+        Fault { at: self.at, what: what.into() }
+    }
+}
+
+/// The lines of a file, and the bytes between them.
+#[derive(Debug)]
+pub(crate) struct Lines<'a> {
+    bytes: &'a [u8],
+    next: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub fn new(bytes: &'a [u8]) -> Self {
+        Self { bytes, next: 0 }
+    }
+
+    /// The next line, without its end.
+    pub fn next(&mut self) -> Option<Line<'a>> {
+        let rest = self.rest();
+        if rest.is_empty() {
+            return None;
+        }
+        let end = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
+        let line = Line { text: rest[..end].trim_ascii_end(), at: self.next };
+        self.next += end + 1;
+        Some(line)
+    }
+
+    /// The next line, which must be there; `missing` says what it means if it is not.
+    pub fn required(&mut self, missing: &str) -> Result<Line<'a>, Fault> {
+        let at = self.bytes.len();
+        self.next().ok_or_else(|| Fault { at, what: missing.into() })
+    }
+
+    /// The bytes that are left.
+    pub fn rest(&self) -> &'a [u8] {
+        self.bytes.get(self.next..).unwrap_or_default()
+    }
+
+    /// Where they begin.
+    pub fn at(&self) -> usize {
+        self.next
+    }
+
+    /// Takes so many of them, or what there is.
+    pub fn take(&mut self, len: usize) -> &'a [u8] {
+        let taken = self.rest().get(..len).unwrap_or(self.rest());
+        self.next += taken.len();
+        taken
+    }
+
+    /// The number of the line on which a byte stands, counted from 1.
+    pub fn number_at(&self, at: usize) -> u64 {
+        let before = &self.bytes[..at.min(self.bytes.len())];
+        // At the very end: the last line there is.
+        let before = if at >= self.bytes.len() { before.trim_ascii_end() } else { before };
+        1 + before.iter().filter(|b| **b == b'\n').count() as u64
+    }
+}
+
+/// Whether a line begins or ends a dataset.
+pub(crate) fn is_mark(line: &[u8]) -> bool {
+    line == b"    -1"
+}
+
+/// A number in a field, if there is one; Fortran writes 1.0D+00 for double precision.
+pub(crate) fn number<T: std::str::FromStr>(field: &[u8]) -> Option<T> {
+    let text = std::str::from_utf8(field).ok()?.trim();
+    text.parse().ok().or_else(|| text.replace(['D', 'd'], "E").parse().ok())
+}

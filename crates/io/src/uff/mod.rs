@@ -1,0 +1,80 @@
+//! Universal files: functions of time in datasets 58 and 58b.
+//!
+//! # Source
+//! University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets 58,
+//! 58b and 164.
+
+mod function;
+mod header;
+mod lines;
+mod values;
+
+use std::collections::BTreeMap;
+
+use self::lines::{Fault, Lines, is_mark, number};
+use crate::IoError;
+use crate::table::{Contents, Place};
+
+/// The functions of a file as columns.
+pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Contents, IoError> {
+    let mut lines = Lines::new(bytes);
+    match datasets(&mut lines) {
+        Ok(contents) if contents.columns.is_empty() => {
+            Err(IoError::Empty { file: file.into(), found: "it has no dataset 58" })
+        }
+        Ok(contents) => Ok(contents.with_usual_length()),
+        Err(fault) => Err(IoError::Malformed {
+            file: file.into(),
+            at: Place::Line(lines.number_at(fault.at)),
+            what: fault.what,
+        }),
+    }
+}
+
+fn datasets(lines: &mut Lines<'_>) -> Result<Contents, Fault> {
+    let mut contents = Contents { format: "universal file".into(), ..Contents::default() };
+    let mut skipped: BTreeMap<u32, usize> = BTreeMap::new();
+    while let Some(mark) = lines.next() {
+        if mark.text.trim_ascii().is_empty() {
+            continue;
+        }
+        if !is_mark(mark.text) {
+            return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
+        }
+        let id = lines.required("a dataset begins here and has no number")?;
+        let dataset: u32 = number(id.text.get(..6).unwrap_or(id.text))
+            .ok_or_else(|| id.fault("the number of the dataset is missing in columns 1 to 6"))?;
+        match dataset {
+            58 => function::read(lines, &id, &mut contents.columns)?,
+            164 => contents.remarks.push(units(lines)?),
+            _ => *skipped.entry(dataset).or_default() += 1,
+        }
+        while !is_mark(lines.required("dataset has no end: the file is cut short")?.text) {
+            // The rest of a dataset is left out.
+        }
+    }
+    if !skipped.is_empty() {
+        let told: Vec<String> = skipped.iter().map(|(n, count)| format!("{n} ({count})")).collect();
+        contents.remarks.push(format!("left out: datasets {}", told.join(", ")));
+    }
+    Ok(contents)
+}
+
+/// What dataset 164 says of the units.
+fn units(lines: &mut Lines<'_>) -> Result<String, Fault> {
+    let first = lines.required("the units are cut short")?;
+    let code: u32 = number(first.text.get(..10).unwrap_or(first.text))
+        .ok_or_else(|| first.fault("the units code is missing in columns 1 to 10"))?;
+    let name = String::from_utf8_lossy(first.text.get(10..30).unwrap_or_default());
+    let factors = lines.required("the units are cut short")?;
+    let factor = |field: usize| -> Result<f64, Fault> {
+        let part = factors.text.get(25 * field..).unwrap_or_default();
+        number(part.get(..25).unwrap_or(part))
+            .ok_or_else(|| factors.fault("the factor of a unit is no number"))
+    };
+    let (length, force) = (factor(0)?, factor(1)?);
+    Ok(format!(
+        "units: code {code} {}; to get SI units, divide lengths by {length} and forces by {force}",
+        name.trim()
+    ))
+}

@@ -1,0 +1,149 @@
+//! The values of a function, printed or binary.
+
+use super::header::Header;
+use super::lines::{Fault, Line, Lines, is_mark, number};
+
+/// How many columns a printed number takes, in single and in double precision.
+const SINGLE: usize = 13;
+const DOUBLE: usize = 20;
+
+/// The printed numbers up to the end of the dataset, whose mark is left to read.
+pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
+    let expected = numbers(header);
+    let mut values = Vec::new();
+    while values.len() < expected {
+        let line = lines.required("the file is cut short within the values of a dataset 58")?;
+        if is_mark(line.text) {
+            let what = format!("a function of {expected} numbers ends after {}", values.len());
+            return Err(line.fault(what));
+        }
+        row(header, &line, &mut values)?;
+    }
+    if values.len() > expected {
+        return Err(Fault {
+            at: lines.at().saturating_sub(1),
+            what: format!("a function of {expected} numbers has more"),
+        });
+    }
+    Ok(values)
+}
+
+/// Numbers in the file: values, or an instant before each.
+fn numbers(header: &Header) -> usize {
+    let each = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
+    header.count.saturating_mul(each)
+}
+
+/// The numbers of a line, between blanks or, where they touch, by their columns.
+fn row(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result<(), Fault> {
+    let before = values.len();
+    let blank = |b: &u8| b.is_ascii_whitespace();
+    for word in line.text.split(blank).filter(|word| !word.is_empty()) {
+        let Some(value) = number(word) else {
+            values.truncate(before);
+            return by_columns(header, line, values);
+        };
+        values.push(value);
+    }
+    Ok(())
+}
+
+fn by_columns(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result<(), Fault> {
+    let mut rest = line.text;
+    while !rest.trim_ascii().is_empty() {
+        // In uneven spacing the instants are single precision even among double values.
+        let each = 2 + usize::from(header.is_complex);
+        let is_instant = !header.is_even && values.len().is_multiple_of(each);
+        let width = if header.is_double && !is_instant { DOUBLE } else { SINGLE };
+        let (field, after) = rest.split_at(width.min(rest.len()));
+        let value = number(field).ok_or_else(|| {
+            let text = String::from_utf8_lossy(field.trim_ascii()).into_owned();
+            line.fault(format!("\"{text}\" is not a number"))
+        })?;
+        values.push(value);
+        rest = after;
+    }
+    Ok(())
+}
+
+/// How the numbers of a dataset 58b are stored.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Binary {
+    is_big_endian: bool,
+}
+
+impl Binary {
+    /// From the line with the number of the dataset; nothing if its values are printed.
+    pub fn of(id: &Line<'_>) -> Result<Option<Self>, Fault> {
+        if !matches!(id.text.get(6), Some(b'b' | b'B')) {
+            return Ok(None);
+        }
+        let field = |from: usize| id.text.get(from..from + 6).and_then(number::<u32>);
+        match (field(7), field(13)) {
+            (Some(order @ 1..=2), Some(2)) => Ok(Some(Self { is_big_endian: order == 2 })),
+            (Some(1..=2), Some(format)) => Err(id.fault(format!(
+                "floating point format {format} of a dataset 58b is not known here, only 2 (IEEE 754)"
+            ))),
+            _ => Err(id.fault("the byte order of a dataset 58b is neither 1 nor 2")),
+        }
+    }
+
+    /// The numbers, which end where the end of the dataset follows.
+    pub fn read(self, header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
+        let width = if header.is_double { 8 } else { 4 };
+        let expected = numbers(header);
+        let plain = expected.saturating_mul(width);
+        // By the standard instants are single precision, but not every program writes them so.
+        let narrow = plain.saturating_sub(4 * header.count);
+        let is_mixed = header.is_double
+            && !header.is_even
+            && !ends_after(lines.rest(), plain)
+            && ends_after(lines.rest(), narrow);
+        let len = if is_mixed { narrow } else { plain };
+        if !ends_after(lines.rest(), len) {
+            return Err(Fault {
+                at: lines.at(),
+                what: format!(
+                    "the end of the dataset does not follow {len} bytes of binary values"
+                ),
+            });
+        }
+        let mut bytes = lines.take(len);
+        let each = 2 + usize::from(header.is_complex);
+        let values = (0..expected).map(|k| {
+            let narrow = width == 4 || (is_mixed && k % each == 0);
+            self.number(&mut bytes, narrow).unwrap_or(f64::NAN)
+        });
+        let values = values.collect();
+        if lines.rest().first().is_some_and(|b| matches!(b, b'\n' | b'\r')) {
+            lines.next();
+        }
+        Ok(values)
+    }
+
+    /// The next number, of 4 or 8 bytes.
+    fn number(self, bytes: &mut &[u8], narrow: bool) -> Option<f64> {
+        if narrow {
+            let (number, rest) = bytes.split_first_chunk::<4>()?;
+            *bytes = rest;
+            let big = f32::from_be_bytes(*number);
+            return Some(f64::from(if self.is_big_endian {
+                big
+            } else {
+                f32::from_le_bytes(*number)
+            }));
+        }
+        let (number, rest) = bytes.split_first_chunk::<8>()?;
+        *bytes = rest;
+        let big = f64::from_be_bytes(*number);
+        Some(if self.is_big_endian { big } else { f64::from_le_bytes(*number) })
+    }
+}
+
+/// Whether the mark of an end follows so many bytes, at once or on the next line.
+fn ends_after(bytes: &[u8], len: usize) -> bool {
+    let Some(rest) = bytes.get(len..) else { return false };
+    let line_end = rest.iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();
+    let rest = &rest[line_end.min(2)..];
+    rest.starts_with(b"    -1") && rest.get(6).is_none_or(u8::is_ascii_whitespace)
+}

@@ -1,0 +1,151 @@
+//! MATLAB files. Judge: SciPy wrote them (`data/make.py`), the numbers stand here.
+
+use mechid_io::{IoError, Table, TimeAxis};
+use proptest::prelude::*;
+
+const PLAIN: &[u8] = include_bytes!("../data/plain.mat");
+const COMPRESSED: &[u8] = include_bytes!("../data/compressed.mat");
+
+pub const FORCE: [f64; 8] = [-3.0, -2.0, 1.0, -1.0, -1.0, 1.0, -2.0, -3.0];
+pub const X: [f64; 8] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625, 0.0078125];
+
+fn both() -> [Table; 2] {
+    [PLAIN, COMPRESSED].map(|bytes| Table::parse("a.mat", bytes).unwrap())
+}
+
+#[test]
+fn vectors_matrices_and_structs_are_columns() {
+    for table in both() {
+        let wanted = ["force", "motion[1]", "motion[2]", "rig.x", "single"];
+        let record = table.record(&TimeAxis::Column("time"), &wanted).unwrap();
+        assert_eq!((record.len(), record.sampling().dt()), (8, 0.25));
+        assert_eq!(record.channel(0), FORCE);
+        for channel in [1, 3, 4] {
+            assert_eq!(record.channel(channel), X, "{}", wanted[channel]);
+        }
+        assert_eq!(record.channel(2), X.map(|x| -x));
+        let low: Vec<f64> = (-4..4).map(f64::from).collect();
+        assert_eq!(table.column("rig.limits.low").unwrap(), low);
+        assert_eq!(table.column("counts").unwrap(), low);
+        assert_eq!(table.len(), 8);
+        assert_eq!(table.scalars(), [("fs".to_string(), 4.0)]);
+        assert_eq!(table.format(), "MATLAB level 5");
+    }
+}
+
+#[test]
+fn what_makes_no_channel_is_named_when_it_is_asked_for() {
+    for table in both() {
+        for (column, what) in [
+            ("note", "text"),
+            ("rig.label", "text"),
+            ("analytic", "complex numbers"),
+            ("cells", "a cell array"),
+            ("cube", "an array of more than two dimensions"),
+            ("nothing", "nothing"),
+        ] {
+            let message = table.column(column).unwrap_err().to_string();
+            assert!(message.contains(&format!("{column}\": it holds {what}, a")), "{message}");
+        }
+        let e = table.column("gap").unwrap_err().to_string();
+        assert!(e.ends_with("\"gap\": NaN is not a finite number"), "{e}");
+        assert!(e.starts_with("a.mat, sample 2, column "), "{e}");
+        assert!(matches!(table.column("fs"), Err(IoError::MissingColumn { .. })));
+    }
+}
+
+#[test]
+fn channels_of_different_lengths_make_no_record() {
+    for table in both() {
+        let e = table.record(&TimeAxis::RateHz(4.0), &["force", "short"]).unwrap_err().to_string();
+        assert!(e.contains("2 \"force\" has 8, ") && e.contains("\"short\" has 3"), "{e}");
+        let alone = table.record(&TimeAxis::RateHz(4.0), &["short"]).unwrap();
+        assert_eq!(alone.channel(0), [1.0, 2.0, 3.0]);
+        let e = table.record(&TimeAxis::Column("time"), &["short"]).unwrap_err();
+        assert!(matches!(e, IoError::Lengths { .. }), "{e}");
+    }
+}
+
+#[test]
+fn uneven_time_is_refused_with_its_sample() {
+    let table = Table::parse("a.mat", PLAIN).unwrap();
+    let e = table.record(&TimeAxis::Column("rig.x"), &["force"]).unwrap_err().to_string();
+    assert!(e.contains("not uniform") && e.contains("up to sample "), "{e}");
+}
+
+/// A file of one vector of doubles, put together by hand.
+fn by_hand(values: &[f64], big: bool) -> Vec<u8> {
+    let word = |v: u32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+    let double = |v: &f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+    let len = u32::try_from(values.len()).unwrap();
+    let mut data = Vec::new();
+    // Class 6 (double); size; name; numbers.
+    for v in [6, 8, 6, 0, 5, 8, len, 1, 1, 1] {
+        data.extend(word(v));
+    }
+    data.extend(b"v\0\0\0\0\0\0\0");
+    data.extend([word(9), word(8 * len)].concat());
+    values.iter().for_each(|v| data.extend(double(v)));
+    let mut file = b"MATLAB 5.0 MAT-file, by hand".to_vec();
+    file.resize(124, b' ');
+    file.extend(if big { b"\x01\x00MI" } else { b"\x00\x01IM" });
+    file.extend([word(14), word(data.len() as u32)].concat());
+    file.extend(data);
+    file
+}
+
+#[test]
+fn both_byte_orders_are_read() {
+    for big in [false, true] {
+        let table = Table::parse("a.mat", &by_hand(&[1.5, -2.25e300], big)).unwrap();
+        assert_eq!(table.column("v").unwrap(), [1.5, -2.25e300]);
+    }
+}
+
+#[test]
+fn other_versions_say_how_to_save() {
+    let mut header = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec();
+    header.resize(512, 0);
+    for bytes in [&header[..], b"\x89HDF\r\n\x1a\n rest"] {
+        let e = Table::parse("a.mat", bytes).unwrap_err();
+        assert_eq!(e.to_string(), "a.mat is a MATLAB file of version 7.3 (HDF5): save it with -v7");
+    }
+    // Level 4 has no header: a type, rows, columns, whether complex, and the length of the name.
+    let level_4 = b"\0\0\0\0\x01\0\0\0\x01\0\0\0\0\0\0\0\x02\0\0\0a\0\0\0\0\0\0\0\xf0\x3f";
+    let e = Table::parse("a.mat", level_4).unwrap_err().to_string();
+    assert!(e.contains("MATLAB level 5 (save with -v7)"), "{e}");
+}
+
+#[test]
+fn a_file_cut_short_is_refused_wherever_it_ends() {
+    for (name, bytes) in [("plain", PLAIN), ("compressed", COMPRESSED)] {
+        let whole = Table::parse("a.mat", bytes).unwrap().names().len();
+        let mut complete = 0;
+        for end in 20..bytes.len() {
+            match Table::parse("a.mat", &bytes[..end]) {
+                // Between two variables nothing tells that there were more.
+                Ok(table) => {
+                    assert!(table.names().len() < whole, "{name} {end}");
+                    complete += 1;
+                }
+                Err(IoError::Malformed { .. } | IoError::Empty { .. }) => {}
+                Err(e) => panic!("{name} cut at {end}: {e}"),
+            }
+        }
+        assert!(complete < 14, "{name}: {complete} cuts of 14 variables were not noticed");
+    }
+    let e = Table::parse("a.mat", &PLAIN[..200]).unwrap_err().to_string();
+    assert_eq!(e, "a.mat, byte 129: an element of 112 bytes has 64: the file is cut short");
+}
+
+proptest! {
+    #[test]
+    fn no_damage_panics(at in 0..PLAIN.len(), byte in any::<u8>(), packed in any::<bool>()) {
+        let mut bytes = if packed { COMPRESSED } else { PLAIN }.to_vec();
+        let at = at % bytes.len();
+        bytes[at] = byte;
+        if let Ok(table) = Table::parse("a.mat", &bytes) {
+            super::use_all(&table);
+        }
+    }
+}
