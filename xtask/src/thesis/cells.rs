@@ -1,7 +1,7 @@
 //! Printed cells beside computed ones, with a verdict on each.
 
 use super::case::Machine;
-use super::misprints::{self, Field, Misprint};
+use super::misprints::{self, Field, MeanMisprint, Misprint};
 use super::published::{Cell, Method, Published};
 use super::results::{Key, Results};
 use super::verdict::{Verdict, compare};
@@ -136,23 +136,42 @@ pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
                 .iter()
                 .filter(|r| r.cell.method == m.method && r.cell.parameter == m.parameter)
                 .collect();
-            let errors = column.iter().filter_map(|r| r.error.printed.parse::<f64>().ok());
-            let value = average(errors);
             let listed = misprints::MEANS.iter().find(|x| x.table == table && x.method == m.method);
-            let plain = compare(value, &m.mean_error_percent);
-            let (verdict, reason) = match listed {
-                Some(x) => (Verdict::Misprint, Some(x.reason)),
-                None => (plain, None),
-            };
             Mean {
                 parameter: m.parameter.clone(),
                 method: m.method,
-                printed: Judged { printed: m.mean_error_percent.clone(), value, verdict, reason },
+                printed: judge_mean(&column, &m.mean_error_percent, listed),
                 correct: average(column.iter().map(|r| r.correct_error)),
                 best: average(column.iter().map(|r| r.best_error)),
             }
         })
         .collect()
+}
+
+/// As for a cell, a listed misprint is believed only if a mean of the column confirms the number it
+/// ought to be: of the errors as printed, as printed but for their own misprints, or as we compute
+/// them.
+fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMisprint>) -> Judged {
+    let digits = |r: &&Row| r.error.printed.parse::<f64>().ok();
+    let value = average(column.iter().filter_map(digits));
+    let put_right = average(column.iter().filter_map(|r| right_error(r).or_else(|| digits(r))));
+    let ours = average(column.iter().map(|r| r.error.value));
+    let confirmed = |m: &MeanMisprint| {
+        let same = |mean| matches!(compare(mean, m.right), Verdict::ToTheDigit | Verdict::Rounding);
+        [value, put_right, ours].into_iter().any(same)
+    };
+    let (verdict, reason) = match listed {
+        Some(m) if confirmed(m) => (Verdict::Misprint, Some(m.reason)),
+        _ => (compare(value, printed), None),
+    };
+    Judged { printed: printed.to_owned(), value, verdict, reason }
+}
+
+/// The error that a misprinted one ought to be.
+fn right_error(row: &Row) -> Option<f64> {
+    let cell = &row.cell;
+    let misprint = misprints::find(&cell.table, cell.method, cell.npi, Field::Error)?;
+    misprint.npi.and_then(|_| misprint.right.parse().ok())
 }
 
 fn average(values: impl Iterator<Item = f64>) -> f64 {
