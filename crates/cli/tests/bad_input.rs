@@ -225,6 +225,17 @@ fn files_that_cannot_be_written() {
 }
 
 #[test]
+fn pages_that_cannot_be_written() {
+    let common = "report a.csv --displacement x --force";
+    refused(&good(), &format!("{common} force --output out.pdf"), &["must end in .html"]);
+    refused(&good(), &format!("{common} F --output out.html"), &["no column \"F\""]);
+    let elsewhere = format!("{common} force --mass 1 --output no/such/folder/out.html");
+    refused(&good(), &elsewhere, &["cannot write no/such/folder"]);
+    // One line, two equations: the fit fails after the record was read.
+    refused(&good(), &format!("{common} force --output out.html"), &["3 unknowns"]);
+}
+
+#[test]
 fn descriptions_that_describe_nothing() {
     let common = "simulate a.csv --output out.csv";
     refused("{ \"system\": 3 }", common, &["a.csv: invalid type: integer `3`", "line 1 column"]);

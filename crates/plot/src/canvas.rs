@@ -112,14 +112,25 @@ pub struct Canvas {
     height: f64,
     body: String,
     clips: usize,
+    /// What the ids of this document begin with.
+    ids: String,
 }
 
 impl Canvas {
     /// An empty white sheet, px.
     pub fn new(width: f64, height: f64) -> Self {
-        let mut sheet = Canvas { width, height, body: String::new(), clips: 0 };
+        let mut sheet = Canvas { width, height, body: String::new(), clips: 0, ids: String::new() };
         sheet.rect((0.0, 0.0), (width, height), Some(Color::WHITE), None);
         sheet
+    }
+
+    /// The same sheet with ids that begin with `ids` (letters, digits, `-`, `_`; others become `-`),
+    /// to stand in one document with other sheets.
+    #[must_use]
+    pub fn with_ids(mut self, ids: &str) -> Self {
+        let safe = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c } else { '-' };
+        self.ids = ids.chars().map(safe).collect();
+        self
     }
 
     /// A straight line.
@@ -223,12 +234,12 @@ impl Canvas {
 
     /// Opens a group of which only the part inside a rectangle shows.
     pub fn open_clip(&mut self, corner: Point, size: Point) {
-        let id = self.clips;
+        let id = format!("{}clip{}", self.ids, self.clips);
         self.clips += 1;
         let (x, y, w, h) = (num(corner.0), num(corner.1), num(size.0), num(size.1));
         let _ = writeln!(
             self.body,
-            r#"<clipPath id="clip{id}"><rect x="{x}" y="{y}" width="{w}" height="{h}"/></clipPath><g clip-path="url(#clip{id})">"#
+            r#"<clipPath id="{id}"><rect x="{x}" y="{y}" width="{w}" height="{h}"/></clipPath><g clip-path="url(#{id})">"#
         );
     }
 

@@ -86,11 +86,24 @@ impl Figure {
     /// # Errors
     /// A panel or a curve without points, coordinates an axis cannot show, or a size without room to draw in.
     pub fn to_svg(&self) -> Result<String, PlotError> {
+        self.svg("", &self.title)
+    }
+
+    /// The figure as an SVG element to stand in an HTML document beside others: its ids begin with `ids`,
+    /// different for each, and `label` is its name for readers who do not see it.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`].
+    pub fn to_inline_svg(&self, ids: &str, label: &str) -> Result<String, PlotError> {
+        self.svg(ids, label)
+    }
+
+    fn svg(&self, ids: &str, label: &str) -> Result<String, PlotError> {
         self.validate()?;
         let layout = Layout::new(self)?;
-        let mut sheet = Canvas::new(layout.size.0, layout.size.1);
+        let mut sheet = Canvas::new(layout.size.0, layout.size.1).with_ids(ids);
         draw::figure(self, &layout, &mut sheet);
-        Ok(sheet.finish(&self.title))
+        Ok(sheet.finish(label))
     }
 
     /// The figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.

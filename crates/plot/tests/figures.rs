@@ -318,3 +318,22 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn figures_of_one_document_share_no_id() {
+    let document = format!(
+        "<body>{}{}</body>",
+        everything().to_inline_svg("first", "One & two").unwrap(),
+        everything().to_inline_svg("a\"b", "Two").unwrap()
+    );
+    let document = roxmltree::Document::parse(&document).expect("the figures are XML");
+    let ids: Vec<&str> = document.descendants().filter_map(|node| node.attribute("id")).collect();
+    let used: Vec<&str> = document
+        .descendants()
+        .filter_map(|node| node.attribute("clip-path")?.strip_prefix("url(#")?.strip_suffix(')'))
+        .collect();
+    assert_eq!(ids, ["firstclip0", "firstclip1", "a-bclip0", "a-bclip1"]);
+    assert_eq!(ids, used);
+    let svg = document.root_element().first_element_child().unwrap();
+    assert_eq!(svg.first_element_child().unwrap().text(), Some("One & two"));
+}

@@ -10,6 +10,7 @@ mod identify;
 mod info;
 mod modal;
 mod multisine;
+mod report;
 mod simulate;
 mod stability;
 mod sweep;
@@ -41,6 +42,7 @@ pub enum Command {
     Info(info::InfoArgs),
     Modal(modal::ModalArgs),
     Multisine(multisine::MultisineArgs),
+    Report(report::PageArgs),
     Simulate(simulate::SimulateArgs),
     Stability(stability::StabilityArgs),
     Sweep(sweep::SweepArgs),
@@ -55,6 +57,7 @@ impl Command {
             Command::Info(args) => args.run(),
             Command::Modal(args) => args.run(),
             Command::Multisine(args) => args.run(),
+            Command::Report(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
             Command::Sweep(args) => args.run(),
@@ -69,6 +72,7 @@ impl Command {
             Command::Info(args) => &args.report,
             Command::Modal(args) => &args.report,
             Command::Multisine(args) => &args.report,
+            Command::Report(args) => &args.report,
             Command::Simulate(args) => &args.report,
             Command::Stability(args) => &args.report,
             Command::Sweep(args) => &args.report,

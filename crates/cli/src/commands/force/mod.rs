@@ -1,8 +1,8 @@
 //! `mechid force`: the force that drove a known machine.
 
-mod machine;
-mod method;
-mod motion;
+pub(super) mod machine;
+pub(super) mod method;
+pub(super) mod motion;
 mod report;
 
 use std::path::PathBuf;

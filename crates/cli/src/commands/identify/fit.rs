@@ -141,7 +141,8 @@ pub fn time_domain(
 }
 
 impl BetweenSamples {
-    fn discretisation(self) -> Discretisation {
+    /// What the time domain calls it.
+    pub fn discretisation(self) -> Discretisation {
         match self {
             BetweenSamples::Euler => Discretisation::Euler,
             BetweenSamples::Held => Discretisation::ZeroOrderHold,
@@ -192,7 +193,7 @@ impl Fitted {
 
 impl Measurement {
     /// The motion used in the frequency domain, and what it is.
-    fn motion(&self) -> (&Record, Motion) {
+    pub fn motion(&self) -> (&Record, Motion) {
         let candidates = [
             (&self.displacement, Motion::Displacement),
             (&self.velocity, Motion::Velocity),

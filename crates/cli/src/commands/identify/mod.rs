@@ -1,9 +1,9 @@
 //! `mechid identify`: the machine behind a record.
 
 mod excited;
-mod fit;
+pub(super) mod fit;
 mod mass;
-mod measurement;
+pub(super) mod measurement;
 mod picture;
 pub(super) mod report;
 
@@ -49,7 +49,7 @@ pub struct Identification {
     #[command(flatten)]
     pub input: RecordArgs,
     #[command(flatten)]
-    channels: ChannelArgs,
+    pub channels: ChannelArgs,
     /// Where to look
     #[arg(long, value_name = "DOMAIN", value_enum, default_value_t = Domain::Frequency)]
     domain: Domain,
@@ -66,7 +66,7 @@ pub struct Identification {
     /// What is assumed of the force between samples, in the time domain [default: the equation of
     /// motion at the samples if the acceleration is measured, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_enum)]
-    between_samples: Option<BetweenSamples>,
+    pub between_samples: Option<BetweenSamples>,
     /// Masses, in kg, one per degree of freedom (or all n×n entries row by row); or unknown
     #[arg(
         long,
@@ -77,9 +77,10 @@ pub struct Identification {
     mass: KnownMass,
 }
 
-/// A machine found, and how.
+/// A machine found, and what it was found from.
 #[derive(Debug)]
 pub struct Identified {
+    pub measured: Measurement,
     pub fitted: Fitted,
     pub report: Report,
 }
@@ -120,7 +121,7 @@ impl Identification {
             Domain::Time => fit::time_domain(&measured, &unknowns, self.between_samples)?,
         };
         let report = report(&measured, &fitted)?;
-        Ok(Identified { fitted, report })
+        Ok(Identified { measured, fitted, report })
     }
 }
 

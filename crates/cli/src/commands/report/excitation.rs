@@ -1,0 +1,79 @@
+//! Whether the force drives the machine as an identification needs it.
+
+use mechid::estimate::checks::{Check, before_fit, before_spectral_fit};
+use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::signal::measures::{self, Band};
+use mechid::signal::{Record, Spectrum};
+
+use crate::commands::identify::Identified;
+use crate::commands::identify::fit::BetweenSamples;
+use crate::error::CliError;
+
+/// A line this far below the strongest, in dB, is no longer driven: a multisine stands far above
+/// the noise between its lines.
+pub const DROP_DB: f64 = 20.0;
+
+/// Numbers of one force that acts.
+pub struct Excitation {
+    /// Counted from 1.
+    pub dof: usize,
+    pub crest_factor: f64,
+    /// Nothing for a force that does not vary.
+    pub peak_factor: Option<f64>,
+    /// Lines driven.
+    pub lines: usize,
+    pub band: Option<Band>,
+    /// Of the lines driven.
+    pub flatness: Option<f64>,
+    pub order: usize,
+}
+
+/// One period of the force in the frequency domain, averaged; the window in the time domain.
+pub fn force(found: &Identified) -> Result<Record, CliError> {
+    let measured = &found.measured;
+    Ok(match found.fitted.frequency {
+        Some(_) => measured.force.period_mean(measured.period)?,
+        None => measured.force.clone(),
+    })
+}
+
+/// Of every force that is not zero throughout.
+pub fn excitations(found: &Identified) -> Result<Vec<Excitation>, CliError> {
+    let force = force(found)?;
+    let spectrum = Spectrum::of(&force);
+    let floor = 10f64.powf(-DROP_DB / 20.0);
+    let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);
+    acting
+        .map(|c| {
+            let amplitude = |n: &usize| spectrum.line(*n, c).norm();
+            let strongest = (1..spectrum.len()).map(|n| amplitude(&n)).fold(0.0, f64::max);
+            let driven = |n: &usize| strongest > 0.0 && amplitude(n) >= floor * strongest;
+            let lines: Vec<usize> = (1..spectrum.len()).filter(driven).collect();
+            Ok(Excitation {
+                dof: c + 1,
+                crest_factor: measures::crest_factor(&force, c)?,
+                peak_factor: measures::relative_peak_factor(&force, c).ok(),
+                lines: lines.len(),
+                band: measures::effective_band(&spectrum, c, DROP_DB).ok(),
+                flatness: measures::spectral_flatness(&spectrum, c, lines).ok(),
+                order: measures::persistent_excitation_order(&spectrum, c, floor)?,
+            })
+        })
+        .collect()
+}
+
+/// What can be said before the fit.
+pub fn checks(found: &Identified, between: Option<BetweenSamples>) -> Result<Vec<Check>, CliError> {
+    let measured = &found.measured;
+    let force = &measured.force;
+    if let Some((lines, _)) = &found.fitted.frequency {
+        let (motion, kind) = measured.motion();
+        let unknowns = found.fitted.estimate.unknowns();
+        return Ok(before_spectral_fit(lines, force, motion, kind, unknowns)?);
+    }
+    let (Some(x), Some(v)) = (&measured.displacement, &measured.velocity) else {
+        return Ok(Vec::new());
+    };
+    let between = between.map_or(Discretisation::FirstOrderHold, BetweenSamples::discretisation);
+    Ok(before_fit(TimeDomain::new(between, Extent::Open), x, v, force)?)
+}

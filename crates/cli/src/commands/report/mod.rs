@@ -1,0 +1,115 @@
+//! `mechid report`: one HTML file with everything an identification has to show.
+
+mod channels;
+mod excitation;
+mod figures;
+mod page;
+mod reconstruction;
+mod repeat;
+mod residual;
+mod sections;
+mod tables;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::estimate::checks::Check;
+use serde::Serialize;
+
+use self::channels::Channel;
+use self::excitation::Excitation;
+use self::reconstruction::Reconstruction;
+use self::residual::Residual;
+use crate::commands::identify::report::Report;
+use crate::commands::identify::{Identification, Identified};
+use crate::error::CliError;
+use crate::options::ReportArgs;
+use crate::outcome::Outcome;
+
+/// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
+///
+/// Takes the options of `mechid identify`. The file needs nothing else: it can be sent, printed and
+/// kept, and ends with the command that writes it again.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid report record.csv --force force --displacement displacement --output report.html
+  mechid report rotor.csv --force fx,fy --displacement x,y --period 1024 --reconstruct-force \\
+      --title 'Rotor at 3000 rpm' --output rotor.html")]
+pub struct PageArgs {
+    #[command(flatten)]
+    identification: Identification,
+    /// Find the force from the motion with the identified machine, too, and hold it against the
+    /// measured one
+    #[arg(long)]
+    reconstruct_force: bool,
+    /// Where the report goes
+    #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
+    output: PathBuf,
+    /// Heading of the report [default: the name of the record]
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    title: Option<String>,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+fn html_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("html" | "htm") => Ok(path),
+        _ => Err("the file name must end in .html".into()),
+    }
+}
+
+/// Everything the page shows, computed.
+struct Contents<'a> {
+    title: String,
+    found: &'a Identified,
+    channels: Vec<Channel>,
+    excitations: Vec<Excitation>,
+    checks: Vec<Check>,
+    /// Or why there is none.
+    residual: Result<Residual, String>,
+    reconstruction: Option<Reconstruction>,
+    command: String,
+}
+
+/// The report of `mechid identify`, and where the page is.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    html: String,
+}
+
+impl PageArgs {
+    /// Reads, identifies, draws and writes.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let found = self.identification.identify()?;
+        let contents = self.contents(&found)?;
+        let page = page::html(&contents)?;
+        let html = self.output.display().to_string();
+        let text = format!("{}\nreport: {html}\n", found.report.text());
+        let printed = Printed { report: &found.report, html };
+        Ok(Outcome::new(text, &printed)?.with_file(&self.output, page))
+    }
+
+    fn contents<'a>(&self, found: &'a Identified) -> Result<Contents<'a>, CliError> {
+        let between = self.identification.between_samples;
+        let reconstruction = match self.reconstruct_force {
+            true => Some(Reconstruction::of(found)?),
+            false => None,
+        };
+        let name = PathBuf::from(&found.report.file);
+        let name = name.file_name().unwrap_or_default().to_string_lossy();
+        Ok(Contents {
+            title: self.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
+            found,
+            channels: channels::channels(&found.measured, &self.identification.channels)?,
+            excitations: excitation::excitations(found)?,
+            checks: excitation::checks(found, between)?,
+            residual: Residual::of(found, between).map_err(|reason| reason.to_string()),
+            reconstruction,
+            command: repeat::command(std::env::args_os().skip(1)),
+        })
+    }
+}

@@ -1,0 +1,103 @@
+//! The force found from the motion with the identified machine, against the measured one.
+
+use mechid::force::{
+    self, Channel, Entry, IdentifiedForce, Quantity, Rule, Start, SystemCovariance, channel_errors,
+};
+use mechid::signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use crate::commands::force::machine::Machine;
+use crate::commands::force::method::{Method, Request, find};
+use crate::commands::force::motion::Motion;
+use crate::commands::identify::Identified;
+use crate::commands::identify::measurement::Measurement;
+use crate::error::CliError;
+
+/// A force found, and what it should be.
+pub struct Reconstruction {
+    pub method: &'static str,
+    pub found: IdentifiedForce,
+    /// In the frequency domain its mean period, on the lines used alone.
+    pub measured: Record,
+    /// Degrees of freedom on which a force acts, counted from 0.
+    pub forced: Vec<usize>,
+    /// RMS of the difference over RMS of the measured force, per degree of freedom; nothing where
+    /// none acts.
+    pub errors: Vec<Option<f64>>,
+    /// Lines used, in the frequency domain.
+    pub lines: Option<Vec<usize>>,
+}
+
+impl Reconstruction {
+    /// Line by line on the lines of the fit in the frequency domain, otherwise with the method that
+    /// suits an open record.
+    pub fn of(found: &Identified) -> Result<Self, CliError> {
+        let source = &found.measured;
+        let lines = found.fitted.frequency.as_ref().map(|(lines, _)| lines.as_slice().to_vec());
+        let force = &source.force;
+        let forced: Vec<usize> =
+            (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
+        let request = Request {
+            method: if lines.is_some() { Method::FrequencyDomain } else { Method::Auto },
+            forced: forced.clone(),
+            lines: lines.clone(),
+            periodic: lines.is_some(),
+            start: Start::InMotion,
+            rule: Rule::Likelihood,
+            noise: Vec::new(),
+        };
+        let result = find(&request, &machine(found)?, &motion(source, lines.is_some())?)?;
+        let measured = match &lines {
+            Some(lines) => on_lines(&force.period_mean(source.period)?, lines),
+            None => force.clone(),
+        };
+        let errors = channel_errors(result.force.record(), &measured)?;
+        let (method, found) = (result.method, result.force);
+        Ok(Self { method, found, measured, forced, errors, lines })
+    }
+}
+
+fn machine(found: &Identified) -> Result<Machine, CliError> {
+    let estimate = &found.fitted.estimate;
+    let entry = |p: mechid::estimate::Parameter| Entry {
+        matrix: p.matrix(),
+        row: p.row(),
+        column: p.column(),
+    };
+    let entries = estimate.parameters().map(|p| entry(p.parameter)).collect();
+    let covariance = SystemCovariance::new(entries, estimate.covariance().clone())?;
+    Ok(Machine { system: estimate.system()?, covariance: Some(covariance) })
+}
+
+/// Every motion that was measured.
+fn motion(source: &Measurement, periodic: bool) -> Result<Motion, CliError> {
+    let groups = [
+        (&source.displacement, Quantity::Displacement),
+        (&source.velocity, Quantity::Velocity),
+        (&source.acceleration, Quantity::Acceleration),
+    ];
+    let (mut columns, mut channels) = (Vec::new(), Vec::new());
+    for (record, quantity) in groups {
+        let Some(record) = record else { continue };
+        for dof in 0..record.channels() {
+            columns.push(record.column(dof).into_owned());
+            channels.push(Channel { dof, quantity });
+        }
+    }
+    let mut record = Record::new(source.force.sampling(), DMatrix::from_columns(&columns))?;
+    if periodic {
+        record = record.period_mean(source.period)?;
+    }
+    let measured = force::Measurement::new(record, channels)?;
+    Ok(Motion { file: source.file.clone(), measured, periods: source.periods })
+}
+
+/// What a period has on these lines.
+fn on_lines(period: &Record, lines: &[usize]) -> Record {
+    let all = Spectrum::of(period);
+    let mut kept = DMatrix::from_element(all.len(), all.channels(), Complex::ZERO);
+    for &n in lines {
+        kept.set_row(n, &all.lines().row(n));
+    }
+    Spectrum::from_lines(period.sampling(), kept).to_record()
+}

@@ -1,0 +1,35 @@
+//! The command that writes the report again.
+
+use std::ffi::OsString;
+
+use shlex::Quoter;
+
+/// `mechid` with these arguments, quoted for a POSIX shell.
+pub fn command(arguments: impl Iterator<Item = OsString>) -> String {
+    let quoter = Quoter::new().allow_nul(true);
+    let mut command = String::from("mechid");
+    for argument in arguments {
+        let argument = argument.to_string_lossy();
+        command.push(' ');
+        command += &quoter.quote(&argument).expect("only a NUL cannot be quoted, and it may stand");
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shell_reads_the_same_arguments() {
+        let arguments =
+            ["report", "my rig.csv", "--title", "it's <b>", "--lines", "1:2:9", "", "é$x"];
+        let command = command(arguments.iter().map(OsString::from));
+        assert!(
+            command.starts_with("mechid report 'my rig.csv' --title \"it's <b>\""),
+            "{command}"
+        );
+        let read = shlex::split(&command).unwrap();
+        assert_eq!(read[1..], arguments);
+    }
+}
