@@ -39,6 +39,23 @@
 
 mod simulation;
 
+/// The Rust of the README and of the book, compiled and run with the documentation tests.
+#[cfg(doctest)]
+mod book {
+    #[doc = include_str!("../../../README.md")]
+    mod readme {}
+    #[doc = include_str!("../../../docs/book/src/theory/index.md")]
+    mod machine {}
+    #[doc = include_str!("../../../docs/book/src/theory/signal.md")]
+    mod signal {}
+    #[doc = include_str!("../../../docs/book/src/theory/integrate.md")]
+    mod integrate {}
+    #[doc = include_str!("../../../docs/book/src/theory/estimate.md")]
+    mod estimate {}
+    #[doc = include_str!("../../../docs/book/src/theory/force.md")]
+    mod force {}
+}
+
 pub use mechid_estimate as estimate;
 pub use mechid_force as force;
 pub use mechid_integrate as integrate;
