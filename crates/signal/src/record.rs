@@ -27,7 +27,7 @@ impl Record {
                 expected: sampling.len(),
             });
         }
-        if let Some(at) = data.iter().position(|v| !v.is_finite()) {
+        if let Some(at) = first_not_finite(data.as_slice()) {
             let (channel, sample) = (at / data.nrows(), at % data.nrows());
             return Err(SignalError::NotFinite { sample, channel, value: data[(sample, channel)] });
         }
@@ -181,6 +181,17 @@ impl Record {
     }
 }
 
+/// Where the first NaN or infinity stands.
+///
+/// Block by block without a branch inside, so that a sound record is checked at the speed of memory.
+fn first_not_finite(values: &[f64]) -> Option<usize> {
+    const BLOCK: usize = 1024;
+    let sound = |block: &[f64]| block.iter().fold(true, |sound, v| sound & v.is_finite());
+    let block = values.chunks(BLOCK).position(|block| !sound(block))?;
+    let at = values[block * BLOCK..].iter().position(|v| !v.is_finite())?;
+    Some(block * BLOCK + at)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -225,6 +236,12 @@ mod tests {
         assert_eq!(e, SignalError::Length { channel: 1, got: 1, expected: 2 });
         let e = Record::from_channels(s, &[[1.0, 2.0], [0.0, f64::INFINITY]]).unwrap_err();
         assert_eq!(e, SignalError::NotFinite { sample: 1, channel: 1, value: f64::INFINITY });
+        // The first of two, far from the beginning.
+        let mut long = DMatrix::zeros(3000, 2);
+        (long[(2500, 1)], long[(2999, 1)]) = (f64::NEG_INFINITY, f64::NAN);
+        let e = Record::new(Sampling::new(0.1, 3000).unwrap(), long).unwrap_err();
+        let value = f64::NEG_INFINITY;
+        assert_eq!(e, SignalError::NotFinite { sample: 2500, channel: 1, value });
     }
 
     #[test]
