@@ -9,7 +9,7 @@ use mechid::estimate::Unknowns;
 use mechid::estimate::frequency_domain::{Lines, Motion, RepeatedPeriods, equation_error};
 use mechid::io::{Table, TimeAxis};
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
     let table = Table::read(file)?;
     let time = TimeAxis::Column("time");

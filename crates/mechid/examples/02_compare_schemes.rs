@@ -14,7 +14,7 @@ use mechid::integrate::{
 use mechid::model::{Response, Sdof, SecondOrderSystem};
 use mechid::signal::{Multisine, Phases, Record, Sampling};
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Ten samples per natural period.
     let machine = Sdof::from_modal(10.0, 0.05, 10.0)?.system();
     let sampling = Sampling::new(std::f64::consts::TAU / 100.0, 512)?;

@@ -10,7 +10,7 @@ use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
 use mechid::model::Sdof;
 use mechid::signal::{Multisine, Phases, Sampling};
 
-fn main() -> Result<(), Box<dyn Error>> {
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let machine = Sdof::new(10.0, 180.0, 5000.0)?.system();
     let sampling = Sampling::new(0.01, 512)?;
 

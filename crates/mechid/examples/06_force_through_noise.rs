@@ -1,0 +1,46 @@
+//! The force behind a noisy motion: line by line where its lines are known, by shrinkage where they
+//! are not, by a Kalman smoother where there is no period.
+//!
+//! `cargo run --package mechid --example 06_force_through_noise`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+use std::error::Error;
+
+use mechid::force::{
+    Extent, Filter, IdentifiedForce, Measurement, Noise, Quantity, Start, Tuning, frequency_domain,
+    kalman, regularised, relative_error,
+};
+use mechid::model::Sdof;
+use mechid::signal::noise::{self, NoiseLevel};
+use mechid::signal::{Multisine, Phases, Record, Sampling};
+
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    let machine = Sdof::from_modal(25.0, 0.05, std::f64::consts::TAU * 12.0)?.system();
+    let sampling = Sampling::new(1.0 / 256.0, 256)?;
+    let lines = [3, 7, 11, 18, 25];
+    let truth = Multisine::flat(lines, 20.0, Phases::Schroeder)?.sample(sampling)?;
+    let motion = mechid::exact_periodic(&machine, &truth)?;
+    let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.01), 5)?;
+    let measured = Measurement::of_all(Quantity::Displacement, noisy);
+
+    let (all, unknown) = ((1..128).collect::<Vec<_>>(), Noise::Unknown);
+    // On all lines the noise of the high ones comes back multiplied by ω²m.
+    let naive = frequency_domain(&machine, &measured, &[0], &all, &unknown)?;
+    show("every line, as it stands", &naive, &truth)?;
+    let known = frequency_domain(&machine, &measured, &[0], &lines, &Noise::OutsideLines)?;
+    show("the five lines that are driven", &known, &truth)?;
+    let shrunk =
+        regularised(&machine, &measured, &[0], &Extent::Period, Filter::Shrinkage, &unknown)?;
+    show("shrinkage, lines not known", &shrunk.force, &truth)?;
+    let smoothed = kalman(&machine, &measured, &[0], Start::InMotion, &Tuning::Likelihood)?;
+    show("Kalman smoother, no period", &smoothed.force, &truth)
+}
+
+fn show(name: &str, found: &IdentifiedForce, truth: &Record) -> Result<(), Box<dyn Error>> {
+    let error = 100.0 * relative_error(found.record(), truth)?;
+    let size = |record: &Record| record.column(0).norm() / (record.len() as f64).sqrt();
+    let claimed = found.standard_error().map(|e| 100.0 * size(e) / size(truth));
+    let claimed = claimed.map_or("none stated".into(), |claimed| format!("{claimed:.1} % stated"));
+    println!("{name}: {error:.1} % off, {claimed}");
+    Ok(())
+}

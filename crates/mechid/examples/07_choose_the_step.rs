@@ -1,0 +1,62 @@
+//! Which step a scheme needs: how long it may be, and how far period and damping are off before.
+//!
+//! `cargo run --package mechid --example 07_choose_the_step`
+#![allow(clippy::print_stdout, reason = "an example shows its result")]
+
+use std::error::Error;
+
+use mechid::integrate::{
+    Accuracy, CentralDifference, Houbolt, IntegrateError, Newmark, RungeKutta4, Scheme,
+    WilsonTheta, accuracy, critical_step,
+};
+use mechid::model::Sdof;
+
+/// A period this much too long is accepted.
+const ACCEPTED: f64 = 0.01;
+
+pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    // 12 Hz, damping ratio 0.02.
+    let period = 1.0 / 12.0;
+    let machine = Sdof::from_modal(1.0, 0.02, std::f64::consts::TAU / period)?.system();
+    let wilson = WilsonTheta::new(1.4)?;
+    let schemes: [&dyn Scheme; 5] = [
+        &Newmark::AVERAGE_ACCELERATION,
+        &CentralDifference::default(),
+        &Houbolt::default(),
+        &wilson,
+        &RungeKutta4::LINEAR,
+    ];
+    for scheme in schemes {
+        let limit = match critical_step(scheme, &machine)? {
+            Some(step) => format!("stable up to {:.2} ms", 1e3 * step),
+            None => "stable at any step".into(),
+        };
+        let step = longest(scheme)?;
+        let found = accuracy(scheme, 0.02, step)?;
+        let added = found.numerical_damping_ratio.unwrap_or(f64::NAN);
+        println!(
+            "{}: {limit}; 1 % of the period at {:.2} ms ({:.0} steps a period), damping ratio {added:+.5}",
+            scheme.name(),
+            1e3 * step * period,
+            1.0 / step,
+        );
+    }
+    Ok(())
+}
+
+/// The longest step, in periods, whose period is right to [`ACCEPTED`]: halved until it is, then
+/// bisected.
+fn longest(scheme: &dyn Scheme) -> Result<f64, IntegrateError> {
+    let off = |found: Accuracy| found.period_elongation.map_or(f64::INFINITY, f64::abs);
+    let good = |step: f64| Ok::<_, IntegrateError>(off(accuracy(scheme, 0.02, step)?) <= ACCEPTED);
+    let mut low = 0.25;
+    while !good(low)? {
+        low /= 2.0;
+    }
+    let mut high = 2.0 * low;
+    for _ in 0..30 {
+        let middle = 0.5 * (low + high);
+        if good(middle)? { low = middle } else { high = middle }
+    }
+    Ok(low)
+}

@@ -1,0 +1,37 @@
+//! Every example runs through; what it prints is for its reader.
+
+/// Each example is a module here, so that one program runs them all.
+macro_rules! examples {
+    ($($name:ident $file:literal),+ $(,)?) => { $(
+        #[path = $file]
+        mod $name;
+
+        #[test]
+        fn $name() {
+            $name::main().unwrap();
+        }
+    )+
+
+        /// A file beside the others that is not in the list would never run.
+        #[test]
+        fn the_list_is_whole() {
+            let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
+            let files = std::fs::read_dir(folder).unwrap();
+            let mut there: Vec<_> = files.map(|file| file.unwrap().file_name()).collect();
+            there.sort();
+            let listed = [$($file),+].map(|path| path.rsplit('/').next().unwrap());
+            assert_eq!(there, listed);
+        }
+    };
+}
+
+examples! {
+    identify_a_record "../examples/01_identify_a_record.rs",
+    compare_schemes "../examples/02_compare_schemes.rs",
+    find_the_force "../examples/03_find_the_force.rs",
+    design_measure_identify "../examples/04_design_measure_identify.rs",
+    weigh_the_noise "../examples/05_weigh_the_noise.rs",
+    force_through_noise "../examples/06_force_through_noise.rs",
+    choose_the_step "../examples/07_choose_the_step.rs",
+    identify_a_bearing "../examples/08_identify_a_bearing.rs",
+}
