@@ -95,7 +95,8 @@ impl SavitzkyGolay {
         Ok(Self { half_width, order, inverse })
     }
 
-    /// The `times`-th derivative of every channel (0 smooths).
+    /// The `times`-th derivative of every channel (0 smooths), samples × channels as the record, in
+    /// its unit per s^`times`.
     ///
     /// # Errors
     /// [`EstimateError::TooShort`] if the record is shorter than the window,

@@ -125,7 +125,8 @@ impl Estimate {
         })
     }
 
-    /// Covariance of the estimated entries, in the order of [`Unknowns::free`].
+    /// Covariance of the estimated entries, in the order of [`Unknowns::free`], each in the product of
+    /// the two parameters' units (kg, N·s/m, N/m).
     ///
     /// An undetermined parameter has an infinite variance and NaN covariances.
     pub fn covariance(&self) -> &DMatrix<f64> {

@@ -243,7 +243,7 @@ impl Frf {
         &self.coherence
     }
 
-    /// Variance E|ΔH|² at one of the frequencies, motions × forces.
+    /// Variance E|ΔH|² at one of the frequencies, motions × forces, in the square of the unit of H.
     ///
     /// # Panics
     /// If there is no such frequency.

@@ -130,7 +130,7 @@ impl NoiseSpectrum {
         &self.omega
     }
 
-    /// E[z zᴴ] of a row, 2n×2n: displacements first, then forces.
+    /// E[z zᴴ] of a row, 2n×2n: displacements (m) first, then forces (N).
     ///
     /// # Panics
     /// If there is no such row.

@@ -142,7 +142,7 @@ impl Unknowns {
         self.dof
     }
 
-    /// The known value of an entry (counted from 0), `None` if it is free.
+    /// The known value of an entry (counted from 0) in kg, N·s/m or N/m; `None` if it is free.
     ///
     /// # Panics
     /// If there is no such entry.
@@ -160,7 +160,7 @@ impl Unknowns {
     }
 
     /// The three matrices with the known values in place and `values` (in the order of
-    /// [`Unknowns::free`]) in the free entries.
+    /// [`Unknowns::free`]) in the free entries: M (kg), C (N·s/m) and K (N/m), n×n each.
     ///
     /// # Panics
     /// If there are not as many values as free entries.
@@ -174,7 +174,7 @@ impl Unknowns {
         matrices
     }
 
-    /// M if all of it is known.
+    /// M, n×n, in kg, if all of it is known.
     pub fn mass(&self) -> Option<DMatrix<f64>> {
         let known = &self.fixed[Matrix::Mass as usize];
         let values: Option<Vec<f64>> = known.iter().copied().collect();

@@ -30,7 +30,7 @@ impl IdentifiedForce {
         &self.record
     }
 
-    /// The lines of F̂, the record taken as one whole period.
+    /// The lines of F̂, lines × degrees of freedom, in N; the record taken as one whole period.
     pub fn spectrum(&self) -> &Spectrum {
         &self.spectrum
     }

@@ -97,7 +97,7 @@ impl Measurement {
         Self { record, channels }
     }
 
-    /// The measured samples × channels.
+    /// The measured samples × channels, in m, m/s or m/s² as each channel's quantity says.
     pub fn record(&self) -> &Record {
         &self.record
     }

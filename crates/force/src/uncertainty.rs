@@ -57,7 +57,7 @@ impl SystemCovariance {
         &self.entries
     }
 
-    /// Their covariance.
+    /// Their covariance, one row and column per entry, in the products of their units (kg, N·s/m, N/m).
     pub fn covariance(&self) -> &DMatrix<f64> {
         &self.covariance
     }

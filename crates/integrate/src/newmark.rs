@@ -54,12 +54,12 @@ impl Newmark {
         Ok(Self { beta, gamma })
     }
 
-    /// Weight of the new acceleration in the displacement.
+    /// Weight of the new acceleration in the displacement, a pure number.
     pub fn beta(&self) -> f64 {
         self.beta
     }
 
-    /// Weight of the new acceleration in the velocity.
+    /// Weight of the new acceleration in the velocity, a pure number.
     pub fn gamma(&self) -> f64 {
         self.gamma
     }

@@ -26,7 +26,7 @@ impl ParameterCovariance {
         Self { parameters, matrix, degrees_of_freedom }
     }
 
-    /// The matrix.
+    /// The matrix, one row and column per parameter, in the products of their units (kg, N·s/m, N/m).
     ///
     /// # Panics
     /// If the rows are not as many and as long as the parameters, which [`read_covariance`] checks.

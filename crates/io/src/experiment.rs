@@ -303,7 +303,7 @@ impl Experiment {
         self.sampled(false)
     }
 
-    /// The same half a step later: sample k belongs to t = (k + ½) Δt.
+    /// The same force half a step later, in N: sample k belongs to t = (k + ½) Δt.
     ///
     /// # Errors
     /// As [`Experiment::force`].

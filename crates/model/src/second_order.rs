@@ -114,7 +114,7 @@ impl SecondOrderSystem {
         &self.stiffness
     }
 
-    /// One of the three, by name.
+    /// One of the three, by name, n×n, in kg, N·s/m or N/m.
     pub fn matrix(&self, which: Matrix) -> &DMatrix<f64> {
         match which {
             Matrix::Mass => &self.mass,

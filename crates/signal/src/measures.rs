@@ -20,7 +20,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::error::{not_negative, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
-/// Root mean square; 0 for no samples.
+/// Root mean square, in the unit of the samples; 0 for no samples.
 pub fn rms(samples: &[f64]) -> f64 {
     let peak = peak(samples);
     if peak == 0.0 {
@@ -31,7 +31,7 @@ pub fn rms(samples: &[f64]) -> f64 {
     peak * (sum / samples.len() as f64).sqrt()
 }
 
-/// Largest absolute value; 0 for no samples.
+/// Largest absolute value, in the unit of the samples; 0 for no samples.
 pub fn peak(samples: &[f64]) -> f64 {
     samples.iter().fold(0.0, |m, x| m.max(x.abs()))
 }

@@ -106,7 +106,7 @@ impl Multisine {
         &self.lines
     }
 
-    /// The amplitude of each line.
+    /// The amplitude of each line, in the unit of the signal, N for a force.
     pub fn amplitudes(&self) -> &[f64] {
         &self.amplitudes
     }

@@ -6,7 +6,8 @@ use crate::{Sampling, SignalError};
 
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
-/// Every value is finite: a record that exists can be computed with.
+/// Every value is finite: a record that exists can be computed with. Values are in any unit: whoever
+/// takes a record says in which, and what is derived from one here keeps it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     sampling: Sampling,

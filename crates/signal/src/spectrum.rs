@@ -17,7 +17,7 @@ use realfft::RealFftPlanner;
 
 use crate::{Record, Sampling};
 
-/// Lines × channels of one-sided complex amplitudes; line n stands at n·ω0.
+/// Lines × channels of one-sided complex amplitudes, in the unit of the record; line n stands at n·ω0.
 ///
 /// The scaling is stated in the [module documentation](self).
 ///

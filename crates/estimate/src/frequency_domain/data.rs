@@ -176,7 +176,7 @@ impl FrequencyData {
         self.measured
     }
 
-    /// What is known of the noise.
+    /// What is known of the noise: covariances of displacement (m) and force (N) for every row.
     pub fn noise(&self) -> Option<&NoiseSpectrum> {
         self.noise.as_ref()
     }

@@ -92,7 +92,8 @@ impl RepeatedPeriods {
         Ok((self.mean_of(0..half)?, self.mean_of(count - half..count)?))
     }
 
-    /// Covariance of the mean over the periods, line by line or pooled over lines.
+    /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
+    /// pooled over lines.
     ///
     /// A force that is the same in every period to rounding is taken as exact.
     ///

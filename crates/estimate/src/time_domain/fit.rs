@@ -77,19 +77,19 @@ impl TimeDomainFit {
         self.discretisation
     }
 
-    /// Φ of z⁺ = Φ z + Γ F with z = (x, ẋ): 2n × 2n.
+    /// Φ of z⁺ = Φ z + Γ F with z = (x, ẋ) in m and m/s: 2n × 2n.
     pub fn transition(&self) -> DMatrix<f64> {
         let states = self.change.nrows();
         self.change.columns(0, states) + DMatrix::identity(states, states)
     }
 
-    /// A of ż = A z + B F: 2n × 2n. In exact data its upper half is \[0 I\].
+    /// A of ż = A z + B F with z = (x, ẋ) in m and m/s: 2n × 2n. In exact data its upper half is \[0 I\].
     pub fn state_matrix(&self) -> &DMatrix<f64> {
         &self.state_matrix
     }
 
     /// How far the identified dx/dt is from the measured velocity: the largest deviation of the
-    /// upper half of A from \[0 I\], relative, displacements counted in steps of velocity.
+    /// upper half of A from \[0 I\], relative (a pure number), displacements counted in steps of velocity.
     ///
     /// A velocity of the wrong scale shows here, as does a discretisation that does not fit.
     pub fn kinematic_error(&self) -> f64 {
