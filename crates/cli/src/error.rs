@@ -33,6 +33,9 @@ pub enum CliError {
         /// Numbers and names of the columns there are.
         available: String,
     },
+    /// No force was measured.
+    #[error("the force is missing: name its columns with --force")]
+    NoForce,
     /// No motion was measured.
     #[error(
         "the motion is missing: name its columns with --displacement, --velocity or --acceleration"
@@ -143,17 +146,61 @@ pub enum CliError {
     /// The time domain needs the whole state.
     #[error(
         "in the time domain --displacement and --velocity are both needed (in the frequency domain \
-         one kind of motion is enough)"
+         one kind of motion is enough); with displacement or acceleration alone, --derivatives says \
+         how to find the others: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
     )]
     TimeDomainMotions,
+    /// Derivatives belong to one measured motion.
+    #[error(
+        "--derivatives completes a record of the displacement alone or of the acceleration alone: name \
+         one of them, or leave --derivatives out"
+    )]
+    NothingToDerive,
+    /// Second derivatives fit the equation of motion only.
+    #[error(
+        "with the acceleration alone, a sliding polynomial gives second derivatives of force and motion, \
+         which only the equation of motion takes: leave --between-samples out"
+    )]
+    TwiceDifferentiated,
+    /// An option without its object.
+    #[error("{option} {why}")]
+    MisplacedOption {
+        /// The option.
+        option: &'static str,
+        /// What is wrong with it there.
+        why: &'static str,
+    },
+    /// Frequency responses have no halves.
+    #[error(
+        "instrumental variables need periods, not their averages: leave --from-frf or --method \
+         instrumental out"
+    )]
+    InstrumentalResponses,
+    /// Which samples are to be predicted is open.
+    #[error(
+        "--validate-samples {samples} of which record? Name another one with --validate, or the first \
+         sample of this one with --validate-start"
+    )]
+    ValidationStart {
+        /// Samples asked for.
+        samples: usize,
+    },
+    /// A steady state is predicted over whole periods.
+    #[error("--validate-samples {samples} is less than one period of {period}")]
+    ValidationPeriod {
+        /// Samples asked for.
+        samples: usize,
+        /// Samples in a period.
+        period: usize,
+    },
     /// No receptance can be read off the record.
     #[error(
         "nothing to plot: several forces act on every line, so the record shows no single receptance"
     )]
     NothingToDraw,
-    /// There are no spectra to draw.
-    #[error("--plot draws receptances: it needs --domain frequency")]
-    PlotNeedsSpectra,
+    /// A fit sample by sample has no receptances.
+    #[error("there are no spectra to draw: the fit was done sample by sample")]
+    NoSpectra,
     /// A covariance names a parameter the machine does not have.
     #[error("{file}: the covariance names \"{name}\"; the parameters of this machine are {known}")]
     UnknownParameter {
@@ -173,6 +220,37 @@ pub enum CliError {
     /// The simulation failed.
     #[error(transparent)]
     Simulate(#[from] mechid::SimulateError),
+    /// A record has no such rate.
+    #[error(
+        "a record of {own_hz} Hz has no samples at {rate_hz} Hz: its rates are {own_hz} Hz divided by \
+         whole numbers"
+    )]
+    SweepRate {
+        /// The rate asked for, in Hz.
+        rate_hz: f64,
+        /// The rate of the record, in Hz.
+        own_hz: f64,
+    },
+    /// Samples cannot be taken that often.
+    #[error("every n-th sample of a record: n is a whole number, got {value}")]
+    Decimation {
+        /// The number asked for.
+        value: f64,
+    },
+    /// The period is lost.
+    #[error("a period of {period} samples is no whole number of every {factor}-th sample")]
+    DecimatedPeriod {
+        /// Samples in a period.
+        period: usize,
+        /// Every how many-th is taken.
+        factor: usize,
+    },
+    /// The estimator needs what was not measured.
+    #[error("this --estimator needs the {wanted}: name its columns with --{wanted}")]
+    SweepMotion {
+        /// What is missing.
+        wanted: mechid::estimate::frequency_domain::Motion,
+    },
     /// No setting of a sweep gave an estimate.
     #[error("no setting gave an estimate; at the first one, {setting}: {reason}")]
     EmptySweep {

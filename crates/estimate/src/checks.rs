@@ -10,7 +10,7 @@ use std::fmt;
 
 pub use after::{Correlation, after_fit, cross_correlation, whiteness};
 pub use before::{before_equation_of_motion, before_fit, periodicity};
-pub use spectral::before_spectral_fit;
+pub use spectral::{before_response_fit, before_spectral_fit};
 
 /// How a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -35,6 +35,8 @@ pub enum Subject {
     Periodicity,
     /// Whether the step suits the fastest mode and the discretisation.
     Step,
+    /// Whether motion and force belong together.
+    Coherence,
     /// Whether the residual is white.
     Whiteness,
     /// Whether the residual has anything in common with the force.
@@ -71,6 +73,7 @@ impl fmt::Display for Subject {
             Subject::Conditioning => "conditioning",
             Subject::Periodicity => "periodicity",
             Subject::Step => "step",
+            Subject::Coherence => "coherence",
             Subject::Whiteness => "whiteness",
             Subject::CrossCorrelation => "cross-correlation",
         })

@@ -6,6 +6,7 @@
 //! [`CliError`].
 
 mod force;
+mod frf;
 mod identify;
 mod info;
 mod modal;
@@ -38,6 +39,7 @@ pub struct Cli {
 #[derive(Debug, Subcommand)]
 pub enum Command {
     Force(force::ForceArgs),
+    Frf(frf::FrfArgs),
     Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
     Modal(modal::ModalArgs),
@@ -53,6 +55,7 @@ impl Command {
     pub fn run(&self) -> Result<Outcome, CliError> {
         match self {
             Command::Force(args) => args.run(),
+            Command::Frf(args) => args.run(),
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
             Command::Modal(args) => args.run(),
@@ -68,6 +71,7 @@ impl Command {
     pub fn report(&self) -> &ReportArgs {
         match self {
             Command::Force(args) => &args.report,
+            Command::Frf(args) => &args.report,
             Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
             Command::Modal(args) => &args.report,

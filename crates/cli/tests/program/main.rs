@@ -1,6 +1,9 @@
 //! What every subcommand has in common: the records it takes, and how it talks.
 
+mod identification;
+mod modal;
 mod records;
+mod sweep;
 
 use std::path::Path;
 

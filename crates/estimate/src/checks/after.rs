@@ -114,13 +114,12 @@ pub fn after_fit(
 
 impl Correlation {
     fn check(&self, subject: Subject, rounding: bool, name: &str) -> Check {
+        if rounding {
+            let text = format!("{name}: rounding, whatever its correlations");
+            return Check { subject, verdict: Verdict::Good, value: self.p_value, text };
+        }
         let (outside, count) = (self.outside(), self.coefficients.len());
-        let found = format!(
-            "{name}: {outside} of {count} correlations beyond the 95 % bound of {:.3}, p = {:.2e}",
-            self.bound, self.p_value
-        );
         let (verdict, meaning) = match (subject, self.p_value < SIGNIFICANT) {
-            _ if rounding => (Verdict::Good, "rounding, whatever its correlations"),
             (Subject::Whiteness, true) => (
                 Verdict::Doubtful,
                 "not white: the noise is coloured, or the model misses something",
@@ -131,7 +130,15 @@ impl Correlation {
             (Subject::Whiteness, false) => (Verdict::Good, "white, as noise is"),
             (_, false) => (Verdict::Good, "nothing in common"),
         };
-        let text = format!("{found}; {meaning}");
+        // A distribution function does not resolve the rest.
+        let p = match self.p_value {
+            p if p < 1e-15 => "p < 1e-15".to_owned(),
+            p => format!("p = {p:.1e}"),
+        };
+        let text = format!(
+            "{name}: {outside} of {count} correlations beyond the 95 % bound of {:.3}, {p}; {meaning}",
+            self.bound
+        );
         Check { subject, verdict, value: self.p_value, text }
     }
 }

@@ -7,7 +7,7 @@ use super::before::{
 };
 use super::{Check, Subject, Verdict};
 use crate::frequency_domain::{FrequencyData, Lines, Motion, RepeatedPeriods, equation_rows};
-use crate::{Estimate, EstimateError, Unknowns};
+use crate::{Estimate, EstimateError, Frf, Unknowns};
 
 /// Periods that differ from their mean by these shares of the motion are hardly, or not, periods of
 /// one steady motion.
@@ -39,6 +39,41 @@ pub fn before_spectral_fit(
         repetition(motion, lines.sampling().len())?,
     ];
     checks.extend(band(&estimate, lines)?);
+    Ok(checks)
+}
+
+/// Shares of a motion's power that the force does not explain.
+const DOUBTFUL_INCOHERENCE: f64 = 0.1;
+const BAD_INCOHERENCE: f64 = 0.5;
+
+/// Looks at excitation, conditioning and coherence before frequency responses are fitted; forces act
+/// at the degrees of freedom `force_dof`, as for [`Frf::data`].
+///
+/// # Errors
+/// As [`Frf::data`] and [`equation_error`](crate::frequency_domain::equation_error).
+pub fn before_response_fit(
+    frf: &Frf,
+    force_dof: &[usize],
+    unknowns: &Unknowns,
+) -> Result<Vec<Check>, EstimateError> {
+    let data = frf.data(force_dof)?;
+    let mut checks = vec![excitation(&data, unknowns)];
+    match equation_rows(&data)?.solve(unknowns) {
+        Err(EstimateError::TooFewRows { .. }) => {}
+        solved => {
+            let found = solved?;
+            checks.push(conditioning(found.condition(), found.undetermined().len()));
+        }
+    }
+    let mut coherence: Vec<f64> = frf.coherence().iter().copied().collect();
+    coherence.sort_by(f64::total_cmp);
+    let (least, median) = (coherence[0], coherence[coherence.len() / 2]);
+    let verdict = grade(1.0 - median, DOUBTFUL_INCOHERENCE, BAD_INCOHERENCE);
+    let text = format!(
+        "the coherence is {median:.4} in the median and {least:.4} at least, of {:.1} averages",
+        frf.averages()
+    );
+    checks.push(Check { subject: Subject::Coherence, verdict, value: median, text });
     Ok(checks)
 }
 

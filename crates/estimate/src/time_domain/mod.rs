@@ -43,7 +43,6 @@ mod direct;
 mod fit;
 mod transitions;
 
-use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record};
 
 pub use direct::equation_of_motion;
@@ -124,7 +123,7 @@ impl TimeDomain {
         rows.fit(self.discretisation, unknowns)
     }
 
-    /// The same on a record with `factor − 1` intermediate points in every interval: the step, and
+    /// The same for displacement, velocity and force with `factor − 1` intermediate points in every interval: the step, and
     /// with it Euler's bias, becomes `factor` times smaller, as far as the interpolation is right.
     ///
     /// Band-limited interpolation takes the record as one whole period; after any other the refined
@@ -142,20 +141,14 @@ impl TimeDomain {
     /// Dissertation Appendix B.
     pub fn fit_refined(
         &self,
-        [displacement, velocity, force]: [&Record; 3],
+        records: [&Record; 3],
         unknowns: &Unknowns,
         factor: usize,
         interpolation: Interpolation,
     ) -> Result<TimeDomainFit, EstimateError> {
-        let finer = |record| refine(record, factor, interpolation);
-        let extent = match interpolation {
-            Interpolation::BandLimited => self.extent,
-            _ => Extent::Open,
-        };
-        let (x, v, f) = (finer(displacement)?, finer(velocity)?, finer(force)?);
-        let mut rows = Transitions::new(x.channels(), x.sampling().dt())?;
-        rows.push(&x, &v, &f, extent)?;
-        rows.count_as(rows.rows() / factor);
+        let dt = records[0].sampling().dt() / factor.max(1) as f64;
+        let mut rows = Transitions::new(records[0].channels(), dt)?;
+        rows.push_refined(records, self.extent, factor, interpolation)?;
         rows.fit(self.discretisation, unknowns)
     }
 }

@@ -1,6 +1,7 @@
 //! Pairs of neighbouring samples, gathered from any number of records.
 
-use mechid_signal::{Record, Sampling};
+use mechid_signal::resample::refine;
+use mechid_signal::{Interpolation, Record, Sampling};
 use nalgebra::{DMatrix, DMatrixView};
 
 use super::{Discretisation, Extent, TimeDomainFit};
@@ -102,9 +103,31 @@ impl Transitions {
         Ok(())
     }
 
-    /// From now on the pairs seen count as so many independent ones.
-    pub(super) fn count_as(&mut self, pairs: usize) {
-        self.factor.stand_for(pairs);
+    /// Adds the pairs of one record with `factor − 1` intermediate points in every interval; the step
+    /// of these transitions is `factor` times smaller than that of the record.
+    ///
+    /// Band-limited interpolation takes the record as one whole period; after any other the refined
+    /// record is open. However many points there are, [`Transitions::rows`] and all standard errors
+    /// count the intervals that were measured, as [`super::TimeDomain::fit_refined`] says.
+    ///
+    /// # Errors
+    /// As [`Transitions::push`], and [`EstimateError::Signal`] if the record cannot be refined.
+    pub fn push_refined(
+        &mut self,
+        [displacement, velocity, force]: [&Record; 3],
+        extent: Extent,
+        factor: usize,
+        interpolation: Interpolation,
+    ) -> Result<(), EstimateError> {
+        let finer = |record| refine(record, factor, interpolation);
+        let extent = match interpolation {
+            Interpolation::BandLimited => extent,
+            _ => Extent::Open,
+        };
+        let before = self.rows();
+        self.push(&finer(displacement)?, &finer(velocity)?, &finer(force)?, extent)?;
+        self.factor.stand_for(before + (self.rows() - before) / factor);
+        Ok(())
     }
 
     /// M, C and K from all pairs so far.

@@ -1,7 +1,7 @@
 //! Standard errors of fits to records with intermediate points, against the scatter of experiments.
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
 use mechid_model::{InitialState, Response};
 use mechid_problems::{dissertation_sdof, exact_harmonic_periodic, exact_zoh};
 use mechid_signal::{Interpolation, Multisine, Phases, Record, Sampling, noise};
@@ -116,6 +116,13 @@ fn standard_errors_settle_as_points_are_added() {
     };
     let once = linear.fit(&x, &v, &experiment.force, &unknowns).unwrap().into_estimate();
     assert_eq!(fit(1, Interpolation::BandLimited).degrees_of_freedom(), once.degrees_of_freedom());
+    // Two records count twice, and no more.
+    let mut rows = Transitions::new(1, 0.02 / 4.0).unwrap();
+    for _ in 0..2 {
+        let records = [&x, &v, &experiment.force];
+        rows.push_refined(records, Extent::WholePeriod, 4, Interpolation::BandLimited).unwrap();
+    }
+    assert_eq!(rows.rows(), 2 * SAMPLES);
     let [four, sixteen] =
         [4, 16].map(|factor| fit(factor, Interpolation::BandLimited).parameter("k").unwrap());
     assert_eq!(four.degrees_of_freedom, once.degrees_of_freedom());

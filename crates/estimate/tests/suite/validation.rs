@@ -1,12 +1,13 @@
 //! Checks of spectral fits and of residuals, and predictions of records that were not fitted.
 
 use mechid_estimate::checks::{
-    Check, Subject, Verdict, after_fit, before_equation_of_motion, before_spectral_fit,
+    Check, Subject, Verdict, after_fit, before_equation_of_motion, before_response_fit,
+    before_spectral_fit,
 };
 use mechid_estimate::frequency_domain::{Lines, Motion};
 use mechid_estimate::time_domain::{Discretisation, Extent};
 use mechid_estimate::{
-    EstimateError, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
+    EstimateError, Frf, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
 };
 use mechid_model::{InitialState, KyxSign, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, exact_foh, exact_harmonic_periodic};
@@ -85,6 +86,26 @@ fn trouble_with_samples_is_seen_before_the_equation_of_motion_is_fitted() {
     assert_eq!(of(&poor, Subject::Excitation).verdict, Verdict::Bad);
     assert_eq!(of(&poor, Subject::Conditioning).verdict, Verdict::Bad);
     assert_eq!(of(&look(1..=250, 2.0), Subject::Step).verdict, Verdict::Bad);
+}
+
+#[test]
+fn trouble_with_responses_is_seen_before_they_are_fitted() {
+    let system = bearing();
+    let unknowns = Unknowns::known_mass(system.mass()).unwrap();
+    let look = |lines: usize, coherence: f64| {
+        let omega: Vec<f64> = (1..=lines).map(|n| 0.1 * n as f64).collect();
+        let response = omega.iter().map(|w| system.receptance(*w).unwrap()).collect();
+        let coherence = DMatrix::from_element(lines, 2, coherence);
+        let frf = Frf::new(omega, response, coherence, 20.0, Motion::Displacement).unwrap();
+        before_response_fit(&frf, &[0, 1], &unknowns).unwrap()
+    };
+    let good = look(30, 0.99);
+    assert!(good.iter().all(|c| c.verdict == Verdict::Good), "{good:?}");
+    assert_eq!(of(&good, Subject::Coherence).value, 0.99);
+    assert_eq!(of(&look(30, 0.7), Subject::Coherence).verdict, Verdict::Doubtful);
+    assert_eq!(of(&look(30, 0.3), Subject::Coherence).verdict, Verdict::Bad);
+    // One frequency and two forces: four equations for four unknowns.
+    assert_eq!(of(&look(1, 0.99), Subject::Excitation).verdict, Verdict::Doubtful);
 }
 
 #[test]

@@ -1,15 +1,17 @@
 //! The estimators, and what the identified model leaves unexplained.
 
 use clap::ValueEnum;
+use mechid::estimate::checks::{Check, before_spectral_fit};
 use mechid::estimate::frequency_domain::{
-    FrequencyData, Lines, Motion, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
+    FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
 };
-use mechid::estimate::time_domain::{self, Discretisation, Extent, TimeDomain};
-use mechid::estimate::{Estimate, Unknowns};
-use mechid::model::{Response, SecondOrderSystem};
+use mechid::estimate::time_domain::Discretisation;
+use mechid::estimate::{Estimate, EstimateError, Unknowns};
+use mechid::model::SecondOrderSystem;
 use mechid::signal::Record;
 
+use super::course::Course;
 use super::measurement::Measurement;
 use crate::error::CliError;
 
@@ -44,56 +46,72 @@ pub struct Fitted {
     pub estimate: Estimate,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
-    /// The spectra, if it was done in the frequency domain.
+    /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
+    /// What was looked at before the fit, record by record.
+    pub before: Vec<Vec<Check>>,
+    /// What the fit leaves of each record; empty where that is not a row of samples.
+    pub residuals: Vec<Residual>,
+    /// How the machine found is made to move under a measured force.
+    pub course: Course,
     pub remarks: Vec<String>,
 }
 
-/// Fits the spectra of the window on the lines given.
+/// What a fit leaves of a record.
+#[derive(Debug)]
+pub struct Residual {
+    pub left: Record,
+    /// What it is left of, to tell rounding from noise.
+    pub fitted: Record,
+    pub force: Record,
+}
+
+/// Fits the spectra of the windows of one or several records, each on the lines that `choose` finds
+/// in a period of its force.
 pub fn frequency_domain(
-    measured: &Measurement,
+    records: &[Measurement],
     unknowns: &Unknowns,
-    lines: Vec<usize>,
+    choose: impl Fn(&Record) -> Result<Vec<usize>, CliError>,
     method: Method,
 ) -> Result<Fitted, CliError> {
-    let (motion, kind) = measured.motion();
-    let lines = Lines::new(measured.force.sampling().with_len(measured.period)?, lines)?;
-    let periods = RepeatedPeriods::new(&lines, &measured.force, motion, kind)?;
-    let data = periods.mean()?;
-    let mut remarks = Vec::new();
-    if measured.motions() > 1 {
-        remarks.push(format!("of the motions measured, the {kind} was used"));
+    let mut spectra = Vec::new();
+    for measured in records {
+        let (motion, kind) = measured.motion();
+        let chosen = choose(&measured.force.period_mean(measured.period)?)?;
+        let lines = Lines::new(measured.force.sampling().with_len(measured.period)?, chosen)?;
+        let periods = RepeatedPeriods::new(&lines, &measured.force, motion, kind)?;
+        spectra.push((lines, periods));
     }
+    let mut remarks = one_motion_of(&records[0]);
+    let together = |of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, EstimateError>| {
+        let mut all = of(&spectra[0].1)?;
+        for (_, periods) in &spectra[1..] {
+            all = all.and(&of(periods)?)?;
+        }
+        Ok::<_, CliError>(all)
+    };
+    let data = together(&RepeatedPeriods::mean)?;
     let (estimator, estimate) = match method {
         Method::LeastSquares => (
             "least squares on the equation of motion, in the frequency domain",
             equation_error(&data, unknowns)?,
         ),
         Method::Instrumental => {
-            let (first, second) = periods.halves()?;
+            let first = together(&|periods| Ok(periods.halves()?.0))?;
+            let second = together(&|periods| Ok(periods.halves()?.1))?;
             (
                 "instrumental variables, half of the periods against the other",
                 instrumental_variables(&first, &second, unknowns)?,
             )
         }
         Method::MaximumLikelihood => {
-            let data = match periods.count() {
-                1 => {
-                    remarks.push(
-                        "one period does not show its noise: it was taken as white on the motion, \
-                         of the level the residual has"
-                            .into(),
-                    );
-                    data.clone()
-                }
-                few @ 2..8 => {
-                    remarks.push(format!("{few} periods are few: one noise level for all lines"));
-                    periods.mean_with_noise(Pooling::AllLines)?
-                }
-                _ => periods.mean_with_noise(Pooling::PerLine)?,
+            let fewest = spectra.iter().map(|(_, periods)| periods.count()).min().unwrap_or(1);
+            let data = match pooling(fewest, &mut remarks) {
+                None => data.clone(),
+                Some(pooling) => together(&|periods| periods.mean_with_noise(pooling))?,
             };
             let fit = output_error(&data, unknowns)?;
-            if measured.periods > 1 {
+            if fewest > 1 {
                 remarks.push(format!(
                     "the residual has {:.3} times the power that the noise of the periods explains",
                     fit.misfit_ratio
@@ -102,42 +120,70 @@ pub fn frequency_domain(
             ("maximum likelihood, in the frequency domain", fit.estimate)
         }
     };
+    let mut before = Vec::new();
+    for (measured, (lines, _)) in records.iter().zip(&spectra) {
+        let (motion, kind) = measured.motion();
+        before.push(before_spectral_fit(lines, &measured.force, motion, kind, unknowns)?);
+    }
+    let lines = spectra.swap_remove(0).0;
+    let residuals = steady_residuals(records, &estimate)?;
     Ok(Fitted {
         domain: "frequency",
         estimator,
         estimate,
         equations: 2 * data.len(),
         frequency: Some((lines, data)),
+        before,
+        residuals,
+        course: Course::Steady,
         remarks,
     })
 }
 
-/// Fits the samples of the window: the equation of motion itself where the acceleration is measured
-/// and nothing else is asked for, otherwise what leads from one sample to the next.
-pub fn time_domain(
-    measured: &Measurement,
-    unknowns: &Unknowns,
-    between: Option<BetweenSamples>,
-) -> Result<Fitted, CliError> {
-    let (Some(x), Some(v)) = (&measured.displacement, &measured.velocity) else {
-        return Err(CliError::TimeDomainMotions);
-    };
-    let force = &measured.force;
-    let (estimator, estimate, equations) = match (between, &measured.acceleration) {
-        (None, Some(a)) => {
-            let response = Response::new(x.clone(), v.clone(), a.clone())?;
-            let found = time_domain::equation_of_motion(&response, force, unknowns)?;
-            ("least squares on the equation of motion, sample by sample", found, force.len())
+/// How the noise of so many periods is averaged over the lines; nothing if it does not show.
+fn pooling(periods: usize, remarks: &mut Vec<String>) -> Option<Pooling> {
+    match periods {
+        1 => {
+            remarks.push(
+                "one period does not show its noise: it was taken as white on the motion, of the \
+                 level the residual has"
+                    .into(),
+            );
+            None
         }
-        (between, _) => {
-            let between = between.unwrap_or(BetweenSamples::Linear);
-            let method = TimeDomain::new(between.discretisation(), Extent::Open);
-            let fit = method.fit(x, v, force, unknowns)?;
-            (between.estimator(), fit.into_estimate(), force.len() - 1)
+        few @ 2..8 => {
+            remarks.push(format!("{few} periods are few: one noise level for all lines"));
+            Some(Pooling::AllLines)
         }
-    };
-    let remarks = Vec::new();
-    Ok(Fitted { domain: "time", estimator, estimate, equations, frequency: None, remarks })
+        _ => Some(Pooling::PerLine),
+    }
+}
+
+/// What to say of the motions that spectra leave aside.
+pub fn one_motion_of(measured: &Measurement) -> Vec<String> {
+    let unused = measured.motions().len() > 1;
+    let kind = measured.motion().1;
+    Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
+}
+
+/// The motion that is left when the machine's steady state under the measured force is taken away,
+/// means apart.
+pub fn steady_residuals(
+    records: &[Measurement],
+    estimate: &Estimate,
+) -> Result<Vec<Residual>, CliError> {
+    let system = estimate.system()?;
+    let mut residuals = Vec::new();
+    for measured in records {
+        let motion = measured.motion().0.without_mean();
+        let predicted = Course::Steady.predict(&system, measured)?.swap_remove(0).predicted;
+        residuals.push(Residual {
+            left: Record::new(motion.sampling(), motion.data() - predicted.data())?,
+            fitted: motion,
+            force: measured.force.clone(),
+        });
+    }
+    Ok(residuals)
 }
 
 impl BetweenSamples {
@@ -150,7 +196,8 @@ impl BetweenSamples {
         }
     }
 
-    fn estimator(self) -> &'static str {
+    /// The estimator in words.
+    pub fn estimator(self) -> &'static str {
         match self {
             BetweenSamples::Euler => "least squares from sample to sample, Euler's rule",
             BetweenSamples::Held => {
@@ -188,23 +235,5 @@ impl Fitted {
             all += measured.norm_squared();
         }
         Ok((all > 0.0).then(|| (left / all).sqrt()))
-    }
-}
-
-impl Measurement {
-    /// The motion used in the frequency domain, and what it is.
-    pub fn motion(&self) -> (&Record, Motion) {
-        let candidates = [
-            (&self.displacement, Motion::Displacement),
-            (&self.velocity, Motion::Velocity),
-            (&self.acceleration, Motion::Acceleration),
-        ];
-        let found =
-            candidates.into_iter().find_map(|(record, kind)| Some((record.as_ref()?, kind)));
-        found.expect("a measurement has a motion")
-    }
-
-    fn motions(&self) -> usize {
-        [&self.displacement, &self.velocity, &self.acceleration].into_iter().flatten().count()
     }
 }

@@ -3,52 +3,73 @@
 use std::str::FromStr;
 
 use mechid::estimate::Unknowns;
-use nalgebra::{DMatrix, DVector};
+use mechid::model::Matrix;
 
 use crate::error::CliError;
 
-/// The masses given on the command line; empty if they are to be found.
+/// The masses given on the command line; nothing for one that is to be found, empty if all are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KnownMass {
-    values: Vec<f64>,
+    values: Vec<Option<f64>>,
 }
+
+/// Stands for a mass that is to be found.
+const UNKNOWN: &str = "unknown";
 
 impl FromStr for KnownMass {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        if text == "unknown" {
+        if text == UNKNOWN {
             return Ok(Self { values: Vec::new() });
         }
-        let number = |t: &str| t.trim().parse().map_err(|_| format!("\"{t}\" is not a number"));
-        Ok(Self { values: text.split(',').map(number).collect::<Result<_, _>>()? })
+        let entry = |t: &str| match t.trim() {
+            UNKNOWN => Ok(None),
+            number => match number.parse() {
+                Ok(value) => Ok(Some(value)),
+                Err(_) => Err(format!("\"{t}\" is not a number, nor {UNKNOWN}")),
+            },
+        };
+        Ok(Self { values: text.split(',').map(entry).collect::<Result<_, _>>()? })
     }
 }
 
 impl KnownMass {
-    /// Damping and stiffness free, and the mass unless it is given: its diagonal, or all entries
-    /// row by row.
+    /// Damping and stiffness free, and of the mass what is not given: its diagonal (then it has no
+    /// other entries), or all entries row by row.
     ///
     /// # Errors
     /// [`CliError::Mass`], [`CliError::MassCount`].
     pub fn unknowns(&self, dof: usize) -> Result<Unknowns, CliError> {
+        let mut unknowns = Unknowns::unknown_mass(dof)?;
         let got = self.values.len();
-        let mass = match got {
-            0 => return Ok(Unknowns::unknown_mass(dof)?),
-            _ if got == dof => DMatrix::from_diagonal(&DVector::from_column_slice(&self.values)),
-            _ if got == dof * dof => DMatrix::from_row_slice(dof, dof, &self.values),
-            _ => return Err(CliError::MassCount { got, dof }),
+        let entry = |row: usize, column: usize| match got {
+            _ if got == dof * dof => self.values[row * dof + column],
+            _ if row == column => self.values[row],
+            _ => Some(0.0),
         };
-        let bad = |m: &&f64| !(**m > 0.0 && m.is_finite());
-        if let Some(&value) = mass.diagonal().iter().find(bad) {
-            return Err(CliError::Mass { value });
+        match got {
+            0 => return Ok(unknowns),
+            _ if got == dof || got == dof * dof => {}
+            _ => return Err(CliError::MassCount { got, dof }),
         }
-        Ok(Unknowns::known_mass(&mass)?)
+        for row in 0..dof {
+            for column in 0..dof {
+                let Some(value) = entry(row, column) else { continue };
+                if row == column && !(value > 0.0 && value.is_finite()) {
+                    return Err(CliError::Mass { value });
+                }
+                unknowns = unknowns.fix(Matrix::Mass, row, column, value)?;
+            }
+        }
+        Ok(unknowns)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::DMatrix;
+
     use super::*;
 
     #[test]
@@ -59,6 +80,12 @@ mod tests {
         assert_eq!(mass("1,2", 2).unwrap().mass(), Some(two));
         let coupled = DMatrix::from_row_slice(2, 2, &[1.0, -0.5, -0.25, 2.0]);
         assert_eq!(mass("1,-0.5,-0.25,2", 2).unwrap().mass(), Some(coupled));
+        let partly = mass("12.5,unknown", 2).unwrap();
+        let fixed = |row, column| partly.fixed(Matrix::Mass, row, column);
+        assert_eq!((fixed(0, 0), fixed(0, 1), fixed(1, 1)), (Some(12.5), Some(0.0), None));
+        let partly = mass("1,unknown,0,2", 2).unwrap();
+        let fixed = |row, column| partly.fixed(Matrix::Mass, row, column);
+        assert_eq!((fixed(0, 1), fixed(1, 0), fixed(1, 1)), (None, Some(0.0), Some(2.0)));
         for (text, message) in [
             ("-3", "a mass must be positive and finite, got -3 kg"),
             ("0", "a mass must be positive and finite, got 0 kg"),

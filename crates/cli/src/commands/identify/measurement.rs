@@ -1,6 +1,7 @@
 //! The columns of a record as the forces and motions of a machine.
 
 use clap::Args;
+use mechid::estimate::frequency_domain::Motion;
 use mechid::signal::Record;
 use nalgebra::DMatrix;
 
@@ -11,7 +12,7 @@ use crate::options::RecordArgs;
 #[derive(Debug, Args)]
 pub struct ChannelArgs {
     /// Force columns, in N, one per degree of freedom; 0 where no force acts
-    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',', required = true)]
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     pub force: Vec<String>,
     /// Displacement columns, in m
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
@@ -46,6 +47,25 @@ pub struct Measurement {
     pub period: usize,
     /// Periods in the window.
     pub periods: usize,
+}
+
+impl Measurement {
+    /// The first kind of motion measured, and what it is.
+    pub fn motion(&self) -> (&Record, Motion) {
+        let (kind, record) = self.motions()[0];
+        (record, kind)
+    }
+
+    /// Every kind of motion measured.
+    pub fn motions(&self) -> Vec<(Motion, &Record)> {
+        let candidates = [
+            (Motion::Displacement, &self.displacement),
+            (Motion::Velocity, &self.velocity),
+            (Motion::Acceleration, &self.acceleration),
+        ];
+        let measured = candidates.into_iter();
+        measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()
+    }
 }
 
 impl ChannelArgs {
@@ -95,6 +115,9 @@ impl ChannelArgs {
     }
 
     fn check_counts(&self) -> Result<(), CliError> {
+        if self.force.is_empty() {
+            return Err(CliError::NoForce);
+        }
         let motions = [
             ("--displacement", &self.displacement),
             ("--velocity", &self.velocity),

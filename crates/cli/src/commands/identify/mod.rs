@@ -1,23 +1,37 @@
 //! `mechid identify`: the machine behind a record.
 
-mod excited;
+mod checks;
+mod course;
+mod derivatives;
+pub(super) mod excited;
 pub(super) mod fit;
-mod mass;
+pub(super) mod mass;
 pub(super) mod measurement;
-mod picture;
+mod motion_picture;
+pub(super) mod picture;
 pub(super) mod report;
+mod responses;
+mod time;
+mod validation;
+
+use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use mechid::estimate::{Estimate, Parameter, Unknowns};
 use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
 use mechid::plot::Figure;
+use mechid::signal::Record;
 
-use self::excited::Band;
-use self::excited::choose_lines;
+use self::excited::{Band, choose_lines};
 use self::fit::{BetweenSamples, Fitted, Method};
 use self::mass::KnownMass;
 use self::measurement::{ChannelArgs, Measurement};
-use self::report::{CONFIDENCE, Fit, Lines, ModeRow, ParameterRow, Report, Uncertain, Window};
+use self::report::{
+    CONFIDENCE, Fit, Lines, ModeRow, ParameterRow, RecordRow, Report, Uncertain, Window,
+};
+use self::time::TimeArgs;
+use self::validation::{Validation, ValidationArgs};
+use super::frf::responses::{Estimator, SegmentArgs};
 use crate::error::CliError;
 use crate::options::{PlotArgs, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
@@ -25,15 +39,22 @@ use crate::outcome::Outcome;
 /// Find mass, damping and stiffness from a measured force and response
 ///
 /// In the frequency domain (the default) the window must hold whole periods of a periodic
-/// excitation, and one kind of motion is enough; the periods are averaged. In the time domain any
-/// record will do: displacement, velocity and acceleration for the equation of motion itself, or
-/// displacement and velocity with an assumption on the force between the samples.
+/// excitation, and one kind of motion is enough; the periods are averaged. A random excitation is
+/// cut into segments with --from-frf. In the time domain any record will do: displacement, velocity
+/// and acceleration for the equation of motion itself, or displacement and velocity with an
+/// assumption on the force between the samples; what was not measured, --derivatives finds.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
   mechid identify rig.csv --sample-rate 610.35 --force V1 --displacement V2 \\
       --start 10585 --period 1024 --periods 1 --lines 1:2:335 --detrend mean --plot receptance.svg
-  mechid identify rotor.csv --force fx,fy --displacement x,y --mass 14.8,14.8 --band-hz 20:90 --json")]
+  mechid identify rotor.csv --force fx,fy --displacement x,y --mass 14.8,unknown --band-hz 20:90 --json
+  mechid identify a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
+      --validate c.csv
+  mechid identify random.csv --force f --acceleration a --from-frf h1 --segment 1024
+  mechid identify t.csv --force f --displacement x --velocity v --domain time \\
+      --between-samples euler --extent period --refine 8 --interpolation band-limited --plot t.svg
+  mechid identify t.csv --force f --acceleration a --domain time --derivatives savitzky-golay:11:4")]
 pub struct IdentifyArgs {
     #[command(flatten)]
     identification: Identification,
@@ -43,11 +64,14 @@ pub struct IdentifyArgs {
     pub report: ReportArgs,
 }
 
-/// Which record, what in it, and how to find the machine.
+/// Which records, what in them, and how to find the machine.
 #[derive(Debug, Args)]
 pub struct Identification {
     #[command(flatten)]
     pub input: RecordArgs,
+    /// More records of the same machine, with the same columns and window: all are fitted together
+    #[arg(value_name = "RECORD")]
+    pub more: Vec<PathBuf>,
     #[command(flatten)]
     pub channels: ChannelArgs,
     /// Where to look
@@ -60,26 +84,38 @@ pub struct Identification {
     /// Use the lines with force between two frequencies, in Hz
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
-    /// How to find the parameters from the spectra
-    #[arg(long, value_name = "METHOD", value_enum, default_value_t = Method::LeastSquares)]
-    method: Method,
+    /// How to find the parameters from the spectra [default: least-squares, or maximum-likelihood
+    /// with --from-frf]
+    #[arg(long, value_name = "METHOD", value_enum)]
+    method: Option<Method>,
     /// What is assumed of the force between samples, in the time domain [default: the equation of
-    /// motion at the samples if the acceleration is measured, else linear]
+    /// motion at the samples if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_enum)]
     pub between_samples: Option<BetweenSamples>,
-    /// Masses, in kg, one per degree of freedom (or all n×n entries row by row); or unknown
+    /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
+    /// unknown
     #[arg(
         long,
-        value_name = "unknown|KG,…",
+        value_name = "KG|unknown,…",
         default_value = "unknown",
         allow_hyphen_values = true
     )]
     mass: KnownMass,
+    #[command(flatten)]
+    time: TimeArgs,
+    /// Fit frequency responses, averaged over segments, with their coherence as weights
+    #[arg(long, value_name = "ESTIMATOR", value_enum, help_heading = "Frequency responses")]
+    from_frf: Option<Estimator>,
+    #[command(flatten)]
+    segments: SegmentArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
 }
 
 /// A machine found, and what it was found from.
 #[derive(Debug)]
 pub struct Identified {
+    /// The first record.
     pub measured: Measurement,
     pub fitted: Fitted,
     pub report: Report,
@@ -110,48 +146,93 @@ impl IdentifyArgs {
 impl Identification {
     /// Reads and identifies.
     pub fn identify(&self) -> Result<Identified, CliError> {
-        let measured = self.channels.measure(&self.input)?;
-        let unknowns = self.mass.unknowns(measured.force.channels())?;
-        let fitted = match self.domain {
-            Domain::Frequency => {
-                let force = measured.force.period_mean(measured.period)?;
-                let lines = choose_lines(&force, self.lines.as_ref(), self.band_hz)?;
-                fit::frequency_domain(&measured, &unknowns, lines, self.method)?
+        self.check_options()?;
+        let mut records = vec![self.channels.measure(&self.input)?];
+        for record in &self.more {
+            let input = RecordArgs { record: record.clone(), ..self.input.clone() };
+            records.push(self.channels.measure(&input)?);
+        }
+        let unknowns = self.mass.unknowns(records[0].force.channels())?;
+        let choose = |force: &Record| choose_lines(force, self.lines.as_ref(), self.band_hz);
+        let fitted = match (self.domain, self.from_frf) {
+            (Domain::Time, _) => self.time.fit(&records, &unknowns, self.between_samples)?,
+            (Domain::Frequency, Some(estimator)) => {
+                let how = (estimator, &self.segments);
+                responses::fit(&records, &unknowns, choose, how, self.method)?
             }
-            Domain::Time => fit::time_domain(&measured, &unknowns, self.between_samples)?,
+            (Domain::Frequency, None) => {
+                let method = self.method.unwrap_or(Method::LeastSquares);
+                fit::frequency_domain(&records, &unknowns, choose, method)?
+            }
         };
-        let report = report(&measured, &fitted)?;
-        Ok(Identified { measured, fitted, report })
+        let mut report = report(&records, &fitted)?;
+        let other = self.validation.measure(&self.input, &self.channels, fitted.course)?;
+        if let Some(other) = other {
+            let system = fitted.estimate.system()?;
+            report.validation = Some(Validation::of(&other, &system, fitted.course)?);
+        }
+        Ok(Identified { measured: records.swap_remove(0), fitted, report })
+    }
+
+    /// Refuses what the domain chosen would leave unheard.
+    fn check_options(&self) -> Result<(), CliError> {
+        let of_time = [self.between_samples.map(|_| "--between-samples"), self.time.given()];
+        let of_frequency = [
+            self.lines.as_ref().map(|_| "--lines"),
+            self.band_hz.map(|_| "--band-hz"),
+            self.method.map(|_| "--method"),
+            self.from_frf.map(|_| "--from-frf"),
+        ];
+        let first = |options: &[Option<&'static str>]| options.iter().flatten().next().copied();
+        let (misplaced, why) = match self.domain {
+            Domain::Frequency => (first(&of_time), "belongs to --domain time"),
+            Domain::Time => (first(&of_frequency), "belongs to --domain frequency"),
+        };
+        let alone =
+            (self.from_frf.is_none() && !self.segments.are_periods()).then_some("--segment");
+        match misplaced.map(|o| (o, why)).or(alone.map(|o| (o, "belongs to --from-frf"))) {
+            Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
+            None => Ok(()),
+        }
     }
 }
 
 impl Identified {
+    /// Measured and identified receptance; in the time domain measured and predicted motion of the
+    /// first record.
+    ///
+    /// # Errors
+    /// [`CliError::NothingToDraw`] if no receptance can be read off, those of a prediction.
+    pub fn picture(&self, title: &str) -> Result<Figure, CliError> {
+        if self.fitted.frequency.is_some() {
+            return self.receptance(title);
+        }
+        let system = self.fitted.estimate.system()?;
+        let compared = self.fitted.course.predict(&system, &self.measured)?;
+        Ok(motion_picture::motion(title, &compared[0]))
+    }
+
     /// Measured and identified receptance.
     ///
     /// # Errors
-    /// [`CliError::PlotNeedsSpectra`] in the time domain, [`CliError::NothingToDraw`].
-    pub fn picture(&self, title: &str) -> Result<Figure, CliError> {
-        let (_, data) = self.fitted.frequency.as_ref().ok_or(CliError::PlotNeedsSpectra)?;
+    /// [`CliError::NoSpectra`] in the time domain, [`CliError::NothingToDraw`].
+    pub fn receptance(&self, title: &str) -> Result<Figure, CliError> {
+        let (_, data) = self.fitted.frequency.as_ref().ok_or(CliError::NoSpectra)?;
         picture::receptance(title, data, &self.fitted.estimate.system()?)
     }
 }
 
-fn report(measured: &Measurement, fitted: &Fitted) -> Result<Report, CliError> {
+fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> {
     let estimate = &fitted.estimate;
     let system = estimate.system()?;
-    let samples = measured.period * measured.periods;
     let unexplained_motion = fitted.unexplained_motion(&system)?;
+    let files: Vec<&str> = records.iter().map(|r| r.file.as_str()).collect();
+    let row = |r: &Measurement| RecordRow { file: r.file.clone(), window: Window::of(r) };
     let mut report = Report {
-        file: measured.file.clone(),
+        file: records[0].file.clone(),
         domain: fitted.domain,
         estimator: fitted.estimator,
-        window: Window {
-            first_sample: measured.first_sample,
-            last_sample: measured.first_sample + samples - 1,
-            period_samples: measured.period,
-            periods: measured.periods,
-            sample_rate_hz: measured.force.sampling().rate_hz(),
-        },
+        window: Window::of(&records[0]),
         lines: fitted.frequency.as_ref().map(|(lines, _)| Lines::of(lines)),
         confidence: CONFIDENCE,
         parameters: parameters(fitted)?,
@@ -163,6 +244,9 @@ fn report(measured: &Measurement, fitted: &Fitted) -> Result<Report, CliError> {
             equations: fitted.equations,
             unknowns: estimate.parameters().len(),
         },
+        records: records.iter().map(row).collect(),
+        checks: checks::rows(fitted, &files)?,
+        validation: None,
         remarks: Vec::new(),
         system: SystemMatrices::from(&system),
         covariance: covariance(estimate),

@@ -17,7 +17,7 @@ const FINE: usize = 800;
 const ALONE: f64 = 1e-3;
 
 /// A curve before it is drawn.
-struct Trace {
+pub struct Trace {
     name: String,
     frequency_hz: Vec<f64>,
     magnitude: Vec<f64>,
@@ -83,7 +83,7 @@ fn next_to(other: f64, angle: f64) -> f64 {
 
 impl Trace {
     /// The curve of points (ω, H) with a phase that never jumps.
-    fn continuous(name: String, points: impl Iterator<Item = (f64, Complex<f64>)>) -> Self {
+    pub fn continuous(name: String, points: impl Iterator<Item = (f64, Complex<f64>)>) -> Self {
         let mut previous = 0.0;
         Self::with_phase(name, points, |_, angle| {
             previous = next_to(previous, angle);
@@ -120,7 +120,7 @@ impl Trace {
         trace
     }
 
-    fn as_response(&self) -> FrequencyResponse<'_> {
+    pub fn as_response(&self) -> FrequencyResponse<'_> {
         FrequencyResponse {
             name: &self.name,
             frequency: &self.frequency_hz,

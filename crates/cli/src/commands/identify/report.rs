@@ -6,6 +6,9 @@ use mechid::estimate::{self, IdentifiedMode, frequency_domain};
 use mechid::io::{ParameterCovariance, SystemMatrices};
 use serde::Serialize;
 
+use super::checks::CheckRow;
+use super::measurement::Measurement;
+use super::validation::Validation;
 use crate::error::CliError;
 use crate::text_table::{compact, significant, text_table};
 
@@ -25,12 +28,26 @@ pub struct Report {
     pub parameters: Vec<ParameterRow>,
     pub modes: Vec<ModeRow>,
     pub fit: Fit,
+    /// Every record, the first included.
+    pub records: Vec<RecordRow>,
+    /// What was looked at before and after the fit.
+    pub checks: Vec<CheckRow>,
+    /// How much of a record that was not fitted is predicted.
+    pub validation: Option<Validation>,
     /// What the user should know before believing the numbers.
     pub remarks: Vec<String>,
     /// M, C and K, as `mechid force --system` and others read them back.
     pub system: SystemMatrices,
     /// Of the parameters found, for what is derived from them (`mechid modal`).
     pub covariance: ParameterCovariance,
+}
+
+/// One of the records fitted.
+#[derive(Debug, Serialize)]
+pub struct RecordRow {
+    pub file: String,
+    #[serde(flatten)]
+    pub window: Window,
 }
 
 /// The samples used, counted from 1.
@@ -108,6 +125,16 @@ impl Report {
         text += &self.mode_table();
         text.push('\n');
         text += &self.fit_lines();
+        if let Some(validation) = &self.validation {
+            text += &format!("\n{}", validation.text());
+        }
+        text.push('\n');
+        for check in self.checks.iter().filter(|check| !check.is_conspicuous()) {
+            text += &format!("{}: {}\n", check.subject, check.sentence());
+        }
+        for check in self.checks.iter().filter(|check| check.is_conspicuous()) {
+            text += &format!("\nwarning, {}: {}\n", check.subject, check.sentence());
+        }
         for remark in &self.remarks {
             text += &format!("\nnote: {remark}\n");
         }
@@ -129,15 +156,17 @@ impl Report {
     }
 
     fn heading(&self) -> String {
-        let w = &self.window;
-        let rate = compact(w.sample_rate_hz, 8);
-        let periods = match (&self.lines, w.periods) {
-            (None, _) => String::new(),
-            (_, 1) => format!(", 1 period of {}", w.period_samples),
-            (_, n) => format!(", {n} periods of {}", w.period_samples),
-        };
-        let (first, last) = (w.first_sample, w.last_sample);
-        let mut text = format!("{}: samples {first} to {last}{periods}, {rate} Hz\n", self.file);
+        let mut text = String::new();
+        for RecordRow { file, window } in &self.records {
+            let rate = compact(window.sample_rate_hz, 8);
+            let periods = match (&self.lines, window.periods) {
+                (None, _) => String::new(),
+                (_, 1) => format!(", 1 period of {}", window.period_samples),
+                (_, n) => format!(", {n} periods of {}", window.period_samples),
+            };
+            let (first, last) = (window.first_sample, window.last_sample);
+            text += &format!("{file}: samples {first} to {last}{periods}, {rate} Hz\n");
+        }
         text += self.estimator;
         if let Some(l) = &self.lines {
             let [low, high] = [l.first_hz, l.last_hz].map(|hz| compact(hz, 5));
@@ -192,6 +221,19 @@ impl Report {
             );
         }
         text_table(&rows)
+    }
+}
+
+impl Window {
+    /// The samples of a measurement.
+    pub fn of(measured: &Measurement) -> Self {
+        Self {
+            first_sample: measured.first_sample,
+            last_sample: measured.first_sample + measured.period * measured.periods - 1,
+            period_samples: measured.period,
+            periods: measured.periods,
+            sample_rate_hz: measured.force.sampling().rate_hz(),
+        }
     }
 }
 

@@ -111,11 +111,11 @@ pub fn data(found: &Identified) -> Result<Vec<Drawn>, CliError> {
 /// Measured and identified receptance.
 ///
 /// # Errors
-/// [`CliError::PlotNeedsSpectra`], [`CliError::NothingToDraw`].
+/// [`CliError::NoSpectra`], [`CliError::NothingToDraw`].
 pub fn receptance(found: &Identified) -> Result<Drawn, CliError> {
     let caption = "Receptance, motion over force: measured on the lines used, and that of the \
                    identified machine.";
-    drawn("receptance", found.picture("")?, caption.into())
+    drawn("receptance", found.receptance("")?, caption.into())
 }
 
 /// Measured and modelled motion with what is left, over one period or the whole open record.

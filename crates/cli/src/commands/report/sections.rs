@@ -172,7 +172,7 @@ fn fit_rows(report: &Report) -> Vec<Vec<String>> {
 /// The frequency response, and the motion in time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, CliError> {
     let receptance = match figures::receptance(contents.found) {
-        Err(reason @ (CliError::NothingToDraw | CliError::PlotNeedsSpectra)) => Err(reason),
+        Err(reason @ (CliError::NothingToDraw | CliError::NoSpectra)) => Err(reason),
         drawn => Ok(drawn?),
     };
     let fit = contents.residual.as_ref().ok().map(|residual| figures::fit(contents, residual));

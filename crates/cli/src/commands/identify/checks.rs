@@ -1,0 +1,76 @@
+//! What was looked at before and after the fit, for people and for programs.
+
+use mechid::estimate::checks::{Check, Verdict, after_fit};
+use serde::Serialize;
+
+use super::fit::{Fitted, Residual};
+use crate::error::CliError;
+
+/// Lags up to which a residual is correlated.
+const LAGS: usize = 25;
+
+/// Samples that a lag takes at least.
+const SAMPLES_PER_LAG: usize = 4;
+
+/// One thing looked at.
+#[derive(Debug, Serialize)]
+pub struct CheckRow {
+    /// Before or after the fit.
+    pub when: &'static str,
+    /// Which record, where there are several.
+    pub record: Option<String>,
+    pub subject: String,
+    /// Good, doubtful or bad.
+    pub verdict: String,
+    /// The number behind the verdict; nothing where it is infinite.
+    pub value: Option<f64>,
+    pub text: String,
+}
+
+/// Everything looked at; `files` are the names of the records.
+pub fn rows(fitted: &Fitted, files: &[&str]) -> Result<Vec<CheckRow>, CliError> {
+    let name = |at: usize| (files.len() > 1).then(|| files[at].to_owned());
+    let mut rows = Vec::new();
+    for (at, checks) in fitted.before.iter().enumerate() {
+        rows.extend(checks.iter().map(|check| CheckRow::new("before", name(at), check)));
+    }
+    for (at, residual) in fitted.residuals.iter().enumerate() {
+        let checks = of_residual(residual)?;
+        rows.extend(checks.iter().map(|check| CheckRow::new("after", name(at), check)));
+    }
+    Ok(rows)
+}
+
+/// Nothing if there are too few samples to tell.
+fn of_residual(residual: &Residual) -> Result<Vec<Check>, CliError> {
+    match LAGS.min(residual.left.len() / SAMPLES_PER_LAG) {
+        0 => Ok(Vec::new()),
+        lags => Ok(after_fit(&residual.left, &residual.fitted, &residual.force, lags)?),
+    }
+}
+
+impl CheckRow {
+    fn new(when: &'static str, record: Option<String>, check: &Check) -> Self {
+        Self {
+            when,
+            record,
+            subject: check.subject.to_string(),
+            verdict: check.verdict.to_string(),
+            value: check.value.is_finite().then_some(check.value),
+            text: check.text.clone(),
+        }
+    }
+
+    /// Whether the user must be warned.
+    pub fn is_conspicuous(&self) -> bool {
+        self.verdict != Verdict::Good.to_string()
+    }
+
+    /// The sentence, with the record it is about.
+    pub fn sentence(&self) -> String {
+        match &self.record {
+            Some(record) => format!("{record}: {}", self.text),
+            None => self.text.clone(),
+        }
+    }
+}

@@ -1,0 +1,233 @@
+//! Fits sample by sample.
+
+use clap::{Args, ValueEnum};
+use mechid::estimate::checks::{before_equation_of_motion, before_fit};
+use mechid::estimate::time_domain::{
+    Discretisation, Extent, TimeDomain, TimeDomainFit, Transitions,
+};
+use mechid::estimate::{EquationOfMotion, Estimate, Unknowns};
+use mechid::signal::{Interpolation, Record};
+
+use super::course::Course;
+use super::derivatives::{Derivatives, Prepared};
+use super::fit::{BetweenSamples, Fitted, Residual};
+use super::measurement::Measurement;
+use crate::error::CliError;
+use crate::options::at_least_one;
+
+/// What a fit sample by sample makes of the record.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Time domain")]
+pub struct TimeArgs {
+    /// What the window is [default: open, or period with spectral derivatives]
+    #[arg(long, value_name = "EXTENT", value_enum)]
+    extent: Option<WindowExtent>,
+    /// How to find the velocity and the acceleration where only the displacement was measured, or
+    /// only the acceleration: by the spectrum of whole periods, or by a polynomial of an ORDER
+    /// through a sliding WINDOW of samples (odd)
+    #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
+    derivatives: Option<Derivatives>,
+    /// Put this many steps into every interval, which makes the error of --between-samples smaller
+    #[arg(long, value_name = "FACTOR", value_parser = at_least_one,
+          requires_all = ["interpolation", "between_samples"])]
+    refine: Option<usize>,
+    /// How to find the values between the samples
+    #[arg(long, value_name = "WAY", value_enum, requires = "refine")]
+    interpolation: Option<Between>,
+}
+
+/// What a window is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum WindowExtent {
+    /// Any stretch of motion
+    Open,
+    /// Whole periods: the first sample follows the last again
+    Period,
+}
+
+/// A way to find values between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Between {
+    /// Straight lines
+    Linear,
+    /// A cubic spline
+    Spline,
+    /// The Fourier series of the window, which must hold whole periods
+    BandLimited,
+}
+
+impl TimeArgs {
+    /// The first of these options that was given, for a message.
+    pub fn given(&self) -> Option<&'static str> {
+        [
+            (self.extent.is_some(), "--extent"),
+            (self.derivatives.is_some(), "--derivatives"),
+            (self.refine.is_some(), "--refine"),
+        ]
+        .into_iter()
+        .find_map(|(given, name)| given.then_some(name))
+    }
+
+    fn extent(&self) -> Extent {
+        match (self.extent, &self.derivatives) {
+            (Some(WindowExtent::Period), _) | (None, Some(Derivatives::Spectral)) => {
+                Extent::WholePeriod
+            }
+            _ => Extent::Open,
+        }
+    }
+
+    fn refinement(&self) -> Option<(usize, Interpolation)> {
+        let way = match self.interpolation? {
+            Between::Linear => Interpolation::Linear,
+            Between::Spline => Interpolation::NotAKnotSpline,
+            Between::BandLimited => Interpolation::BandLimited,
+        };
+        Some((self.refine?, way))
+    }
+
+    /// Fits the samples of one or several windows: the equation of motion itself where there is an
+    /// acceleration and nothing else is asked for, otherwise what leads from one sample to the next.
+    pub fn fit(
+        &self,
+        records: &[Measurement],
+        unknowns: &Unknowns,
+        between: Option<BetweenSamples>,
+    ) -> Result<Fitted, CliError> {
+        let prepare = |measured| Prepared::of(measured, self.derivatives.as_ref());
+        let prepared: Vec<Prepared> = records.iter().map(prepare).collect::<Result<_, _>>()?;
+        if between.is_some() && prepared.iter().any(|p| p.twice_differentiated) {
+            return Err(CliError::TwiceDifferentiated);
+        }
+        match between {
+            None if prepared[0].acceleration.is_some() => self.at_samples(&prepared, unknowns),
+            _ => self.step_by_step(&prepared, unknowns, between),
+        }
+    }
+
+    fn at_samples(&self, prepared: &[Prepared], unknowns: &Unknowns) -> Result<Fitted, CliError> {
+        let mut rows = EquationOfMotion::new(unknowns.dof());
+        let mut before = Vec::new();
+        for p in prepared {
+            let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
+            let [a, v, x] = [response.acceleration(), response.velocity(), response.displacement()]
+                .map(|r| r.data().as_view());
+            rows.push_rows(a, v, x, p.force.data().as_view())?;
+            before.push(before_equation_of_motion(&response, &p.force, unknowns, self.extent())?);
+        }
+        let estimate = rows.solve(unknowns)?;
+        // Says what the data leave open, before anything is made of it.
+        estimate.system()?;
+        let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate));
+        Ok(Fitted {
+            domain: "time",
+            estimator: "least squares on the equation of motion, sample by sample",
+            equations: rows.rows(),
+            frequency: None,
+            before,
+            residuals: residuals.collect::<Result<_, _>>()?,
+            course: self.course(Discretisation::FirstOrderHold),
+            remarks: self.remarks(prepared),
+            estimate,
+        })
+    }
+
+    fn step_by_step(
+        &self,
+        prepared: &[Prepared],
+        unknowns: &Unknowns,
+        between: Option<BetweenSamples>,
+    ) -> Result<Fitted, CliError> {
+        let between = between.unwrap_or(BetweenSamples::Linear);
+        let (discretisation, extent) = (between.discretisation(), self.extent());
+        let dt = prepared[0].force.sampling().dt();
+        let (factor, interpolation) = self.refinement().unzip();
+        let mut rows = Transitions::new(unknowns.dof(), dt / factor.unwrap_or(1) as f64)?;
+        let mut before = Vec::new();
+        for p in prepared {
+            let [x, v, force] = p.states();
+            match (factor, interpolation) {
+                (Some(factor), Some(interpolation)) => {
+                    rows.push_refined([x, v, force], extent, factor, interpolation)?;
+                }
+                _ => rows.push(x, v, force, extent)?,
+            }
+            before.push(before_fit(TimeDomain::new(discretisation, extent), x, v, force)?);
+        }
+        let fit = rows.fit(discretisation, unknowns)?;
+        let residuals = match factor {
+            // Intermediate points are not independent: their correlations say nothing.
+            Some(_) => Vec::new(),
+            None => {
+                let left = prepared.iter().map(|p| left_of_step(p, &fit, extent));
+                left.collect::<Result<_, _>>()?
+            }
+        };
+        Ok(Fitted {
+            domain: "time",
+            estimator: between.estimator(),
+            equations: rows.rows(),
+            frequency: None,
+            before,
+            residuals,
+            course: self.course(discretisation),
+            remarks: self.remarks(prepared),
+            estimate: fit.into_estimate(),
+        })
+    }
+
+    fn course(&self, discretisation: Discretisation) -> Course {
+        match &self.derivatives {
+            // What was differentiated by its spectrum is predicted by it.
+            Some(Derivatives::Spectral) => Course::Steady,
+            _ => Course::Sampled { discretisation, extent: self.extent() },
+        }
+    }
+
+    fn remarks(&self, prepared: &[Prepared]) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if let Some((factor, way)) = self.refinement() {
+            let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
+            remarks.push(format!(
+                "{factor} steps in every interval; the standard errors count measured samples only{}",
+                if open { ", and the interpolation takes the window as open" } else { "" }
+            ));
+        }
+        if prepared.iter().any(|p| p.twice_differentiated) {
+            remarks.push(
+                "the equation of motion was fitted to second derivatives of force and acceleration"
+                    .into(),
+            );
+        } else if self.derivatives.is_some() {
+            remarks.push("two of the three motions are derivatives, not measured".into());
+        }
+        remarks
+    }
+}
+
+/// F − M ẍ − C ẋ − K x, left of the inertia.
+fn left_of_equation(p: &Prepared, estimate: &Estimate) -> Option<Result<Residual, CliError>> {
+    let a = p.acceleration.as_ref()?;
+    let inertia = a.data() * estimate.mass().transpose();
+    let left = p.force.data()
+        - &inertia
+        - p.velocity.data() * estimate.damping().transpose()
+        - p.displacement.data() * estimate.stiffness().transpose();
+    let record = |data| Record::new(a.sampling(), data);
+    let residual =
+        || Ok(Residual { left: record(left)?, fitted: record(inertia)?, force: p.force.clone() });
+    Some(residual())
+}
+
+/// What one step predicts wrong of the velocity.
+fn left_of_step(p: &Prepared, fit: &TimeDomainFit, extent: Extent) -> Result<Residual, CliError> {
+    let [x, v, force] = p.states();
+    let errors = fit.one_step_errors(x, v, force, extent)?;
+    let n = v.channels();
+    let sampling = v.sampling().with_len(errors.nrows())?;
+    Ok(Residual {
+        left: Record::new(sampling, errors.columns(n, n).into_owned())?,
+        fitted: v.window(0, errors.nrows())?,
+        force: force.window(0, errors.nrows())?,
+    })
+}

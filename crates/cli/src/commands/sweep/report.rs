@@ -1,0 +1,234 @@
+//! What a sweep found, for people and for programs.
+
+use mechid::estimate::{Estimate, SweepPoint};
+use mechid::model::SecondOrderSystem;
+use mechid::plot::charts::{self, Quantity, Series};
+use mechid::plot::{Axis, Figure};
+use serde::Serialize;
+
+use super::samples::Estimator;
+use super::settings::Kind;
+use crate::commands::identify::report::{CONFIDENCE, Uncertain};
+use crate::error::CliError;
+use crate::text_table::{compact, significant, text_table};
+
+/// Everything `mechid sweep` has to say.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    file: String,
+    estimator: &'static str,
+    /// What the settings are.
+    setting: Kind,
+    samples_per_period: usize,
+    /// Nothing for a record without a reference.
+    natural_frequency_hz: Option<f64>,
+    confidence: f64,
+    points: Vec<Point>,
+    /// The setting with the smallest error.
+    best_setting: f64,
+    /// The same, where the settings are NPI.
+    best_npi: Option<f64>,
+}
+
+/// What came out at one setting.
+#[derive(Debug, Serialize)]
+pub struct Point {
+    setting: f64,
+    npi: Option<f64>,
+    step_s: f64,
+    /// Samples in one cycle of the natural frequency.
+    samples_per_cycle: Option<f64>,
+    /// Largest error of an entry relative to the largest entry of its matrix; without a reference
+    /// the largest standard error.
+    error: Option<f64>,
+    parameters: Vec<Parameter>,
+    /// Why there is no estimate.
+    failure: Option<String>,
+}
+
+#[derive(Debug, Serialize)]
+struct Parameter {
+    name: String,
+    unit: &'static str,
+    value: f64,
+    standard_error: f64,
+    interval: [f64; 2],
+    /// Nothing without a reference.
+    true_value: Option<f64>,
+}
+
+/// Why a setting gave no estimate.
+pub fn failure(point: &SweepPoint<f64, CliError>) -> Option<String> {
+    match &point.outcome {
+        Ok(found) => found.system().err().map(|reason| reason.to_string()),
+        Err(reason) => Some(reason.to_string()),
+    }
+}
+
+impl Point {
+    pub fn new(
+        kind: Kind,
+        point: &SweepPoint<f64, CliError>,
+        reference: Option<&SecondOrderSystem>,
+        step_s: f64,
+        natural_frequency_hz: Option<f64>,
+    ) -> Result<Self, CliError> {
+        let mut parameters = Vec::new();
+        for p in point.outcome.iter().flat_map(Estimate::parameters).filter(|p| p.value.is_finite())
+        {
+            let which = p.parameter;
+            let truth = |system: &SecondOrderSystem| {
+                system.matrix(which.matrix())[(which.row(), which.column())]
+            };
+            parameters.push(Parameter {
+                name: which.to_string(),
+                unit: which.matrix().unit(),
+                value: p.value,
+                standard_error: p.standard_error,
+                interval: p.interval(CONFIDENCE)?,
+                true_value: reference.map(truth),
+            });
+        }
+        Ok(Self {
+            setting: point.setting,
+            npi: (kind == Kind::Npi).then_some(point.setting),
+            step_s,
+            samples_per_cycle: natural_frequency_hz.map(|hz| 1.0 / (hz * step_s)),
+            error: point.error,
+            parameters,
+            failure: failure(point),
+        })
+    }
+}
+
+impl Point {
+    fn error_percent(&self) -> String {
+        self.error.map_or("none".into(), |e| significant(100.0 * e, 3))
+    }
+}
+
+impl Report {
+    pub fn new(
+        file: String,
+        estimator: Estimator,
+        setting: Kind,
+        samples_per_period: usize,
+        natural_frequency_hz: Option<f64>,
+        points: Vec<Point>,
+        best_setting: f64,
+    ) -> Self {
+        Self {
+            file,
+            estimator: estimator.name(),
+            setting,
+            samples_per_period,
+            natural_frequency_hz,
+            confidence: CONFIDENCE,
+            points,
+            best_setting,
+            best_npi: (setting == Kind::Npi).then_some(best_setting),
+        }
+    }
+
+    fn has_reference(&self) -> bool {
+        self.points.iter().flat_map(|p| &p.parameters).any(|p| p.true_value.is_some())
+    }
+
+    /// As a person reads it: all settings, or the best with its intervals.
+    pub fn text(&self, only_best: bool) -> String {
+        let mut text = format!(
+            "{}: {}, {} samples in a period",
+            self.file, self.estimator, self.samples_per_period
+        );
+        if let Some(hz) = self.natural_frequency_hz {
+            text += &format!(", natural frequency {} Hz", significant(hz, 6));
+        }
+        text += "\n\n";
+        text += &if only_best { self.best_table() } else { self.table() };
+        for point in self.points.iter().filter(|_| !only_best) {
+            if let Some(failure) = &point.failure {
+                let (name, _) = self.setting.label();
+                text += &format!("{name} {}: {failure}\n", compact(point.setting, 6));
+            }
+        }
+        text += match self.has_reference() {
+            true => "\nThe error is that of the worst entry, relative to the largest of its matrix",
+            false => {
+                "\nThe error is the largest standard error, relative to the largest entry of its \
+                 matrix: it knows nothing of bias"
+            }
+        };
+        text += if only_best { ".\n" } else { "; ± is one standard error.\n" };
+        let (name, unit) = self.setting.label();
+        let best = format!("Best: {name} {} {unit}", compact(self.best_setting, 6));
+        text + best.trim_end() + "\n"
+    }
+
+    fn table(&self) -> String {
+        let names = self.points.iter().map(|p| &p.parameters).max_by_key(|p| p.len());
+        let names: Vec<&Parameter> = names.into_iter().flatten().collect();
+        let setting = match self.setting.label() {
+            (name, "") => name.to_owned(),
+            (name, unit) => format!("{name} ({unit})"),
+        };
+        let mut header =
+            vec![setting, "step (s)".into(), "samples per cycle".into(), "error (%)".into()];
+        header.extend(names.iter().map(|p| format!("{} ({})", p.name, p.unit)));
+        let mut rows = vec![header];
+        for point in &self.points {
+            let mut row = vec![
+                compact(point.setting, 6),
+                significant(point.step_s, 4),
+                point.samples_per_cycle.map_or("–".into(), |n| significant(n, 4)),
+                point.error_percent(),
+            ];
+            row.extend(point.parameters.iter().map(|p| {
+                format!("{} ± {}", significant(p.value, 6), significant(p.standard_error, 2))
+            }));
+            rows.push(row);
+        }
+        if self.has_reference() {
+            let mut truth = vec!["true".into(), String::new(), String::new(), String::new()];
+            let value = |p: &&Parameter| p.true_value.map_or(String::new(), |v| compact(v, 6));
+            truth.extend(names.iter().map(value));
+            rows.push(truth);
+        }
+        text_table(&rows)
+    }
+
+    fn best_table(&self) -> String {
+        let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
+        let header = ["parameter", "value", "standard error", &interval, "true", "unit"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        let best = self.points.iter().filter(|p| p.setting == self.best_setting);
+        for point in best.take(1) {
+            for p in &point.parameters {
+                let mut row = vec![p.name.clone()];
+                row.extend(Uncertain::new(p.value, p.standard_error, p.interval).cells());
+                row.push(p.true_value.map_or("–".into(), |v| compact(v, 6)));
+                row.push(p.unit.into());
+                rows.push(row);
+            }
+            rows.push(vec!["error".into(), format!("{} %", point.error_percent())]);
+        }
+        text_table(&rows)
+    }
+
+    /// The error over the settings.
+    pub fn figure(&self) -> Figure {
+        let found = || self.points.iter().filter_map(|p| Some((p.setting, 100.0 * p.error?)));
+        let (x, y): (Vec<f64>, Vec<f64>) = found().unzip();
+        let (name, unit) = self.setting.label();
+        let error = match self.has_reference() {
+            true => "Worst error",
+            false => "Worst standard error",
+        };
+        charts::sweep(
+            &format!("Error over {name}: {}", self.estimator),
+            Axis::linear(name, unit),
+            Quantity::new(error, "%"),
+            &[Series::new(self.estimator, &x, &y)],
+            None,
+        )
+    }
+}

@@ -1,0 +1,156 @@
+//! `mechid sweep`: the best step is found, of experiments and of records, and what cannot be swept is
+//! refused.
+
+use std::fs;
+
+use assert_cmd::Command;
+use serde_json::Value;
+
+/// The dissertation's oscillator under a flat multisine; the response is the exact one of the
+/// band-limited force.
+const EXPERIMENT: &str = r#"{
+    "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
+    "sampling": { "samples": 256, "rate_hz": 1 },
+    "excitation": [{ "lines": "all", "amplitude": 5, "phases": "schroeder" }]
+}"#;
+
+fn sweep(experiment: &str, arguments: &str) -> (bool, Value, String) {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.json"), experiment).unwrap();
+    let output = Command::cargo_bin("mechid")
+        .unwrap()
+        .current_dir(folder.path())
+        .args(["sweep", "a.json", "--json"])
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    let report = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (output.status.success(), report, String::from_utf8(output.stderr).unwrap())
+}
+
+fn errors(report: &Value) -> Vec<f64> {
+    report["points"].as_array().unwrap().iter().map(|p| p["error"].as_f64().unwrap()).collect()
+}
+
+#[test]
+fn euler_is_best_at_the_finest_step_and_spectra_at_any() {
+    let (done, report, _) = sweep(EXPERIMENT, "--npi 4:-1:1 --estimator euler");
+    assert!(!done && report == Value::Null);
+
+    let (done, report, error) = sweep(EXPERIMENT, "--npi 1:1:4 --estimator euler --plot a.svg");
+    assert!(done, "{error}");
+    assert_eq!(report["best_npi"], 1.0);
+    let found = errors(&report);
+    assert_eq!(found.len(), 4);
+    assert!(found.windows(2).all(|pair| pair[0] < pair[1]), "{found:?}");
+    // ωn = 22.3607 rad/s: a cycle of 256 samples at NPI 1.
+    let point = &report["points"][0];
+    assert!((point["samples_per_cycle"].as_f64().unwrap() - 256.0).abs() < 1e-9);
+    assert_eq!(point["parameters"][1]["name"], "k");
+    assert_eq!(point["parameters"][1]["true_value"], 5000.0);
+
+    for estimator in ["least-squares", "maximum-likelihood", "equation-of-motion"] {
+        let arguments = format!("--npi 1:1:4 --unknown-mass --estimator {estimator}");
+        let (done, report, error) = sweep(EXPERIMENT, &arguments);
+        assert!(done, "{error}");
+        // Exact data: only rounding, amplified by the condition of the equations, is left.
+        assert!(errors(&report).iter().all(|e| *e < 1e-8), "{estimator}: {report}");
+    }
+}
+
+#[test]
+fn a_sweep_that_finds_nothing_says_why() {
+    let silent = EXPERIMENT.replace("\"amplitude\": 5", "\"amplitude\": 0");
+    let (done, _, error) = sweep(&silent, "--npi 1,2 --estimator euler");
+    assert!(
+        !done
+            && error.contains("no setting gave an estimate")
+            && error.contains("at the first one, 1"),
+        "{error}"
+    );
+}
+
+/// A record of the closed form: the oscillator under fifteen lines of a period of 240 samples.
+fn record(folder: &std::path::Path) {
+    use mechid::signal::{Multisine, Phases, Sampling};
+    let system = mechid::model::Sdof::new(10.0, 180.0, 5000.0).unwrap().system();
+    let sampling = Sampling::from_rate_hz(100.0, 240).unwrap();
+    let force = Multisine::flat(1..=15, 5.0, Phases::Schroeder).unwrap();
+    let force = force.sample(sampling).unwrap().repeated(2).unwrap();
+    let motion = mechid_problems::exact_harmonic_periodic(&system, &force).unwrap();
+    let columns = [
+        ("f".to_string(), force.channel(0)),
+        ("x".to_string(), motion.displacement().channel(0)),
+        ("v".to_string(), motion.velocity().channel(0)),
+    ];
+    let text = mechid::io::csv_text(force.sampling(), &columns);
+    fs::write(folder.join("r.csv"), text).unwrap();
+    fs::write(folder.join("a.json"), EXPERIMENT).unwrap();
+}
+
+#[test]
+fn a_record_is_swept_by_taking_fewer_samples() {
+    let place = tempfile::tempdir().unwrap();
+    record(place.path());
+    let columns = "sweep r.csv --force f --displacement x --velocity v --period 240";
+    let known = format!("{columns} --reference a.json --estimator euler");
+    let told = |arguments: &str| crate::mechid(place.path(), arguments);
+    let report = |arguments: &str| -> Value {
+        serde_json::from_str(&told(&format!("{arguments} --json"))).unwrap()
+    };
+    let euler = report(&format!("{known} --decimate 1:1:4 --plot s.svg"));
+    assert!(errors(&euler).windows(2).all(|pair| pair[0] < pair[1]), "{euler}");
+    assert_eq!((&euler["best_setting"], &euler["setting"]), (&1.0.into(), &"decimation".into()));
+    let point = &euler["points"][2];
+    assert!((point["step_s"].as_f64().unwrap() - 0.03).abs() < 1e-12);
+    assert_eq!(point["parameters"][2]["true_value"], 5000.0);
+    let [low, high] = [0, 1].map(|at| point["parameters"][2]["interval"][at].as_f64().unwrap());
+    assert!(low < high);
+    assert!(place.path().join("s.svg").exists());
+    // The same samples by their rate, as a person reads of the best of them.
+    let rates = report(&format!("{known} --rate-hz 100,50"));
+    assert_eq!(errors(&rates), errors(&euler)[..2]);
+    let best = told(&format!("{known} --rate-hz 50,100 --best"));
+    assert!(best.contains("\nBest: rate 100 Hz\n") && best.contains("95 % interval"), "{best}");
+    assert!(best.contains("\nerror ") && best.contains(" 5000 "), "{best}");
+    // Spectra do not care as long as the lines are below half the rate; the mass may be known.
+    let spectra = format!("{columns} --reference a.json --estimator least-squares");
+    for mass in ["", "--mass 10"] {
+        let found = report(&format!("{spectra} --decimate 1,2,4 {mass}"));
+        assert!(errors(&found).iter().all(|e| *e < 1e-8), "{found}");
+    }
+    // A period that falls between the samples is said where it happens.
+    let uneven = report(&format!("{spectra} --decimate 1,7"));
+    let reason = uneven["points"][1]["failure"].as_str().unwrap();
+    assert_eq!(reason, "a period of 240 samples is no whole number of every 7-th sample");
+    // Without a reference the standard errors are told as such.
+    let own = told(&format!("{columns} --decimate 1,2"));
+    assert!(own.contains("it knows nothing of bias"), "{own}");
+}
+
+#[test]
+fn settings_belong_to_what_is_swept() {
+    let place = tempfile::tempdir().unwrap();
+    record(place.path());
+    let columns = "sweep r.csv --force f --displacement x";
+    for (arguments, part) in [
+        (format!("{columns} --velocity v --npi 1,2"), "--npi belongs to the description"),
+        (format!("{columns} --velocity v --rate-hz 30"), "no samples at 30 Hz"),
+        (format!("{columns} --velocity v --decimate 2.5"), "got 2.5"),
+        (format!("{columns} --decimate 1,2"), "needs the velocity"),
+        (format!("{columns} --velocity v"), "--npi"),
+        (format!("{columns} --decimate 1 --rate-hz 50"), "cannot be used with"),
+        ("sweep a.json --npi 1 --force f".to_owned(), "--force belongs to a record"),
+    ] {
+        let message = crate::refused(place.path(), &arguments);
+        assert!(message.contains(part), "{arguments}: {message}");
+    }
+    // A described experiment is simulated at other rates.
+    let told = |arguments: &str| -> Value {
+        serde_json::from_str(&crate::mechid(place.path(), arguments)).unwrap()
+    };
+    let rates = told("sweep a.json --rate-hz 8,16 --estimator euler --json");
+    assert_eq!(rates["points"][1]["step_s"], 0.0625);
+    let thinned = told("sweep a.json --decimate 0.0625,0.125 --estimator euler --json");
+    assert_eq!(errors(&thinned), [errors(&rates)[1], errors(&rates)[0]]);
+}
