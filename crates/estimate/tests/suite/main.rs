@@ -17,4 +17,5 @@ mod refined;
 mod silverbox;
 mod time_domain;
 mod time_domain_invariance;
+mod time_domain_study;
 mod validation;

@@ -1,5 +1,6 @@
 //! Thousands of experiments: do the intervals hold, and could any estimator do better?
 
+use crate::common::documentation::documented;
 use crate::common::monte_carlo::{Estimator, Experiment, Scatter};
 use crate::common::{bearing, oscillator};
 use mechid_estimate::Unknowns;
@@ -79,35 +80,7 @@ fn table() -> Vec<String> {
     rows
 }
 
-/// Set the variable `MECHID_BLESS` to rewrite the table.
 #[test]
 fn the_table_in_the_documentation_is_what_comes_out() {
-    let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/book/src/choose/estimators.md");
-    let text = std::fs::read_to_string(place).expect("choose/estimators.md");
-    let (start, end) = ("<!-- table -->\n", "<!-- end of table -->\n");
-    let from = text.find(start).expect("start of the table") + start.len();
-    let to = text.find(end).expect("end of the table");
-    let computed = table();
-    let head: Vec<&str> = text[from..to].lines().take(2).collect();
-    if std::env::var_os("MECHID_BLESS").is_some() {
-        let table = format!("{}\n{}\n", head.join("\n"), computed.join("\n"));
-        std::fs::write(place, format!("{}{table}{}", &text[..from], &text[to..])).unwrap();
-        return;
-    }
-    let printed: Vec<&str> = text[from..to].lines().skip(2).collect();
-    assert_eq!(printed.len(), computed.len());
-    for (printed, computed) in printed.iter().zip(&computed) {
-        for (left, right) in printed.split('|').zip(computed.split('|')) {
-            let (left, right) = (left.trim(), right.trim());
-            match (left.parse::<f64>(), right.parse::<f64>()) {
-                // Other processors round the last digit otherwise.
-                (Ok(l), Ok(r)) => {
-                    let decimals = left.find('.').map_or(0, |dot| left.len() - dot - 1);
-                    let unit = 10f64.powi(-(decimals as i32));
-                    assert!((l - r).abs() < 1.5 * unit, "{printed}\n{computed}");
-                }
-                _ => assert_eq!(left, right, "{printed}\n{computed}"),
-            }
-        }
-    }
+    documented("<!-- table -->\n", "<!-- end of table -->\n", &table());
 }

@@ -1,5 +1,6 @@
 //! Closed-form steady states: the judges of the estimators.
 
+pub mod documentation;
 pub mod monte_carlo;
 
 use mechid_estimate::frequency_domain::Motion;
