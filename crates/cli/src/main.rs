@@ -9,6 +9,7 @@ mod commands;
 mod error;
 mod options;
 mod outcome;
+mod progress;
 mod text_table;
 
 use std::process::ExitCode;
@@ -32,6 +33,9 @@ fn main() -> ExitCode {
 }
 
 fn run(cli: &Cli) -> Result<(), CliError> {
-    let outcome = cli.command.run()?;
+    let outcome = match cli.command.waiting() {
+        Some(message) => progress::watched(message, || cli.command.run())?,
+        None => cli.command.run()?,
+    };
     outcome.deliver(cli.command.report())
 }

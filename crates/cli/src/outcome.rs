@@ -30,6 +30,11 @@ impl Outcome {
         Ok(Self { text, json, files: Vec::new() })
     }
 
+    /// An outcome that is a text and nothing else.
+    pub fn of_text(text: String) -> Self {
+        Self { text, json: String::new(), files: Vec::new() }
+    }
+
     /// The same outcome with one more file to write.
     pub fn with_file(mut self, path: &std::path::Path, content: impl Into<Vec<u8>>) -> Self {
         self.files.push(OutputFile { path: path.to_owned(), content: content.into() });

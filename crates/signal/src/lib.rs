@@ -34,6 +34,7 @@
 //! | uncorrelated inputs | [`multi_input`] |
 //! | impact, noise, sweep, binary sequence | [`excitation`] |
 //! | crest factor, flatness, order of excitation | [`measures`] |
+//! | whether a record repeats, and how well | [`repetition()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 
@@ -47,6 +48,7 @@ mod multisine;
 pub mod noise;
 pub mod phases;
 mod record;
+mod repetition;
 pub mod resample;
 mod sampling;
 pub mod spectrum;
@@ -57,6 +59,7 @@ pub use multisine::Multisine;
 pub use noise::NoiseLevel;
 pub use phases::Phases;
 pub use record::Record;
+pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;

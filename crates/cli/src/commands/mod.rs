@@ -5,6 +5,7 @@
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
 //! [`CliError`].
 
+mod completions;
 mod force;
 mod frf;
 mod identify;
@@ -28,8 +29,11 @@ use crate::outcome::Outcome;
     name = "mechid",
     version,
     max_term_width = 100,
-    after_help = "Numbers are in SI units. Columns are chosen by header name or by number, counted from 1.\n\
-                  Every failure prints one message, writes no file, and exits with code 2."
+    after_help = "Numbers are in SI units. Columns are chosen by name or by number, counted from 1. Records are \
+                  text\n(CSV and its relatives), MATLAB files up to -v7, universal files (dataset 58), \
+                  or any of them in gzip.\n\n\
+                  Exit codes:\n  0  success\n  2  every failure, wrong options included: one message on \
+                  the error stream, no file written"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -38,6 +42,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Completions(completions::CompletionsArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
     Identify(identify::IdentifyArgs),
@@ -54,6 +59,7 @@ impl Command {
     /// What the command found; nothing is printed or written yet.
     pub fn run(&self) -> Result<Outcome, CliError> {
         match self {
+            Command::Completions(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
             Command::Identify(args) => args.run(),
@@ -67,9 +73,22 @@ impl Command {
         }
     }
 
+    /// What to say while it computes, if that takes long; nothing if it says so itself, or must not.
+    pub fn waiting(&self) -> Option<&'static str> {
+        match self {
+            Command::Multisine(_) | Command::Sweep(_) => None,
+            _ if self.report().quiet => None,
+            Command::Simulate(_) => Some("simulating"),
+            Command::Force(_) => Some("looking for the force"),
+            Command::Identify(_) => Some("identifying"),
+            _ => Some("working"),
+        }
+    }
+
     /// How the user wants to be told.
     pub fn report(&self) -> &ReportArgs {
         match self {
+            Command::Completions(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,
             Command::Identify(args) => &args.report,
@@ -83,3 +102,6 @@ impl Command {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

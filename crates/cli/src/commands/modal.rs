@@ -21,7 +21,7 @@ use crate::text_table::{compact, significant, text_table};
 /// frequency, ratio and shape comes with the standard error that the uncertainty of mass, damping and
 /// stiffness gives it. Shapes are scaled so that their largest entry is 1.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
   mechid modal found.json")]
 pub struct ModalArgs {

@@ -38,7 +38,7 @@ use crate::text_table::{compact, significant, text_table};
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
-    after_help = "Example:\n  mechid simulate examples/machine.json --output record.csv\n  \
+    after_help = "Examples:\n  mechid simulate examples/machine.json --output record.csv\n  \
                   mechid identify record.csv --force force --displacement displacement"
 )]
 pub struct SimulateArgs {

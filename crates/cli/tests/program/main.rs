@@ -1,9 +1,11 @@
 //! What every subcommand has in common: the records it takes, and how it talks.
 
 mod identification;
+mod info;
 mod modal;
 mod records;
 mod sweep;
+mod talk;
 
 use std::path::Path;
 

@@ -269,8 +269,24 @@ impl Table {
         Ok(columns)
     }
 
-    /// The numbers of a column, by its index.
-    pub(crate) fn values(&self, column: usize) -> Result<&[f64], IoError> {
+    /// The number of samples that all the columns `wanted` have.
+    ///
+    /// # Errors
+    /// [`IoError::Lengths`] if they differ, and those of [`Table::column`].
+    pub fn common_length(&self, wanted: &[impl AsRef<str>]) -> Result<usize, IoError> {
+        let columns: Vec<usize> =
+            wanted.iter().map(|w| self.find(w.as_ref())).collect::<Result<_, _>>()?;
+        time_axis::common_length(self, &columns)
+    }
+
+    /// The numbers of a column, by its index counted from 0.
+    ///
+    /// # Errors
+    /// As [`Table::column`].
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn values(&self, column: usize) -> Result<&[f64], IoError> {
         match &self.contents.columns[column].values {
             Ok(values) => Ok(values),
             Err(why) => Err(why.error(&self.file, self.label(column))),
@@ -282,8 +298,11 @@ impl Table {
         self.contents.columns[column].axis
     }
 
-    /// Number and name of a column, by its index.
-    pub(crate) fn label(&self, column: usize) -> String {
+    /// Number and name of a column for a message, by its index counted from 0: `2 "force"`.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn label(&self, column: usize) -> String {
         match self.names[column].as_str() {
             "" => format!("{}", column + 1),
             name => format!("{} \"{name}\"", column + 1),

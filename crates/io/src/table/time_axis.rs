@@ -60,7 +60,7 @@ impl TimeAxis<'_> {
 }
 
 /// The number of samples that all the columns have.
-fn common_length(table: &Table, columns: &[usize]) -> Result<usize, IoError> {
+pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, IoError> {
     let mut lengths = Vec::new();
     for column in columns {
         lengths.push((*column, table.values(*column)?.len()));

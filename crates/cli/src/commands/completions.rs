@@ -1,0 +1,33 @@
+//! `mechid completions`: what a shell needs to complete the program's options.
+
+use clap::{Args, CommandFactory as _};
+use clap_complete::Shell;
+
+use super::Cli;
+use crate::error::CliError;
+use crate::options::ReportArgs;
+use crate::outcome::Outcome;
+
+/// Print a script that lets a shell complete subcommands and options
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid completions bash > ~/.local/share/bash-completion/completions/mechid
+  mechid completions zsh > ~/.zfunc/_mechid
+  mechid completions fish > ~/.config/fish/completions/mechid.fish")]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL", value_enum)]
+    shell: Shell,
+    /// There is nothing to report but the script itself.
+    #[arg(skip)]
+    pub report: ReportArgs,
+}
+
+impl CompletionsArgs {
+    /// Writes the script.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let mut script = Vec::new();
+        clap_complete::generate(self.shell, &mut Cli::command(), "mechid", &mut script);
+        Ok(Outcome::of_text(String::from_utf8_lossy(&script).into_owned()))
+    }
+}

@@ -1,0 +1,131 @@
+//! What can be said of one channel.
+
+use std::f64::consts::TAU;
+
+use mechid::signal::{Record, Repetition, Sampling, SignalError, Spectrum, measures, repetition};
+use serde::Serialize;
+
+/// Spectral lines told of a channel.
+const STRONGEST: usize = 3;
+
+/// Weaker lines are not told, as a part of the strongest one.
+const FAINTEST: f64 = 0.01;
+
+/// The measures of a channel.
+#[derive(Debug, Serialize)]
+pub struct Channel {
+    pub column: usize,
+    pub name: String,
+    /// What the file says of it beyond its name.
+    pub about: String,
+    pub mean: f64,
+    pub rms: f64,
+    pub peak: f64,
+    /// Peak over RMS; 1.41 for a sine. Nothing for a channel of zeros.
+    pub crest_factor: Option<f64>,
+    pub minimum: f64,
+    pub maximum: f64,
+    /// The strongest lines of the spectrum, the strongest first.
+    pub spectrum_peaks: Vec<SpectrumPeak>,
+    /// Nothing if it does not repeat.
+    pub period: Option<Period>,
+}
+
+/// A line of a spectrum that is higher than its neighbours.
+#[derive(Debug, Serialize)]
+pub struct SpectrumPeak {
+    pub cycles_per_sample: f64,
+    /// Nothing without a time axis.
+    pub frequency_hz: Option<f64>,
+    /// Of the sine, in the unit of the channel.
+    pub amplitude: f64,
+}
+
+/// After how long a channel repeats.
+#[derive(Debug, Serialize)]
+pub struct Period {
+    pub samples: usize,
+    /// Nothing without a time axis.
+    pub seconds: Option<f64>,
+    /// RMS difference from one period to the next, over √2 times the RMS about the mean.
+    pub mismatch: f64,
+}
+
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+impl Channel {
+    /// Measures a channel whose step, in s, may be unknown.
+    pub fn of(
+        column: usize,
+        name: String,
+        about: String,
+        values: Vec<f64>,
+        dt: Option<f64>,
+    ) -> Result<Self, SignalError> {
+        let repeats = repetition(&values);
+        let extreme =
+            |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or(0.0);
+        let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
+        let (mean, rms, peak) = (mean(&values), measures::rms(&values), measures::peak(&values));
+        let spectrum_peaks = spectrum_peaks(values, mean, repeats, dt)?;
+        Ok(Self {
+            column,
+            name,
+            about,
+            mean,
+            rms,
+            peak,
+            crest_factor: (peak > 0.0).then(|| peak / rms),
+            minimum,
+            maximum,
+            spectrum_peaks,
+            period: repeats.map(|r| Period {
+                samples: r.period,
+                seconds: dt.map(|dt| r.period as f64 * dt),
+                mismatch: r.mismatch,
+            }),
+        })
+    }
+}
+
+/// The strongest local maxima of the spectrum about the mean: of whole periods where the channel
+/// repeats, otherwise of all samples weighted by a Hann window.
+fn spectrum_peaks(
+    mut values: Vec<f64>,
+    mean: f64,
+    repeats: Option<Repetition>,
+    dt: Option<f64>,
+) -> Result<Vec<SpectrumPeak>, SignalError> {
+    if let Some(Repetition { period, .. }) = repeats {
+        values.truncate(values.len() / period * period);
+    }
+    let len = values.len();
+    for (k, value) in values.iter_mut().enumerate() {
+        // The window's mean is 1, so that a sine keeps its amplitude.
+        let weight = match repeats {
+            Some(_) => 1.0,
+            None => 1.0 - (TAU * k as f64 / len as f64).cos(),
+        };
+        *value = weight * (*value - mean);
+    }
+    let spectrum = Spectrum::of(&Record::from_channel(Sampling::new(1.0, len)?, values)?);
+    let amplitude: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
+    let at = |n: usize| amplitude.get(n).copied().unwrap_or(0.0);
+    let mut peaks: Vec<usize> =
+        (1..amplitude.len()).filter(|n| at(*n) > at(n - 1) && at(*n) >= at(n + 1)).collect();
+    peaks.sort_by(|a, b| at(*b).total_cmp(&at(*a)));
+    let strongest = peaks.first().map_or(0.0, |n| at(*n));
+    let told = peaks.into_iter().take(STRONGEST).take_while(|n| at(*n) > FAINTEST * strongest);
+    Ok(told
+        .map(|n| {
+            let cycles_per_sample = n as f64 / len as f64;
+            SpectrumPeak {
+                cycles_per_sample,
+                frequency_hz: dt.map(|dt| cycles_per_sample / dt),
+                amplitude: at(n),
+            }
+        })
+        .collect())
+}

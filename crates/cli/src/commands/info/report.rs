@@ -1,0 +1,144 @@
+//! How `mechid info` tells what it found.
+
+use serde::Serialize;
+
+use super::channel::{Channel, Period, SpectrumPeak};
+use crate::text_table::{compact, significant, text_table};
+
+/// What is in a record.
+#[derive(Debug, Serialize)]
+pub struct Report {
+    pub file: String,
+    pub format: String,
+    pub columns: usize,
+    /// Samples that most columns have.
+    pub samples: usize,
+    /// Nothing if no column can be shown.
+    pub window: Option<Window>,
+    /// Nothing without a time axis.
+    pub sampling: Option<Sampling>,
+    pub channels: Vec<Channel>,
+    /// Single numbers in the file.
+    pub scalars: Vec<Scalar>,
+    /// What else the file says.
+    pub remarks: Vec<String>,
+    /// Columns not shown, and why.
+    pub left_out: Vec<String>,
+}
+
+/// The samples shown, counted from 1.
+#[derive(Debug, Serialize)]
+pub struct Window {
+    first_sample: usize,
+    last_sample: usize,
+}
+
+#[derive(Debug, Serialize)]
+pub struct Sampling {
+    rate_hz: f64,
+    step_s: f64,
+    duration_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+pub struct Scalar {
+    pub name: String,
+    pub value: f64,
+}
+
+impl Window {
+    pub fn of(start: usize, len: usize) -> Self {
+        Self { first_sample: start + 1, last_sample: start + len }
+    }
+}
+
+impl Sampling {
+    pub fn of(dt: f64, len: usize) -> Self {
+        Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt }
+    }
+}
+
+impl Report {
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{}: {}, {} columns, {} samples",
+            self.file, self.format, self.columns, self.samples
+        );
+        if let Some(Window { first_sample, last_sample }) = &self.window {
+            text += &format!("; shown: samples {first_sample} to {last_sample}");
+        }
+        text += &match &self.sampling {
+            Some(s) => format!(
+                "\n{} Hz, a step of {} s, {} s long\n",
+                compact(s.rate_hz, 8),
+                compact(s.step_s, 6),
+                compact(s.duration_s, 6)
+            ),
+            None => "\nno time axis: give --time or --sample-rate\n".into(),
+        };
+        text += &self.levels();
+        text += &self.lines();
+        for Scalar { name, value } in &self.scalars {
+            text += &format!("{name} = {value:e}\n");
+        }
+        for remark in &self.remarks {
+            text += &format!("{remark}\n");
+        }
+        for reason in &self.left_out {
+            text += &format!("left out: {reason}\n");
+        }
+        text
+    }
+
+    fn levels(&self) -> String {
+        if self.channels.is_empty() {
+            return String::new();
+        }
+        let header = ["column", "mean", "RMS", "peak", "crest factor", "minimum", "maximum"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for c in &self.channels {
+            let about = if c.about.is_empty() { String::new() } else { format!(" ({})", c.about) };
+            let mut row = vec![format!("{} {}{about}", c.column, c.name)];
+            row.extend([c.mean, c.rms, c.peak].map(|v| significant(v, 5)));
+            row.push(c.crest_factor.map_or("–".into(), |v| significant(v, 4)));
+            row.extend([c.minimum, c.maximum].map(|v| significant(v, 5)));
+            rows.push(row);
+        }
+        format!("\n{}\n", text_table(&rows))
+    }
+
+    fn lines(&self) -> String {
+        if self.channels.is_empty() {
+            return String::new();
+        }
+        let unit = if self.sampling.is_some() { "Hz" } else { "cycles/sample" };
+        let mut rows = vec![
+            [
+                "column",
+                "period, samples",
+                "mismatch",
+                &format!("strongest lines, {unit}: amplitude"),
+            ]
+            .map(String::from)
+            .to_vec(),
+        ];
+        for c in &self.channels {
+            let (period, mismatch) = match &c.period {
+                Some(Period { samples, mismatch, .. }) => {
+                    (samples.to_string(), format!("{} %", significant(100.0 * mismatch, 3)))
+                }
+                None => ("–".into(), "–".into()),
+            };
+            let peaks: Vec<String> = c.spectrum_peaks.iter().map(SpectrumPeak::text).collect();
+            rows.push(vec![format!("{} {}", c.column, c.name), period, mismatch, peaks.join(", ")]);
+        }
+        format!("{}\n", text_table(&rows)).replace("\n\n\n", "\n\n")
+    }
+}
+
+impl SpectrumPeak {
+    fn text(&self) -> String {
+        let frequency = self.frequency_hz.unwrap_or(self.cycles_per_sample);
+        format!("{}: {}", compact(frequency, 5), significant(self.amplitude, 3))
+    }
+}

@@ -1,0 +1,93 @@
+//! The help of every subcommand keeps what the program promises.
+
+use std::any::TypeId;
+
+use clap::{Arg, CommandFactory as _, Parser as _};
+
+use super::Cli;
+
+/// Units by the name of an option's value.
+const UNITS: [(&str, &str); 3] = [("HZ", "Hz"), ("N", "N"), ("DB", "dB")];
+
+/// Values that are numbers without a unit.
+const PURE: [&str; 6] = ["RATIO", "LAMBDA", "BETA", "GAMMA", "THETA", "FRACTION,…"];
+
+fn subcommands() -> Vec<clap::Command> {
+    let mut program = Cli::command();
+    program.build();
+    let all: Vec<_> =
+        program.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
+    assert!(all.len() >= 9);
+    all
+}
+
+/// The examples of a help text; lines that end with a backslash go on.
+fn examples(help: &str) -> Vec<String> {
+    let (_, block) = help.split_once("Examples:\n").unwrap_or_default();
+    let joined = block.replace("\\\n", " ");
+    joined.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+#[test]
+fn every_subcommand_has_examples_that_are_understood() {
+    for command in subcommands() {
+        let name = command.get_name();
+        let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let examples = examples(&help);
+        assert!(!examples.is_empty(), "{name} --help has no Examples:");
+        for example in &examples {
+            // What the shell would take for itself.
+            let words = example.split_once(" > ").map_or(example.as_str(), |(words, _)| words);
+            let parsed = Cli::try_parse_from(words.split_whitespace());
+            assert!(parsed.is_ok(), "{example}\n{}", parsed.unwrap_err());
+        }
+        assert!(examples.iter().any(|e| e.starts_with(&format!("mechid {name}"))), "{name}");
+    }
+}
+
+#[test]
+fn every_subcommand_can_be_quiet() {
+    for command in subcommands().iter().filter(|c| c.get_name() != "completions") {
+        for option in ["quiet", "json"] {
+            let has = command.get_arguments().any(|arg| arg.get_long() == Some(option));
+            assert!(has, "{} has no --{option}", command.get_name());
+        }
+    }
+}
+
+#[test]
+fn every_option_is_explained_and_names_its_unit() {
+    for command in subcommands() {
+        for arg in command.get_arguments() {
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            let place = format!("{} {}", command.get_name(), arg.get_id());
+            assert!(!help.is_empty(), "{place} has no help");
+            if arg.get_value_parser().type_id() != TypeId::of::<f64>() {
+                continue;
+            }
+            let name = value_name(arg);
+            let unit = UNITS.iter().find(|(value, _)| name.starts_with(value));
+            match unit {
+                Some((_, unit)) => assert!(help.contains(unit), "{place}: {help}"),
+                // A level in the unit of its own column, or no unit at all.
+                None => assert!(
+                    PURE.contains(&name.as_str()) || help.contains("unit"),
+                    "{place} takes a number called {name}: which unit?"
+                ),
+            }
+        }
+    }
+}
+
+fn value_name(arg: &Arg) -> String {
+    arg.get_value_names()
+        .and_then(|names| names.first())
+        .map(ToString::to_string)
+        .unwrap_or_default()
+}
+
+#[test]
+fn the_exit_codes_are_documented() {
+    let help = Cli::command().render_long_help().to_string();
+    assert!(help.contains("Exit codes:\n  0  success\n  2  every failure"), "{help}");
+}

@@ -1,0 +1,116 @@
+//! `mechid info`. Judge: closed forms of the signals in the files.
+
+use std::f64::consts::{SQRT_2, TAU};
+use std::fmt::Write as _;
+use std::fs;
+
+use serde_json::Value;
+
+use super::mechid;
+
+/// Six periods of 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1 at 100 Hz, and a decaying 7 Hz.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("t,force,ring\n");
+    for k in 0..300 {
+        let turn = TAU * f64::from(k) / 50.0;
+        let force = 2.0 * turn.sin() + 0.5 * (3.0 * turn).sin() + 1.0;
+        let t = f64::from(k) / 100.0;
+        writeln!(text, "{t},{force},{}", (-0.5 * t).exp() * (TAU * 7.0 * t).sin()).unwrap();
+    }
+    fs::write(folder.path().join("a.csv"), text.replace("t,force", "clock,force")).unwrap();
+    fs::write(folder.path().join("timed.csv"), text).unwrap();
+    folder
+}
+
+fn info(folder: &tempfile::TempDir, arguments: &str) -> Value {
+    serde_json::from_str(&mechid(folder.path(), &format!("info {arguments} --json"))).unwrap()
+}
+
+fn close(value: &Value, truth: f64, tolerance: f64) {
+    let value = value.as_f64().unwrap();
+    assert!((value - truth).abs() < tolerance, "{value}, truth {truth}");
+}
+
+#[test]
+fn levels_lines_and_period_are_those_of_the_signal() {
+    let folder = folder();
+    let report = info(&folder, "timed.csv --columns force,ring");
+    assert_eq!(report["format"], "text, fields between commas");
+    close(&report["sampling"]["rate_hz"], 100.0, 1e-9);
+    close(&report["sampling"]["duration_s"], 3.0, 1e-9);
+    let force = &report["channels"][0];
+    close(&force["mean"], 1.0, 1e-14);
+    close(&force["rms"], f64::sqrt(1.0 + 2.0 + 0.125), 1e-13);
+    let crest = force["peak"].as_f64().unwrap() / force["rms"].as_f64().unwrap();
+    close(&force["crest_factor"], crest, 1e-14);
+    assert_eq!(force["period"]["samples"], 50);
+    close(&force["period"]["seconds"], 0.5, 1e-12);
+    close(&force["period"]["mismatch"], 0.0, 1e-12);
+    // All lines there are, exact since the window holds whole periods.
+    let peaks = force["spectrum_peaks"].as_array().unwrap();
+    assert_eq!(peaks.len(), 2);
+    for (peak, (hz, amplitude)) in peaks.iter().zip([(2.0, 2.0), (6.0, 0.5)]) {
+        close(&peak["frequency_hz"], hz, 1e-10);
+        close(&peak["amplitude"], amplitude, 1e-12);
+    }
+    let ring = &report["channels"][1];
+    assert!(ring["period"].is_null());
+    close(&ring["spectrum_peaks"][0]["frequency_hz"], 7.0, 0.34);
+}
+
+#[test]
+fn without_a_time_axis_frequencies_are_per_sample() {
+    let folder = folder();
+    let report = info(&folder, "a.csv --columns force");
+    assert!(report["sampling"].is_null());
+    let force = &report["channels"][0];
+    assert!(force["period"]["seconds"].is_null());
+    assert_eq!(force["period"]["samples"], 50);
+    assert!(force["spectrum_peaks"][0]["frequency_hz"].is_null());
+    close(&force["spectrum_peaks"][0]["cycles_per_sample"], 0.02, 1e-15);
+    let text = mechid(folder.path(), "info a.csv");
+    assert!(text.contains("no time axis: give --time or --sample-rate"), "{text}");
+    assert!(text.contains("strongest lines, cycles/sample"), "{text}");
+}
+
+#[test]
+fn a_sine_has_its_crest_factor_and_its_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let sine = |k: u32| (TAU * f64::from(k) / 8.0).sin();
+    let text: String = (0..64).map(|k| format!("{}\n", 3.0 * sine(k))).collect();
+    fs::write(folder.path().join("sine.csv"), text).unwrap();
+    let report = info(&folder, "sine.csv --sample-rate 8 --start 9 --period 16 --periods 2");
+    assert_eq!(report["window"]["first_sample"], 9);
+    assert_eq!(report["window"]["last_sample"], 40);
+    close(&report["channels"][0]["crest_factor"], SQRT_2, 1e-12);
+    close(&report["channels"][0]["spectrum_peaks"][0]["frequency_hz"], 1.0, 1e-14);
+}
+
+#[test]
+fn what_cannot_be_shown_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../io/tests/data/");
+    let report = info(&folder, &format!("{data}plain.mat"));
+    assert_eq!(report["format"], "MATLAB level 5");
+    assert_eq!(report["scalars"][0]["name"], "fs");
+    assert_eq!(report["scalars"][0]["value"], 4.0);
+    let left_out = report["left_out"].as_array().unwrap();
+    assert!(left_out.iter().any(|l| l.as_str().unwrap().contains("\"short\" has 3 samples")));
+    assert!(left_out.iter().any(|l| l.as_str().unwrap().contains("\"note\": it holds text")));
+    let text = mechid(folder.path(), &format!("info {data}printed.unv"));
+    for part in [
+        "universal file, 6 columns, 8 samples",
+        "4 Hz, a step of 0.25 s, 2 s long",
+        "12+Z (rig 4, acceleration)",
+        "units: code 1 SI: Meter (newton)",
+        "it holds a frequency response function",
+    ] {
+        assert!(text.contains(part), "\"{part}\" is missing in\n{text}");
+    }
+    // Time that is not even is told, unless it was asked for.
+    fs::write(folder.path().join("b.csv"), "time,x\n0,1\n1,2\n3,1\n").unwrap();
+    let text = mechid(folder.path(), "info b.csv");
+    assert!(text.contains("left out: time axis: b.csv: the time steps are not uniform"), "{text}");
+    super::refused(folder.path(), "info b.csv --time time");
+}

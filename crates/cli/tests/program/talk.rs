@@ -1,0 +1,65 @@
+//! How the program talks: scripts for shells, no colours into pipes, nothing when told to be quiet.
+
+use std::fs;
+use std::process::Command;
+
+use super::{mechid, refused, run};
+
+const SUBCOMMANDS: [&str; 9] = [
+    "completions",
+    "force",
+    "identify",
+    "info",
+    "modal",
+    "multisine",
+    "simulate",
+    "stability",
+    "sweep",
+];
+
+#[test]
+fn completions_know_every_subcommand() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        let script = mechid(folder.path(), &format!("completions {shell}"));
+        for subcommand in SUBCOMMANDS {
+            assert!(script.contains(subcommand), "{shell}: {subcommand}");
+        }
+        assert!(script.contains("band-hz"), "{shell}");
+    }
+    let message = refused(folder.path(), "completions tcsh");
+    assert!(message.contains("bash, elvish, fish, powershell, zsh"), "{message}");
+}
+
+/// Judge: bash itself, which reads the script without running it.
+#[test]
+fn bash_understands_its_completions() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mechid.bash");
+    fs::write(&path, mechid(folder.path(), "completions bash")).unwrap();
+    let output = Command::new("bash").arg("-n").arg(&path).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn no_colours_go_into_pipes() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut calls = vec!["--help".to_owned(), "--version".into(), "nonsense".into(), "info".into()];
+    calls.extend(SUBCOMMANDS.map(|subcommand| format!("{subcommand} --help")));
+    calls.push("info no-such-file".into());
+    for arguments in calls {
+        let output = run(folder.path(), &arguments);
+        for stream in [output.stdout, output.stderr] {
+            assert!(!stream.contains(&0x1b), "{arguments}: {}", String::from_utf8_lossy(&stream));
+        }
+    }
+}
+
+#[test]
+fn quiet_success_says_nothing_and_quiet_failure_says_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.csv"), "t,f\n0,1\n1,-1\n2,1\n3,-1\n").unwrap();
+    assert_eq!(mechid(folder.path(), "info a.csv --quiet"), "");
+    let message = refused(folder.path(), "info a.csv --columns x --quiet");
+    assert!(message.starts_with("error: a.csv has no column \"x\""), "{message}");
+}
