@@ -1,5 +1,7 @@
 //! What can go wrong between the command line and the result.
 
+use mechid::signal::told;
+
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -97,7 +99,7 @@ pub enum CliError {
         columns: String,
     },
     /// A mass that no body has.
-    #[error("a mass must be positive and finite, got {value} kg")]
+    #[error("a mass must be positive and finite, got {value} kg", value = told(*value))]
     Mass {
         /// The value given, in kg.
         value: f64,
@@ -121,7 +123,8 @@ pub enum CliError {
     /// No line of the band is driven.
     #[error(
         "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
-         {first_hz:.6} and {last_hz:.6} Hz"
+         {first_hz:.6} and {last_hz:.6} Hz",
+        low_hz = told(*low_hz), high_hz = told(*high_hz)
     )]
     EmptyBand {
         /// Lower end asked for, in Hz.
@@ -252,7 +255,10 @@ pub enum CliError {
         wanted: mechid::estimate::frequency_domain::Motion,
     },
     /// No setting of a sweep gave an estimate.
-    #[error("no setting gave an estimate; at the first one, {setting}: {reason}")]
+    #[error(
+        "no setting gave an estimate; at the first one, {setting}: {reason}",
+        setting = told(*setting)
+    )]
     EmptySweep {
         /// The first setting.
         setting: f64,

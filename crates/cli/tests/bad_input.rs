@@ -148,6 +148,7 @@ fn window_past_the_end() {
 fn no_excited_line() {
     // Line 3 of 128 ms stands at 23.4375 Hz.
     identify(&good(), "--band-hz 30:60", &["no excited line between 30 and 60 Hz", "23.4375"]);
+    identify(&good(), "--band-hz 1e300:2e300", &["between 1e300 and 2e300 Hz"]);
     identify(&good(), "--lines even", &["no excited line among even"]);
     identify(&good(), "--lines 1:20", &["line 20 is not between 1 and 15"]);
     identify(&good(), "--lines 5:1", &["\"5:1\" is no choice of lines", "first:step:last"]);

@@ -1,17 +1,22 @@
 //! What can be wrong with an integration.
 
+use mechid_signal::told;
+
 /// An integration that cannot be set up or carried out; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IntegrateError {
     /// The time step is not a positive finite number of seconds.
-    #[error("time step must be positive and finite, got {dt} s")]
+    #[error("time step must be positive and finite, got {dt} s", dt = told(*dt))]
     TimeStep {
         /// The step given, in seconds.
         dt: f64,
     },
     /// A parameter of a scheme lies outside its range.
-    #[error("{scheme}: {parameter} must lie between {least} and {most}, got {value}")]
+    #[error(
+        "{scheme}: {parameter} must lie between {least} and {most}, got {value}",
+        least = told(*least), most = told(*most), value = told(*value)
+    )]
     Parameter {
         /// Which scheme.
         scheme: &'static str,
@@ -35,7 +40,10 @@ pub enum IntegrateError {
         dof: usize,
     },
     /// The forces in the middle of the steps do not lie on the time axis of the force.
-    #[error("the mid-step forces have {got} samples at {got_dt} s, the force {expected} at {dt} s")]
+    #[error(
+        "the mid-step forces have {got} samples at {got_dt} s, the force {expected} at {dt} s",
+        got_dt = told(*got_dt), dt = told(*dt)
+    )]
     MidStepSampling {
         /// Samples of the mid-step forces.
         got: usize,
@@ -55,7 +63,10 @@ pub enum IntegrateError {
         scheme: String,
     },
     /// A value given or computed by the caller's function is NaN or infinite.
-    #[error("{what}, component {component}, is {value} at t = {time} s, not a finite number")]
+    #[error(
+        "{what}, component {component}, is {value} at t = {time} s, not a finite number",
+        time = told(*time), value = told(*value)
+    )]
     NotFinite {
         /// What was given.
         what: &'static str,
@@ -68,7 +79,8 @@ pub enum IntegrateError {
     },
     /// The matrix the scheme has to solve with is singular.
     #[error(
-        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)"
+        "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)",
+        dt = told(*dt)
     )]
     SingularEffectiveMass {
         /// Which scheme.
@@ -81,7 +93,8 @@ pub enum IntegrateError {
     /// The step makes the free motion of a stable system grow.
     #[error(
         "{scheme} is unstable at Δt = {dt} s: spectral radius {spectral_radius:.6}; {}",
-        limit_text(*.critical_step)
+        limit_text(*.critical_step),
+        dt = told(*dt)
     )]
     Unstable {
         /// The scheme's name.
@@ -95,7 +108,8 @@ pub enum IntegrateError {
     },
     /// A start from rest was asked for, but the machine moves.
     #[error(
-        "the start from rest needs zero initial velocity, component {component} is {velocity} m/s"
+        "the start from rest needs zero initial velocity, component {component} is {velocity} m/s",
+        velocity = told(*velocity)
     )]
     NotAtRest {
         /// Component, counted from 1.
@@ -106,7 +120,8 @@ pub enum IntegrateError {
     /// No response repeats with the period of the force, or none that can be told from rounding.
     #[error(
         "no unique response repeats every {period} s: the free motion repeats too \
-         (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})"
+         (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
+        period = told(*period)
     )]
     NoPeriodicState {
         /// Period of the force, in seconds.
@@ -125,7 +140,10 @@ pub enum IntegrateError {
         component: usize,
     },
     /// An accuracy analysis needs a motion that oscillates.
-    #[error("the damping ratio must be at least 0 and less than 1, got {damping_ratio}")]
+    #[error(
+        "the damping ratio must be at least 0 and less than 1, got {damping_ratio}",
+        damping_ratio = told(*damping_ratio)
+    )]
     DampingRatio {
         /// The ratio given.
         damping_ratio: f64,

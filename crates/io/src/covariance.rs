@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mechid_signal::told;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -39,12 +40,19 @@ impl ParameterCovariance {
 /// The covariance in a JSON report, if it has one.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::Json`], and [`IoError::Description`] if it is not one row and one
-/// column per parameter with positive variances.
+/// [`IoError::Read`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is null, as JSON writes
+/// what is infinite, and [`IoError::Description`] if it is not one row and one column per parameter
+/// with positive variances.
 pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovariance>, IoError> {
     #[derive(Deserialize)]
     struct Described {
-        covariance: Option<ParameterCovariance>,
+        covariance: Option<Written>,
+    }
+    #[derive(Deserialize)]
+    struct Written {
+        parameters: Vec<String>,
+        matrix: Vec<Vec<Option<f64>>>,
+        degrees_of_freedom: usize,
     }
     let file = path.as_ref().display().to_string();
     let text = match std::fs::read_to_string(path) {
@@ -61,11 +69,29 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     if covariance.matrix.len() != n || covariance.matrix.iter().any(|row| row.len() != n) {
         return Err(wrong(format!("the covariance of {n} parameters must be a {n}×{n} matrix")));
     }
-    for (row, name) in covariance.parameters.iter().enumerate() {
-        let variance = covariance.matrix[row][row];
+    let Written { parameters, matrix, degrees_of_freedom } = covariance;
+    let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);
+    // A parameter whose own variance is missing explains what is missing in its row and column.
+    let own = |row: &usize| matrix[*row][*row].is_none();
+    let rows = if (0..n).any(|row| own(&row)) {
+        (0..n).filter(own).collect::<Vec<_>>()
+    } else {
+        (0..n).filter(missing).collect()
+    };
+    if !rows.is_empty() {
+        let names: Vec<&str> = rows.iter().map(|row| parameters[*row].as_str()).collect();
+        return Err(IoError::Undetermined { file, parameters: names.join(", ") });
+    }
+    let matrix: Vec<Vec<f64>> =
+        matrix.into_iter().map(|row| row.into_iter().flatten().collect()).collect();
+    for (row, name) in parameters.iter().enumerate() {
+        let variance = matrix[row][row];
         if variance < 0.0 {
-            return Err(wrong(format!("the variance of {name} is {variance}, less than zero")));
+            return Err(wrong(format!(
+                "the variance of {name} is {}, less than zero",
+                told(variance)
+            )));
         }
     }
-    Ok(Some(covariance))
+    Ok(Some(ParameterCovariance { parameters, matrix, degrees_of_freedom }))
 }

@@ -1,7 +1,7 @@
 //! What can be wrong with a file.
 
 use mechid_model::ModelError;
-use mechid_signal::SignalError;
+use mechid_signal::{SignalError, told};
 
 use crate::Place;
 
@@ -157,7 +157,7 @@ pub enum IoError {
         what: String,
     },
     /// A sample is NaN or infinite.
-    #[error("{file}, {at}, column {column}: {value} is not a finite number")]
+    #[error("{file}, {at}, column {column}: {value} is not a finite number", value = told(*value))]
     NotFinite {
         /// The file.
         file: String,
@@ -173,8 +173,8 @@ pub enum IoError {
         "{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
          {} s (resample the record, or give the sample rate instead of the time column if the \
          times are only rounded)",
-        six_digits(*step),
-        six_digits(*usual)
+        told(six_digits(*step)),
+        told(six_digits(*usual))
     )]
     NonUniformTime {
         /// The file.
@@ -211,7 +211,11 @@ pub enum IoError {
     /// Columns of one record were sampled at different instants.
     #[error(
         "{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
-         s from {first_start} s, {second} of {second_step} s from {second_start} s"
+         s from {first_start} s, {second} of {second_step} s from {second_start} s",
+        first_start = told(*first_start),
+        first_step = told(*first_step),
+        second_start = told(*second_start),
+        second_step = told(*second_step),
     )]
     TimeAxes {
         /// The file.
@@ -232,7 +236,8 @@ pub enum IoError {
     /// The rate given is not that of the file.
     #[error(
         "the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
-         the rate out)"
+         the rate out)",
+        own_hz = told(*own_hz), rate_hz = told(*rate_hz)
     )]
     RateContradicts {
         /// The file.
@@ -245,7 +250,10 @@ pub enum IoError {
         rate_hz: f64,
     },
     /// The sampling rate is not usable.
-    #[error("the sample rate must be a positive finite number of Hz, got {rate_hz}")]
+    #[error(
+        "the sample rate must be a positive finite number of Hz, got {rate_hz}",
+        rate_hz = told(*rate_hz)
+    )]
     SampleRate {
         /// The rate given, in Hz.
         rate_hz: f64,
@@ -273,6 +281,18 @@ pub enum IoError {
         file: String,
         /// What is wrong.
         what: String,
+    },
+    /// A covariance is not known.
+    #[error(
+        "{file}: the covariance of {parameters} is null: the record it was identified from leaves \
+         {parameters} undetermined; identify from one that moves the machine more, or take \
+         \"covariance\" out of the file to count the machine as exactly known"
+    )]
+    Undetermined {
+        /// The file.
+        file: String,
+        /// Names of the parameters.
+        parameters: String,
     },
     /// The matrices make no system.
     #[error("{file}: {source}")]

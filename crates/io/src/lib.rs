@@ -31,8 +31,8 @@ pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::csv_text;
 pub use error::IoError;
 pub use experiment::{
-    Experiment, FirstDisplacements, FirstSteps, Level, LoadBeyond, MiddleLoad, Noise, ResponseKind,
-    SchemeChoice,
+    Experiment, FirstDisplacements, FirstSteps, InitialMotion, Level, LoadBeyond, MiddleLoad,
+    Noise, PerDof, ResponseKind, SchemeChoice,
 };
 pub use line_spec::LineSpec;
 pub use output::{OutputFile, write_all};

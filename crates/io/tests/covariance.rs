@@ -38,3 +38,22 @@ fn a_wrong_covariance_is_refused() {
     assert!(matches!(read_covariance(file("{").path()), Err(IoError::Json { .. })));
     assert!(matches!(read_covariance("/no/such/file"), Err(IoError::Read { .. })));
 }
+
+/// JSON has no infinity: what the data left undetermined is written as null.
+#[test]
+fn an_undetermined_parameter_is_named() {
+    for (matrix, named) in [
+        ("[[1.0, null], [null, null]]", "k"),
+        ("[[null, null], [null, null]]", "c, k"),
+        ("[[1.0, null], [0.0, 2.0]]", "c"),
+    ] {
+        let text = format!(
+            "{{\"covariance\": {{\"parameters\": [\"c\", \"k\"], \"matrix\": {matrix}, \
+             \"degrees_of_freedom\": 3}}}}"
+        );
+        let e = read_covariance(file(&text).path()).unwrap_err();
+        let what =
+            format!(": the covariance of {named} is null: the record it was identified from");
+        assert!(matches!(e, IoError::Undetermined { .. }) && e.to_string().contains(&what), "{e}");
+    }
+}

@@ -1,8 +1,8 @@
 //! Descriptions of experiments: what they mean, and what is said about wrong ones.
 
 use mechid_io::{
-    Experiment, FirstDisplacements, IoError, LoadBeyond, MiddleLoad, SchemeChoice, SystemMatrices,
-    read_system,
+    Experiment, FirstDisplacements, FirstSteps, InitialMotion, IoError, LoadBeyond, MiddleLoad,
+    PerDof, ResponseKind, SchemeChoice, SystemMatrices, read_system,
 };
 
 /// A description with these lines in place of the default ones.
@@ -142,4 +142,105 @@ fn the_system_of_a_report_is_read_back() {
     assert_eq!(read_system(&path).unwrap(), system);
     std::fs::write(&path, "{}").unwrap();
     assert!(read_system(&path).unwrap_err().to_string().contains("missing field `system`"));
+}
+
+/// Judge: closed forms written out here.
+#[test]
+fn every_kind_of_excitation_is_sampled() {
+    let force = |excitation: &str| {
+        let text = description(SDOF, excitation, "");
+        parse(&text).unwrap().force().unwrap().channel(0).to_vec()
+    };
+    let at = |f: &dyn Fn(f64) -> f64| (0..32).map(|k| f(f64::from(k) / 64.0)).collect::<Vec<_>>();
+    let same = |found: Vec<f64>, truth: Vec<f64>| {
+        let off = found.iter().zip(&truth).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12, "{found:?}\n{truth:?}");
+    };
+    let tau = std::f64::consts::TAU;
+    same(
+        force(r#"{ "kind": "harmonic", "amplitude": 3, "frequency_hz": 4, "phase_rad": 0.5 }"#),
+        at(&|t| 3.0 * (tau * 4.0 * t + 0.5).cos()),
+    );
+    same(
+        force(
+            r#"{ "kind": "sweep", "amplitude": 2, "start_hz": 1, "end_hz": 9, "duration_s": 0.5 }"#,
+        ),
+        at(&|t| 2.0 * (tau * (t + 8.0 * t * t)).sin()),
+    );
+    same(
+        force(r#"{ "kind": "half-sine", "peak": 7, "start_s": 0.125, "duration_s": 0.25 }"#),
+        at(&|t| {
+            if (0.125..=0.375).contains(&t) { 7.0 * (tau * 2.0 * (t - 0.125)).sin() } else { 0.0 }
+        }),
+    );
+    // 5 N·s within one step of 1/64 s.
+    let impulse = force(r#"{ "kind": "impulse", "momentum": 5, "at_s": 0.0625 }"#);
+    assert_eq!((impulse[4], impulse.iter().sum::<f64>()), (320.0, 320.0));
+    let prbs = force(r#"{ "kind": "prbs", "order": 4, "amplitude": 2, "hold_samples": 2 }"#);
+    assert!(prbs.iter().all(|f| f.abs() == 2.0));
+    assert_eq!((prbs[..2].to_vec(), prbs[30..].to_vec()), (vec![2.0; 2], vec![2.0; 2]));
+    let random = r#""kind": "random", "standard_deviation": 2, "burst": 0.5, "seed": 3"#;
+    let burst = force(&format!("{{ {random} }}"));
+    assert!(burst[..16].iter().all(|f| *f != 0.0) && burst[16..].iter().all(|f| *f == 0.0));
+    assert_ne!(burst, force(&format!("{{ {}, \"band_hz\": [4, 20] }}", random)));
+    // Several forces on one degree of freedom add up, and a kind that is left out is a multisine.
+    let one = r#"{ "kind": "multisine", "lines": "3", "amplitude": 2 }"#;
+    let twice = force(&format!("{one}, {}", one.replace(r#""kind": "multisine", "#, "")));
+    same(twice, force(one).iter().map(|f| 2.0 * f).collect());
+}
+
+#[test]
+fn a_response_starts_where_it_is_told_to() {
+    let from = |motion: &str| {
+        let text = description(SDOF, FORCE, &format!(r#", "response": {{ "from": {motion} }}"#));
+        parse(&text)
+    };
+    let experiment = from(r#"{ "displacement": 0.5, "velocity": [-2] }"#).unwrap();
+    let motion =
+        InitialMotion { displacement: PerDof::One(0.5), velocity: PerDof::Each(vec![-2.0]) };
+    assert_eq!(experiment.response, ResponseKind::From(motion));
+    let state = experiment.initial_state().unwrap();
+    assert_eq!((state.displacement()[0], state.velocity()[0]), (0.5, -2.0));
+    let state = from(r#"{ "velocity": 1 }"#).unwrap().initial_state().unwrap();
+    assert_eq!((state.displacement()[0], state.velocity()[0]), (0.0, 1.0));
+    for (motion, part) in [
+        (r#"{ "displacement": [1, 2] }"#, "displacement at the first sample has 2 entries"),
+        (r#"{ "acceleration": 1 }"#, "unknown field `acceleration`"),
+        (r#"{ "displacement": "1 m" }"#, "expected a number, or a list with one for each degree"),
+    ] {
+        let e = from(motion).and_then(|e| e.initial_state()).unwrap_err().to_string();
+        assert!(e.contains(part), "\"{part}\" is missing in: {e}");
+    }
+    let given =
+        r#", "scheme": { "name": "houbolt", "start": { "given": { "at_dt": 1, "at_2dt": 2 } } }"#;
+    let start = FirstSteps::Given { at_dt: PerDof::One(1.0), at_2dt: PerDof::One(2.0) };
+    assert_eq!(
+        parse(&description(SDOF, FORCE, given)).unwrap().scheme,
+        SchemeChoice::Houbolt { start }
+    );
+}
+
+#[test]
+fn wrong_excitations_say_what_is_wrong() {
+    for (excitation, part) in [
+        (
+            r#"{ "kind": "saw" }"#,
+            "unknown kind of excitation `saw`, expected one of multisine, harm",
+        ),
+        (r#"{ "kind": "harmonic", "amplitude": 1 }"#, "missing field `frequency_hz`"),
+        (r#"{ "kind": "prbs", "order": 4, "amplitude": 1, "hold": 2 }"#, "unknown field `hold`"),
+        (r#"{ "lines": "3", "amplitude": 1, "order": 4 }"#, "unknown field `order`"),
+        (r#"{ "kind": "prbs", "order": 99, "amplitude": 1 }"#, "between 2 and 24, got 99"),
+        (
+            r#"{ "kind": "harmonic", "amplitude": 1, "frequency_hz": 40 }"#,
+            "40 Hz is not below half",
+        ),
+    ] {
+        let e = parse(&description(SDOF, excitation, "")).and_then(|e| e.force()).unwrap_err();
+        assert!(e.to_string().contains(part), "\"{part}\" is missing in: {e}");
+    }
+    let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
+    let experiment = parse(&description(SDOF, random, "")).unwrap();
+    let e = experiment.mid_step_force().unwrap_err().to_string();
+    assert!(e.contains("a random force has none: choose load held or linear"), "{e}");
 }

@@ -9,7 +9,7 @@ use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, IoError, Level, LoadBeyond, MiddleLoad,
     ResponseKind, SchemeChoice,
 };
-use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
+use mechid_model::{ModelError, Response, SecondOrderSystem};
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
@@ -54,9 +54,9 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let system = experiment.system()?;
     let period = experiment.force()?;
     let force = repeated(&period, experiment.periods)?;
-    let scheme = scheme(experiment.scheme)?;
+    let scheme = scheme(experiment)?;
     let response = match &scheme {
-        None if experiment.response == ResponseKind::FromRest => {
+        None if experiment.response != ResponseKind::Periodic => {
             return Err(SimulateError::ExactFromRest);
         }
         None => exact_periodic(&system, &period)?,
@@ -68,20 +68,23 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
                 false => None,
             };
             match experiment.response {
+                ResponseKind::Periodic if has_given_start(experiment) => {
+                    return Err(SimulateError::GivenStartPeriodic);
+                }
                 ResponseKind::Periodic => {
                     integrate_periodic(scheme, &system, with_middle(&period, middle.as_ref()))?
                 }
-                ResponseKind::FromRest => {
-                    let rest = InitialState::rest(system.dof());
+                ResponseKind::FromRest | ResponseKind::From(_) => {
+                    let start = experiment.initial_state()?;
                     let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
-                    integrate(scheme, &system, with_middle(&force, middle.as_ref()), &rest)?
+                    integrate(scheme, &system, with_middle(&force, middle.as_ref()), &start)?
                 }
             }
         }
     };
     let response = match experiment.response {
         ResponseKind::Periodic => map(&response, |_, r| repeated(r, experiment.periods))?,
-        ResponseKind::FromRest => response,
+        ResponseKind::FromRest | ResponseKind::From(_) => response,
     };
     let noise = experiment.noise;
     let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
@@ -125,9 +128,16 @@ pub enum SimulateError {
     Signal(#[from] SignalError),
     /// Without time steps there is no start.
     #[error(
-        "the scheme \"exact\" gives the periodic response only: choose another one for a response from rest"
+        "the scheme \"exact\" gives the periodic response only: choose another one for a response that \
+         starts from rest or from a given motion"
     )]
     ExactFromRest,
+    /// What repeats has no start.
+    #[error(
+        "a periodic response has no start: give displacements for Houbolt's first steps only with a \
+         response from rest or from a given motion"
+    )]
+    GivenStartPeriodic,
 }
 
 /// The response that repeats with a force which is band-limited between its samples, line by line
@@ -164,9 +174,13 @@ pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Resp
     Response::new(x, v, a)
 }
 
-fn scheme(choice: SchemeChoice) -> Result<Option<Box<dyn Scheme>>, IntegrateError> {
-    Ok(Some(match choice {
-        SchemeChoice::Newmark { beta, gamma } => Box::new(Newmark::new(beta, gamma)?),
+fn has_given_start(experiment: &Experiment) -> bool {
+    matches!(experiment.scheme, SchemeChoice::Houbolt { start: FirstSteps::Given { .. } })
+}
+
+fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, SimulateError> {
+    Ok(Some(match &experiment.scheme {
+        SchemeChoice::Newmark { beta, gamma } => Box::new(Newmark::new(*beta, *gamma)?),
         SchemeChoice::CentralDifference { start } => Box::new(CentralDifference {
             start: match start {
                 FirstDisplacements::Taylor => CentralDifferenceStart::Taylor,
@@ -177,10 +191,14 @@ fn scheme(choice: SchemeChoice) -> Result<Option<Box<dyn Scheme>>, IntegrateErro
             start: match start {
                 FirstSteps::AverageAcceleration => HouboltStart::AverageAcceleration,
                 FirstSteps::CentralDifference => HouboltStart::CentralDifference,
+                FirstSteps::Given { at_dt, at_2dt } => HouboltStart::Given {
+                    at_dt: experiment.per_dof("the displacement at Δt", at_dt)?,
+                    at_2dt: experiment.per_dof("the displacement at 2Δt", at_2dt)?,
+                },
             },
         }),
         SchemeChoice::WilsonTheta { theta, load } => {
-            Box::new(WilsonTheta::new(theta)?.with_load(match load {
+            Box::new(WilsonTheta::new(*theta)?.with_load(match load {
                 LoadBeyond::Projected => WilsonLoad::Projected,
                 LoadBeyond::Interpolated => WilsonLoad::Interpolated,
             }))
@@ -247,5 +265,42 @@ mod tests {
         let order = |scheme: &str| (error(scheme, 128) / error(scheme, 256)).log2();
         assert!((order(exact) - 4.0).abs() < 0.2, "{}", order(exact));
         assert!((order(linear) - 2.0).abs() < 0.2, "{}", order(linear));
+    }
+    fn simulated(scheme: &str, response: &str) -> Result<Simulation, SimulateError> {
+        let text = format!(
+            r#"{{ "system": {{ "mass": 2, "damping": 0, "stiffness": 8 }},
+                 "sampling": {{ "samples": 64, "rate_hz": 100 }},
+                 "excitation": [],
+                 "scheme": {scheme}, "response": {response} }}"#
+        );
+        simulate(&Experiment::parse("test.json", &text).unwrap())
+    }
+
+    /// Judge: x = x0 cos ωt + v0/ω sin ωt with ω = 2.
+    #[test]
+    fn a_free_motion_starts_where_it_is_told_to() {
+        let from = r#"{ "from": { "displacement": 0.5, "velocity": -3 } }"#;
+        let truth = |t: f64| 0.5 * (2.0 * t).cos() - 1.5 * (2.0 * t).sin();
+        let given = format!(
+            r#"{{ "name": "houbolt", "start": {{ "given": {{ "at_dt": {}, "at_2dt": {} }} }} }}"#,
+            truth(0.01),
+            truth(0.02)
+        );
+        for scheme in [r#"{ "name": "newmark" }"#, &given] {
+            let simulation = simulated(scheme, from).unwrap();
+            let x = simulation.response.displacement();
+            for (k, t) in x.sampling().times().enumerate() {
+                // Second order: (ωΔt)² = 4e-4 per unit of time and amplitude, 0.64 s of 1.6 m.
+                assert!((x.channel(0)[k] - truth(t)).abs() < 4e-4, "{scheme} at {t} s");
+            }
+        }
+        let x = simulated(&given, from).unwrap();
+        assert!((x.response.displacement().channel(0)[2] - truth(0.02)).abs() < 1e-15);
+        assert!(matches!(
+            simulated(r#"{ "name": "exact" }"#, from),
+            Err(SimulateError::ExactFromRest)
+        ));
+        let periodic = simulated(&given, r#""periodic""#);
+        assert!(matches!(periodic, Err(SimulateError::GivenStartPeriodic)));
     }
 }

@@ -1,5 +1,7 @@
 //! What can be wrong with a model.
 
+use mechid_signal::told;
+
 use crate::Matrix;
 
 /// A model that cannot be made or evaluated; every variant carries the offending numbers.
@@ -19,7 +21,10 @@ pub enum ModelError {
         dof: usize,
     },
     /// A matrix entry is NaN or infinite.
-    #[error("entry ({row}, {column}) of the {matrix} matrix is {value}, not a finite number")]
+    #[error(
+        "entry ({row}, {column}) of the {matrix} matrix is {value}, not a finite number",
+        value = told(*value)
+    )]
     NotFinite {
         /// Which matrix.
         matrix: Matrix,
@@ -50,7 +55,7 @@ pub enum ModelError {
         expected: usize,
     },
     /// A scalar parameter is out of range.
-    #[error("the {name} must be {requirement}, got {value}")]
+    #[error("the {name} must be {requirement}, got {value}", value = told(*value))]
     Parameter {
         /// What it is called.
         name: &'static str,
@@ -68,7 +73,10 @@ pub enum ModelError {
         dof: usize,
     },
     /// An initial displacement or velocity is NaN or infinite.
-    #[error("the initial {quantity} of degree of freedom {dof} is {value}, not a finite number")]
+    #[error(
+        "the initial {quantity} of degree of freedom {dof} is {value}, not a finite number",
+        value = told(*value)
+    )]
     StateNotFinite {
         /// `"displacement"` or `"velocity"`.
         quantity: &'static str,
@@ -88,7 +96,8 @@ pub enum ModelError {
     /// The dynamic stiffness cannot be inverted: an undamped resonance.
     #[error(
         "the dynamic stiffness is singular at {omega} rad/s \
-         (reciprocal condition about {reciprocal_condition:.1e}): an undamped resonance"
+         (reciprocal condition about {reciprocal_condition:.1e}): an undamped resonance",
+        omega = told(*omega)
     )]
     SingularDynamicStiffness {
         /// Angular frequency, in rad/s.

@@ -1,13 +1,15 @@
 //! What can be wrong with a signal.
 
-use crate::Sampling;
+use crate::{Sampling, told};
 
 /// A signal that cannot be made or used; every variant carries the offending numbers.
+///
+/// Fields count from 0, as indices do; messages count from 1, as people do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SignalError {
     /// The time step is not a positive finite number of seconds.
-    #[error("time step must be positive and finite, got {dt} s")]
+    #[error("time step must be positive and finite, got {dt} s", dt = told(*dt))]
     TimeStep {
         /// The step given, in seconds.
         dt: f64,
@@ -16,7 +18,7 @@ pub enum SignalError {
     #[error("a record needs at least one sample")]
     Empty,
     /// The data do not have as many samples as the sampling says.
-    #[error("channel {channel} has {got} samples where the sampling has {expected}")]
+    #[error("channel {} has {got} samples where the sampling has {expected}", channel + 1)]
     Length {
         /// Channel, counted from 0.
         channel: usize,
@@ -26,7 +28,11 @@ pub enum SignalError {
         expected: usize,
     },
     /// A sample is NaN or infinite.
-    #[error("sample {sample} of channel {channel} is {value}, not a finite number")]
+    #[error(
+        "sample {} of channel {} is {value}, not a finite number",
+        sample + 1, channel + 1,
+        value = told(*value)
+    )]
     NotFinite {
         /// Sample, counted from 0.
         sample: usize,
@@ -36,7 +42,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A window does not lie inside the record.
-    #[error("samples {start}..{end} were asked for, the record has {len}")]
+    #[error("samples {} to {end} were asked for, the record has {len}", start + 1)]
     Window {
         /// First sample asked for, counted from 0.
         start: usize,
@@ -47,7 +53,8 @@ pub enum SignalError {
     },
     /// Two records that must share a time axis do not.
     #[error(
-        "time axes differ: {left_len} samples at {left_dt} s against {right_len} at {right_dt} s"
+        "time axes differ: {left_len} samples at {left_dt} s against {right_len} at {right_dt} s",
+        left_dt = told(*left_dt), right_dt = told(*right_dt)
     )]
     SamplingMismatch {
         /// Samples of the first record.
@@ -97,7 +104,7 @@ pub enum SignalError {
         len: usize,
     },
     /// A quantity that must be finite and not negative is not.
-    #[error("{what} must be finite and not negative, got {value}")]
+    #[error("{what} must be finite and not negative, got {value}", value = told(*value))]
     Negative {
         /// The quantity.
         what: &'static str,
@@ -105,7 +112,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite is not.
-    #[error("{what} must be finite, got {value}")]
+    #[error("{what} must be finite, got {value}", value = told(*value))]
     Infinite {
         /// The quantity.
         what: &'static str,
@@ -113,7 +120,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite and greater than zero is not.
-    #[error("{what} must be finite and positive, got {value}")]
+    #[error("{what} must be finite and positive, got {value}", value = told(*value))]
     NotPositive {
         /// The quantity.
         what: &'static str,
@@ -121,7 +128,10 @@ pub enum SignalError {
         value: f64,
     },
     /// A frequency at or above half the sampling rate cannot be sampled.
-    #[error("{frequency_hz} Hz is not below half the sampling rate, {nyquist_hz} Hz")]
+    #[error(
+        "{frequency_hz} Hz is not below half the sampling rate, {nyquist_hz} Hz",
+        frequency_hz = told(*frequency_hz), nyquist_hz = told(*nyquist_hz)
+    )]
     AboveNyquist {
         /// The frequency, in Hz.
         frequency_hz: f64,
@@ -129,7 +139,10 @@ pub enum SignalError {
         nyquist_hz: f64,
     },
     /// A band must have its lower end at or above zero and below its upper end.
-    #[error("a band from {low_hz} Hz to {high_hz} Hz is none")]
+    #[error(
+        "a band from {low_hz} Hz to {high_hz} Hz is none",
+        low_hz = told(*low_hz), high_hz = told(*high_hz)
+    )]
     Band {
         /// Lower end, in Hz.
         low_hz: f64,
@@ -137,7 +150,10 @@ pub enum SignalError {
         high_hz: f64,
     },
     /// No spectral line lies in the band.
-    #[error("no line lies between {low_hz} Hz and {high_hz} Hz, they stand every {spacing_hz} Hz")]
+    #[error(
+        "no line lies between {low_hz} Hz and {high_hz} Hz, they stand every {spacing_hz} Hz",
+        low_hz = told(*low_hz), high_hz = told(*high_hz), spacing_hz = told(*spacing_hz)
+    )]
     EmptyBand {
         /// Lower end, in Hz.
         low_hz: f64,
@@ -147,7 +163,10 @@ pub enum SignalError {
         spacing_hz: f64,
     },
     /// A quantity lies outside the range it may have.
-    #[error("{what} must be between {low} and {high}, got {value}")]
+    #[error(
+        "{what} must be between {low} and {high}, got {value}",
+        value = told(*value), low = told(*low), high = told(*high)
+    )]
     Range {
         /// The quantity.
         what: &'static str,
@@ -169,7 +188,7 @@ pub enum SignalError {
         got: usize,
     },
     /// Several inputs must excite the same lines.
-    #[error("input {input} has other lines than input 0")]
+    #[error("input {} has other lines than input 1", input + 1)]
     DifferentLines {
         /// The input, counted from 0.
         input: usize,
@@ -181,7 +200,7 @@ pub enum SignalError {
         order: usize,
     },
     /// A signal that is zero throughout has no crest factor, no signal-to-noise ratio, no band.
-    #[error("channel {channel} is zero throughout")]
+    #[error("channel {} is zero throughout", channel + 1)]
     Silent {
         /// Channel, counted from 0.
         channel: usize,

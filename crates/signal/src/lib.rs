@@ -52,6 +52,7 @@ mod repetition;
 pub mod resample;
 mod sampling;
 pub mod spectrum;
+mod told;
 
 pub use crest::CrestSearch;
 pub use error::SignalError;
@@ -63,3 +64,4 @@ pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
+pub use told::told;

@@ -14,7 +14,7 @@ pub struct Repetition {
 }
 
 /// Signals that differ more from period to period do not count as periodic.
-const WORST: f64 = 0.2;
+const WORST: f64 = 0.1;
 
 /// Lags of the same quality differ by this factor at most in the square of the mismatch.
 const ALIKE: f64 = 2.0;
@@ -23,7 +23,7 @@ const ALIKE: f64 = 2.0;
 const ROUNDING: f64 = 1e-12;
 
 /// The shortest whole number of samples after which a signal repeats, if it does so at least once
-/// in full and better than to a fifth of its RMS value.
+/// in full and better than to a tenth of its RMS value.
 ///
 /// A signal that changes slowly also resembles itself a few samples later; lags up to the first at
 /// which it does not are left out. A period that is no whole number of samples is not found, but a
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn the_mismatch_is_the_noise_to_signal_ratio() {
         let clean = multisine(200, 10);
-        for part in [0.001, 0.01, 0.1] {
+        for part in [0.001, 0.01, 0.08] {
             let noisy = add_white(&clean, NoiseLevel::FractionOfRms(part), 7).unwrap();
             let found = repetition(noisy.channel(0)).unwrap();
             assert_eq!(found.period, 200, "noise of {part}");

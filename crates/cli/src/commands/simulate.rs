@@ -22,14 +22,26 @@ use crate::text_table::{compact, significant, text_table};
 ///
 ///   sampling    samples in one period, rate_hz
 ///
-///   excitation  a list of multisines: dof (counted from 1), lines (all, odd, 1:2:99 …), amplitude
-///               of each line in N, phases (schroeder, schroeder-binary, random with seed, zero)
+///   excitation  a list of forces, each with dof (counted from 1) and a kind; without a kind a
+///               multisine:
+///                 multisine  lines (all, odd, 1:2:99 …), amplitude of each line in N, phases
+///                            (schroeder, schroeder-binary, random with seed, zero)
+///                 harmonic   amplitude in N, frequency_hz, phase_rad
+///                 sweep      amplitude in N, start_hz, end_hz, duration_s, law (linear,
+///                            logarithmic), ramp_s
+///                 prbs       order, amplitude in N, hold_samples
+///                 random     standard_deviation in N, band_hz [low, high], burst (part of the
+///                            period), seed
+///                 impulse    momentum in N·s, at_s
+///                 half-sine  peak in N, start_s, duration_s
 ///
 ///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, runge-kutta-4) and
 ///               its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
-///               central-difference; theta, load: projected, interpolated; load: held, linear, exact)
+///               central-difference, {"given": {"at_dt": …, "at_2dt": …}} in m; theta, load:
+///               projected, interpolated; load: held, linear, exact)
 ///
-///   response    periodic (the steady state) or from-rest
+///   response    periodic (the steady state), from-rest, or {"from": {"displacement": …,
+///               "velocity": …}} in m and m/s
 ///
 ///   periods     how many
 ///
@@ -133,7 +145,7 @@ impl SimulateArgs {
                 .iter()
                 .map(|c| Convention { what: c.what, choice: c.choice })
                 .collect(),
-            response: experiment.response,
+            response: experiment.response.clone(),
             samples: simulation.force.len(),
             periods: experiment.periods,
             sample_rate_hz: simulation.force.sampling().rate_hz(),
@@ -166,6 +178,7 @@ impl Report {
         let kind = match self.response {
             ResponseKind::Periodic => "the response that repeats",
             ResponseKind::FromRest => "from rest",
+            ResponseKind::From(_) => "from a given motion",
         };
         let mut text = format!(
             "{}: {} samples at {} Hz, {} {}, {kind}\nscheme: {}\n",

@@ -16,7 +16,7 @@ fn folder() -> tempfile::TempDir {
         let turn = TAU * f64::from(k) / 50.0;
         let force = 2.0 * turn.sin() + 0.5 * (3.0 * turn).sin() + 1.0;
         let t = f64::from(k) / 100.0;
-        writeln!(text, "{t},{force},{}", (-0.5 * t).exp() * (TAU * 7.0 * t).sin()).unwrap();
+        writeln!(text, "{t},{force},{}", (-4.0 * t).exp() * (TAU * 7.0 * t).sin()).unwrap();
     }
     fs::write(folder.path().join("a.csv"), text.replace("t,force", "clock,force")).unwrap();
     fs::write(folder.path().join("timed.csv"), text).unwrap();

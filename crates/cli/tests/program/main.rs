@@ -4,6 +4,7 @@ mod identification;
 mod info;
 mod modal;
 mod records;
+mod reference;
 mod sweep;
 mod talk;
 

@@ -140,6 +140,22 @@ fn force_finds_the_same_force_in_every_format() {
 }
 
 #[test]
+fn a_machine_with_an_undetermined_parameter_is_refused_by_its_name() {
+    let (folder, _) = records();
+    let arguments = "identify rec.csv --force force --displacement displacement --period 256";
+    let machine = mechid(folder.path(), &format!("{arguments} --json"));
+    let mut machine: serde_json::Value = serde_json::from_str(&machine).unwrap();
+    assert_eq!(machine["covariance"]["parameters"][1], "c");
+    machine["covariance"]["matrix"][1][1] = serde_json::Value::Null;
+    fs::write(folder.path().join("machine.json"), machine.to_string()).unwrap();
+    let arguments = "force rec.csv --system machine.json --displacement displacement --period 256";
+    let message = refused(folder.path(), arguments);
+    let part =
+        "error: machine.json: the covariance of c is null: the record it was identified from";
+    assert!(message.starts_with(part), "{message}");
+}
+
+#[test]
 fn a_universal_file_needs_no_rate_and_bears_no_other() {
     let (folder, _) = records();
     let common = "identify rec.unv --force 1+Z --displacement 2+Z --period 256";

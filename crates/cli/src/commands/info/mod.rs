@@ -38,11 +38,11 @@ impl InfoArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         let table = self.input.table()?;
         let (shown, mut left_out) = self.shown(&table)?;
-        let len = match shown.first() {
-            Some(_) => table.common_length(&shown)?,
-            None => 0,
+        let len = match self.columns.as_slice() {
+            [] => table.len(),
+            named => table.common_length(named)?,
         };
-        let dt = self.step(&table, &shown, &mut left_out)?;
+        let dt = self.step(&table, &mut left_out)?;
         let window = match len {
             0 => None,
             len => Some(self.input.span(table.file(), len)?),
@@ -70,17 +70,17 @@ impl InfoArgs {
         Outcome::new(report.text(), &report)
     }
 
-    /// The columns asked for, or those that are numbers and as long as most; and what is wrong with
-    /// the others.
-    fn shown(&self, table: &Table) -> Result<(Vec<String>, Vec<String>), CliError> {
+    /// Indices of the columns asked for, or of those that are numbers and as long as most; and what is
+    /// wrong with the others.
+    fn shown(&self, table: &Table) -> Result<(Vec<usize>, Vec<String>), CliError> {
         if !self.columns.is_empty() {
-            return Ok((self.columns.clone(), Vec::new()));
+            let named = self.columns.iter().map(|wanted| table.find(wanted));
+            return Ok((named.collect::<Result<_, _>>()?, Vec::new()));
         }
         let (mut shown, mut left_out) = (Vec::new(), Vec::new());
         for column in table.filled_columns() {
-            let number = (column + 1).to_string();
             match table.values(column) {
-                Ok(values) if values.len() == table.len() => shown.push(number),
+                Ok(values) if values.len() == table.len() => shown.push(column),
                 Ok(values) => left_out.push(format!(
                     "column {} has {} samples, most have {}",
                     table.label(column),
@@ -94,15 +94,10 @@ impl InfoArgs {
     }
 
     /// The time step, in s. A time axis that nobody asked for may be wrong: that is told, no error.
-    fn step(
-        &self,
-        table: &Table,
-        shown: &[String],
-        left_out: &mut Vec<String>,
-    ) -> Result<Option<f64>, CliError> {
+    fn step(&self, table: &Table, left_out: &mut Vec<String>) -> Result<Option<f64>, CliError> {
         let Some(time) = self.input.time_axis(table) else { return Ok(None) };
         let asked_for = self.input.time.is_some() || matches!(time, TimeAxis::RateHz(_));
-        match table.sampling(&time, shown) {
+        match table.sampling(&time, &self.columns) {
             Ok(sampling) => Ok(Some(sampling.dt())),
             Err(reason) if asked_for => Err(reason.into()),
             Err(reason) => {
@@ -115,15 +110,15 @@ impl InfoArgs {
     fn channels(
         &self,
         table: &Table,
-        shown: &[String],
+        shown: &[usize],
         start: usize,
         len: usize,
         dt: Option<f64>,
     ) -> Result<Vec<Channel>, CliError> {
         let detrend = self.input.detrend == Some(Detrend::Mean);
         let mut channels = Vec::new();
-        for wanted in shown {
-            let (column, values) = (table.find(wanted)?, table.column(wanted)?);
+        for &column in shown {
+            let values = table.values(column)?;
             let offset = if detrend { channel::mean(values) } else { 0.0 };
             let window: Vec<f64> = values[start..start + len].iter().map(|v| v - offset).collect();
             let name = table.names()[column].clone();

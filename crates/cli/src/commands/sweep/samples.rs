@@ -72,7 +72,7 @@ impl Samples {
             period: experiment.samples(),
             extent: match experiment.response {
                 ResponseKind::Periodic => Extent::WholePeriod,
-                ResponseKind::FromRest => Extent::Open,
+                ResponseKind::FromRest | ResponseKind::From(_) => Extent::Open,
             },
         })
     }

@@ -1,0 +1,126 @@
+//! The reference page names every field that a report has, and its description of an experiment is
+//! one.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::mechid;
+
+fn page() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/src/reference/json.md");
+    fs::read_to_string(path).unwrap()
+}
+
+/// The part of the page below a heading of second level.
+fn section<'a>(page: &'a str, heading: &str) -> &'a str {
+    let (_, rest) = page.split_once(&format!("\n## {heading}\n")).unwrap_or_else(|| {
+        panic!("no section {heading}");
+    });
+    rest.split("\n## ").next().unwrap()
+}
+
+/// Paths of all values that are no object or list: `modes[].damping_ratio.value`.
+fn leaves(value: &Value, path: &str, into: &mut BTreeSet<String>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                let dot = if path.is_empty() { "" } else { "." };
+                leaves(value, &format!("{path}{dot}{name}"), into);
+            }
+        }
+        Value::Array(values) => values.iter().for_each(|v| leaves(v, &format!("{path}[]"), into)),
+        _ => drop(into.insert(path.to_owned())),
+    }
+}
+
+/// Whether the section names a path, or the uncertain number whose field it is, or what is null.
+fn is_named(section: &str, path: &str) -> bool {
+    let row = |path: &str| {
+        section.lines().find(|line| line.starts_with('|') && line.contains(&format!("`{path}`")))
+    };
+    if row(path).is_some() {
+        return true;
+    }
+    let of_uncertain = [".value", ".standard_error", ".interval", ".interval[]"]
+        .iter()
+        .filter_map(|field| path.strip_suffix(field))
+        .any(|parent| row(parent).is_some_and(|row| row.contains("uncertain")));
+    // A whole object or list may be null, where its fields are named.
+    of_uncertain || [".", "["].iter().any(|next| section.contains(&format!("`{path}{next}")))
+}
+
+#[test]
+fn every_field_of_every_report_is_in_the_reference() {
+    let folder = tempfile::tempdir().unwrap();
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
+    for file in ["machine.csv", "machine.json"] {
+        fs::copy(examples.join(file), folder.path().join(file)).unwrap();
+    }
+    let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../io/tests/data/plain.mat");
+    let identify = "identify machine.csv --force force --displacement displacement";
+    let found = mechid(folder.path(), &format!("{identify} --period 256 --json"));
+    fs::write(folder.path().join("found.json"), found).unwrap();
+    let time = "--velocity velocity --acceleration acceleration --domain time";
+    for arguments in [
+        format!("{identify} --period 256"),
+        format!("{identify} {time} --mass 25"),
+        "force machine.csv --system found.json --displacement displacement --period 256".into(),
+        "force machine.csv --system machine.json --displacement displacement".into(),
+        format!("info {data}"),
+        "info machine.csv --sample-rate 128".into(),
+        "modal found.json".into(),
+        "modal machine.json".into(),
+        "multisine --samples 64 --rate 64 --inputs 2 --output force.csv".into(),
+        "simulate machine.json --output record.csv".into(),
+        "stability machine.json".into(),
+        "sweep machine.json --npi 2,4".into(),
+    ] {
+        let report = mechid(folder.path(), &format!("{arguments} --json"));
+        let report: Value = serde_json::from_str(&report).unwrap();
+        let command = arguments.split_whitespace().next().unwrap();
+        let page = page();
+        let section = section(&page, &format!("mechid {command}"));
+        let mut paths = BTreeSet::new();
+        leaves(&report, "", &mut paths);
+        assert!(paths.len() > 5, "{arguments}");
+        for path in paths {
+            assert!(is_named(section, &path), "{arguments}: `{path}` is not in the reference");
+        }
+    }
+}
+
+#[test]
+fn the_description_in_the_reference_is_one() {
+    let page = page();
+    let (_, json) = page.split_once("```json\n").unwrap();
+    let (json, _) = json.split_once("```").unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.json"), json).unwrap();
+    let report = mechid(folder.path(), "simulate a.json --output a.csv --json");
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["response"]["from"]["displacement"], 0.001);
+    let text = fs::read_to_string(folder.path().join("a.csv")).unwrap();
+    assert_eq!(text.lines().count(), 513);
+    // Every kind and every scheme there is has a row.
+    let description = section(&page, "The description of an experiment");
+    for name in [
+        "multisine",
+        "harmonic",
+        "sweep",
+        "prbs",
+        "random",
+        "impulse",
+        "half-sine",
+        "exact",
+        "newmark",
+        "central-difference",
+        "houbolt",
+        "wilson-theta",
+        "runge-kutta-4",
+    ] {
+        assert!(description.contains(&format!("| `{name}`")), "{name}");
+    }
+}

@@ -1,0 +1,275 @@
+//! The forces of an experiment, each on one degree of freedom.
+
+use mechid_signal::excitation::{HalfSine, Harmonic, Impulse, Prbs, Random, Sweep, SweepLaw};
+use mechid_signal::{Multisine, Phases, Record, Sampling, SignalError};
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, Deserializer, Error as _};
+use serde_json::{Map, Value};
+
+use crate::{IoError, LineSpec};
+
+/// A force: an object with a `kind`, `multisine` where it has none.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Excitation {
+    /// Counted from 1.
+    pub dof: usize,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Kind {
+    Multisine(MultisineForce),
+    Harmonic(HarmonicForce),
+    Sweep(SweepForce),
+    Prbs(PrbsForce),
+    Random(RandomForce),
+    Impulse(ImpulseForce),
+    HalfSine(HalfSineForce),
+}
+
+/// Names of the kinds, as they are written.
+const KINDS: &str = "multisine, harmonic, sweep, prbs, random, impulse, half-sine";
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MultisineForce {
+    lines: LineSpec,
+    /// Amplitude of every line, in N.
+    amplitude: f64,
+    #[serde(default)]
+    phases: PhaseLaw,
+    /// Seed of random phases.
+    #[serde(default)]
+    seed: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum PhaseLaw {
+    #[default]
+    Schroeder,
+    SchroederBinary,
+    Random,
+    Zero,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HarmonicForce {
+    amplitude: f64,
+    frequency_hz: f64,
+    #[serde(default)]
+    phase_rad: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SweepForce {
+    amplitude: f64,
+    start_hz: f64,
+    end_hz: f64,
+    duration_s: f64,
+    #[serde(default)]
+    law: Law,
+    #[serde(default)]
+    ramp_s: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Law {
+    #[default]
+    Linear,
+    Logarithmic,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PrbsForce {
+    order: u32,
+    amplitude: f64,
+    #[serde(default = "super::one")]
+    hold_samples: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RandomForce {
+    standard_deviation: f64,
+    /// Lower and upper end; white without.
+    band_hz: Option<[f64; 2]>,
+    /// Part of the period after which the force stays zero.
+    burst: Option<f64>,
+    #[serde(default)]
+    seed: u64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ImpulseForce {
+    /// In N·s.
+    momentum: f64,
+    #[serde(default)]
+    at_s: f64,
+}
+
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct HalfSineForce {
+    peak: f64,
+    #[serde(default)]
+    start_s: f64,
+    duration_s: f64,
+}
+
+impl<'de> Deserialize<'de> for Excitation {
+    /// By hand: serde knows no default for the tag of an enum.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        fn rest<T: DeserializeOwned, E: serde::de::Error>(
+            fields: Map<String, Value>,
+        ) -> Result<T, E> {
+            serde_json::from_value(Value::Object(fields)).map_err(E::custom)
+        }
+        let mut fields = Map::deserialize(deserializer)?;
+        let dof = match fields.shift_remove("dof") {
+            Some(dof) => serde_json::from_value(dof).map_err(D::Error::custom)?,
+            None => 1,
+        };
+        let kind = match fields.shift_remove("kind") {
+            Some(kind) => serde_json::from_value(kind).map_err(D::Error::custom)?,
+            None => "multisine".to_owned(),
+        };
+        let kind = match kind.as_str() {
+            "multisine" => Kind::Multisine(rest(fields)?),
+            "harmonic" => Kind::Harmonic(rest(fields)?),
+            "sweep" => Kind::Sweep(rest(fields)?),
+            "prbs" => Kind::Prbs(rest(fields)?),
+            "random" => Kind::Random(rest(fields)?),
+            "impulse" => Kind::Impulse(rest(fields)?),
+            "half-sine" => Kind::HalfSine(rest(fields)?),
+            other => {
+                let message =
+                    format!("unknown kind of excitation `{other}`, expected one of {KINDS}");
+                return Err(D::Error::custom(message));
+            }
+        };
+        Ok(Self { dof, kind })
+    }
+}
+
+/// What a force does between two samples.
+enum Between {
+    /// What this function of time says.
+    Function(Box<dyn Fn(f64) -> f64>),
+    /// It keeps the value of the earlier one.
+    Held,
+    /// Nobody knows; what a person calls the force.
+    Unknown(&'static str),
+}
+
+impl Excitation {
+    /// The force over one period, in N; half a step later if `mid_step`, where it is known there.
+    pub fn sampled(
+        &self,
+        sampling: Sampling,
+        mid_step: bool,
+        file: &str,
+    ) -> Result<Vec<f64>, IoError> {
+        let (samples, between) = self.force(sampling, file)?;
+        match between {
+            Between::Function(value) if mid_step => {
+                let instants = (0..sampling.len()).map(|k| (k as f64 + 0.5) * sampling.dt());
+                Ok(instants.map(value).collect())
+            }
+            Between::Unknown(what) if mid_step => Err(IoError::Description {
+                file: file.into(),
+                what: format!(
+                    "the scheme needs the force between samples, where {what} has none: choose load \
+                     held or linear"
+                ),
+            }),
+            _ => Ok(samples.channel(0).to_vec()),
+        }
+    }
+
+    fn force(&self, sampling: Sampling, file: &str) -> Result<(Record, Between), IoError> {
+        let lines = match &self.kind {
+            Kind::Multisine(m) => m.lines.lines(sampling)?,
+            _ => Vec::new(),
+        };
+        self.kind
+            .force(sampling, lines)
+            .map_err(|source| IoError::Signal { file: file.into(), source })
+    }
+}
+
+impl Kind {
+    fn force(
+        &self,
+        sampling: Sampling,
+        lines: Vec<usize>,
+    ) -> Result<(Record, Between), SignalError> {
+        Ok(match self {
+            Kind::Multisine(m) => {
+                let force = Multisine::flat(lines, m.amplitude, m.phases())?;
+                let (samples, omega0) = (force.sample(sampling)?, sampling.omega0());
+                (samples, Between::Function(Box::new(move |t| force.value(t, omega0))))
+            }
+            Kind::Harmonic(h) => {
+                let force = Harmonic::new(h.amplitude, h.frequency_hz, h.phase_rad)?;
+                (force.sample(sampling)?, Between::Function(Box::new(move |t| force.value(t))))
+            }
+            Kind::Sweep(s) => {
+                let force = s.sweep()?;
+                (force.sample(sampling)?, Between::Function(Box::new(move |t| force.value(t))))
+            }
+            Kind::HalfSine(h) => {
+                let force = HalfSine::new(h.peak, h.start_s, h.duration_s)?;
+                (force.sample(sampling)?, Between::Function(Box::new(move |t| force.value(t))))
+            }
+            Kind::Prbs(p) => {
+                let force = Prbs::new(p.order, p.amplitude, p.hold_samples)?;
+                (force.sample(sampling)?, Between::Held)
+            }
+            Kind::Random(r) => (r.random()?.sample(sampling)?, Between::Unknown("a random force")),
+            Kind::Impulse(i) => {
+                let force = Impulse::new(i.momentum, i.at_s)?;
+                (force.sample(sampling)?, Between::Unknown("an impulse"))
+            }
+        })
+    }
+}
+
+impl MultisineForce {
+    fn phases(&self) -> Phases {
+        match self.phases {
+            PhaseLaw::Schroeder => Phases::Schroeder,
+            PhaseLaw::SchroederBinary => Phases::SchroederBinary,
+            PhaseLaw::Random => Phases::Random { seed: self.seed },
+            PhaseLaw::Zero => Phases::Zero,
+        }
+    }
+}
+
+impl SweepForce {
+    fn sweep(&self) -> Result<Sweep, SignalError> {
+        let law = match self.law {
+            Law::Linear => SweepLaw::Linear,
+            Law::Logarithmic => SweepLaw::Logarithmic,
+        };
+        Sweep::new(self.amplitude, self.start_hz, self.end_hz, self.duration_s, law)?
+            .with_ramps(self.ramp_s)
+    }
+}
+
+impl RandomForce {
+    fn random(&self) -> Result<Random, SignalError> {
+        let force = match self.band_hz {
+            Some([low, high]) => {
+                Random::band_limited(self.standard_deviation, low, high, self.seed)?
+            }
+            None => Random::white(self.standard_deviation, self.seed)?,
+        };
+        self.burst.map_or(Ok(force), |part| force.burst(part))
+    }
+}

@@ -1,0 +1,209 @@
+//! A simulated experiment described in a JSON file: system, excitation, scheme, noise.
+
+mod excitation;
+mod noise;
+mod response;
+mod scheme;
+
+use std::path::Path;
+
+use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_signal::{Record, Sampling};
+use nalgebra::{DMatrix, DVector};
+use serde::Deserialize;
+
+use self::excitation::Excitation;
+pub use self::noise::{Level, Noise};
+pub use self::response::{InitialMotion, PerDof, ResponseKind};
+pub use self::scheme::{FirstDisplacements, FirstSteps, LoadBeyond, MiddleLoad, SchemeChoice};
+use crate::IoError;
+use crate::system::SystemDescription;
+
+/// What to simulate. Every field of the file is one of those below; an unknown one is an error.
+///
+/// ```
+/// use mechid_io::Experiment;
+///
+/// let experiment = Experiment::parse("machine.json", r#"{
+///     "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
+///     "sampling": { "samples": 256, "rate_hz": 100 },
+///     "excitation": [{ "dof": 1, "lines": "all", "amplitude": 50, "phases": "schroeder-binary" }],
+///     "scheme": { "name": "newmark" },
+///     "noise": { "displacement": { "snr_db": 40 }, "seed": 1 }
+/// }"#)?;
+/// assert_eq!(experiment.system()?.dof(), 1);
+/// assert_eq!(experiment.force()?.len(), 256);
+/// # Ok::<(), mechid_io::IoError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Experiment {
+    #[serde(skip)]
+    file: String,
+    system: SystemDescription,
+    sampling: SamplingDescription,
+    excitation: Vec<Excitation>,
+    /// How the response is computed.
+    #[serde(default)]
+    pub scheme: SchemeChoice,
+    /// Which response: the one that repeats, or one that starts.
+    #[serde(default)]
+    pub response: ResponseKind,
+    /// Whether a scheme may take steps at which the motion grows by itself.
+    #[serde(default)]
+    pub allow_unstable: bool,
+    /// How many periods of the excitation the record has.
+    #[serde(default = "one")]
+    pub periods: usize,
+    /// Noise added to the records.
+    pub noise: Option<Noise>,
+}
+
+/// Numbers in the largest force record that is made: 800 MB.
+const LARGEST: usize = 100_000_000;
+
+fn one() -> usize {
+    1
+}
+
+/// Number of samples in a period, and their rate.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SamplingDescription {
+    samples: usize,
+    rate_hz: f64,
+}
+
+impl Experiment {
+    /// The experiment described in a file.
+    ///
+    /// # Errors
+    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let file = path.as_ref().display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(file, &text),
+            Err(source) => Err(IoError::Read { file, source }),
+        }
+    }
+
+    /// The experiment described by a text; `file` is how messages call it.
+    ///
+    /// # Errors
+    /// [`IoError::Json`] with line and column where the text is no such description.
+    pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
+        let file = file.into();
+        match serde_json::from_str::<Self>(text) {
+            Ok(experiment) => Ok(Self { file, ..experiment }),
+            Err(source) => Err(IoError::Json { file, source }),
+        }
+    }
+
+    /// How messages call the file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// The same experiment at another sampling rate, in Hz: the period is so much longer or shorter.
+    pub fn with_rate_hz(mut self, rate_hz: f64) -> Self {
+        self.sampling.rate_hz = rate_hz;
+        self
+    }
+
+    /// Samples in one period.
+    pub fn samples(&self) -> usize {
+        self.sampling.samples
+    }
+
+    /// The system described.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] if parameters are missing or one too many, [`IoError::Model`] if
+    /// they make no system.
+    pub fn system(&self) -> Result<SecondOrderSystem, IoError> {
+        self.system.system(&self.file)
+    }
+
+    /// One period of the force: samples × degrees of freedom, in N.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] for a degree of freedom that the system does not have,
+    /// [`IoError::LineOutside`], [`IoError::Signal`], and those of [`Experiment::system`].
+    pub fn force(&self) -> Result<Record, IoError> {
+        self.sampled(false)
+    }
+
+    /// The same force half a step later, in N: sample k belongs to t = (k + ½) Δt.
+    ///
+    /// # Errors
+    /// As [`Experiment::force`].
+    pub fn mid_step_force(&self) -> Result<Record, IoError> {
+        self.sampled(true)
+    }
+
+    /// The motion at the first sample, for a response that starts.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] if it has not one number per degree of freedom, [`IoError::Model`]
+    /// for numbers that are not finite, and those of [`Experiment::system`].
+    pub fn initial_state(&self) -> Result<InitialState, IoError> {
+        let dof = self.system()?.dof();
+        let ResponseKind::From(InitialMotion { displacement, velocity }) = &self.response else {
+            return Ok(InitialState::rest(dof));
+        };
+        let vector = |what: &str, given: &PerDof| {
+            self.per_dof(&format!("the {what} at the first sample"), given).map(DVector::from_vec)
+        };
+        let state =
+            InitialState::new(vector("displacement", displacement)?, vector("velocity", velocity)?);
+        state.map_err(|source| IoError::Model { file: self.file.clone(), source })
+    }
+
+    /// One number per degree of freedom of the system; `what` is how a message calls them.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].
+    pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
+        let dof = self.system()?.dof();
+        let wrong =
+            |got| format!("{what} has {got} entries, the system has {dof} degrees of freedom");
+        given.values(dof).map_err(|got| self.wrong(wrong(got)))
+    }
+
+    fn sampled(&self, mid_step: bool) -> Result<Record, IoError> {
+        let dof = self.system()?.dof();
+        let signal = |source| IoError::Signal { file: self.file.clone(), source };
+        if self.periods == 0 {
+            return Err(self.wrong("periods must be at least 1".into()));
+        }
+        let SamplingDescription { samples, rate_hz } = self.sampling;
+        if !(rate_hz > 0.0 && (1.0 / rate_hz).is_normal()) {
+            return Err(IoError::SampleRate { rate_hz });
+        }
+        let numbers = samples.saturating_mul(dof).saturating_mul(self.periods);
+        if numbers > LARGEST {
+            return Err(self.wrong(format!(
+                "{samples} samples × {} periods × {dof} degrees of freedom are {numbers} numbers, \
+                 the limit is {LARGEST}",
+                self.periods
+            )));
+        }
+        let sampling = Sampling::from_rate_hz(rate_hz, samples).map_err(signal)?;
+        let mut force = DMatrix::zeros(samples, dof);
+        for excitation in &self.excitation {
+            if !(1..=dof).contains(&excitation.dof) {
+                return Err(self.wrong(format!(
+                    "the excitation drives degree of freedom {}, the system has {dof}",
+                    excitation.dof
+                )));
+            }
+            let part = excitation.sampled(sampling, mid_step, &self.file)?;
+            force.column_mut(excitation.dof - 1).iter_mut().zip(part).for_each(|(f, p)| *f += p);
+        }
+        Record::new(sampling, force).map_err(signal)
+    }
+
+    fn wrong(&self, what: String) -> IoError {
+        IoError::Description { file: self.file.clone(), what }
+    }
+}

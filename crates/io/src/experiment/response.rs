@@ -1,0 +1,53 @@
+//! Which response an experiment records.
+
+use serde::{Deserialize, Serialize};
+
+/// Which of the responses to the force.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ResponseKind {
+    /// The steady state: one period is like the next.
+    #[default]
+    Periodic,
+    /// Displacement and velocity are zero at the first sample.
+    FromRest,
+    /// Displacement and velocity are given at the first sample.
+    From(InitialMotion),
+}
+
+/// The motion at the first sample.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InitialMotion {
+    /// x(0), in m; zero where it is left out.
+    pub displacement: PerDof,
+    /// ẋ(0), in m/s; zero where it is left out.
+    pub velocity: PerDof,
+}
+
+/// One number per degree of freedom, or a single one for the only degree of freedom.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
+#[serde(untagged, expecting = "expected a number, or a list with one for each degree of freedom")]
+pub enum PerDof {
+    /// Zero everywhere.
+    #[default]
+    #[serde(skip)]
+    Zero,
+    /// The only degree of freedom.
+    One(f64),
+    /// Each degree of freedom.
+    Each(Vec<f64>),
+}
+
+impl PerDof {
+    /// The numbers for so many degrees of freedom, or how many there are instead.
+    pub(super) fn values(&self, dof: usize) -> Result<Vec<f64>, usize> {
+        match self {
+            Self::Zero => Ok(vec![0.0; dof]),
+            Self::One(value) if dof == 1 => Ok(vec![*value]),
+            Self::One(_) => Err(1),
+            Self::Each(values) if values.len() == dof => Ok(values.clone()),
+            Self::Each(values) => Err(values.len()),
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! The schemes an experiment can be simulated with.
+
+use serde::Deserialize;
+
+use super::PerDof;
+
+/// How the response to a sampled force is computed.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
+#[non_exhaustive]
+pub enum SchemeChoice {
+    /// No time step at all: line by line through the receptance. Periodic responses only.
+    #[default]
+    Exact,
+    /// Newmark's method; the average acceleration method unless told otherwise.
+    Newmark {
+        /// β, 1/4 by default.
+        #[serde(default = "quarter")]
+        beta: f64,
+        /// γ, 1/2 by default.
+        #[serde(default = "half")]
+        gamma: f64,
+    },
+    /// The central difference method.
+    CentralDifference {
+        /// Where the displacement before the first sample comes from.
+        #[serde(default)]
+        start: FirstDisplacements,
+    },
+    /// Houbolt's method.
+    Houbolt {
+        /// Where the first two steps come from.
+        #[serde(default)]
+        start: FirstSteps,
+    },
+    /// Wilson's θ method.
+    WilsonTheta {
+        /// θ, 1.4 by default.
+        #[serde(default = "wilson")]
+        theta: f64,
+        /// The force at t + θΔt.
+        #[serde(default)]
+        load: LoadBeyond,
+    },
+    /// The classical Runge-Kutta method of fourth order.
+    #[serde(rename = "runge-kutta-4")]
+    RungeKutta4 {
+        /// The force between two samples.
+        load: MiddleLoad,
+    },
+}
+
+fn quarter() -> f64 {
+    0.25
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+fn wilson() -> f64 {
+    1.4
+}
+
+/// The force in the middle of a step, which a sampled force leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MiddleLoad {
+    /// The value at the beginning of the step.
+    Held,
+    /// The mean of both ends.
+    Linear,
+    /// That of the excitation itself.
+    Exact,
+}
+
+/// The displacement before the first sample, for central difference.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FirstDisplacements {
+    /// By the Taylor step with the consistent acceleration.
+    #[default]
+    Taylor,
+    /// That of the first sample: at rest until then.
+    Rest,
+}
+
+/// The first two steps of Houbolt's method.
+#[derive(Debug, Clone, PartialEq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+pub enum FirstSteps {
+    /// By Newmark's average acceleration.
+    #[default]
+    AverageAcceleration,
+    /// By central difference.
+    CentralDifference,
+    /// Displacements given in the description.
+    Given {
+        /// x(Δt), in m.
+        at_dt: PerDof,
+        /// x(2Δt), in m.
+        at_2dt: PerDof,
+    },
+}
+
+/// The force at t + θΔt, for Wilson's method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LoadBeyond {
+    /// On the line through both ends of the step.
+    #[default]
+    Projected,
+    /// Between the samples around it.
+    Interpolated,
+}
