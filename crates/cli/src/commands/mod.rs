@@ -80,7 +80,7 @@ impl Command {
             _ if self.report().quiet => None,
             Command::Simulate(_) => Some("simulating"),
             Command::Force(_) => Some("looking for the force"),
-            Command::Identify(_) => Some("identifying"),
+            Command::Identify(_) | Command::Report(_) => Some("identifying"),
             _ => Some("working"),
         }
     }

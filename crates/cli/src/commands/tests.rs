@@ -17,7 +17,7 @@ fn subcommands() -> Vec<clap::Command> {
     program.build();
     let all: Vec<_> =
         program.get_subcommands().filter(|c| c.get_name() != "help").cloned().collect();
-    assert!(all.len() >= 9);
+    assert!(all.len() >= 10);
     all
 }
 
@@ -26,6 +26,17 @@ fn examples(help: &str) -> Vec<String> {
     let (_, block) = help.split_once("Examples:\n").unwrap_or_default();
     let joined = block.replace("\\\n", " ");
     joined.lines().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
+}
+
+/// The words of a command, as a shell splits it: what stands between quotes stays together.
+fn words(call: &str) -> Vec<&str> {
+    let parts = call.split('\'').enumerate();
+    parts
+        .flat_map(|(k, part)| match k % 2 {
+            0 => part.split_whitespace().collect(),
+            _ => vec![part],
+        })
+        .collect()
 }
 
 #[test]
@@ -37,8 +48,8 @@ fn every_subcommand_has_examples_that_are_understood() {
         assert!(!examples.is_empty(), "{name} --help has no Examples:");
         for example in &examples {
             // What the shell would take for itself.
-            let words = example.split_once(" > ").map_or(example.as_str(), |(words, _)| words);
-            let parsed = Cli::try_parse_from(words.split_whitespace());
+            let call = example.split_once(" > ").map_or(example.as_str(), |(call, _)| call);
+            let parsed = Cli::try_parse_from(words(call));
             assert!(parsed.is_ok(), "{example}\n{}", parsed.unwrap_err());
         }
         assert!(examples.iter().any(|e| e.starts_with(&format!("mechid {name}"))), "{name}");

@@ -5,13 +5,14 @@ use std::process::Command;
 
 use super::{mechid, refused, run};
 
-const SUBCOMMANDS: [&str; 9] = [
+const SUBCOMMANDS: [&str; 10] = [
     "completions",
     "force",
     "identify",
     "info",
     "modal",
     "multisine",
+    "report",
     "simulate",
     "stability",
     "sweep",
