@@ -70,6 +70,7 @@ fn every_field_of_every_report_is_in_the_reference() {
         format!("{} --period 256 --output report.html", identify.replace("identify", "report")),
         "force machine.csv --system found.json --displacement displacement --period 256".into(),
         "force machine.csv --system machine.json --displacement displacement".into(),
+        "frf machine.csv --force force --displacement displacement --period 256".into(),
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
         "modal found.json".into(),

@@ -5,9 +5,10 @@ use std::process::Command;
 
 use super::{mechid, refused, run};
 
-const SUBCOMMANDS: [&str; 10] = [
+const SUBCOMMANDS: [&str; 11] = [
     "completions",
     "force",
+    "frf",
     "identify",
     "info",
     "modal",

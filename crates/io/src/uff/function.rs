@@ -50,7 +50,8 @@ fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {
     }
     let (pairs, _) = values.as_chunks::<2>();
     let (times, values) = pairs.iter().map(|[time, value]| (*time, *value)).unzip();
-    columns.push(Column::of_numbers(format!("{name} time"), times));
-    let axis = Axis::Column(columns.len() - 1);
+    // The instants are their own time axis, too.
+    let axis = Axis::Column(columns.len());
+    columns.push(Column { axis, ..Column::of_numbers(format!("{name} time"), times) });
     columns.push(Column { about, axis, ..Column::of_numbers(name, values) });
 }
