@@ -47,8 +47,9 @@ pub struct RecordArgs {
     /// is a column called after its node and direction, such as 12+Z, and brings its time axis.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
-    /// Time column, in s: name or number, counted from 1 [default: the file's own time axis, or
-    /// time, time_s or t]
+    /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
+    /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
+    /// column called time or t]
     #[arg(long, value_name = "COLUMN", help_heading = "Time and window")]
     pub time: Option<String>,
     /// Samples per second, in Hz, where there is no time column
@@ -94,9 +95,6 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Names by which a time column is known without being told.
-const TIME_COLUMNS: [&str; 4] = ["time", "Time", "time_s", "t"];
-
 impl RecordArgs {
     /// The file as a table.
     pub fn table(&self) -> Result<Table, CliError> {
@@ -104,15 +102,12 @@ impl RecordArgs {
     }
 
     /// The time axis asked for, that of the file, or the time column found by its name.
-    pub fn time_axis(&self, table: &Table) -> Option<TimeAxis<'_>> {
+    pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
         match (self.sample_rate, &self.time) {
             (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
             (None, Some(column)) => Some(TimeAxis::Column(column)),
             (None, None) if table.has_time_axis() => Some(TimeAxis::OfFile),
-            (None, None) => TIME_COLUMNS
-                .into_iter()
-                .find(|name| table.names().iter().any(|n| n == name))
-                .map(TimeAxis::Column),
+            (None, None) => table.time_column().map(TimeAxis::Column),
         }
     }
 

@@ -5,6 +5,7 @@ mod dialect;
 mod source;
 mod text;
 mod time_axis;
+mod time_unit;
 
 use std::path::Path;
 
@@ -31,7 +32,7 @@ use crate::{IoError, mat, uff};
 /// - The delimiter (comma, semicolon, tab, blanks) is found by itself; between semicolons or tabs a
 ///   decimal comma is understood.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
-///   numbers only.
+///   numbers only. A second row without any number holds their units.
 /// - Lines that start with `#`, and empty lines, are left out.
 ///
 /// A column is chosen by its name, or by its number counted from 1; one that nobody asks for may
@@ -145,6 +146,12 @@ impl Table {
     /// Whether columns bring their own time axis, [`TimeAxis::OfFile`].
     pub fn has_time_axis(&self) -> bool {
         self.contents.columns.iter().any(|column| column.axis != Axis::Unknown)
+    }
+
+    /// The first column whose name says that it holds instants: `time` or `t`, in any case, with a
+    /// unit (`time_ms`, `Time [s]`) or without.
+    pub fn time_column(&self) -> Option<&str> {
+        self.names.iter().map(String::as_str).find(|name| time_unit::is_time(name))
     }
 
     /// Indices, counted from 0, of the columns that have a name or a first value: not those that a

@@ -128,6 +128,7 @@ struct Rows<'a> {
     shape: Option<Shape>,
     columns: Vec<Column>,
     has_header: bool,
+    has_units: bool,
     samples: usize,
     lines: Lines,
     /// Rows of empty fields not yet followed by another one: line and number of fields. At the end
@@ -150,6 +151,7 @@ impl<'a> Rows<'a> {
             shape: None,
             columns: Vec::new(),
             has_header: false,
+            has_units: false,
             samples: 0,
             lines: Lines::default(),
             empty: Vec::new(),
@@ -189,6 +191,9 @@ impl<'a> Rows<'a> {
                 }
             }
         }
+        if self.take_units(fields) {
+            return Ok(());
+        }
         for (c, column) in self.columns.iter_mut().enumerate() {
             let field = fields.get(c).unwrap_or_default();
             column.filled |= self.samples == 0 && !field.is_empty();
@@ -214,6 +219,19 @@ impl<'a> Rows<'a> {
             }
         }
         self.has_header
+    }
+
+    /// Takes the units of the columns, if the row below the names has no number at all.
+    fn take_units(&mut self, fields: &ByteRecord) -> bool {
+        let below_names = self.has_header && self.samples == 0 && !self.has_units;
+        let wordy = fields.iter().all(|field| number(field, self.delimiter).is_none());
+        self.has_units |= below_names && wordy;
+        if below_names && wordy {
+            for (column, field) in self.columns.iter_mut().zip(fields) {
+                column.about = String::from_utf8_lossy(field).into_owned();
+            }
+        }
+        below_names && wordy
     }
 
     fn finish(self, format: &str) -> Result<Contents, IoError> {

@@ -2,13 +2,14 @@
 
 use mechid_signal::Sampling;
 
-use super::{Axis, Table};
+use super::{Axis, Table, time_unit};
 use crate::IoError;
 
 /// The time axis of columns of a [`Table`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeAxis<'a> {
-    /// A column of instants, in seconds, chosen by name or number.
+    /// A column of instants, chosen by name or number: in the unit that its name or a line of units
+    /// says, otherwise in seconds.
     Column(&'a str),
     /// A known sampling rate, in Hz.
     RateHz(f64),
@@ -47,7 +48,8 @@ impl TimeAxis<'_> {
             TimeAxis::RateHz(rate_hz) => Err(IoError::SampleRate { rate_hz }),
             TimeAxis::Column(column) => {
                 let column = table.find(column)?;
-                let dt = uniform_step(table, table.values(column)?)?;
+                let unit = time_unit::unit(&table.contents.columns[column]);
+                let dt = uniform_step(table, table.values(column)?, unit)?;
                 let all: Vec<usize> = [&[column], columns].concat();
                 Sampling::new(dt, common_length(table, &all)?).map_err(signal)
             }
@@ -113,7 +115,7 @@ fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoErro
         Axis::Even { start, step } => Some(Instants { start, step }),
         Axis::Column(times) => {
             let times = table.values(times)?;
-            Some(Instants { start: times[0], step: uniform_step(table, times)? })
+            Some(Instants { start: times[0], step: uniform_step(table, times, 1.0)? })
         }
     })
 }
@@ -135,8 +137,8 @@ fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError>
     }
 }
 
-/// The mean step of instants that are equally spaced.
-fn uniform_step(table: &Table, times: &[f64]) -> Result<f64, IoError> {
+/// The mean step, in s, of instants in `unit` s that are equally spaced.
+fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError> {
     let file = || table.file().to_owned();
     let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let middle = steps.len() / 2;
@@ -148,12 +150,12 @@ fn uniform_step(table: &Table, times: &[f64]) -> Result<f64, IoError> {
     let worst = (0..steps.len()).max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or_default();
     // Also refuses time that stands still or runs backwards, and steps that overflow.
     if usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual {
-        return Ok((times[times.len() - 1] - times[0]) / steps.len() as f64);
+        return Ok(unit * (times[times.len() - 1] - times[0]) / steps.len() as f64);
     }
     Err(IoError::NonUniformTime {
         file: file(),
         at: table.place(worst + 1),
-        step: times[worst + 1] - times[worst],
-        usual,
+        step: unit * (times[worst + 1] - times[worst]),
+        usual: unit * usual,
     })
 }

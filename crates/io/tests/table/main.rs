@@ -88,6 +88,31 @@ fn missing_and_duplicate_columns_list_those_there_are() {
 }
 
 #[test]
+fn time_is_taken_in_the_unit_that_its_name_or_the_line_of_units_says() {
+    for text in [
+        "Time [ms],f\n0,1\n2,-1\n4,1\n",
+        "t;f\nms;N\n0;1\n2;-1\n4;1\n",
+        "time_s f\n0 1\n0.002 -1\n0.004 1\n",
+        "f,TIME,\nN,s,\n1,0,\n-1,0.002,\n1,0.004,\n",
+    ] {
+        let t = table(text);
+        let time = t.time_column().expect(text);
+        let record = t.record(&TimeAxis::Column(time), &["f"]).unwrap();
+        assert!((record.sampling().dt() - 2e-3).abs() < 1e-15, "{text}");
+        assert_eq!(record.channel(0), [1.0, -1.0, 1.0], "{text}");
+    }
+    let uneven = table("time_ms,f\n0,1\n2,1\n4,1\n9,1\n");
+    let e = uneven.record(&TimeAxis::Column("time_ms"), &["f"]).unwrap_err();
+    assert!(
+        matches!(e, IoError::NonUniformTime { step, usual, .. } if step == 5e-3 && usual == 2e-3)
+    );
+    // One line of units, not two.
+    let twice = table("t,f\ns,N\nx,y\n0,1\n");
+    assert!(matches!(twice.column("f"), Err(IoError::NotANumber { line: 3, .. })));
+    assert_eq!(table("speed,f\n0,1\n1,2\n").time_column(), None);
+}
+
+#[test]
 fn bad_fields_are_named_with_line_and_column() {
     for (field, message) in [
         ("abc", "a.csv, line 4, column 2 \"f\": \"abc\" is not a number"),
