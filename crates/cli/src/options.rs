@@ -36,6 +36,7 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
 }
 
 /// Which record, and which part of it.
+#[allow(rustdoc::broken_intra_doc_links, reason = "brackets of a help text")]
 #[derive(Debug, Clone, Args)]
 pub struct RecordArgs {
     /// The record: text with one row per sample, MATLAB .mat (up to -v7), or universal file (dataset

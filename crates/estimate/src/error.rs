@@ -218,7 +218,7 @@ pub enum EstimateError {
         right: f64,
     },
     /// A ratio or covariance needs more averages than there are.
-    #[error("{got} averages cannot tell signal from noise, at least {needed} are needed")]
+    #[error("signal cannot be told from noise: at least {needed} averages are needed, got {got}")]
     TooFewAverages {
         /// Averages there are.
         got: usize,

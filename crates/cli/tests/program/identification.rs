@@ -364,7 +364,11 @@ fn frequency_responses_are_estimated_and_fitted() {
     }
     let (_, text, _) = run(folder, &format!("frf p.csv {common}"));
     assert!(text.contains("H1 from periods of 256 samples, worth 4 averages; 20 lines"), "{text}");
-    refused(folder, &format!("frf p.csv {common} --periods 1"), &["1 averages cannot tell"]);
+    refused(
+        folder,
+        &format!("frf p.csv {common} --periods 1"),
+        &["at least 2 averages are needed, got 1"],
+    );
     refused(folder, "frf p.csv --displacement x", &["--force"]);
 
     // Random excitation under windows: leakage leaves some per cent.

@@ -133,7 +133,8 @@ impl Correlation {
         // A distribution function does not resolve the rest.
         let p = match self.p_value {
             p if p < 1e-15 => "p < 1e-15".to_owned(),
-            p => format!("p = {p:.1e}"),
+            p if p < 1e-3 => format!("p = {p:.1e}"),
+            p => format!("p = {p:.3}"),
         };
         let text = format!(
             "{name}: {outside} of {count} correlations beyond the 95 % bound of {:.3}, {p}; {meaning}",

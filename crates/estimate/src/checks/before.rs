@@ -126,6 +126,10 @@ fn excitation(force: &Record, needed: usize) -> Vec<Check> {
 }
 
 pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
+    let told = match condition {
+        short if short < 1e4 => format!("{short:.1}"),
+        long => format!("{long:.1e}"),
+    };
     let (verdict, text) = if lost > 0 {
         let text = format!(
             "{lost} combinations of displacements, velocities and forces do not vary in the data: \
@@ -134,12 +138,12 @@ pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
         (Verdict::Bad, text)
     } else if condition > DOUBTFUL_CONDITION {
         let text = format!(
-            "the regressors have the condition number {condition:.1e}: relative noise is amplified \
+            "the regressors have the condition number {told}: relative noise is amplified \
              up to that much in the worst combination of parameters"
         );
         (Verdict::Doubtful, text)
     } else {
-        (Verdict::Good, format!("the regressors have the condition number {condition:.1e}"))
+        (Verdict::Good, format!("the regressors have the condition number {told}"))
     };
     Check { subject: Subject::Conditioning, verdict, value: condition, text }
 }
