@@ -91,6 +91,9 @@ impl Estimate {
 /// [`EstimateError::Size`] if the covariance has not one row and column per parameter,
 /// [`EstimateError::NoSuchEntry`] for a parameter the machine does not have,
 /// [`EstimateError::Model`] if the eigenvalues do not converge.
+///
+/// # Source
+/// That of [`Estimate::modes`].
 pub fn identified_modes(
     system: &SecondOrderSystem,
     parameters: &[Parameter],

@@ -20,6 +20,10 @@ use crate::{IntegrateError, SampledForce, Scheme};
 /// # Errors
 /// Those of [`integrate`](crate::integrate()), and [`IntegrateError::NoPeriodicState`] if the free
 /// motion repeats too: a rigid body, or a scheme that sees an undamped mode exactly on a line.
+///
+/// # Source
+/// Nayfeh & Balachandran, *Applied Nonlinear Dynamics* (1995), on shooting for periodic solutions;
+/// of a linear system the first step of it is exact.
 pub fn integrate_periodic<'a>(
     scheme: &dyn Scheme,
     system: &SecondOrderSystem,

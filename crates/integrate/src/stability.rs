@@ -22,6 +22,9 @@ const SHARP: f64 = 1e-9;
 ///
 /// # Errors
 /// Those of [`Scheme::prepare_unchecked`].
+///
+/// # Source
+/// Bathe & Wilson (1973); Hughes (1987), section 9.1.
 pub fn spectral_radius(
     scheme: &dyn Scheme,
     system: &SecondOrderSystem,
@@ -65,6 +68,9 @@ pub(crate) fn eigenvalues(transition: &Transition) -> Option<DVector<Complex<f64
 /// # Errors
 /// Those of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the
 /// smallest step is stable.
+///
+/// # Source
+/// Hughes (1987), section 9.1.
 pub fn critical_step(
     scheme: &dyn Scheme,
     system: &SecondOrderSystem,

@@ -34,6 +34,9 @@ impl Sdof {
     /// # Errors
     /// [`ModelError::Parameter`] if `force`, `x0` or `v0` is not finite,
     /// [`ModelError::Signal`] if an unstable motion overflows.
+    ///
+    /// # Source
+    /// Meirovitch (1975), response of a damped single-degree-of-freedom system to a step.
     pub fn step_response(
         &self,
         sampling: Sampling,
@@ -60,6 +63,10 @@ impl Sdof {
     /// # Errors
     /// [`ModelError::Parameter`] if an argument is not finite,
     /// [`ModelError::Signal`] if an unstable motion overflows.
+    ///
+    /// # Source
+    /// Meirovitch (1975), response of a damped single-degree-of-freedom system to harmonic forces,
+    /// with the transient.
     pub fn harmonic_response(
         &self,
         sampling: Sampling,
@@ -84,6 +91,9 @@ impl Sdof {
     /// # Errors
     /// [`ModelError::SingularDynamicStiffness`] at an undamped resonance,
     /// [`ModelError::Parameter`] if an argument is not finite.
+    ///
+    /// # Source
+    /// Dissertation eqs. (4.6.9)–(4.6.10).
     pub fn harmonic_steady_state(
         &self,
         sampling: Sampling,
@@ -100,6 +110,9 @@ impl Sdof {
     }
 
     /// Impulse response h(t) for t ≥ 0, in m/(N·s): the motion after a unit impulse at rest.
+    ///
+    /// # Source
+    /// Meirovitch (1975), impulse response of a damped single-degree-of-freedom system.
     pub fn impulse_response(&self, t: f64) -> f64 {
         self.integrated_impulse_response(0, t)
     }

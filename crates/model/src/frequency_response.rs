@@ -25,6 +25,9 @@ impl SecondOrderSystem {
     /// # Errors
     /// [`ModelError::Parameter`] if ω is not finite,
     /// [`ModelError::SingularDynamicStiffness`] if D(ω) cannot be inverted in double precision.
+    ///
+    /// # Source
+    /// Ewins (2000), the receptance matrix of a viscously damped system.
     pub fn receptance(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, ModelError> {
         require("angular frequency", omega, "finite", true)?;
         let stiffness = self.dynamic_stiffness(omega);

@@ -117,6 +117,9 @@ impl SecondOrderSystem {
     ///
     /// # Errors
     /// As [`eigenvalues`](Self::eigenvalues).
+    ///
+    /// # Source
+    /// Meirovitch (1975), the state form of a damped system; Dissertation, Appendix E.
     pub fn modes(&self) -> Result<Vec<Mode>, ModelError> {
         let eigenvalues = self.eigenvalues()?;
         let mut modes: Vec<Mode> = Vec::with_capacity(self.dof());

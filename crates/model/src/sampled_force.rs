@@ -57,6 +57,10 @@ impl Sdof {
     /// [`ModelError::ForceChannels`] if the force has not one channel,
     /// [`ModelError::Parameter`] if `x0` or `v0` is not finite,
     /// [`ModelError::Signal`] if an unstable motion overflows.
+    ///
+    /// # Source
+    /// Nigam & Jennings (1969), Bull. Seismological Society of America 59(2), 909–922, with the force
+    /// held instead of linear.
     pub fn held_force_response(
         &self,
         force: &Record,

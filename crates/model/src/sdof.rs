@@ -45,6 +45,9 @@ impl Sdof {
     ///
     /// # Errors
     /// [`ModelError::Parameter`] naming the one that is out of range.
+    ///
+    /// # Source
+    /// Meirovitch (1975), viscous damping factor and undamped natural frequency.
     pub fn from_modal(
         mass: f64,
         damping_ratio: f64,

@@ -46,6 +46,10 @@ pub fn peak(samples: &[f64]) -> f64 {
 ///
 /// # Panics
 /// If there is no such channel.
+///
+/// # Source
+/// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on the choice of
+/// excitation signals.
 pub fn crest_factor(record: &Record, channel: usize) -> Result<f64, SignalError> {
     let samples = record.channel(channel);
     let peak = peak(samples);
@@ -126,6 +130,9 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
 ///
 /// # Panics
 /// If there is no such channel.
+///
+/// # Source
+/// Gray and Markel (1974), IEEE Trans. Acoustics, Speech, Signal Processing 22, 207–217.
 pub fn spectral_flatness(
     spectrum: &Spectrum,
     channel: usize,

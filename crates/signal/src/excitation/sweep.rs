@@ -18,6 +18,10 @@ pub enum SweepLaw {
 ///
 /// w(t) rises and falls as half a cosine at the two ends ([`with_ramps`](Self::with_ramps)), so
 /// that the machine is not hit when the sweep begins and ends.
+///
+/// # Source
+/// Farina (2000), *Simultaneous measurement of impulse response and distortion with a swept-sine
+/// technique*, 108th AES Convention (the logarithmic law).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sweep {
     amplitude: f64,
