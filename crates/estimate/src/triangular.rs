@@ -257,6 +257,22 @@ mod tests {
             .prop_map(move |v| DMatrix::from_vec(rows, columns, v))
     }
 
+    #[test]
+    fn every_width_of_vector_registers_gives_the_same_bits() {
+        let block = (0..BLOCK_ROWS * 5).map(|k| (0.37 * k as f64).sin()).collect::<Vec<_>>();
+        let mut factors = [TriangularFactor::new(5), TriangularFactor::new(5)];
+        for len in [BLOCK_ROWS, 77] {
+            let [chosen, plain] = &mut factors;
+            chosen.block.copy_from_slice(&block);
+            plain.block.copy_from_slice(&block);
+            chosen.absorb(len);
+            plain.reflect(len);
+        }
+        let bits = |f: &TriangularFactor| f.r.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        assert_eq!(bits(&factors[0]), bits(&factors[1]));
+        assert!(factors[0].r.iter().any(|v| *v != 0.0));
+    }
+
     proptest! {
         /// The Gram matrix, formed explicitly, judges the factor; signs of rows are free.
         #[test]
