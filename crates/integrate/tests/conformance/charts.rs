@@ -191,7 +191,7 @@ fn anchors_at_ten_steps_per_period() {
 }
 
 /// Period elongation and amplitude decay of the root that turns least.
-fn published_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
+fn principal_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     let roots = Schur::new(matrix).complex_eigenvalues();
     // Of a spurious pair, were there one, the principal root is the larger.
     let root = roots.iter().filter(|l| l.im > 1e-9).max_by(|a, b| a.norm().total_cmp(&b.norm()));
@@ -199,13 +199,12 @@ fn published_point(matrix: Matrix3<f64>, w: f64) -> [f64; 2] {
     [w / root.arg() - 1.0, 1.0 - (TAU * root.norm().ln() / root.arg()).exp()]
 }
 
-/// Bathe & Wilson (1973), Earthquake Eng. Struct. Dyn. 1, 283–291 (also Bathe 1982, section 9.4),
-/// draw period elongation and amplitude decay of these schemes over Δt/T. Their curves are the
-/// eigenvalues of the matrices printed beside them, from which the points are taken here, since a
-/// curve cannot be read to a digit; Houbolt's matrix is the companion of
-/// (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
+/// Curves of period elongation and amplitude decay over Δt/T, such as those of Bathe & Wilson (1973),
+/// Earthquake Eng. Struct. Dyn. 1, 283–291, draw the eigenvalues of the amplification matrices. A
+/// curve cannot be read to a digit and none was, so the points are computed from the matrices;
+/// Houbolt's is the companion of (2 + Ω²) λ³ − 5 λ² + 4 λ − 1.
 #[test]
-fn charts_pass_through_the_published_curves() {
+fn charts_follow_the_printed_matrices() {
     for ratio in (1..=20).map(|k| 0.01 * f64::from(k)) {
         let w = TAU * ratio;
         let lead = 2.0 + w * w;
@@ -218,7 +217,7 @@ fn charts_pass_through_the_published_curves() {
             (Box::new(Newmark::AVERAGE_ACCELERATION), printed_newmark(0.25, 0.5, 0.0, w)),
         ];
         for (scheme, matrix) in curves {
-            let [elongation, decay] = published_point(matrix, w);
+            let [elongation, decay] = principal_point(matrix, w);
             let found = accuracy(scheme.as_ref(), 0.0, ratio).unwrap();
             let name = scheme.name();
             // Three roots lie near 1 at small steps, which makes them sensitive to rounding.
