@@ -98,18 +98,21 @@ impl Mapping {
     }
 }
 
+/// Values below this are drawn as zero, and no axis is shorter: its pixels per unit would overflow.
+pub(crate) const TINY: f64 = 1e-290;
+
 /// The range that shows everything from `low` to `high`, with `margin` of it to spare on both sides.
 pub(crate) fn padded(scale: Scale, low: f64, high: f64, margin: f64) -> (f64, f64) {
     match scale {
         Scale::Linear => {
             // A constant curve still needs a scale to lie in: ± 5 % of its value, or ± 1 about zero.
-            let flat = 1e-12 * low.abs().max(high.abs());
-            let pad = if high - low > flat {
-                (high - low) * margin
-            } else if low == 0.0 && high == 0.0 {
+            let largest = low.abs().max(high.abs());
+            let pad = if largest < TINY {
                 1.0
+            } else if high - low > 1e-12 * largest {
+                (high - low) * margin
             } else {
-                0.05 * low.abs().max(high.abs())
+                0.05 * largest
             };
             (low - pad, high + pad)
         }

@@ -1,6 +1,6 @@
 //! Where everything in a figure stands.
 
-use crate::axis::Mapping;
+use crate::axis::{Mapping, TINY};
 use crate::canvas::Point;
 use crate::draw::{LABEL_SIZE, TICK_SIZE};
 use crate::error::PlotError;
@@ -10,6 +10,9 @@ use crate::panel::{Legend, Panel};
 use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
 use crate::trace::{self, Mappings, Segment};
+
+/// Pixels in the width or height of a figure, at most: more overflow on a short axis.
+const LARGEST: f64 = 1e9;
 
 /// Length of a tick and the distance of its label.
 pub(crate) const TICK: f64 = 4.0;
@@ -107,7 +110,7 @@ impl<'a> Planner<'a> {
             (width, height + title + legend::strip_height(&strip, width - 2.0 * EDGE))
         });
         let ranges = ranges(figure, columns)?;
-        if !(size.0.is_finite() && size.1.is_finite()) {
+        if !(size.0 <= LARGEST && size.1 <= LARGEST) {
             let (width, height) = size;
             let (needed_width, needed_height) = LEAST_FRAME;
             return Err(PlotError::Size { width, height, needed_width, needed_height });
@@ -323,7 +326,7 @@ fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
         for (axis, (low, high)) in [(&panel.x, x), (&panel.y, y)] {
             // Numbers near the ends of f64 leave no room for a margin or have no finite difference.
             let length = axis.scale.forward(high) - axis.scale.forward(low);
-            if !(length > 0.0 && length.is_finite()) {
+            if !(length > TINY && length.is_finite()) {
                 return Err(PlotError::Range { axis: axis.caption(), low, high });
             }
         }

@@ -24,7 +24,7 @@ pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option
 fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     // A step that would crowd the axis is not a step the caller can have meant.
     let step = step
-        .filter(|step| *step > 0.0 && (high - low) / step <= 40.0)
+        .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
         .unwrap_or_else(|| nice_step((high - low) / wanted));
     let exponent = common_exponent(low.abs().max(high.abs()));
     let unit = 10f64.powi(exponent);

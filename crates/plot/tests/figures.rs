@@ -264,6 +264,16 @@ fn charts_draw_what_they_are_given() {
     }
 }
 
+#[test]
+fn numbers_too_small_for_a_scale_are_drawn_as_zero() {
+    for y in [vec![3.98506063583514e-309], vec![0.0, 5e-324], vec![-2e-300, 1e-300]] {
+        let x = vec![0.0; y.len()];
+        let panel = Panel::new(Axis::linear("q", "u"), Axis::linear("q", "u"));
+        let svg = Figure::new("f").panel(panel.curve(Curve::line("l", &x, &y))).to_svg().unwrap();
+        assert!(coordinates(&svg).iter().all(|value| value.is_finite()), "{y:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
