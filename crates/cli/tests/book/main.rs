@@ -5,6 +5,7 @@
 //! book's summary share one folder. `MECHID_BLESS=1 cargo test -p mechid-cli --test book` writes
 //! the answers and pictures anew.
 
+mod commands;
 mod markdown;
 mod pictures;
 mod session;
@@ -14,6 +15,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
+use commands::Workspace;
 use markdown::Page;
 use session::{Session, Step, fits};
 
@@ -83,11 +85,8 @@ fn follow(page: &Path, session: &mut Session, findings: &mut Findings) -> String
     let (mut today, mut copied) = (String::new(), 0);
     for block in Page::parse(&text).blocks {
         let content = &text[block.range.clone()];
-        if block.language() == "sh" && content.lines().any(|line| line.starts_with("mechid ")) {
-            let place = page.display();
-            findings
-                .wrong
-                .push(format!("{place}: commands of mechid belong into `console`\n{content}"));
+        if block.language() == "sh" {
+            findings.wrong.extend(content.lines().filter_map(|line| session.walk(line).err()));
         }
         if let Some(file) = block.file() {
             session.write(file, content);
@@ -193,6 +192,75 @@ fn every_page_can_be_found() {
             document.display()
         );
     }
+}
+
+/// Every line for a shell, in blocks and in running text, is one that a test holds. Folders are made
+/// and entered where the pages are followed.
+#[test]
+fn no_command_is_untested() {
+    let workspace = Workspace::of(&root());
+    let mut wrong = Vec::new();
+    for document in documents() {
+        let text = read(&document);
+        let page = Page::parse(&text);
+        let mut lines: Vec<String> = page.codes.clone();
+        lines.retain(|code| commands::BEGINNINGS.iter().any(|start| code.starts_with(start)));
+        for block in &page.blocks {
+            let content = text[block.range.clone()].replace("\\\n", " ");
+            let place = document.display();
+            match block.language() {
+                "sh" => lines.extend(content.lines().map(String::from)),
+                "console" | "rust" | "json" | "text" => {}
+                other => wrong.push(format!("{place}: nothing tests a block of \"{other}\"")),
+            }
+            let typed = |line: &&str| {
+                ["$ ", "mechid "].iter().chain(&commands::BEGINNINGS).any(|b| line.starts_with(b))
+            };
+            if block.language() == "text" {
+                let typed = content.lines().find(typed);
+                wrong.extend(typed.map(|line| format!("{place}: a command as text: {line}")));
+            }
+        }
+        for line in lines.iter().filter(|line| !Session::walks(line)) {
+            let told = workspace.hold(line).err();
+            wrong.extend(told.map(|why| format!("{}: {line}: {why}", document.display())));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Subcommands and options that the pages speak of are in the program's help.
+#[test]
+fn options_in_running_text_exist() {
+    let help = |arguments: &[&str]| {
+        let output = Command::cargo_bin("mechid").unwrap().args(arguments).output().unwrap();
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let all = read(&root().join("docs/book/src/reference/commands.md"));
+    let has = |help: &str, option: &str| {
+        help.split(|c: char| c.is_whitespace() || ",[]()".contains(c)).any(|word| word == option)
+    };
+    let (mut wrong, mut looked_at) = (Vec::new(), 0);
+    for document in documents() {
+        for code in Page::parse(&read(&document)).codes {
+            let mut words = code.split_whitespace();
+            let known = match words.next() {
+                Some("mechid") => match words.next() {
+                    Some(name) if !name.starts_with('-') => help(&[name, "--help"]),
+                    _ => help(&["--help"]),
+                },
+                Some(option) if option.starts_with("--") => all.clone(),
+                _ => continue,
+            };
+            let options = code.split_whitespace().filter(|word| word.starts_with("--"));
+            let missing = options.filter(|option| !has(&known, option)).count();
+            if known.is_empty() || missing > 0 {
+                wrong.push(format!("{}: {code}", document.display()));
+            }
+            looked_at += 1;
+        }
+    }
+    assert!(wrong.is_empty() && looked_at > 40, "{looked_at} looked at\n{}", wrong.join("\n"));
 }
 
 /// `cargo test --doc` compiles and runs the Rust of the pages that the facade names.

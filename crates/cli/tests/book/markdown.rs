@@ -30,6 +30,8 @@ impl Block {
 #[derive(Debug, Default)]
 pub struct Page {
     pub blocks: Vec<Block>,
+    /// Code in running text.
+    pub codes: Vec<String>,
     /// Targets of links with the depth of the list they stand in.
     pub links: Vec<(usize, String)>,
     pub images: Vec<String>,
@@ -44,6 +46,9 @@ impl Page {
         let mut page = Self { includes: includes.map(String::from).collect(), ..Self::default() };
         let (mut depth, mut heading, mut block) = (0, None::<String>, None::<Block>);
         for (event, range) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
+            if let Event::Code(code) = &event {
+                page.codes.push(code.to_string());
+            }
             match event {
                 Event::Start(Tag::List(_)) => depth += 1,
                 Event::End(TagEnd::List(_)) => depth -= 1,

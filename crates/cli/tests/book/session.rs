@@ -1,7 +1,7 @@
 //! A reader at a terminal: follows a page's commands in a folder of its own.
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use tempfile::TempDir;
@@ -11,30 +11,49 @@ const PROGRAM: [&str; 2] = ["mechid", "cargo run --package mechid-cli --"];
 
 /// A folder with the repository's examples, and what the commands so far have left there.
 pub struct Session {
-    folder: TempDir,
+    /// Removed with the session.
+    _home: TempDir,
+    /// Where the reader is.
+    folder: PathBuf,
     /// Exit code of the last command; one that is not 0 must be asked for by `echo $?`.
     code: i32,
 }
 
 impl Session {
     pub fn new(root: &Path) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        fs::create_dir(folder.path().join("examples")).unwrap();
+        let home = tempfile::tempdir().unwrap();
+        let folder = home.path().to_owned();
+        fs::create_dir(folder.join("examples")).unwrap();
         for file in ["machine.json", "machine.csv"] {
             let name = Path::new("examples").join(file);
-            fs::copy(root.join(&name), folder.path().join(&name)).unwrap();
+            fs::copy(root.join(&name), folder.join(&name)).unwrap();
         }
-        Self { folder, code: 0 }
+        Self { _home: home, folder, code: 0 }
     }
 
     /// Writes a file that a page shows.
     pub fn write(&self, name: &str, text: &str) {
-        fs::write(self.folder.path().join(name), text).unwrap();
+        fs::write(self.folder.join(name), text).unwrap();
     }
 
     /// A file that the reader would find, if it is there.
     pub fn read(&self, name: &str) -> Option<String> {
-        fs::read_to_string(self.folder.path().join(name)).ok()
+        fs::read_to_string(self.folder.join(name)).ok()
+    }
+
+    /// Whether a line makes or enters a folder.
+    pub fn walks(line: &str) -> bool {
+        line.starts_with("mkdir ") || line.starts_with("cd ")
+    }
+
+    /// Makes or enters a folder, if that is what the line does.
+    pub fn walk(&mut self, line: &str) -> Result<(), String> {
+        let done = match line.split_whitespace().collect::<Vec<_>>()[..] {
+            ["mkdir", name] => fs::create_dir(self.folder.join(name)),
+            ["cd", name] => self.folder.join(name).canonicalize().map(|at| self.folder = at),
+            _ => Ok(()),
+        };
+        done.map_err(|error| format!("{line}: {error}"))
     }
 
     /// What the terminal shows after a command.
@@ -76,7 +95,7 @@ impl Session {
             .ok_or_else(|| format!("`{command}` is none of the commands a page may show"))?;
         let output = Command::cargo_bin("mechid")
             .unwrap()
-            .current_dir(self.folder.path())
+            .current_dir(&self.folder)
             // The width of the developer's terminal is not the reader's.
             .env_remove("COLUMNS")
             .args(arguments.split(' '))
