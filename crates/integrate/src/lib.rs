@@ -43,6 +43,7 @@ mod error;
 mod force;
 mod houbolt;
 mod newmark;
+mod period;
 mod periodic;
 mod run;
 mod runge_kutta;

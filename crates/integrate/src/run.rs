@@ -56,6 +56,8 @@ pub(crate) struct Run {
     transition: Option<Transition>,
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
+    /// What rounding has kept from `state` so far.
+    owed: Vec<f64>,
     /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
 }
@@ -70,7 +72,8 @@ impl Run {
             .then(|| Transition::of(stepper.as_mut()))
             .filter(|transition| resolves(transition, dt, n));
         let rows = [(); 4].map(|()| vec![0.0; n]);
-        Self { stepper, transition, state: vec![0.0; len], change: vec![0.0; len], rows }
+        let [state, change, owed] = [(); 3].map(|()| vec![0.0; len]);
+        Self { stepper, transition, state, change, owed, rows }
     }
 
     /// Starts the stepper and keeps the state it starts in.
@@ -81,6 +84,12 @@ impl Run {
         motions: &mut [Vec<f64>],
     ) -> Result<(), IntegrateError> {
         self.stepper.start(initial, early, motions, &mut self.state)
+    }
+
+    /// Goes on from `state`.
+    pub(crate) fn restart(&mut self, state: &[f64]) {
+        self.state.copy_from_slice(state);
+        self.owed.fill(0.0);
     }
 
     pub(crate) fn stepper(&mut self) -> &mut dyn Stepper {
@@ -105,15 +114,25 @@ impl Run {
         }
     }
 
-    /// One step through the stepper itself.
-    fn step(&mut self, table: &ForceTable<'_>, k: usize) {
+    /// One step through the stepper itself, from sample `k`.
+    ///
+    /// The sum is compensated: what a small step adds to a large state keeps its digits.
+    ///
+    /// # Source
+    /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.
+    pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
         }
         let [now, middle, next, beyond] = &self.rows;
         let loads = Loads { now, middle, next, beyond };
         self.stepper.change(&self.state, &loads, &mut self.change);
-        self.state.iter_mut().zip(&self.change).for_each(|(z, dz)| *z += dz);
+        for ((z, dz), owed) in self.state.iter_mut().zip(&self.change).zip(&mut self.owed) {
+            let add = dz + *owed;
+            let sum = *z + add;
+            *owed = add - (sum - *z);
+            *z = sum;
+        }
     }
 
     /// Takes as many steps as it can at fixed size; returns the step to go on with.
