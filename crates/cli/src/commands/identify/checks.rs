@@ -7,10 +7,10 @@ use super::fit::{Fitted, Residual};
 use crate::error::CliError;
 
 /// Lags up to which a residual is correlated.
-const LAGS: usize = 25;
+pub const LAGS: usize = 25;
 
 /// Samples that a lag takes at least.
-const SAMPLES_PER_LAG: usize = 4;
+pub const SAMPLES_PER_LAG: usize = 4;
 
 /// One thing looked at.
 #[derive(Debug, Serialize)]

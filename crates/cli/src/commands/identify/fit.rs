@@ -1,5 +1,7 @@
 //! The estimators, and what the identified model leaves unexplained.
 
+use std::fmt;
+
 use clap::ValueEnum;
 use mechid::estimate::checks::{Check, before_spectral_fit};
 use mechid::estimate::frequency_domain::{
@@ -54,7 +56,25 @@ pub struct Fitted {
     pub residuals: Vec<Residual>,
     /// How the machine found is made to move under a measured force.
     pub course: Course,
+    /// Residual power against that of the noise, where the noise is known.
+    pub misfit: Option<Misfit>,
+    /// How it was done, where that is not plain.
     pub remarks: Vec<String>,
+}
+
+/// Power of a residual over what the noise explains: 1 if the model is right.
+#[derive(Debug, Clone, Copy)]
+pub struct Misfit {
+    pub ratio: f64,
+    /// What the noise was known from.
+    pub noise: &'static str,
+}
+
+impl fmt::Display for Misfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (ratio, noise) = (self.ratio, self.noise);
+        write!(f, "the residual has {ratio:.3} times the power that {noise} explains")
+    }
 }
 
 /// What a fit leaves of a record.
@@ -91,6 +111,7 @@ pub fn frequency_domain(
         Ok::<_, CliError>(all)
     };
     let data = together(&RepeatedPeriods::mean)?;
+    let mut misfit = None;
     let (estimator, estimate) = match method {
         Method::LeastSquares => (
             "least squares on the equation of motion, in the frequency domain",
@@ -111,12 +132,8 @@ pub fn frequency_domain(
                 Some(pooling) => together(&|periods| periods.mean_with_noise(pooling))?,
             };
             let fit = output_error(&data, unknowns)?;
-            if fewest > 1 {
-                remarks.push(format!(
-                    "the residual has {:.3} times the power that the noise of the periods explains",
-                    fit.misfit_ratio
-                ));
-            }
+            let noise = "the noise of the periods";
+            misfit = (fewest > 1).then_some(Misfit { ratio: fit.misfit_ratio, noise });
             ("maximum likelihood, in the frequency domain", fit.estimate)
         }
     };
@@ -136,6 +153,7 @@ pub fn frequency_domain(
         before,
         residuals,
         course: Course::Steady,
+        misfit,
         remarks,
     })
 }

@@ -1,7 +1,7 @@
 //! `mechid identify`: the machine behind a record.
 
-mod checks;
-mod course;
+pub(super) mod checks;
+pub(super) mod course;
 mod derivatives;
 pub(super) mod excited;
 pub(super) mod fit;
@@ -12,7 +12,7 @@ pub(super) mod picture;
 pub(super) mod report;
 mod responses;
 mod time;
-mod validation;
+pub(super) mod validation;
 
 use std::path::PathBuf;
 
@@ -115,8 +115,10 @@ pub struct Identification {
 /// A machine found, and what it was found from.
 #[derive(Debug)]
 pub struct Identified {
-    /// The first record.
-    pub measured: Measurement,
+    /// The records fitted, at least one.
+    pub records: Vec<Measurement>,
+    /// The record predicted, if one was given.
+    pub validated: Option<Measurement>,
     pub fitted: Fitted,
     pub report: Report,
 }
@@ -153,7 +155,7 @@ impl Identification {
             records.push(self.channels.measure(&input)?);
         }
         let unknowns = self.mass.unknowns(records[0].force.channels())?;
-        let choose = |force: &Record| choose_lines(force, self.lines.as_ref(), self.band_hz);
+        let choose = |force: &Record| self.choose(force);
         let fitted = match (self.domain, self.from_frf) {
             (Domain::Time, _) => self.time.fit(&records, &unknowns, self.between_samples)?,
             (Domain::Frequency, Some(estimator)) => {
@@ -166,12 +168,17 @@ impl Identification {
             }
         };
         let mut report = report(&records, &fitted)?;
-        let other = self.validation.measure(&self.input, &self.channels, fitted.course)?;
-        if let Some(other) = other {
+        let validated = self.validation.measure(&self.input, &self.channels, fitted.course)?;
+        if let Some(other) = &validated {
             let system = fitted.estimate.system()?;
-            report.validation = Some(Validation::of(&other, &system, fitted.course)?);
+            report.validation = Some(Validation::of(other, &system, fitted.course)?);
         }
-        Ok(Identified { measured: records.swap_remove(0), fitted, report })
+        Ok(Identified { records, validated, fitted, report })
+    }
+
+    /// The lines of one period of a force that are fitted.
+    pub fn choose(&self, force: &Record) -> Result<Vec<usize>, CliError> {
+        choose_lines(force, self.lines.as_ref(), self.band_hz)
     }
 
     /// Refuses what the domain chosen would leave unheard.
@@ -208,7 +215,7 @@ impl Identified {
             return self.receptance(title);
         }
         let system = self.fitted.estimate.system()?;
-        let compared = self.fitted.course.predict(&system, &self.measured)?;
+        let compared = self.fitted.course.predict(&system, &self.records[0])?;
         Ok(motion_picture::motion(title, &compared[0]))
     }
 
@@ -240,6 +247,7 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         fit: Fit {
             nrmse: fitted.nrmse(),
             unexplained_motion,
+            misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
             condition_number: estimate.condition(),
             equations: fitted.equations,
             unknowns: estimate.parameters().len(),
@@ -251,7 +259,8 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         system: SystemMatrices::from(&system),
         covariance: covariance(estimate),
     };
-    report.remarks = remarks(fitted, &report);
+    let misfit = fitted.misfit.iter().map(ToString::to_string);
+    report.remarks = fitted.remarks.iter().cloned().chain(misfit).chain(doubts(&report)).collect();
     Ok(report)
 }
 
@@ -287,17 +296,18 @@ fn covariance(estimate: &Estimate) -> ParameterCovariance {
     ParameterCovariance::new(names, estimate.covariance(), estimate.degrees_of_freedom())
 }
 
-fn remarks(fitted: &Fitted, report: &Report) -> Vec<String> {
-    let mut remarks = fitted.remarks.clone();
+/// What in the numbers themselves speaks against them.
+pub fn doubts(report: &Report) -> Vec<String> {
+    let mut doubts = Vec::new();
     if let Some(part) = report.fit.unexplained_motion.filter(|part| *part > CONSPICUOUS) {
-        remarks.push(format!(
+        doubts.push(format!(
             "the linear model leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \
              degree of freedom more, or a record that is not periodic",
             100.0 * part
         ));
     }
     for p in report.parameters.iter().filter(|p| p.row == p.column && p.estimate.value < 0.0) {
-        remarks.push(format!("{} is negative: no passive machine has that", p.name));
+        doubts.push(format!("{} is negative: no passive machine has that", p.name));
     }
-    remarks
+    doubts
 }

@@ -109,6 +109,8 @@ pub struct Fit {
     /// RMS of measured minus modelled motion over RMS of the measured motion: what the linear model
     /// leaves unexplained. Nothing where it was not computed.
     pub unexplained_motion: Option<f64>,
+    /// Power of the residual over what the noise explains; nothing where the noise is not known.
+    pub misfit_ratio: Option<f64>,
     /// Condition number of the column-scaled regressor.
     pub condition_number: f64,
     pub equations: usize,

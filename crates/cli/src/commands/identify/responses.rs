@@ -7,7 +7,7 @@ use mechid::estimate::time_domain::{Discretisation, Extent};
 use mechid::signal::Record;
 
 use super::course::Course;
-use super::fit::{Fitted, Method, one_motion_of, steady_residuals};
+use super::fit::{Fitted, Method, Misfit, one_motion_of, steady_residuals};
 use super::measurement::Measurement;
 use crate::commands::frf::responses::{Estimator, Responses, SegmentArgs};
 use crate::error::CliError;
@@ -35,7 +35,7 @@ pub fn fit(
         });
     }
     let Some(data) = data else { return Err(CliError::NoMotion) };
-    let mut remarks = one_motion_of(&records[0]);
+    let mut misfit = None;
     let (name, found) = match method {
         Some(Method::Instrumental) => return Err(CliError::InstrumentalResponses),
         Some(Method::LeastSquares) => (
@@ -44,10 +44,7 @@ pub fn fit(
         ),
         Some(Method::MaximumLikelihood) | None => {
             let fit = output_error(&data, unknowns)?;
-            remarks.push(format!(
-                "the residual has {:.3} times the power that the coherence explains",
-                fit.misfit_ratio
-            ));
+            misfit = Some(Misfit { ratio: fit.misfit_ratio, noise: "the coherence" });
             ("maximum likelihood on frequency responses, weighted by their coherence", fit.estimate)
         }
     };
@@ -68,7 +65,8 @@ pub fn fit(
                 extent: Extent::Open,
             },
         },
-        remarks,
+        misfit,
+        remarks: one_motion_of(&records[0]),
         estimate: found,
     })
 }

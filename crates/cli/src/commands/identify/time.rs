@@ -127,6 +127,7 @@ impl TimeArgs {
             before,
             residuals: residuals.collect::<Result<_, _>>()?,
             course: self.course(Discretisation::FirstOrderHold),
+            misfit: None,
             remarks: self.remarks(prepared),
             estimate,
         })
@@ -171,6 +172,7 @@ impl TimeArgs {
             before,
             residuals,
             course: self.course(discretisation),
+            misfit: None,
             remarks: self.remarks(prepared),
             estimate: fit.into_estimate(),
         })

@@ -1,12 +1,9 @@
 //! Whether the force drives the machine as an identification needs it.
 
-use mechid::estimate::checks::{Check, before_fit, before_spectral_fit};
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
 use mechid::signal::measures::{self, Band};
 use mechid::signal::{Record, Spectrum};
 
-use crate::commands::identify::Identified;
-use crate::commands::identify::fit::BetweenSamples;
+use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
 
 /// A line this far below the strongest, in dB, is no longer driven: a multisine stands far above
@@ -28,18 +25,17 @@ pub struct Excitation {
     pub order: usize,
 }
 
-/// One period of the force in the frequency domain, averaged; the window in the time domain.
-pub fn force(found: &Identified) -> Result<Record, CliError> {
-    let measured = &found.measured;
-    Ok(match found.fitted.frequency {
-        Some(_) => measured.force.period_mean(measured.period)?,
-        None => measured.force.clone(),
+/// One period of the force, averaged; or the window.
+pub fn force(measured: &Measurement, periodic: bool) -> Result<Record, CliError> {
+    Ok(match periodic {
+        true => measured.force.period_mean(measured.period)?,
+        false => measured.force.clone(),
     })
 }
 
 /// Of every force that is not zero throughout.
-pub fn excitations(found: &Identified) -> Result<Vec<Excitation>, CliError> {
-    let force = force(found)?;
+pub fn excitations(measured: &Measurement, periodic: bool) -> Result<Vec<Excitation>, CliError> {
+    let force = force(measured, periodic)?;
     let spectrum = Spectrum::of(&force);
     let floor = 10f64.powf(-DROP_DB / 20.0);
     let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);
@@ -60,20 +56,4 @@ pub fn excitations(found: &Identified) -> Result<Vec<Excitation>, CliError> {
             })
         })
         .collect()
-}
-
-/// What can be said before the fit.
-pub fn checks(found: &Identified, between: Option<BetweenSamples>) -> Result<Vec<Check>, CliError> {
-    let measured = &found.measured;
-    let force = &measured.force;
-    if let Some((lines, _)) = &found.fitted.frequency {
-        let (motion, kind) = measured.motion();
-        let unknowns = found.fitted.estimate.unknowns();
-        return Ok(before_spectral_fit(lines, force, motion, kind, unknowns)?);
-    }
-    let (Some(x), Some(v)) = (&measured.displacement, &measured.velocity) else {
-        return Ok(Vec::new());
-    };
-    let between = between.map_or(Discretisation::FirstOrderHold, BetweenSamples::discretisation);
-    Ok(before_fit(TimeDomain::new(between, Extent::Open), x, v, force)?)
 }

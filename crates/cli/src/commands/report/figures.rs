@@ -4,10 +4,14 @@ use mechid::estimate::frequency_domain::Motion;
 use mechid::plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid::signal::{Record, Spectrum};
 
+use super::receptance::Receptance;
 use super::reconstruction::Reconstruction;
-use super::residual::Residual;
-use super::{Contents, excitation};
+use super::residual::Correlations;
+use super::{Part, excitation};
 use crate::commands::identify::Identified;
+use crate::commands::identify::course::Compared;
+use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::picture;
 use crate::error::CliError;
 
 /// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
@@ -19,18 +23,18 @@ const PANEL: f64 = 210.0;
 
 /// A picture with its words.
 pub struct Drawn {
-    pub id: &'static str,
+    pub id: String,
     pub svg: String,
     pub caption: String,
 }
 
-fn drawn(id: &'static str, figure: Figure, caption: String) -> Result<Drawn, CliError> {
+fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, CliError> {
     let panels = figure.panels();
     // Many curves have a legend of several rows.
     let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
     let height = PANEL * (panels.len() as f64).max(1.5) + 12.0 * curves as f64;
     let figure = figure.size(WIDTH, height);
-    let svg = figure.to_inline_svg(id, &caption)?;
+    let svg = figure.to_inline_svg(&id, &caption)?;
     Ok(Drawn { id, svg, caption })
 }
 
@@ -80,10 +84,11 @@ fn overlay(t: &[f64], measured: &[f64], name: &str, own: &[f64]) -> [Curve; 2] {
 }
 
 /// Time histories and spectra of force and motion.
-pub fn data(found: &Identified) -> Result<Vec<Drawn>, CliError> {
-    let source = &found.measured;
+pub fn data(part: &Part<'_>) -> Result<Vec<Drawn>, CliError> {
+    let source = part.measured;
     let (motion, kind) = source.motion();
-    let (force, mean) = (excitation::force(found)?, found.fitted.frequency.is_some());
+    let mean = part.lines.is_some();
+    let force = excitation::force(source, mean)?;
     let period = if mean { motion.period_mean(source.period)? } else { motion.clone() };
     let of = match (mean, source.periods) {
         (false, _) => "the window taken as one period",
@@ -96,12 +101,12 @@ pub fn data(found: &Identified) -> Result<Vec<Drawn>, CliError> {
     let name = symbol(kind);
     Ok(vec![
         drawn(
-            "force",
+            part.id("force"),
             history(("Force", "N"), &source.force, &force, &acting),
             format!("Measured force: time history of the window, and line amplitudes of {of}."),
         )?,
         drawn(
-            "motion",
+            part.id("motion"),
             history(name, motion, &period, &all),
             format!("Measured {kind}: time history of the window, and line amplitudes of {of}."),
         )?,
@@ -111,58 +116,78 @@ pub fn data(found: &Identified) -> Result<Vec<Drawn>, CliError> {
 /// Measured and identified receptance.
 ///
 /// # Errors
-/// [`CliError::NoSpectra`], [`CliError::NothingToDraw`].
-pub fn receptance(found: &Identified) -> Result<Drawn, CliError> {
-    let caption = "Receptance, motion over force: measured on the lines used, and that of the \
-                   identified machine.";
-    drawn("receptance", found.receptance("")?, caption.into())
+/// [`CliError::NothingToDraw`].
+pub fn receptance(found: &Identified, measured: &Receptance) -> Result<Drawn, CliError> {
+    let figure = picture::receptance("", &measured.data, &found.fitted.estimate.system()?)?;
+    let origin = &measured.origin;
+    let caption = format!(
+        "Receptance, motion over force: that of the identified machine, and that of the record, {origin}."
+    );
+    drawn("receptance".into(), figure, caption)
 }
 
 /// Measured and modelled motion with what is left, over one period or the whole open record.
-pub fn fit(contents: &Contents<'_>, residual: &Residual) -> Result<Drawn, CliError> {
-    let source = &contents.found.measured;
-    let (label, unit) = symbol(residual.kind);
-    let [measured, modelled, left] = [&residual.measured, &residual.modelled, &residual.residual]
-        .map(|record| record.window(0, source.period));
-    let (measured, modelled, left) = (measured?, modelled?, left?);
+pub fn fit(part: &Part<'_>, compared: &Compared) -> Result<Drawn, CliError> {
+    let extent = extent(part.measured);
+    let caption = format!(
+        "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
+        compared.kind
+    );
+    over_time(part.id("fit"), compared, part.measured.period, caption)
+}
+
+/// The same of a record that was not fitted.
+pub fn validation(source: &Measurement, compared: &Compared) -> Result<Drawn, CliError> {
+    let extent = extent(source);
+    let caption = format!(
+        "{}: measured {} and the one predicted {extent}; below, their difference.",
+        source.file, compared.kind
+    );
+    over_time("validation".into(), compared, source.period, caption)
+}
+
+fn extent(source: &Measurement) -> &'static str {
+    if source.periods == 1 { "over the window" } else { "over the first period" }
+}
+
+/// The first samples of a motion, measured and modelled, above their difference.
+fn over_time(
+    id: String,
+    compared: &Compared,
+    samples: usize,
+    caption: String,
+) -> Result<Drawn, CliError> {
+    let (label, unit) = symbol(compared.kind);
+    let measured = compared.measured.window(0, samples)?;
+    let modelled = compared.predicted.window(0, samples)?;
     let t = times(&measured);
     let mut figure = Figure::new("").share_x();
     for c in 0..measured.channels() {
         let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), unit);
         let time = || Axis::linear("Time in the window", "s");
+        let (x, own) = (measured.channel(c), modelled.channel(c));
+        let left: Vec<f64> = x.iter().zip(own).map(|(x, own)| x - own).collect();
         let both = Panel::new(time(), axis(label))
-            .curves(overlay(&t, measured.channel(c), "modelled", modelled.channel(c)))
+            .curves(overlay(&t, x, "modelled", own))
             .legend(Legend::Above);
-        let rest = Curve::line("", &t, left.channel(c)).color(Color::VERMILION).width(1.0);
+        let rest = Curve::line("", &t, &left).color(Color::VERMILION).width(1.0);
         figure = figure.panel(both).panel(Panel::new(time(), axis("Residual")).curve(rest));
     }
-    let extent = match source.periods {
-        1 => "over the window",
-        _ => "over the first period",
-    };
-    drawn(
-        "fit",
-        figure,
-        format!(
-            "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
-            residual.kind
-        ),
-    )
+    drawn(id, figure, caption)
 }
 
 /// Amplitudes of motion and residual, on the lines used or all.
-pub fn residual_spectrum(found: &Identified, residual: &Residual) -> Result<Drawn, CliError> {
-    let source = &found.measured;
-    let lines = found.fitted.frequency.as_ref().map(|(lines, _)| lines.as_slice().to_vec());
-    let mean = |record: &Record| match lines {
-        Some(_) => record.period_mean(source.period),
+pub fn residual_spectrum(part: &Part<'_>, compared: &Compared) -> Result<Drawn, CliError> {
+    let mean = |record: &Record| match part.lines {
+        Some(_) => record.period_mean(part.measured.period),
         None => Ok(record.clone()),
     };
-    let [motion, left] = [&residual.measured, &residual.residual].map(mean);
-    let (motion, left) = (Spectrum::of(&motion?), Spectrum::of(&left?));
-    let mut shown = lines.unwrap_or_else(|| (1..motion.len()).collect());
+    let (motion, model) = (mean(&compared.measured)?, mean(&compared.predicted)?);
+    let left = Record::new(motion.sampling(), motion.data() - model.data())?;
+    let (motion, left) = (Spectrum::of(&motion), Spectrum::of(&left));
+    let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
-    let (_, unit) = symbol(residual.kind);
+    let (_, unit) = symbol(compared.kind);
     let mut figure = Figure::new("");
     for c in 0..motion.channels() {
         let points = |spectrum: &Spectrum| -> (Vec<f64>, Vec<f64>) {
@@ -181,21 +206,21 @@ pub fn residual_spectrum(found: &Identified, residual: &Residual) -> Result<Draw
         figure = figure.panel(panel);
     }
     drawn(
-        "residual-spectrum",
+        part.id("residual-spectrum"),
         figure,
         format!(
             "Spectra of the measured {} and of the residual: noise lies flat, what the model misses has the shape of a resonance or of the force.",
-            residual.kind
+            compared.kind
         ),
     )
 }
 
-/// Correlation of the residual with itself and with the forces.
-pub fn correlations(residual: &Residual) -> Result<Drawn, CliError> {
-    let dofs = residual.channels.len();
+/// Correlation of what the fit leaves with itself and with the forces.
+pub fn correlations(part: &Part<'_>, found: &[Correlations]) -> Result<Drawn, CliError> {
+    let dofs = found.len();
     let mut figure = Figure::new("");
-    for (c, channel) in residual.channels.iter().enumerate() {
-        let own = (1, "Autocorrelation".to_owned(), &channel.whiteness);
+    for (c, channel) in found.iter().enumerate() {
+        let own = (1, "Autocorrelation".to_owned(), &channel.own);
         let forces = channel.forces.iter().map(|(force, found)| {
             let first = -((found.coefficients.len() / 2) as i32);
             (first, numbered("With the force", *force, dofs), found)
@@ -212,14 +237,14 @@ pub fn correlations(residual: &Residual) -> Result<Drawn, CliError> {
         }
     }
     drawn(
-        "correlations",
+        part.id("correlations"),
         figure,
-        "Autocorrelation of the residual, and its correlation with the force; 95 % of the stems of white noise stay between the dashed lines.".into(),
+        "Autocorrelation of what the fit leaves, and its correlation with the force; 95 % of the stems of white noise stay between the dashed lines.".into(),
     )
 }
 
 /// The force found and the one measured.
-pub fn force(reconstruction: &Reconstruction) -> Result<Drawn, CliError> {
+pub fn force(part: &Part<'_>, reconstruction: &Reconstruction) -> Result<Drawn, CliError> {
     let (found, measured) = (reconstruction.found.record(), &reconstruction.measured);
     let t = times(measured);
     let mut figure = Figure::new("").share_x();
@@ -243,7 +268,7 @@ pub fn force(reconstruction: &Reconstruction) -> Result<Drawn, CliError> {
         figure = figure.panel(both).panel(below.curve(difference));
     }
     drawn(
-        "reconstructed-force",
+        part.id("reconstructed-force"),
         figure,
         "Force found from the motion with the identified machine, and the measured one; below, their difference.".into(),
     )

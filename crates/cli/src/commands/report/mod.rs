@@ -3,7 +3,9 @@
 mod channels;
 mod excitation;
 mod figures;
+mod judgement;
 mod page;
+mod receptance;
 mod reconstruction;
 mod repeat;
 mod residual;
@@ -13,13 +15,15 @@ mod tables;
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::estimate::checks::Check;
 use serde::Serialize;
 
 use self::channels::Channel;
 use self::excitation::Excitation;
+use self::receptance::Receptance;
 use self::reconstruction::Reconstruction;
 use self::residual::Residual;
+use crate::commands::identify::course::{Compared, Course};
+use crate::commands::identify::measurement::Measurement;
 use crate::commands::identify::report::Report;
 use crate::commands::identify::{Identification, Identified};
 use crate::error::CliError;
@@ -64,13 +68,28 @@ fn html_file(text: &str) -> Result<PathBuf, String> {
 struct Contents<'a> {
     title: String,
     found: &'a Identified,
+    parts: Vec<Part<'a>>,
+    /// The receptance that the records show, or why there is none.
+    receptance: Result<Receptance, String>,
+    /// The motions of a record that was not fitted, measured and predicted.
+    validation: Vec<Compared>,
+    command: String,
+}
+
+/// What the page shows of one record.
+struct Part<'a> {
+    measured: &'a Measurement,
+    /// The name of the record, where there are several.
+    name: Option<&'a str>,
+    /// What makes the names of this record's figures its own.
+    suffix: String,
+    /// Lines of a period, where the fit was done on such.
+    lines: Option<Vec<usize>>,
     channels: Vec<Channel>,
     excitations: Vec<Excitation>,
-    checks: Vec<Check>,
     /// Or why there is none.
     residual: Result<Residual, String>,
     reconstruction: Option<Reconstruction>,
-    command: String,
 }
 
 /// The report of `mechid identify`, and where the page is.
@@ -94,22 +113,53 @@ impl PageArgs {
     }
 
     fn contents<'a>(&self, found: &'a Identified) -> Result<Contents<'a>, CliError> {
-        let between = self.identification.between_samples;
-        let reconstruction = match self.reconstruct_force {
-            true => Some(Reconstruction::of(found)?),
-            false => None,
-        };
         let name = PathBuf::from(&found.report.file);
         let name = name.file_name().unwrap_or_default().to_string_lossy();
+        let parts = 0..found.records.len();
+        let validation = match &found.validated {
+            Some(other) => found.fitted.course.predict(&found.fitted.estimate.system()?, other)?,
+            None => Vec::new(),
+        };
         Ok(Contents {
             title: self.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
             found,
-            channels: channels::channels(&found.measured, &self.identification.channels)?,
-            excitations: excitation::excitations(found)?,
-            checks: excitation::checks(found, between)?,
-            residual: Residual::of(found, between).map_err(|reason| reason.to_string()),
-            reconstruction,
+            parts: parts.map(|at| self.part(found, at)).collect::<Result<_, _>>()?,
+            receptance: Receptance::of(found).map_err(|reason| reason.to_string()),
+            validation,
             command: repeat::command(std::env::args_os().skip(1)),
         })
+    }
+
+    fn part<'a>(&self, found: &'a Identified, at: usize) -> Result<Part<'a>, CliError> {
+        let measured = &found.records[at];
+        let lines = match found.fitted.frequency {
+            // Lines of segments are not those of the record.
+            Some(_) if found.fitted.course == Course::Steady => {
+                let period = measured.force.period_mean(measured.period)?;
+                Some(self.identification.choose(&period)?)
+            }
+            _ => None,
+        };
+        let reconstruction = match self.reconstruct_force {
+            true => Some(Reconstruction::of(found, measured, lines.clone())?),
+            false => None,
+        };
+        Ok(Part {
+            measured,
+            name: (found.records.len() > 1).then_some(measured.file.as_str()),
+            suffix: if at == 0 { String::new() } else { format!("-{}", at + 1) },
+            channels: channels::channels(measured, &self.identification.channels)?,
+            excitations: excitation::excitations(measured, lines.is_some())?,
+            residual: Residual::of(found, at).map_err(|reason| reason.to_string()),
+            reconstruction,
+            lines,
+        })
+    }
+}
+
+impl Part<'_> {
+    /// The name of a figure of this record.
+    fn id(&self, figure: &str) -> String {
+        format!("{figure}{}", self.suffix)
     }
 }

@@ -1,10 +1,9 @@
 //! The page around the sections: head, heading, contents, summary, what to know first, the end.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use mechid::estimate::checks::Verdict;
 
 use super::figures::Drawn;
-use super::{Contents, sections};
+use super::{Contents, judgement, sections};
 use crate::error::CliError;
 use crate::text_table::significant;
 
@@ -12,12 +11,13 @@ use crate::text_table::significant;
 const STYLE: &str = include_str!("style.css");
 
 /// Identifier and heading of each section.
-const SECTIONS: [(&str, &str); 6] = [
+const SECTIONS: [(&str, &str); 7] = [
     ("data", "Data"),
     ("excitation", "Excitation"),
     ("machine", "Machine"),
     ("response", "Frequency response and fit"),
     ("residual", "Residual"),
+    ("validation", "Another record"),
     ("reconstruction", "Identified force"),
 ];
 
@@ -25,10 +25,11 @@ const SECTIONS: [(&str, &str); 6] = [
 pub fn html(contents: &Contents<'_>) -> Result<String, CliError> {
     let bodies = [
         Some(sections::data(contents)?),
-        Some(sections::excitation(contents)),
+        Some(sections::excitation(contents)?),
         Some(sections::machine(contents)),
         Some(sections::response(contents)?),
         Some(sections::residual(contents)?),
+        sections::validation(contents)?,
         sections::reconstruction(contents)?,
     ];
     let present: Vec<(&str, &str, Markup)> = SECTIONS
@@ -88,7 +89,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
     html! {
         header {
             h1 { (contents.title) }
-            p.subtitle { (report.file) " · " (report.estimator) }
+            p.subtitle { (files(contents)) " · " (report.estimator) }
             dl.summary {
                 @for (at, mode) in modes {
                     @let [hz, hz_error, _] = mode.natural_frequency_hz.cells();
@@ -107,19 +108,25 @@ fn heading(contents: &Contents<'_>) -> Markup {
     }
 }
 
-/// What the reader should know before believing the numbers.
+fn files(contents: &Contents<'_>) -> String {
+    let names: Vec<&str> = contents.found.records.iter().map(|r| r.file.as_str()).collect();
+    names.join(", ")
+}
+
+/// What speaks against the numbers, and what for them.
 fn remarks(contents: &Contents<'_>) -> Markup {
-    let doubts = contents.checks.iter().filter(|check| check.verdict != Verdict::Good);
-    let mut all: Vec<String> = contents.found.report.remarks.clone();
-    all.extend(doubts.map(|check| check.text.clone()));
-    all.extend(sections::residual_doubts(contents));
+    let (doubts, merits) = (judgement::doubts(contents), judgement::merits(contents));
     html! {
-        @if all.is_empty() {
-            aside.remarks.good aria-label="Remarks" { p { "No remarks: excitation, fit and residual gave no cause for doubt." } }
-        } @else {
-            aside.remarks aria-labelledby="remarks-heading" {
-                h2 id="remarks-heading" { "Before you believe the numbers" }
-                ul { @for remark in &all { li { (remark) } } }
+        @if !doubts.is_empty() {
+            aside.remarks aria-labelledby="doubts-heading" {
+                h2 id="doubts-heading" { "Before you believe the numbers" }
+                ul { @for doubt in &doubts { li { (doubt) } } }
+            }
+        }
+        @if !merits.is_empty() {
+            aside.remarks.good aria-labelledby="merits-heading" {
+                h2 id="merits-heading" { "What speaks for the numbers" }
+                ul { @for merit in &merits { li { (merit) } } }
             }
         }
     }

@@ -24,16 +24,16 @@ pub struct Reconstruction {
     /// RMS of the difference over RMS of the measured force, per degree of freedom; nothing where
     /// none acts.
     pub errors: Vec<Option<f64>>,
-    /// Lines used, in the frequency domain.
-    pub lines: Option<Vec<usize>>,
 }
 
 impl Reconstruction {
-    /// Line by line on the lines of the fit in the frequency domain, otherwise with the method that
-    /// suits an open record.
-    pub fn of(found: &Identified) -> Result<Self, CliError> {
-        let source = &found.measured;
-        let lines = found.fitted.frequency.as_ref().map(|(lines, _)| lines.as_slice().to_vec());
+    /// Line by line on lines of the periods where there are some, otherwise with the method that suits
+    /// an open record.
+    pub fn of(
+        found: &Identified,
+        source: &Measurement,
+        lines: Option<Vec<usize>>,
+    ) -> Result<Self, CliError> {
         let force = &source.force;
         let forced: Vec<usize> =
             (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
@@ -53,7 +53,7 @@ impl Reconstruction {
         };
         let errors = channel_errors(result.force.record(), &measured)?;
         let (method, found) = (result.method, result.force);
-        Ok(Self { method, found, measured, forced, errors, lines })
+        Ok(Self { method, found, measured, forced, errors })
     }
 }
 

@@ -1,122 +1,75 @@
-//! What the identified machine leaves of the measured motion.
+//! What the identified machine leaves of a measured motion.
 
 use mechid::estimate::checks::{Correlation, cross_correlation, whiteness};
-use mechid::estimate::frequency_domain::Motion;
-use mechid::estimate::predict;
-use mechid::estimate::time_domain::{Discretisation, Extent};
-use mechid::model::{InitialState, ModelError, SecondOrderSystem};
-use mechid::signal::{Record, Spectrum, measures};
-use nalgebra::DMatrix;
+use mechid::signal::{Record, measures};
 
 use crate::commands::identify::Identified;
-use crate::commands::identify::fit::BetweenSamples;
-use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::checks::{LAGS, SAMPLES_PER_LAG};
+use crate::commands::identify::course::Compared;
+use crate::commands::identify::fit;
 use crate::error::CliError;
 
-/// Lags at which correlations are looked at, where the record is long enough.
-const LAGS: usize = 25;
+/// What is below this share of the motion is rounding.
+const ROUNDING: f64 = 1e-12;
 
-/// Below this share of the motion a residual is rounding, not noise.
-const ROUNDING: f64 = 1e-10;
-
-/// Measured and modelled motion over the window, without their means in the frequency domain.
+/// Measured and predicted motion of one record, and whether what the fit leaves is noise.
 pub struct Residual {
-    pub kind: Motion,
-    pub measured: Record,
-    pub modelled: Record,
-    pub residual: Record,
-    pub channels: Vec<ChannelResidual>,
+    /// Every kind of motion measured.
+    pub compared: Vec<Compared>,
+    /// Of each channel that the fit leaves; none where it leaves no row of samples.
+    pub correlations: Vec<Correlations>,
 }
 
-/// The residual of one motion.
-pub struct ChannelResidual {
-    /// RMS of the residual over RMS of the motion.
-    pub share: f64,
-    pub whiteness: Correlation,
+/// Correlations of one channel of a residual.
+pub struct Correlations {
+    pub own: Correlation,
     /// With each force that acts, by its degree of freedom counted from 0.
     pub forces: Vec<(usize, Correlation)>,
 }
 
-impl ChannelResidual {
-    /// Whether there is nothing left but rounding.
-    pub fn is_rounding(&self) -> bool {
-        self.share < ROUNDING
-    }
-}
-
 impl Residual {
-    /// The motion under the measured force, taken from the measured motion.
+    /// Of the record at this place.
     ///
     /// # Errors
-    /// If the machine has no such motion, or the window is too short to judge.
-    pub fn of(found: &Identified, between: Option<BetweenSamples>) -> Result<Self, CliError> {
-        let (motion, kind) = found.measured.motion();
+    /// If the machine has no such motion.
+    pub fn of(found: &Identified, at: usize) -> Result<Self, CliError> {
         let system = found.fitted.estimate.system()?;
-        let (measured, modelled) = match found.fitted.frequency {
-            Some(_) => (motion.without_mean(), steady(&found.measured, &system, kind)?),
-            None => (motion.clone(), simulated(&found.measured, &system, between)?),
+        let compared = found.fitted.course.predict(&system, &found.records[at])?;
+        let correlations = match found.fitted.residuals.get(at) {
+            Some(left) => correlations(left)?,
+            None => Vec::new(),
         };
-        let residual = Record::new(measured.sampling(), measured.data() - modelled.data())?;
-        let channels = (0..residual.channels())
-            .map(|c| channel(&found.measured, &measured, &residual, c))
-            .collect::<Result<_, _>>()?;
-        Ok(Self { kind, measured, modelled, residual, channels })
+        Ok(Self { compared, correlations })
     }
 }
 
-/// The periodic motion under the mean period of the force, without its mean.
-fn steady(
-    measured: &Measurement,
-    system: &SecondOrderSystem,
-    kind: Motion,
-) -> Result<Record, CliError> {
-    let force = Spectrum::of(&measured.force.period_mean(measured.period)?);
-    let mut lines = DMatrix::zeros(force.len(), force.channels());
-    for n in 1..force.len() {
-        let omega = force.omega(n);
-        let loads = force.lines().row(n).transpose();
-        let motion = system.receptance(omega)? * loads * kind.per_displacement(omega);
-        if motion.iter().any(|z| !z.is_finite()) {
-            let reciprocal_condition = 0.0;
-            return Err(ModelError::SingularDynamicStiffness { omega, reciprocal_condition }.into());
-        }
-        lines.set_row(n, &motion.transpose());
-    }
-    let period = Spectrum::from_lines(force.sampling(), lines).to_record();
-    Ok(period.repeated(measured.periods)?)
+/// RMS of the measured motion, and of what the prediction leaves of it, of one channel.
+pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
+    let measured = compared.measured.channel(channel);
+    let apart: Vec<f64> =
+        measured.iter().zip(compared.predicted.channel(channel)).map(|(x, p)| x - p).collect();
+    let (size, left) = (measures::rms(measured), measures::rms(&apart));
+    (size, if left > ROUNDING * size { left } else { 0.0 })
 }
 
-/// The displacement from the measured first state on.
-fn simulated(
-    measured: &Measurement,
-    system: &SecondOrderSystem,
-    between: Option<BetweenSamples>,
-) -> Result<Record, CliError> {
-    let (Some(x), Some(v)) = (&measured.displacement, &measured.velocity) else {
-        return Err(CliError::TimeDomainMotions);
+/// At the lags at which `mechid identify` judges the residual.
+fn correlations(residual: &fit::Residual) -> Result<Vec<Correlations>, CliError> {
+    let lags = LAGS.min(residual.left.len() / SAMPLES_PER_LAG);
+    if lags == 0 {
+        return Ok(Vec::new());
+    }
+    let force = &residual.force;
+    let acting = || (0..force.channels()).filter(|c| varies(force, *c));
+    let of = |channel: usize| {
+        let own = residual.left.channel(channel);
+        let with = |c: usize| Ok((c, cross_correlation(own, force.channel(c), lags)?));
+        let forces = acting().map(with).collect::<Result<_, CliError>>()?;
+        Ok(Correlations { own: whiteness(own, lags)?, forces })
     };
-    let first = |record: &Record| record.data().row(0).transpose();
-    let start = InitialState::new(first(x), first(v))?;
-    let between = between.map_or(Discretisation::FirstOrderHold, BetweenSamples::discretisation);
-    let response = predict(system, &measured.force, between, Extent::Open, &start)?;
-    Ok(response.displacement().clone())
+    (0..residual.left.channels()).map(of).collect()
 }
 
-fn channel(
-    source: &Measurement,
-    measured: &Record,
-    residual: &Record,
-    channel: usize,
-) -> Result<ChannelResidual, CliError> {
-    let own = residual.channel(channel);
-    let level = measures::rms(measured.channel(channel));
-    let lags = LAGS.min(own.len() / 4).max(1);
-    let acting = (0..source.force.channels()).filter(|c| source.force.column(*c).amax() > 0.0);
-    Ok(ChannelResidual {
-        share: if level > 0.0 { measures::rms(own) / level } else { 0.0 },
-        whiteness: whiteness(own, lags)?,
-        forces: acting
-            .map(|c| Ok((c, cross_correlation(own, source.force.channel(c), lags)?)))
-            .collect::<Result<_, CliError>>()?,
-    })
+fn varies(force: &Record, channel: usize) -> bool {
+    let values = force.channel(channel);
+    values.iter().any(|value| *value != values[0])
 }

@@ -1,22 +1,19 @@
 //! The sections of the report.
 
 use maud::{Markup, html};
-use mechid::estimate::checks::{Correlation, Verdict};
 
 use super::channels::Channel;
 use super::excitation::DROP_DB;
 use super::page::figure;
-use super::residual::{ChannelResidual, Residual};
+use super::reconstruction::Reconstruction;
+use super::residual::{Residual, sizes};
 use super::tables::Table;
-use super::{Contents, figures};
+use super::{Contents, Excitation, Part, figures, judgement};
 use crate::commands::identify::report::{Report, Uncertain};
 use crate::error::CliError;
 use crate::text_table::{compact, significant};
 
-/// Noise has a larger statistic than this often; below, a correlation is taken as real.
-const UNLIKELY: f64 = 0.01;
-
-fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 3))
 }
 
@@ -28,35 +25,61 @@ fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
     vec![name.into(), value.into()]
 }
 
-/// What is in the record.
+/// Something of every record, below its name where there are several.
+fn of_each(
+    contents: &Contents<'_>,
+    show: impl Fn(&Part<'_>) -> Result<Markup, CliError>,
+) -> Result<Markup, CliError> {
+    let shown: Vec<Markup> = contents.parts.iter().map(show).collect::<Result<_, _>>()?;
+    Ok(html! {
+        @for (part, shown) in contents.parts.iter().zip(&shown) {
+            @if let Some(name) = part.name { h3 { (name) } }
+            (shown)
+        }
+    })
+}
+
+/// What is in the records.
 pub fn data(contents: &Contents<'_>) -> Result<Markup, CliError> {
-    let window = &contents.found.report.window;
-    let rate = window.sample_rate_hz;
-    let samples = window.last_sample + 1 - window.first_sample;
+    let records = of_each(contents, |part| {
+        let header =
+            ["column", "what it is", "unit", "mean", "RMS", "peak", "crest factor", "not repeated"];
+        let rows = part.channels.iter().map(channel_row).collect();
+        let drawn = figures::data(part)?;
+        Ok(html! {
+            div.tables {
+                (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts(contents, part) }.html())
+                (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
+            }
+            div.figures { @for drawn in &drawn { (figure(drawn)) } }
+        })
+    })?;
+    Ok(html! {
+        (records)
+        p.note { "Crest factor: peak over RMS. Not repeated: RMS of what differs from period to period over RMS of what repeats." }
+    })
+}
+
+fn facts(contents: &Contents<'_>, part: &Part<'_>) -> Vec<Vec<String>> {
+    let (measured, samples) = (part.measured, part.measured.force.len());
+    let rate = measured.force.sampling().rate_hz();
+    let first = measured.first_sample;
     let mut facts = vec![
-        pair("File", &contents.found.report.file),
-        pair("Samples used", format!("{} to {}", window.first_sample, window.last_sample)),
+        pair("File", &measured.file),
+        pair("Samples used", format!("{first} to {}", first + samples - 1)),
         pair("Sample rate", format!("{} Hz", compact(rate, 8))),
         pair("Duration", format!("{} s", compact(samples as f64 / rate, 6))),
     ];
-    if contents.found.report.lines.is_some() {
-        let length = format!("{} of {} samples", window.periods, window.period_samples);
-        facts.push(pair("Periods", length));
-        let spacing = rate / window.period_samples as f64;
+    if let Some((lines, _)) = &contents.found.fitted.frequency {
+        let len = lines.sampling().len();
+        facts.push(match part.lines {
+            Some(_) => pair("Periods", format!("{} of {len} samples", measured.periods)),
+            None => pair("Segments", format!("of {len} samples")),
+        });
+        let spacing = lines.sampling().line_spacing_hz();
         facts.push(pair("Line spacing", format!("{} Hz", compact(spacing, 6))));
     }
-    let header =
-        ["column", "what it is", "unit", "mean", "RMS", "peak", "crest factor", "not repeated"];
-    let rows = contents.channels.iter().map(channel_row).collect();
-    let drawn = figures::data(contents.found)?;
-    Ok(html! {
-        div.tables {
-            (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts }.html())
-            (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
-        }
-        p.note { "Crest factor: peak over RMS. Not repeated: RMS of what differs from period to period over RMS of what repeats." }
-        div.figures { @for drawn in &drawn { (figure(drawn)) } }
-    })
+    facts
 }
 
 fn channel_row(channel: &Channel) -> Vec<String> {
@@ -75,7 +98,7 @@ fn channel_row(channel: &Channel) -> Vec<String> {
 }
 
 /// Whether the force suits.
-pub fn excitation(contents: &Contents<'_>) -> Markup {
+pub fn excitation(contents: &Contents<'_>) -> Result<Markup, CliError> {
     let header = [
         "force",
         "crest factor",
@@ -85,39 +108,33 @@ pub fn excitation(contents: &Contents<'_>) -> Markup {
         "flatness",
         "persistence (order)",
     ];
-    let row = |e: &super::Excitation| {
-        let band = e.band.map(|b| format!("{} to {}", compact(b.low_hz, 5), compact(b.high_hz, 5)));
-        vec![
-            e.dof.to_string(),
-            significant(e.crest_factor, 3),
-            or_dash(e.peak_factor.map(|factor| significant(factor, 3))),
-            e.lines.to_string(),
-            or_dash(band),
-            or_dash(e.flatness.map(|flatness| significant(flatness, 3))),
-            e.order.to_string(),
-        ]
-    };
-    let rows = contents.excitations.iter().map(row).collect();
-    html! {
-        (Table { caption: "Quality of the excitation", header: &header, numbers_from: 1, rows }.html())
+    let records = of_each(contents, |part| {
+        let rows = part.excitations.iter().map(excitation_row).collect();
+        Ok(Table { caption: "Quality of the excitation", header: &header, numbers_from: 1, rows }
+            .html())
+    })?;
+    Ok(html! {
+        (records)
         p.note {
             "Peak factor: half the range over √2 times the RMS, 1 for a sine. Excited lines are those within "
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
              excitation is the number of parameters that they can tell apart."
         }
-        @if !contents.checks.is_empty() {
-            ul.checks { @for check in &contents.checks { li { (verdict(check.verdict)) " " (check.text) } } }
-        }
-    }
+        (judgement::list(contents, "before"))
+    })
 }
 
-fn verdict(verdict: Verdict) -> Markup {
-    let word = match verdict {
-        Verdict::Good => "good",
-        Verdict::Doubtful => "doubtful",
-        Verdict::Bad => "bad",
-    };
-    html! { strong class={ "verdict " (word) } { (word) } }
+fn excitation_row(e: &Excitation) -> Vec<String> {
+    let band = e.band.map(|b| format!("{} to {}", compact(b.low_hz, 5), compact(b.high_hz, 5)));
+    vec![
+        e.dof.to_string(),
+        significant(e.crest_factor, 3),
+        or_dash(e.peak_factor.map(|factor| significant(factor, 3))),
+        e.lines.to_string(),
+        or_dash(band),
+        or_dash(e.flatness.map(|flatness| significant(flatness, 3))),
+        e.order.to_string(),
+    ]
 }
 
 fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
@@ -145,12 +162,14 @@ pub fn machine(contents: &Contents<'_>) -> Markup {
         div.tables {
             (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
             (Table { caption: "Modes", header: &header("mode"), numbers_from: 1, rows: modes }.html())
-            (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(report) }.html())
+            (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
         }
+        @for remark in &contents.found.fitted.remarks { p.note { "How it was done: " (remark) "." } }
     }
 }
 
-fn fit_rows(report: &Report) -> Vec<Vec<String>> {
+fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
+    let report: &Report = &contents.found.report;
     let fit = &report.fit;
     let mut rows = vec![pair("Estimator", report.estimator)];
     if let Some(lines) = &report.lines {
@@ -163,6 +182,10 @@ fn fit_rows(report: &Report) -> Vec<Vec<String>> {
     if let Some(part) = fit.unexplained_motion {
         rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
     }
+    if let Some(misfit) = &contents.found.fitted.misfit {
+        let what = format!("Power of the residual over what {} explains", misfit.noise);
+        rows.push(pair(&what, significant(misfit.ratio, 4)));
+    }
     rows.push(pair("Condition number", significant(fit.condition_number, 3)));
     let equations = format!("{} for {} unknowns", fit.equations, fit.unknowns);
     rows.push(pair("Equations for each degree of freedom", equations));
@@ -171,114 +194,131 @@ fn fit_rows(report: &Report) -> Vec<Vec<String>> {
 
 /// The frequency response, and the motion in time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, CliError> {
-    let receptance = match figures::receptance(contents.found) {
-        Err(reason @ (CliError::NothingToDraw | CliError::NoSpectra)) => Err(reason),
-        drawn => Ok(drawn?),
+    let several = "on every line several forces act, so the record shows no single one";
+    let receptance = match &contents.receptance {
+        Err(reason) => Err(reason.as_str()),
+        Ok(measured) => match figures::receptance(contents.found, measured) {
+            Err(CliError::NothingToDraw) => Err(several),
+            drawn => Ok(drawn?),
+        },
     };
-    let fit = contents.residual.as_ref().ok().map(|residual| figures::fit(contents, residual));
-    let fit = fit.transpose()?;
+    let mut fits = Vec::new();
+    for part in &contents.parts {
+        if let Ok(residual) = &part.residual {
+            fits.push(figures::fit(part, &residual.compared[0])?);
+        }
+    }
     Ok(html! {
-        @if let Err(reason) = &receptance { p.note { "No receptance: " (why(reason)) } }
+        @if let Err(reason) = &receptance { p.note { "No receptance: " (reason) "." } }
         div.figures {
             @if let Ok(drawn) = &receptance { (figure(drawn)) }
-            @if let Some(drawn) = &fit { (figure(drawn)) }
+            @for drawn in &fits { (figure(drawn)) }
         }
     })
-}
-
-fn why(reason: &CliError) -> &'static str {
-    match reason {
-        CliError::NothingToDraw => {
-            "on every line several forces act, so the record shows no single one."
-        }
-        _ => "the fit was done in the time domain, sample by sample.",
-    }
 }
 
 /// Whether what is left is noise.
 pub fn residual(contents: &Contents<'_>) -> Result<Markup, CliError> {
-    let residual = match &contents.residual {
-        Ok(residual) => residual,
-        Err(reason) => return Ok(html! { p.note { "There is no residual to judge: " (reason) } }),
-    };
-    let drawn =
-        [figures::residual_spectrum(contents.found, residual)?, figures::correlations(residual)?];
-    let header = ["motion", "residual / motion", "test", "outside 95 %", "p-value", "verdict"];
-    let rows = residual_rows(residual);
+    let records = of_each(contents, |part| match &part.residual {
+        Ok(residual) => residual_of(part, residual),
+        Err(reason) => Ok(html! { p.note { "There is no residual to judge: " (reason) } }),
+    })?;
     Ok(html! {
-        p { "The residual is the measured " (residual.kind) " less the one that the identified machine has under the measured force." }
-        (Table { caption: "Is the residual noise?", header: &header, numbers_from: 9, rows }.html())
-        p.note {
-            "The p-value is the share of records of white noise that show as much correlation. The test against a \
-             force takes the residual as white and the force as broad. In white noise 5 % of the lags lie outside the bounds."
+        p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
+        (records)
+        (judgement::list(contents, "after"))
+        @if contents.found.report.checks.iter().any(|check| check.when == "after") {
+            p.note {
+                "p is the share of records of white noise that show as much correlation. The test against a \
+                 force takes the residual as white and the force as broad. In white noise 5 % of the lags lie outside the bounds."
+            }
         }
+        @if let Some(advice) = judgement::advice(contents) { p.note { (advice) } }
+    })
+}
+
+fn residual_of(part: &Part<'_>, residual: &Residual) -> Result<Markup, CliError> {
+    let mut drawn = vec![figures::residual_spectrum(part, &residual.compared[0])?];
+    if !residual.correlations.is_empty() {
+        drawn.push(figures::correlations(part, &residual.correlations)?);
+    }
+    let header = ["motion", "unit", "RMS", "residual, RMS", "residual / motion"];
+    let mut rows = Vec::new();
+    for compared in &residual.compared {
+        let channels = compared.measured.channels();
+        for channel in 0..channels {
+            let (size, left) = sizes(compared, channel);
+            let number = if channels > 1 { format!(" {}", channel + 1) } else { String::new() };
+            rows.push(vec![
+                format!("{}{number}", compared.kind),
+                figures::symbol(compared.kind).1.into(),
+                significant(size, 4),
+                significant(left, 4),
+                or_dash((size > 0.0).then(|| percent(left / size))),
+            ]);
+        }
+    }
+    Ok(html! {
+        (Table { caption: "What is left of the motion", header: &header, numbers_from: 2, rows }.html())
         div.figures { @for drawn in &drawn { (figure(drawn)) } }
     })
 }
 
-fn residual_rows(residual: &Residual) -> Vec<Vec<String>> {
-    let mut rows = Vec::new();
-    for (number, channel) in (1..).zip(&residual.channels) {
-        let tests = std::iter::once(("whiteness".to_owned(), &channel.whiteness)).chain(
-            channel.forces.iter().map(|(force, c)| (format!("against force {}", force + 1), c)),
-        );
-        for (test, found) in tests {
-            rows.push(vec![
-                number.to_string(),
-                percent(channel.share),
-                test,
-                format!("{} of {} lags", found.outside(), found.coefficients.len()),
-                if found.p_value < 1e-3 { "< 0.001".into() } else { significant(found.p_value, 2) },
-                judged(channel, found).into(),
-            ]);
+/// A record that was not fitted.
+pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, CliError> {
+    let found = contents.found;
+    let (Some(validation), Some(source), Some(first)) =
+        (&found.report.validation, &found.validated, contents.validation.first())
+    else {
+        return Ok(None);
+    };
+    let drawn = figures::validation(source, first)?;
+    let several = source.force.channels() > 1;
+    let row = |share: &crate::commands::identify::validation::Share| {
+        let number = if several { format!(" {}", share.degree_of_freedom) } else { String::new() };
+        pair(
+            &format!("{}{number}", share.quantity),
+            format!("{} %", significant(share.fit_percent, 4)),
+        )
+    };
+    let rows = validation.channels.iter().map(row).collect();
+    let (first_sample, last_sample) = (validation.first_sample, validation.last_sample);
+    Ok(Some(html! {
+        p {
+            "The identified machine under the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
+            ", against the motion measured there."
         }
-    }
-    rows
-}
-
-fn judged(channel: &ChannelResidual, found: &Correlation) -> &'static str {
-    match found.p_value {
-        _ if channel.is_rounding() => "rounding only",
-        p if p < UNLIKELY => "correlated",
-        _ => "as noise",
-    }
-}
-
-/// What the residual gives cause to doubt.
-pub fn residual_doubts(contents: &Contents<'_>) -> Vec<String> {
-    let Ok(residual) = &contents.residual else { return Vec::new() };
-    let mut doubts = Vec::new();
-    for (number, channel) in (1..).zip(&residual.channels).filter(|(_, c)| !c.is_rounding()) {
-        let unlikely = |found: &Correlation| found.p_value < UNLIKELY;
-        if unlikely(&channel.whiteness) {
-            doubts.push(format!(
-                "the residual of motion {number} is not white: the model misses something, the \
-                 noise is coloured, or the estimator leaves a part of a resonance behind"
-            ));
-        }
-        for (force, _) in channel.forces.iter().filter(|(_, found)| unlikely(found)) {
-            doubts.push(format!(
-                "the residual of motion {number} is correlated with force {}: there is motion left \
-                 that the force explains and the model does not; where the motion is noisy, least \
-                 squares leaves more of it than --method maximum-likelihood",
-                force + 1
-            ));
-        }
-    }
-    doubts
+        (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
+        p.note { "Fit: 100 % less the size of the difference over that of the motion about its mean; 0 % is no better than the mean." }
+        div.figures { (figure(&drawn)) }
+    }))
 }
 
 /// The force found from the motion.
 pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, CliError> {
-    let Some(found) = &contents.reconstruction else { return Ok(None) };
-    let drawn = figures::force(found)?;
+    if contents.parts.iter().all(|part| part.reconstruction.is_none()) {
+        return Ok(None);
+    }
+    let records = of_each(contents, |part| match &part.reconstruction {
+        Some(found) => reconstruction_of(part, found),
+        None => Ok(html! {}),
+    })?;
+    Ok(Some(html! {
+        (records)
+        p.note {
+            "The machine was fitted to the same record, so agreement says that the fit is consistent, not that \
+             another record would do as well."
+        }
+    }))
+}
+
+fn reconstruction_of(part: &Part<'_>, found: &Reconstruction) -> Result<Markup, CliError> {
+    let drawn = figures::force(part, found)?;
     let rms = |record: &mechid::signal::Record, dof: usize| {
         significant(mechid::signal::measures::rms(record.channel(dof)), 4)
     };
-    let rows = found
-        .forced
-        .iter()
-        .map(|&dof| {
+    let row =
+        |&dof: &usize| {
             vec![
                 (dof + 1).to_string(),
                 rms(&found.measured, dof),
@@ -288,18 +328,14 @@ pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, CliErro
                 })),
                 or_dash(found.errors[dof].map(percent)),
             ]
-        })
-        .collect();
+        };
+    let rows = found.forced.iter().map(row).collect();
     let header =
         ["force", "measured, RMS (N)", "found, RMS (N)", "standard error (N)", "difference"];
-    let lines = if found.lines.is_some() { ", on the lines of the fit" } else { "" };
-    Ok(Some(html! {
-        p {
-            "Found from the measured motion with the identified machine: " (found.method) (lines)
-            ". The machine was fitted to the same record, so agreement says that the fit is consistent, not that \
-             another record would do as well."
-        }
+    let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
+    Ok(html! {
+        p { "Found from the measured motion with the identified machine: " (found.method) (lines) "." }
         (Table { caption: "Force found and force measured", header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
-    }))
+    })
 }

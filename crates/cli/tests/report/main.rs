@@ -1,11 +1,12 @@
 //! The page of `mechid report`: whole, alone, readable, and true.
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
+mod browser;
+
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
-use std::process;
 
 use assert_cmd::Command;
 use roxmltree::{Document, Node, ParsingOptions};
@@ -102,8 +103,16 @@ fn row(document: &Document<'_>, caption: &str, first: &str) -> Vec<String> {
     cells.find(|cells| cells[0] == first).unwrap_or_else(|| panic!("no row \"{first}\""))
 }
 
-fn remarks(document: &Document<'_>) -> String {
-    text(tagged(document, "aside")[0])
+/// Headings and texts of what speaks against the numbers and for them.
+fn remarks(document: &Document<'_>) -> Vec<(String, String)> {
+    let asides = tagged(document, "aside");
+    asides.iter().map(|aside| (text(aside.first_element_child().unwrap()), text(*aside))).collect()
+}
+
+/// The lists of what was looked at.
+fn checks(document: &Document<'_>) -> String {
+    let lists = tagged(document, "ul").into_iter();
+    lists.filter(|list| list.attribute("class") == Some("checks")).map(text).collect()
 }
 
 #[test]
@@ -176,23 +185,33 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!((channel[4].as_str(), channel[7].as_str()), ("31.02", "0 %"));
     let excitation = row(&document, "Quality of the excitation", "1");
     assert_eq!(excitation[3..], ["77", "1 to 20", "1.00", "154"]);
-    assert_eq!(row(&document, "Is the residual noise?", "1")[5], "rounding only");
+    assert_eq!(row(&document, "What is left of the motion", "displacement")[3..], ["0", "0 %"]);
+    assert!(checks(&document).contains("residual 1: rounding"), "{}", checks(&document));
     let force = row(&document, "Force found and force measured", "1");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
-    assert!(remarks(&document).starts_with("No remarks"), "{}", remarks(&document));
+    let [(heading, _)] = &remarks(&document)[..] else { panic!("nothing speaks against it") };
+    assert_eq!(heading, "What speaks for the numbers");
 }
 
 /// Judge: white noise is white, and a mode that the model has not is not.
 #[test]
 fn a_missing_mode_shows_in_the_residual() {
     let likely = [&USUAL[..], &["--method", "maximum-likelihood"]].concat();
-    for (second, verdict) in [(f64::INFINITY, "as noise"), (9000.0, "correlated")] {
+    for second in [f64::INFINITY, 9000.0] {
         let folder = rig(NAMES, second, 4e-3);
         mechid(folder.path(), &likely);
         let closed = closed(&page(folder.path()));
         let document = parse(&closed);
-        assert_eq!(row(&document, "Is the residual noise?", "1")[5], verdict);
-        assert_eq!(remarks(&document).contains("not white"), verdict == "correlated");
+        let is_missing = second.is_finite();
+        assert_eq!(checks(&document).contains("good whiteness"), !is_missing);
+        let remarks = remarks(&document);
+        // The power of the residual speaks for the fit or against it.
+        for (heading, text) in &remarks {
+            let bad = heading.starts_with("Before");
+            assert_eq!(text.contains("not white"), bad && is_missing, "{text}");
+            assert_eq!(text.contains("times the power"), bad == is_missing, "{text}");
+        }
+        assert_eq!(remarks.len(), if is_missing { 2 } else { 1 });
     }
 }
 
@@ -256,7 +275,7 @@ fn programs_get_the_report_of_identify_and_the_place_of_the_page() {
     assert_eq!(printed, identified);
 }
 
-/// The open record has no receptance to draw; everything else is there.
+/// The receptance of an open record is averaged over segments; everything else is there, too.
 #[test]
 fn an_open_record_has_its_page_too() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
@@ -282,70 +301,86 @@ fn an_open_record_has_its_page_too() {
     mechid(folder.path(), &arguments);
     let closed = closed(&page(folder.path()));
     let document = parse(&closed);
-    assert_eq!(tagged(&document, "figure").len(), 6);
+    let figures = tagged(&document, "figure");
+    let receptance =
+        figures.iter().find(|figure| figure.attribute("id") == Some("figure-receptance"));
+    assert!(text(*receptance.unwrap()).contains("by H1 from segments of 64 samples"));
+    assert_eq!(figures.len(), 7);
     let force = row(&document, "Force found and force measured", "1");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
     // Noise of a hundredth on motion of which the inertia is the greater part.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
 }
 
-/// What a browser shows of the page in a frame of this width, in px, and what it complains of; nothing
-/// if there is no browser.
-///
-/// A frame, because the window of a browser has a least width.
-fn browse(folder: &Path, width: u32) -> Option<(String, String)> {
-    let measure = "<script>addEventListener('load', () => {
-        const beyond = [...document.querySelectorAll('body, body *')].filter(e =>
-            e.getBoundingClientRect().right > innerWidth + 0.5 && !e.closest('.scroll > *, svg *'));
-        parent.postMessage([innerWidth, document.documentElement.scrollWidth,
-            ...beyond.map(e => e.tagName)].join(' '), '*');
-    })</script>";
-    // The copy may run the script of the test; the policy still forbids to load anything.
-    let allowed = page(folder)
-        .replace("default-src 'none';", "default-src 'none'; script-src 'unsafe-inline';")
-        .replace("</body>", &format!("{measure}</body>"));
-    fs::write(folder.join("copy.html"), allowed).unwrap();
-    let frame = format!(
-        "<!DOCTYPE html><title>frame</title><script>addEventListener('message', e => {{
-            document.querySelector('output').textContent = e.data;
-        }})</script><output></output>
-        <iframe src=\"copy.html\" width=\"{width}\" height=\"900\"></iframe>"
-    );
-    fs::write(folder.join("frame.html"), frame).unwrap();
-    let browsers = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
-    let output = browsers.iter().find_map(|browser| {
-        process::Command::new(browser)
-            .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
-            .args(["--enable-logging=stderr", "--virtual-time-budget=5000", "--dump-dom"])
-            .arg(format!("--user-data-dir={}", folder.join(format!("profile{width}")).display()))
-            .arg("--window-size=1400,1000")
-            .arg(format!("file://{}", folder.join("frame.html").display()))
-            .output()
-            .ok()
-    })?;
-    let messages = String::from_utf8_lossy(&output.stderr);
-    let console = messages.lines().filter(|line| line.contains("CONSOLE")).collect();
-    let dom = String::from_utf8(output.stdout).unwrap();
-    let seen = dom.split("<output>").nth(1).and_then(|s| s.split("</output>").next());
-    Some((seen.unwrap_or(&dom).to_owned(), console))
+/// Judge: the noise that was added, against the motion of the formula.
+#[test]
+fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
+    let folder = rig(NAMES, f64::INFINITY, 1e-3);
+    let other = rig(NAMES, f64::INFINITY, 4e-2);
+    fs::copy(other.path().join("rig.csv"), folder.path().join("noisy.csv")).unwrap();
+    fs::copy(folder.path().join("rig.csv"), folder.path().join("again.csv")).unwrap();
+    let arguments = [&USUAL[..], &["again.csv", "--validate", "noisy.csv"]].concat();
+    mechid(folder.path(), &arguments);
+    let closed = closed(&page(folder.path()));
+    let document = parse(&closed);
+    let names: Vec<String> = tagged(&document, "h3").into_iter().map(text).collect();
+    // Data, excitation, residual and force of each.
+    assert_eq!(names, ["rig.csv", "again.csv"].repeat(4));
+    let figures = tagged(&document, "figure");
+    let ids: Vec<&str> = figures.iter().filter_map(|f| f.attribute("id")).collect();
+    for name in ["force", "motion", "fit", "residual-spectrum", "reconstructed-force"] {
+        assert!(ids.contains(&format!("figure-{name}").as_str()), "{name}");
+        assert!(ids.contains(&format!("figure-{name}-2").as_str()), "{name}");
+    }
+    assert_eq!(ids.iter().filter(|id| **id == "figure-validation").count(), 1);
+    let fit = &row(&document, "What is predicted", "displacement")[1];
+    let fit: f64 = fit.strip_suffix(" %").unwrap().parse().unwrap();
+    // A uniform number of this width has the standard deviation of its √12th part.
+    let motion: f64 = row(&document, "Channels over the window", "x")[4].parse().unwrap();
+    let noise = 4e-2 / 12f64.sqrt();
+    let expected = 100.0 * (1.0 - noise / motion.hypot(noise));
+    assert!((fit - expected).abs() < 2.0, "{fit} {expected}");
+    let remarks = remarks(&document);
+    let (_, merits) =
+        remarks.iter().find(|(heading, _)| heading.starts_with("What speaks")).unwrap();
+    assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
 }
 
+/// Lines are those of a segment, not of the record. Judge: the oscillator whose motion under sines
+/// that no segment holds whole periods of is summed.
 #[test]
-fn a_browser_shows_it_without_complaint_on_screen_and_telephone() {
-    let folder = rig(NAMES, f64::INFINITY, 1e-3);
-    let long = "long_name_of_a_column_without_any_place_to_break_it_".repeat(3);
-    let record = fs::read_to_string(folder.path().join("rig.csv")).unwrap();
-    let record = record.replacen("\"F\"", &format!("\"{long}\""), 1);
-    fs::write(folder.path().join("rig.csv"), record).unwrap();
-    let mut arguments = USUAL.to_vec();
-    arguments[3] = &long;
-    mechid(folder.path(), &[&arguments[..], &["--title", &long]].concat());
-    for width in [390, 1280] {
-        let Some((seen, console)) = browse(folder.path(), width) else {
-            eprintln!("skipped: no Chromium on this machine");
-            return;
-        };
-        assert_eq!(console, "", "the browser complains");
-        assert_eq!(seen, format!("{width} {width}"), "wider than the window");
+fn a_record_in_segments_has_its_page_too() {
+    let (m, c, k) = (2.0, 6.0, 800.0);
+    let mut text = String::from("time,F,x\n");
+    for sample in 0..4096 {
+        let t = f64::from(sample) / 64.0;
+        let (mut force, mut x) = (0.0, 0.0);
+        for n in 1..=400 {
+            let (omega, phase) = (TAU * 0.0251 * f64::from(n), f64::from(n * n));
+            let (re, im) = (k - m * omega * omega, c * omega);
+            force += (omega * t + phase).cos();
+            x += (omega * t + phase - im.atan2(re)).cos() / re.hypot(im);
+        }
+        writeln!(text, "{t},{force:.17e},{x:.17e}").unwrap();
     }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("rig.csv"), text).unwrap();
+    let segments =
+        ["--from-frf", "h1", "--segment", "512", "--band-hz", "1:8", "--reconstruct-force"];
+    let arguments = [&USUAL[..6], &segments[..], &["--output", "page.html"]].concat();
+    mechid(folder.path(), &arguments);
+    let closed = closed(&page(folder.path()));
+    let document = parse(&closed);
+    for (name, value) in [("m", m), ("c", c), ("k", k)] {
+        let found: f64 = row(&document, "Parameters", name)[1].parse().unwrap();
+        assert!((found - value).abs() < 0.05 * value, "{name} = {found}");
+    }
+    assert_eq!(row(&document, "The record", "Segments")[1], "of 512 samples");
+    assert_eq!(row(&document, "The record", "Line spacing")[1], "0.125 Hz");
+    let percent = |cell: &str| cell.strip_suffix(" %").unwrap().parse::<f64>().unwrap();
+    let left = row(&document, "What is left of the motion", "displacement");
+    assert!(percent(&left[4]) < 5.0, "{left:?}");
+    let force = row(&document, "Force found and force measured", "1");
+    assert!(percent(&force[4]) < 20.0, "{force:?}");
+    assert_eq!(tagged(&document, "figure").len(), 6);
 }

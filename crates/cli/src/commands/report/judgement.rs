@@ -1,0 +1,116 @@
+//! What speaks for the numbers, and what against them.
+
+use maud::{Markup, html};
+use mechid::estimate::checks::{Subject, Verdict};
+
+use super::Contents;
+use crate::commands::identify;
+use crate::commands::identify::checks::CheckRow;
+use crate::text_table::significant;
+
+/// Residual power over what the noise explains, beyond which standard errors are wrong by more than
+/// a factor of √2.
+const MISFIT: f64 = 2.0;
+
+/// A prediction of another record below this fit, in per cent, leaves as much as it explains.
+const POOR_FIT: f64 = 50.0;
+
+/// Checks before or after the fit, with their verdicts.
+pub fn list(contents: &Contents<'_>, when: &str) -> Markup {
+    let checks: Vec<&CheckRow> =
+        contents.found.report.checks.iter().filter(|check| check.when == when).collect();
+    html! {
+        @if !checks.is_empty() {
+            ul.checks {
+                @for check in checks {
+                    li { strong class={ "verdict " (check.verdict) } { (check.verdict) } " " (check.subject) ": " (check.sentence()) }
+                }
+            }
+        }
+    }
+}
+
+/// What the reader should know before believing the numbers, the worst first.
+pub fn doubts(contents: &Contents<'_>) -> Vec<String> {
+    let report = &contents.found.report;
+    let verdict = |verdict: Verdict| {
+        let own = report.checks.iter().filter(move |check| check.verdict == verdict.to_string());
+        own.map(|check| format!("{}: {}", check.subject, check.sentence()))
+    };
+    let mut doubts: Vec<String> = verdict(Verdict::Bad).collect();
+    doubts.extend(identify::doubts(report));
+    if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| !is_explained(misfit.ratio))
+    {
+        let why = match misfit.ratio > MISFIT {
+            true => "the model misses something, and the standard errors are too small",
+            false => "the noise was taken as larger than it is, and so were the standard errors",
+        };
+        doubts.push(format!("{misfit}: {why}"));
+    }
+    doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
+    doubts.extend(verdict(Verdict::Doubtful));
+    doubts
+}
+
+/// What gives cause to believe them.
+pub fn merits(contents: &Contents<'_>) -> Vec<String> {
+    let report = &contents.found.report;
+    let good = report.checks.iter().filter(|check| !check.is_conspicuous());
+    let mut subjects: Vec<&str> = Vec::new();
+    for check in good.clone() {
+        if !subjects.contains(&check.subject.as_str()) {
+            subjects.push(&check.subject);
+        }
+    }
+    let mut merits = Vec::new();
+    if !subjects.is_empty() {
+        merits.push(format!(
+            "{} of {} checks of data and fit are good: {}",
+            good.count(),
+            report.checks.len(),
+            subjects.join(", ")
+        ));
+    }
+    if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| is_explained(misfit.ratio)) {
+        merits.push(format!("{misfit}; 1 is expected"));
+    }
+    merits.extend(predicted(contents).filter(|(fit, _)| is_predicted(*fit)).map(|(_, text)| text));
+    merits
+}
+
+/// What to do about a force that the residual still knows.
+pub fn advice(contents: &Contents<'_>) -> Option<&'static str> {
+    let report = &contents.found.report;
+    let cross = Subject::CrossCorrelation.to_string();
+    let left = report.checks.iter().any(|check| check.subject == cross && check.is_conspicuous());
+    (left && report.domain == "frequency" && contents.found.fitted.misfit.is_none()).then_some(
+        "Where the motion is noisy, least squares leaves more of a resonance behind than --method \
+         maximum-likelihood.",
+    )
+}
+
+fn is_explained(ratio: f64) -> bool {
+    (1.0 / MISFIT..=MISFIT).contains(&ratio)
+}
+
+fn is_predicted(fit_percent: f64) -> bool {
+    fit_percent >= POOR_FIT
+}
+
+/// How well another record is predicted: the poorest channel, in per cent and in words.
+fn predicted(contents: &Contents<'_>) -> impl Iterator<Item = (f64, String)> {
+    let validation = contents.found.report.validation.iter();
+    validation.filter_map(|validation| {
+        let fits = validation.channels.iter().map(|share| share.fit_percent);
+        let least = fits.min_by(f64::total_cmp)?;
+        let (first, last) = (validation.first_sample, validation.last_sample);
+        Some((
+            least,
+            format!(
+                "{}, samples {first} to {last}, which were not fitted: at least {} % of every motion is predicted",
+                validation.file,
+                significant(least, 3)
+            ),
+        ))
+    })
+}

@@ -1,0 +1,66 @@
+//! The page in a real browser, where there is one.
+
+use std::{fs, path::Path, process};
+
+use super::{NAMES, USUAL, mechid, page, rig};
+
+/// What a browser shows of the page in a frame of this width, in px, and what it complains of; nothing
+/// if there is no browser.
+///
+/// A frame, because the window of a browser has a least width.
+fn browse(folder: &Path, width: u32) -> Option<(String, String)> {
+    let measure = "<script>addEventListener('load', () => {
+        const beyond = [...document.querySelectorAll('body, body *')].filter(e =>
+            e.getBoundingClientRect().right > innerWidth + 0.5 && !e.closest('.scroll > *, svg *'));
+        parent.postMessage([innerWidth, document.documentElement.scrollWidth,
+            ...beyond.map(e => e.tagName)].join(' '), '*');
+    })</script>";
+    // The copy may run the script of the test; the policy still forbids to load anything.
+    let allowed = page(folder)
+        .replace("default-src 'none';", "default-src 'none'; script-src 'unsafe-inline';")
+        .replace("</body>", &format!("{measure}</body>"));
+    fs::write(folder.join("copy.html"), allowed).unwrap();
+    let frame = format!(
+        "<!DOCTYPE html><title>frame</title><script>addEventListener('message', e => {{
+            document.querySelector('output').textContent = e.data;
+        }})</script><output></output>
+        <iframe src=\"copy.html\" width=\"{width}\" height=\"900\"></iframe>"
+    );
+    fs::write(folder.join("frame.html"), frame).unwrap();
+    let browsers = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+    let output = browsers.iter().find_map(|browser| {
+        process::Command::new(browser)
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
+            .args(["--enable-logging=stderr", "--virtual-time-budget=5000", "--dump-dom"])
+            .arg(format!("--user-data-dir={}", folder.join(format!("profile{width}")).display()))
+            .arg("--window-size=1400,1000")
+            .arg(format!("file://{}", folder.join("frame.html").display()))
+            .output()
+            .ok()
+    })?;
+    let messages = String::from_utf8_lossy(&output.stderr);
+    let console = messages.lines().filter(|line| line.contains("CONSOLE")).collect();
+    let dom = String::from_utf8(output.stdout).unwrap();
+    let seen = dom.split("<output>").nth(1).and_then(|s| s.split("</output>").next());
+    Some((seen.unwrap_or(&dom).to_owned(), console))
+}
+
+#[test]
+fn a_browser_shows_it_without_complaint_on_screen_and_telephone() {
+    let folder = rig(NAMES, f64::INFINITY, 1e-3);
+    let long = "long_name_of_a_column_without_any_place_to_break_it_".repeat(3);
+    let record = fs::read_to_string(folder.path().join("rig.csv")).unwrap();
+    let record = record.replacen("\"F\"", &format!("\"{long}\""), 1);
+    fs::write(folder.path().join("rig.csv"), record).unwrap();
+    let mut arguments = USUAL.to_vec();
+    arguments[3] = &long;
+    mechid(folder.path(), &[&arguments[..], &["--title", &long]].concat());
+    for width in [390, 1280] {
+        let Some((seen, console)) = browse(folder.path(), width) else {
+            eprintln!("skipped: no Chromium on this machine");
+            return;
+        };
+        assert_eq!(console, "", "the browser complains");
+        assert_eq!(seen, format!("{width} {width}"), "wider than the window");
+    }
+}
