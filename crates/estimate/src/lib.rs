@@ -34,7 +34,6 @@ mod modal;
 mod noise_spectrum;
 mod prediction;
 mod quasi_triangular;
-mod real_schur;
 mod sweep;
 pub mod time_domain;
 mod triangular;

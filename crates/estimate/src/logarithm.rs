@@ -10,11 +10,11 @@
 //! when the force is held. The logarithm of the left side therefore gives A and B at once, also
 //! when A is singular (a free body), and its derivative carries the covariance of Φ and Γ over.
 
+use mechid_model::RealSchur;
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
 use crate::quasi_triangular::{root_derivative, shifted_root};
-use crate::real_schur::{Blocks, real_schur};
 
 /// ‖X‖₁ up to which the \[7/7\] Padé approximant of log(I + X) is exact to double precision.
 ///
@@ -71,7 +71,7 @@ pub(crate) struct Generator {
     pub(crate) value: DMatrix<f64>,
     /// Schur vectors of Φ.
     q: DMatrix<f64>,
-    blocks: Blocks,
+    blocks: Vec<(usize, usize)>,
     /// (I + U)^(1/2^l) − I for l = 1, 2, …, with U the Schur form of \[Φ − I, Γ; 0, 0\].
     roots: Vec<DMatrix<f64>>,
     /// The last of them, or U itself.
@@ -87,7 +87,8 @@ impl Generator {
         input: &DMatrix<f64>,
     ) -> Result<Self, EstimateError> {
         let (states, inputs) = input.shape();
-        let (q, t, mut blocks) = real_schur(difference.clone())?;
+        let RealSchur { q, t, mut blocks } = RealSchur::new(difference.clone())
+            .map_err(|_| EstimateError::Eigenvalues { size: states })?;
         blocks.iter().try_for_each(|block| check_block(&t, *block))?;
         blocks.extend((states..states + inputs).map(|at| (at, 1)));
         let input_scale = match (one_norm(difference), one_norm(input)) {

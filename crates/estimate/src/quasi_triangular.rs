@@ -2,8 +2,6 @@
 
 use nalgebra::{DMatrix, Matrix2, Matrix4, Vector4};
 
-use crate::real_schur::Blocks;
-
 /// (I + U)^½ − I of a quasi-triangular U, without ever forming I + U.
 ///
 /// With Y the result, Y² + 2Y = U: the recurrence of Björck and Hammarling, shifted, so that
@@ -13,7 +11,7 @@ use crate::real_schur::Blocks;
 /// Björck & Hammarling (1983), Linear Algebra Appl. 52/53, 127–140; Higham (1987), Linear
 /// Algebra Appl. 88/89, 405–430 (real Schur form); Higham, *Functions of Matrices* (2008),
 /// algorithms 6.3 and 6.7.
-pub(crate) fn shifted_root(u: &DMatrix<f64>, blocks: &Blocks) -> DMatrix<f64> {
+pub(crate) fn shifted_root(u: &DMatrix<f64>, blocks: &[(usize, usize)]) -> DMatrix<f64> {
     let mut y = DMatrix::zeros(u.nrows(), u.ncols());
     for (at, &(start, width)) in blocks.iter().enumerate() {
         root_of_block(u, &mut y, start, width);
@@ -60,7 +58,11 @@ fn root_of_block(u: &DMatrix<f64>, y: &mut DMatrix<f64>, start: usize, width: us
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 7.6.3 (Bartels–Stewart).
-pub(crate) fn root_derivative(y: &DMatrix<f64>, blocks: &Blocks, e: &DMatrix<f64>) -> DMatrix<f64> {
+pub(crate) fn root_derivative(
+    y: &DMatrix<f64>,
+    blocks: &[(usize, usize)],
+    e: &DMatrix<f64>,
+) -> DMatrix<f64> {
     let size = y.nrows();
     let mut z = DMatrix::zeros(size, size);
     for &(start, width) in blocks {

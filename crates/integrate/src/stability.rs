@@ -4,8 +4,8 @@
 //! does the integrating. There is no second set of formulas that could be right while the code is
 //! wrong.
 
-use mechid_model::SecondOrderSystem;
-use nalgebra::{Complex, DVector, Schur};
+use mechid_model::{RealSchur, SecondOrderSystem};
+use nalgebra::Complex;
 
 use crate::{IntegrateError, Scheme, Stepper, Transition};
 
@@ -51,11 +51,10 @@ pub(crate) fn log_square(mu: Complex<f64>) -> f64 {
 }
 
 /// The eigenvalues μ of D; those of the amplification matrix are 1 + μ.
-pub(crate) fn eigenvalues(transition: &Transition) -> Option<DVector<Complex<f64>>> {
+pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> {
     let mut change = transition.change.clone();
     Transition::balance(&mut change)?;
-    let iterations = 1000 * change.nrows();
-    Some(Schur::try_new(change, f64::EPSILON, iterations)?.complex_eigenvalues())
+    Some(RealSchur::new(change).ok()?.eigenvalues())
 }
 
 /// The largest step at which `scheme` does not make the motion of `system` grow, in seconds;

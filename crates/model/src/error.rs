@@ -117,6 +117,12 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
+    /// The eigenvalue iteration of a matrix did not converge.
+    #[error("the eigenvalues of a {size}×{size} matrix could not be computed")]
+    NotConverged {
+        /// Rows of the matrix.
+        size: usize,
+    },
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),

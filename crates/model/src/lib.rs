@@ -27,6 +27,7 @@
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
+//! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
 
 mod closed_form;
@@ -36,6 +37,7 @@ mod frequency_response;
 mod initial_state;
 mod journal_bearing;
 mod modes;
+mod real_schur;
 mod response;
 mod sampled_force;
 mod sampling_rule;
@@ -46,6 +48,7 @@ pub use error::ModelError;
 pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
 pub use modes::Mode;
+pub use real_schur::RealSchur;
 pub use response::Response;
 pub use sampling_rule::npi_sampling;
 pub use sdof::Sdof;

@@ -1,9 +1,9 @@
 //! Eigenvalues and complex mode shapes of a system with any damping.
 
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
-use nalgebra::{Complex, DMatrix, DVector, SVD, Schur};
+use nalgebra::{Complex, DMatrix, DVector, SVD};
 
-use crate::{ModelError, SecondOrderSystem};
+use crate::{ModelError, RealSchur, SecondOrderSystem};
 
 /// Eigenvalues closer than this, relative to their modulus, count as one repeated eigenvalue:
 /// about √ε, what rounding makes of a defective pair.
@@ -94,10 +94,9 @@ impl SecondOrderSystem {
         }
         // Displacements and velocities differ by a factor ω: balance before iterating.
         balance_parlett_reinsch(&mut a);
-        let iterations = 100 * a.nrows();
-        let schur = Schur::try_new(a, f64::EPSILON, iterations)
-            .ok_or(ModelError::ModesNotConverged { dof: self.dof() })?;
-        let mut eigenvalues = quasi_triangular_eigenvalues(&schur.unpack().1);
+        let schur =
+            RealSchur::new(a).map_err(|_| ModelError::ModesNotConverged { dof: self.dof() })?;
+        let mut eigenvalues = schur.eigenvalues();
         eigenvalues.sort_by(|p, q| {
             p.norm().total_cmp(&q.norm()).then(p.re.total_cmp(&q.re)).then(q.im.total_cmp(&p.im))
         });
@@ -160,30 +159,6 @@ impl SecondOrderSystem {
         });
         Ok(Some(shape / largest))
     }
-}
-
-/// Eigenvalues of a real quasi-triangular matrix: its diagonal blocks of size 1 and 2.
-///
-/// A block of size 2 that rounding left with real eigenvalues is solved as such.
-fn quasi_triangular_eigenvalues(t: &DMatrix<f64>) -> Vec<Complex<f64>> {
-    let mut eigenvalues = Vec::with_capacity(t.nrows());
-    while eigenvalues.len() < t.nrows() {
-        let i = eigenvalues.len();
-        if i + 1 == t.nrows() || t[(i + 1, i)] == 0.0 {
-            eigenvalues.push(Complex::from(t[(i, i)]));
-            continue;
-        }
-        let mean = 0.5 * (t[(i, i)] + t[(i + 1, i + 1)]);
-        let half_gap = 0.5 * (t[(i, i)] - t[(i + 1, i + 1)]);
-        let discriminant = half_gap * half_gap + t[(i, i + 1)] * t[(i + 1, i)];
-        let root = discriminant.abs().sqrt();
-        if discriminant < 0.0 {
-            eigenvalues.extend([Complex::new(mean, root), Complex::new(mean, -root)]);
-        } else {
-            eigenvalues.extend([Complex::from(mean + root), Complex::from(mean - root)]);
-        }
-    }
-    eigenvalues
 }
 
 #[cfg(test)]
@@ -286,5 +261,27 @@ mod tests {
         let s = system(dmatrix![1.0], dmatrix![0.0], dmatrix![0.0]);
         let modes = s.modes().unwrap();
         assert!(modes.iter().all(|m| m.natural_frequency() == 0.0 && m.damping_ratio() == 0.0));
+    }
+
+    #[test]
+    fn many_equal_and_critically_damped_oscillators_have_their_eigenvalue() {
+        // Coordinates that mix them: a product of mirrors.
+        for size in 10..=24 {
+            let mut turn = DMatrix::identity(size, size);
+            for m in 0..size {
+                let normal =
+                    DVector::from_fn(size, |i, _| ((i * (m + 2)) as f64).sin()).normalize();
+                turn -= &turn * &normal * normal.transpose() * 2.0;
+            }
+            let stiffness = turn.transpose() * DMatrix::from_diagonal_element(size, size, 100.0);
+            let stiffness = stiffness * &turn;
+            let damping = DMatrix::from_diagonal_element(size, size, 20.0);
+            let eigenvalues = system(DMatrix::identity(size, size), damping, stiffness)
+                .eigenvalues()
+                .unwrap_or_else(|e| panic!("{size}: {e}"));
+            assert_eq!(eigenvalues.len(), 2 * size);
+            // Defective pairs: rounding of ε splits them by about √ε.
+            assert!(eigenvalues.iter().all(|l| (l + 10.0).norm() < 1e-5), "{eigenvalues:?}");
+        }
     }
 }

@@ -1,14 +1,11 @@
-//! The real Schur form of a small matrix.
+//! The real Schur form of a matrix.
 //!
 //! nalgebra has one, but its shifts suffer from cancellation and are never exceptional: it goes
 //! round in circles for several eigenvalues that are equal to rounding.
 
-use nalgebra::{DMatrix, Hessenberg, Vector3};
+use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
-use crate::EstimateError;
-
-/// Diagonal blocks (first row, size 1 or 2) of a quasi-upper-triangular matrix.
-pub(crate) type Blocks = Vec<(usize, usize)>;
+use crate::ModelError;
 
 /// Sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is dropped too.
 const PATIENCE: usize = 20;
@@ -16,43 +13,92 @@ const PATIENCE: usize = 20;
 /// Sweeps without a deflation after which the iteration is given up.
 const LIMIT: usize = 100;
 
-/// A = Q T Qᵀ with T quasi-upper-triangular, as (Q, T, diagonal blocks).
+/// A = Q T Qᵀ, all size × size, Q orthogonal and T quasi-upper-triangular.
 ///
-/// Francis' double-shift QR iteration. A 2×2 block may also hold two real eigenvalues.
+/// ```
+/// use mechid_model::RealSchur;
+/// use nalgebra::dmatrix;
 ///
-/// # Errors
-/// [`EstimateError::Eigenvalues`] if the iteration does not converge.
-///
-/// # Source
-/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
-pub(crate) fn real_schur(
-    a: DMatrix<f64>,
-) -> Result<(DMatrix<f64>, DMatrix<f64>, Blocks), EstimateError> {
-    let size = a.nrows();
-    if size < 2 {
-        return Ok((DMatrix::identity(size, size), a, (0..size).map(|at| (at, 1)).collect()));
-    }
-    let norm = a.norm();
-    let (mut q, mut h) = Hessenberg::new(a).unpack();
-    let mut blocks = Blocks::new();
-    let (mut end, mut sweeps) = (size, 0);
-    while end > 0 {
-        let last = end - 1;
-        let start = first_of_unreduced(&mut h, last, if sweeps < PATIENCE { 0.0 } else { norm });
-        if last - start < 2 {
-            blocks.push((start, end - start));
-            end = start;
-            sweeps = 0;
-            continue;
+/// // A quarter turn: eigenvalues ±i.
+/// let schur = RealSchur::new(dmatrix![0.0, -1.0; 1.0, 0.0])?;
+/// assert_eq!(schur.blocks, [(0, 2)]);
+/// assert!((schur.eigenvalues()[0].im - 1.0).abs() < 1e-15);
+/// # Ok::<(), mechid_model::ModelError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct RealSchur {
+    /// The Schur vectors Q, in columns.
+    pub q: DMatrix<f64>,
+    /// T, zero below its diagonal blocks.
+    pub t: DMatrix<f64>,
+    /// The diagonal blocks of T in order: first row, and size 1 or 2. A block of size 2 may also
+    /// hold two real eigenvalues.
+    pub blocks: Vec<(usize, usize)>,
+}
+
+impl RealSchur {
+    /// The Schur form of the square matrix `a` by Francis' double-shift QR iteration, with
+    /// exceptional shifts.
+    ///
+    /// # Errors
+    /// [`ModelError::NotConverged`] if the iteration does not converge, as for entries that are not
+    /// finite.
+    ///
+    /// # Panics
+    /// If `a` is not square.
+    ///
+    /// # Source
+    /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
+    pub fn new(a: DMatrix<f64>) -> Result<Self, ModelError> {
+        let size = a.nrows();
+        if size < 2 {
+            let blocks = (0..size).map(|at| (at, 1)).collect();
+            return Ok(Self { q: DMatrix::identity(size, size), t: a, blocks });
         }
-        sweeps += 1;
-        if sweeps > LIMIT {
-            return Err(EstimateError::Eigenvalues { size });
+        let norm = a.norm();
+        let (mut q, mut t) = Hessenberg::new(a).unpack();
+        let mut blocks = Vec::new();
+        let (mut end, mut sweeps) = (size, 0);
+        while end > 0 {
+            let last = end - 1;
+            let start =
+                first_of_unreduced(&mut t, last, if sweeps < PATIENCE { 0.0 } else { norm });
+            if last - start < 2 {
+                blocks.push((start, end - start));
+                end = start;
+                sweeps = 0;
+                continue;
+            }
+            sweeps += 1;
+            if sweeps > LIMIT {
+                return Err(ModelError::NotConverged { size });
+            }
+            sweep(&mut t, &mut q, start, last, sweeps);
         }
-        sweep(&mut h, &mut q, start, last, sweeps);
+        blocks.reverse();
+        Ok(Self { q, t, blocks })
     }
-    blocks.reverse();
-    Ok((q, h, blocks))
+
+    /// The eigenvalues in the order of the blocks, of a conjugate pair the one with Im λ > 0 first.
+    pub fn eigenvalues(&self) -> Vec<Complex<f64>> {
+        self.blocks.iter().flat_map(|&(at, size)| self.block_eigenvalues(at, size)).collect()
+    }
+
+    fn block_eigenvalues(&self, at: usize, size: usize) -> Vec<Complex<f64>> {
+        let t = |i: usize, j: usize| self.t[(at + i, at + j)];
+        if size == 1 {
+            return vec![Complex::from(t(0, 0))];
+        }
+        let mean = 0.5 * (t(0, 0) + t(1, 1));
+        let half_gap = 0.5 * (t(0, 0) - t(1, 1));
+        let discriminant = half_gap * half_gap + t(0, 1) * t(1, 0);
+        let root = discriminant.abs().sqrt();
+        if discriminant < 0.0 {
+            vec![Complex::new(mean, root), Complex::new(mean, -root)]
+        } else {
+            vec![Complex::from(mean + root), Complex::from(mean - root)]
+        }
+    }
 }
 
 /// Goes up from `last` to the first negligible subdiagonal entry and clears it.
@@ -145,7 +191,7 @@ mod tests {
 
     fn check(a: &DMatrix<f64>) {
         let size = a.nrows();
-        let (q, t, blocks) = real_schur(a.clone()).unwrap();
+        let RealSchur { q, t, blocks } = RealSchur::new(a.clone()).unwrap();
         let scale = 1e-14 * (1.0 + size as f64) * a.norm().max(f64::MIN_POSITIVE);
         assert!((&q * &t * q.transpose() - a).norm() <= scale);
         assert!((q.tr_mul(&q) - DMatrix::identity(size, size)).norm() < 1e-14 * size as f64);
