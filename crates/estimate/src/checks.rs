@@ -50,7 +50,7 @@ pub struct Check {
     pub subject: Subject,
     /// How it came out.
     pub verdict: Verdict,
-    /// The number behind the verdict; the text says of what.
+    /// The number behind the verdict; the text says of what, and in which unit.
     pub value: f64,
     /// One sentence.
     pub text: String,

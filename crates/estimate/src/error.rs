@@ -23,7 +23,7 @@ pub enum EstimateError {
     FixedValue {
         /// Name of the parameter.
         parameter: String,
-        /// The value given.
+        /// The value given, in the unit of the parameter.
         value: f64,
     },
     /// There is no such entry.
@@ -81,7 +81,7 @@ pub enum EstimateError {
         row: usize,
         /// Column, counted from 0.
         column: usize,
-        /// The value found.
+        /// The value found, in the unit of the data.
         value: f64,
     },
     /// Squares of the data are beyond the largest number.
@@ -165,7 +165,7 @@ pub enum EstimateError {
          above half the sampling rate (sample faster), or one dies out within a sample, or noise drowns it"
     )]
     NoLogarithm {
-        /// The offending eigenvalue of Φ, zero or negative.
+        /// The offending eigenvalue of Φ, a pure number, zero or negative.
         eigenvalue: f64,
     },
     /// The eigenvalues of a matrix could not be computed.
@@ -177,7 +177,7 @@ pub enum EstimateError {
     /// A confidence level outside (0, 1).
     #[error("a confidence level lies between 0 and 1, got {level}")]
     Level {
-        /// The level given.
+        /// The level given, a probability.
         level: f64,
     },
     /// No spectral line was chosen, or none of them carries force.
@@ -243,7 +243,7 @@ pub enum EstimateError {
         row: usize,
         /// Channel, counted from 0, displacements first, then forces.
         column: usize,
-        /// The value given.
+        /// The value given, in m² or N².
         value: f64,
     },
     /// The noise covariance of a line cannot be inverted.
@@ -264,7 +264,7 @@ pub enum EstimateError {
     /// A coherence outside (0, 1].
     #[error("a coherence lies above 0 and at most at 1, got {value}")]
     Coherence {
-        /// The value given.
+        /// The value given, a pure number.
         value: f64,
     },
     /// The motion has nothing in common with the force.

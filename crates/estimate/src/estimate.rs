@@ -51,9 +51,9 @@ pub struct Estimated {
 /// A combination of parameters on which the data say nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undetermined {
-    /// How strongly the data excite it, relative to the best determined combination.
+    /// How strongly the data excite it, as a ratio to the best determined combination.
     pub relative_singular_value: f64,
-    /// The parameters and how much of each (any multiple of all of them may be added).
+    /// The parameters and how much of each, in its unit (any multiple of all of them may be added).
     pub terms: Vec<(Parameter, f64)>,
 }
 
@@ -139,13 +139,13 @@ impl Estimate {
         mass
     }
 
-    /// Ĉ, in N·s/m.
+    /// Ĉ, n × n, in N·s/m.
     pub fn damping(&self) -> DMatrix<f64> {
         let [_, damping, _] = self.unknowns.assemble(&self.values);
         damping
     }
 
-    /// K̂, in N/m.
+    /// K̂, n × n, in N/m.
     pub fn stiffness(&self) -> DMatrix<f64> {
         let [_, _, stiffness] = self.unknowns.assemble(&self.values);
         stiffness
@@ -185,7 +185,7 @@ impl Estimate {
         self.degrees_of_freedom
     }
 
-    /// √(Σe² / Σb²), residual over right-hand side, of each fitted equation.
+    /// √(Σe² / Σb²), the ratio of residual to right-hand side, of each fitted equation.
     pub fn residual_nrmse(&self) -> &[f64] {
         &self.residual_nrmse
     }
@@ -195,7 +195,8 @@ impl Estimate {
         self.condition
     }
 
-    /// The combinations of parameters on which the data say nothing; empty when all is well.
+    /// The combinations of parameters on which the data say nothing, one entry for each; empty when
+    /// all is well.
     pub fn undetermined(&self) -> &[Undetermined] {
         &self.undetermined
     }

@@ -97,6 +97,10 @@ impl Frf {
     /// # Errors
     /// [`EstimateError::Size`], [`EstimateError::Coherence`] outside (0, 1\],
     /// [`EstimateError::TooFewAverages`] unless there are more averages than forces.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance that the coherence
+    /// gives).
     pub fn new(
         omega: Vec<f64>,
         response: Vec<ComplexMatrix>,

@@ -40,14 +40,17 @@ pub struct LeastSquares {
 /// The least-squares answer of one set of regressors for one or several right-hand sides.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Solution {
-    /// θ: unknowns × right-hand sides. Entries that are not determined are NaN.
+    /// θ: unknowns × right-hand sides, in the unit of the target over that of the regressor.
+    /// Entries that are not determined are NaN.
     pub coefficients: DMatrix<f64>,
-    /// (AᵀA)⁻¹: unknowns × unknowns, over the determined directions. The covariance of
+    /// (AᵀA)⁻¹: unknowns × unknowns, in inverse units of the regressors, over the determined
+    /// directions. The covariance of
     /// coefficients (i, a) and (j, b) is `unscaled_covariance[(i, j)] · residual_covariance[(a, b)]`.
     pub unscaled_covariance: DMatrix<f64>,
-    /// EᵀE / (rows − unknowns): right-hand sides × right-hand sides; infinite without excess rows.
+    /// EᵀE / (rows − unknowns): right-hand sides × right-hand sides, in the units of the targets;
+    /// infinite without excess rows.
     pub residual_covariance: DMatrix<f64>,
-    /// √(Σe² / Σb²) of each right-hand side.
+    /// √(Σe² / Σb²), a pure number, of each right-hand side.
     pub residual_nrmse: Vec<f64>,
     /// Rows minus determined directions.
     pub degrees_of_freedom: usize,
@@ -64,9 +67,9 @@ pub struct Solution {
 /// A combination of unknowns that can be added to a solution without changing the fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Direction {
-    /// Singular value of the scaled regressors along it, relative to the largest.
+    /// Ratio of the singular value of the scaled regressors along it to the largest.
     pub relative_singular_value: f64,
-    /// One entry per unknown, the one that counts most (in scaled columns) being 1.
+    /// One entry per unknown, in its unit, the one that counts most (in scaled columns) being 1.
     pub combination: DVector<f64>,
     /// Which of the unknowns take part.
     pub involved: Vec<bool>,
@@ -83,7 +86,7 @@ impl LeastSquares {
         self.factor.rows()
     }
 
-    /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides.
+    /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides, in any units.
     ///
     /// # Errors
     /// [`EstimateError::Size`], [`EstimateError::NotFinite`] and [`EstimateError::Overflow`]; then

@@ -33,7 +33,8 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
     (0.949_107_912_342_758_5, 0.129_484_966_168_869_7),
 ];
 
-/// The principal logarithm: exp(log A) = A with all eigenvalues of log A within ±iπ.
+/// The principal logarithm of a square matrix of pure numbers: exp(log A) = A with all eigenvalues
+/// of log A within ±iπ.
 ///
 /// Real Schur form, square roots until the matrix is close to I, then a Padé approximant. What is
 /// carried along is the difference to I, so that a matrix close to I keeps its relative accuracy.

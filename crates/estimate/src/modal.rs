@@ -11,7 +11,7 @@ use crate::{Estimate, EstimateError, Parameter};
 /// A value with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Uncertain {
-    /// The value.
+    /// The value, in the unit its owner gives.
     pub value: f64,
     /// Its standard error, in the same unit; infinite where it has no derivative with
     /// respect to the matrices (repeated eigenvalues).
@@ -84,7 +84,8 @@ impl Estimate {
     }
 }
 
-/// The modes of a machine whose `parameters` have this covariance, as [`Estimate::modes`]: for
+/// The modes of a machine whose `parameters` have this covariance (one row and column each, in the
+/// products of their units), as [`Estimate::modes`]: for
 /// matrices identified elsewhere or read back from a file.
 ///
 /// # Errors

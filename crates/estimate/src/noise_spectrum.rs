@@ -74,6 +74,10 @@ impl NoiseSpectrum {
     ///
     /// # Errors
     /// As [`NoiseSpectrum::new`].
+    ///
+    /// # Source
+    /// Brillinger, *Time Series: Data Analysis and Theory* (1981), chapter 4 (the finite Fourier
+    /// transform of white noise).
     pub fn white(
         sampling: Sampling,
         lines: &[usize],

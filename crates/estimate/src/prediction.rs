@@ -41,6 +41,10 @@ pub fn fit_percent(measured: &Record, predicted: &Record) -> Result<Vec<f64>, Es
 /// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::NoSteadyState`] if
 /// the machine has none with this period, [`EstimateError::Signal`] if an unstable motion
 /// overflows.
+///
+/// # Source
+/// Van Loan (1978), IEEE Trans. Automatic Control 23, 395–404 (the exact step); Åström &
+/// Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), chapter 2.
 pub fn predict(
     system: &SecondOrderSystem,
     force: &Record,

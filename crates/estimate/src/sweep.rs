@@ -12,7 +12,8 @@ pub struct SweepPoint<S, E> {
     pub setting: S,
     /// The estimate with its intervals, or why there is none.
     pub outcome: Result<Estimate, E>,
-    /// How good it is, the smaller the better; `None` if there is no complete estimate.
+    /// How good it is, a pure number, the smaller the better; `None` if there is no complete
+    /// estimate.
     ///
     /// With a reference: the largest error of an entry of M, C or K relative to the largest entry
     /// of that matrix. Without: the same of the standard errors, which say nothing of bias.

@@ -136,7 +136,7 @@ pub enum ForceError {
     NotPositive {
         /// What the number is.
         what: &'static str,
-        /// The value found.
+        /// The value found, in the unit of that number.
         value: f64,
     },
     /// An open record too long for the dense problem.
@@ -209,7 +209,7 @@ pub enum ForceError {
         row: usize,
         /// Column, counted from 0.
         column: usize,
-        /// The variance given.
+        /// The variance given, in the squared unit of the entry.
         variance: f64,
     },
     /// The same entry was named twice.

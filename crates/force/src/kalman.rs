@@ -44,11 +44,11 @@ pub struct KalmanForce {
     pub displacement: Record,
     /// Velocity of every degree of freedom, in m/s, measured or not.
     pub velocity: Record,
-    /// Standard deviation of the noise, one per channel.
+    /// Standard deviation of the noise, one per channel, in the unit of the channel.
     pub noise: Vec<f64>,
     /// Intensity of the random walk, one per forced degree of freedom, in N/√s.
     pub walk: Vec<f64>,
-    /// Logarithm of the likelihood of the measurement, constants left out.
+    /// Logarithm of the likelihood of the measurement, dimensionless, constants left out.
     pub log_likelihood: f64,
 }
 

@@ -4,7 +4,7 @@ use mechid_signal::{Record, Spectrum};
 
 use crate::ForceError;
 
-/// ‖F̂ − F‖ / ‖F‖ over all samples and channels.
+/// ‖F̂ − F‖ / ‖F‖ over all samples and channels, a pure number.
 ///
 /// # Errors
 /// [`ForceError::Compared`], [`ForceError::Signal`] if the records do not match,
@@ -18,7 +18,7 @@ pub fn relative_error(estimate: &Record, truth: &Record) -> Result<f64, ForceErr
     Ok((estimate.data() - truth.data()).norm() / norm)
 }
 
-/// ‖F̂ − F‖ / ‖F‖ of each channel; `None` for channels on which no force acts.
+/// ‖F̂ − F‖ / ‖F‖, a pure number, of each channel; `None` for channels on which no force acts.
 ///
 /// # Errors
 /// As [`relative_error`], but for [`ForceError::NoForce`].
@@ -30,7 +30,7 @@ pub fn channel_errors(estimate: &Record, truth: &Record) -> Result<Vec<Option<f6
         .collect())
 }
 
-/// |F̂_n − F_n| / |F_n| at each of the lines, for one channel.
+/// |F̂_n − F_n| / |F_n|, a pure number, at each of the lines, for one channel.
 ///
 /// # Errors
 /// [`ForceError::NoForceAtLine`] where F_n is zero; [`ForceError::NoSuchLine`],
@@ -44,7 +44,7 @@ pub fn line_errors(
     ratios(estimate, truth, channel, channel, lines, |e, t| (e - t).norm())
 }
 
-/// |F̂_n| / |F_n| at each of the lines, for one channel: 1 is perfect.
+/// The ratio |F̂_n| / |F_n| at each of the lines, for one channel: 1 is perfect.
 ///
 /// # Errors
 /// As [`line_errors`].
@@ -57,7 +57,8 @@ pub fn spectrum_ratio(
     ratios(estimate, truth, channel, channel, lines, |e, _| e.norm())
 }
 
-/// |F̂_n| on a channel where no force acts, over |F_n| on one where it does: 0 is perfect.
+/// The ratio of |F̂_n| on a channel where no force acts to |F_n| on one where it does, at each of
+/// the lines: 0 is perfect.
 ///
 /// # Errors
 /// As [`line_errors`].

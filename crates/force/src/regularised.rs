@@ -38,11 +38,11 @@ pub enum Start {
 pub struct RegularisedForce {
     /// The force, with its standard error.
     pub force: IdentifiedForce,
-    /// λ, in scaled channel per newton; `None` for [`Filter::Shrinkage`], which has none.
+    /// λ, in the unit of a scaled channel per N; `None` for [`Filter::Shrinkage`], which has none.
     pub parameter: Option<f64>,
-    /// Real unknowns that the filter lets through, of those there are.
+    /// How many real unknowns the filter lets through, a pure number and rarely a whole one.
     pub unknowns: f64,
-    /// Noise level that the fit leaves over, one standard deviation per channel.
+    /// Noise level that the fit leaves over, one standard deviation per channel, in its unit.
     pub noise: Vec<f64>,
 }
 

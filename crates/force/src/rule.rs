@@ -35,7 +35,7 @@ pub enum Rule {
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
     LCurve,
-    /// This λ.
+    /// This λ, in the unit of a scaled channel per N.
     Given(f64),
 }
 

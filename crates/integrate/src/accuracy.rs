@@ -12,11 +12,11 @@ use crate::{IntegrateError, Scheme, Transition, stability};
 /// All but the spectral radius are `None` where the numerical motion does not oscillate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Accuracy {
-    /// Δt/T, T = 2π/ω being the undamped period.
+    /// Δt/T, a pure number, T = 2π/ω being the undamped period.
     pub step_over_period: f64,
-    /// Largest modulus of the eigenvalues of the amplification matrix.
+    /// Largest modulus of the eigenvalues of the amplification matrix, a pure number.
     pub spectral_radius: f64,
-    /// T̄/T − 1 with the numerical period T̄ (both damped).
+    /// T̄/T − 1, a pure number, with the numerical period T̄ (both damped).
     pub period_elongation: Option<f64>,
     /// ζ̄ − ζ, the damping ratio the scheme adds, from λ = exp(−ζ̄ Ω̄ ± i Ω̄ √(1 − ζ̄²)).
     pub numerical_damping_ratio: Option<f64>,

@@ -22,11 +22,11 @@ pub enum IntegrateError {
         scheme: &'static str,
         /// Which parameter.
         parameter: &'static str,
-        /// Smallest value allowed.
+        /// Smallest value allowed; parameters of schemes are pure numbers.
         least: f64,
-        /// Largest value allowed (may be infinite).
+        /// Largest value allowed, a pure number (may be infinite).
         most: f64,
-        /// The value given.
+        /// The value given, a pure number.
         value: f64,
     },
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.

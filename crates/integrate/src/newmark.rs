@@ -35,7 +35,7 @@ impl Newmark {
     /// β = 0, γ = ½. Stable up to ωΔt = 2.
     pub const CENTRAL_DIFFERENCE: Self = Self { beta: 0.0, gamma: 0.5 };
 
-    /// Any member with β and γ between 0 and 1.
+    /// Any member with β and γ, pure numbers, between 0 and 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`].

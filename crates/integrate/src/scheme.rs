@@ -41,8 +41,8 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError>;
 
-    /// As [`prepare_unchecked`](Self::prepare_unchecked), but refuses a step that makes the motion
-    /// of the system grow. Wrap the scheme in [`AllowUnstable`] to go on all the same.
+    /// As [`prepare_unchecked`](Self::prepare_unchecked), but refuses a step `dt` (s) that makes
+    /// the motion of the system grow. Wrap the scheme in [`AllowUnstable`] to go on all the same.
     ///
     /// # Errors
     /// Those of [`prepare_unchecked`](Self::prepare_unchecked), and
@@ -122,13 +122,13 @@ pub enum Instant {
 /// A scheme reads those of [`Stepper::instants`] only; the others may be anything.
 #[derive(Debug, Clone, Copy)]
 pub struct Loads<'a> {
-    /// F(t).
+    /// F(t), in N, one entry per degree of freedom.
     pub now: &'a [f64],
-    /// F(t + Δt/2).
+    /// F(t + Δt/2), likewise in N per degree of freedom.
     pub middle: &'a [f64],
-    /// F(t + Δt).
+    /// F(t + Δt), likewise in N per degree of freedom.
     pub next: &'a [f64],
-    /// F(t + 2Δt).
+    /// F(t + 2Δt), likewise in N per degree of freedom.
     pub beyond: &'a [f64],
 }
 
@@ -150,7 +150,8 @@ pub trait Stepper: Send {
     /// Writes what the step adds to `state` into `change`: z(t + Δt) − z(t).
     ///
     /// The difference, and not the new state, is what can be computed to full relative precision
-    /// however small the step: near Δt = 0 the amplification matrix is I + O(Δt).
+    /// however small the step: near Δt = 0 the amplification matrix is I + O(Δt). The state is the
+    /// scheme's own, in the units its documentation gives; loads are in N.
     ///
     /// # Panics
     /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or a load that is
@@ -163,8 +164,8 @@ pub trait Stepper: Send {
     }
 
     /// Starts the motion from `initial`, the forces at samples 0 ..= [`first`](Self::first) being
-    /// `early`: writes the motion `[x, ẋ, ẍ]` at each of these samples into `motions` and the
-    /// state at the last of them into `state`.
+    /// `early` (N): writes the motion `[x, ẋ, ẍ]` (m, m/s, m/s², one entry per degree of freedom)
+    /// at each of these samples into `motions` and the state at the last of them into `state`.
     ///
     /// # Errors
     /// [`IntegrateError::NotAtRest`] if the starting procedure chosen cannot take the velocity.

@@ -10,9 +10,9 @@ use crate::{Instant, Loads, Stepper};
 /// D = A − I, A being the amplification matrix: near Δt = 0 it keeps the digits that A loses.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Transition {
-    /// D, state × state.
+    /// D, state × state, in the units of the state.
     pub change: DMatrix<f64>,
-    /// Per instant, the state × n matrix the force there is multiplied by.
+    /// Per instant, the state × n matrix the force there (N) is multiplied by.
     pub loads: Vec<(Instant, DMatrix<f64>)>,
 }
 
@@ -60,7 +60,7 @@ impl Transition {
         representable.then(|| balance_parlett_reinsch(matrix))
     }
 
-    /// The amplification matrix A = I + D.
+    /// The amplification matrix A = I + D, state × state, in the units of the state.
     pub fn amplification(&self) -> DMatrix<f64> {
         &self.change + DMatrix::identity(self.change.nrows(), self.change.nrows())
     }

@@ -33,7 +33,7 @@ pub struct WilsonTheta {
 }
 
 impl WilsonTheta {
-    /// θ ≥ 1 (1 is linear acceleration, 1.4 the usual value), the load projected.
+    /// θ ≥ 1, a pure number (1 is linear acceleration, 1.4 the usual value), the load projected.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`] if θ < 1 or not finite.
@@ -56,7 +56,7 @@ impl WilsonTheta {
         Self { load, ..self }
     }
 
-    /// θ.
+    /// θ, the part of a step beyond which the equation is met, a pure number.
     pub fn theta(&self) -> f64 {
         self.theta
     }

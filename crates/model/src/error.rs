@@ -32,13 +32,13 @@ pub enum ModelError {
         row: usize,
         /// Column, counted from 1.
         column: usize,
-        /// The value found.
+        /// The value found, in the unit of the matrix.
         value: f64,
     },
     /// The mass matrix cannot be inverted.
     #[error("the mass matrix is singular (reciprocal condition about {reciprocal_condition:.1e})")]
     SingularMass {
-        /// Smallest over largest singular value.
+        /// Ratio of the smallest to the largest singular value.
         reciprocal_condition: f64,
     },
     /// A system needs at least one degree of freedom.
@@ -61,7 +61,7 @@ pub enum ModelError {
         name: &'static str,
         /// What it should be.
         requirement: &'static str,
-        /// What was given.
+        /// What was given, in the unit of the quantity.
         value: f64,
     },
     /// Displacement and velocity of a state, or a state and a system, do not fit.
@@ -82,7 +82,7 @@ pub enum ModelError {
         quantity: &'static str,
         /// Degree of freedom, counted from 1.
         dof: usize,
-        /// The value found.
+        /// The value found, in m or m/s.
         value: f64,
     },
     /// A force record does not have one channel per degree of freedom.
@@ -108,7 +108,7 @@ pub enum ModelError {
     /// M⁻¹K or M⁻¹C is too large to compute eigenvalues with.
     #[error("M⁻¹K or M⁻¹C has an entry of size {largest:.1e}: too large for eigenvalues")]
     StateMatrixOverflow {
-        /// Largest modulus of an entry.
+        /// Largest modulus of an entry, in 1/s or its square.
         largest: f64,
     },
     /// The eigenvalue or singular value iteration did not converge.

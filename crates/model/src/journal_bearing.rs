@@ -17,7 +17,7 @@ pub enum KyxSign {
 }
 
 impl KyxSign {
-    /// +1 or −1.
+    /// The factor +1 or −1.
     pub fn factor(self) -> f64 {
         match self {
             KyxSign::Plus => 1.0,
@@ -30,15 +30,22 @@ impl KyxSign {
 ///
 /// The first index is the direction of the force, the second that of the motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(missing_docs, reason = "eight coefficients under their usual names")]
 pub struct OilFilm {
+    /// Stiffness, force in x from displacement in x, in N/m.
     pub kxx: f64,
+    /// Stiffness, force in x from displacement in y, in N/m.
     pub kxy: f64,
+    /// Stiffness, force in y from displacement in x, in N/m.
     pub kyx: f64,
+    /// Stiffness, force in y from displacement in y, in N/m.
     pub kyy: f64,
+    /// Damping, force in x from velocity in x, in N·s/m.
     pub cxx: f64,
+    /// Damping, force in x from velocity in y, in N·s/m.
     pub cxy: f64,
+    /// Damping, force in y from velocity in x, in N·s/m.
     pub cyx: f64,
+    /// Damping, force in y from velocity in y, in N·s/m.
     pub cyy: f64,
 }
 

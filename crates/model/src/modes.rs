@@ -25,7 +25,7 @@ impl Mode {
         self.eigenvalue
     }
 
-    /// φ, one entry per degree of freedom, scaled so that its largest entry is 1.
+    /// φ, one entry per degree of freedom, dimensionless: scaled so that its largest entry is 1.
     pub fn shape(&self) -> &DVector<Complex<f64>> {
         &self.shape
     }

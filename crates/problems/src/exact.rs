@@ -76,6 +76,9 @@ pub fn exact_foh_periodic(
 /// # Errors
 /// [`ProblemError::Model`] if the force does not fit or a line of the period (driven or not)
 /// stands on an undamped resonance.
+///
+/// # Source
+/// Clough & Penzien, *Dynamics of Structures*, the chapter on periodic loading (line by line).
 pub fn exact_harmonic_periodic(
     system: &SecondOrderSystem,
     force: &Record,
@@ -103,6 +106,9 @@ pub fn exact_harmonic_periodic(
 ///
 /// # Errors
 /// As [`exact_harmonic_periodic`] and [`exact_zoh`].
+///
+/// # Source
+/// Superposition: those of [`exact_harmonic_periodic`] and [`exact_zoh`].
 pub fn exact_harmonic(
     system: &SecondOrderSystem,
     force: &Record,

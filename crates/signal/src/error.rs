@@ -38,7 +38,7 @@ pub enum SignalError {
         sample: usize,
         /// Channel, counted from 0.
         channel: usize,
-        /// The value found.
+        /// The value found, in the unit of the record.
         value: f64,
     },
     /// A window does not lie inside the record.
@@ -108,7 +108,7 @@ pub enum SignalError {
     Negative {
         /// The quantity.
         what: &'static str,
-        /// The value given.
+        /// The value given, in the unit of the quantity.
         value: f64,
     },
     /// A quantity that must be finite is not.
@@ -116,7 +116,7 @@ pub enum SignalError {
     Infinite {
         /// The quantity.
         what: &'static str,
-        /// The value given.
+        /// The value given, in the unit of the quantity.
         value: f64,
     },
     /// A quantity that must be finite and greater than zero is not.
@@ -124,7 +124,7 @@ pub enum SignalError {
     NotPositive {
         /// The quantity.
         what: &'static str,
-        /// The value given.
+        /// The value given, in the unit of the quantity.
         value: f64,
     },
     /// A frequency at or above half the sampling rate cannot be sampled.
@@ -170,11 +170,11 @@ pub enum SignalError {
     Range {
         /// The quantity.
         what: &'static str,
-        /// The value given.
+        /// The value given, in the unit of the quantity.
         value: f64,
-        /// Least value allowed.
+        /// Least value allowed, in the same unit.
         low: f64,
-        /// Greatest value allowed.
+        /// Greatest value allowed, in the same unit.
         high: f64,
     },
     /// Too few samples or lines for what was asked.

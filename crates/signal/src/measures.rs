@@ -21,6 +21,9 @@ use crate::error::{not_negative, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// Root mean square, in the unit of the samples; 0 for no samples.
+///
+/// # Source
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 1.
 pub fn rms(samples: &[f64]) -> f64 {
     let peak = peak(samples);
     if peak == 0.0 {
@@ -36,7 +39,7 @@ pub fn peak(samples: &[f64]) -> f64 {
     samples.iter().fold(0.0, |m, x| m.max(x.abs()))
 }
 
-/// Peak over RMS of the samples: 1 for a two-level signal, √2 for a sine.
+/// Peak over RMS of the samples, a pure number: 1 for a two-level signal, √2 for a sine.
 ///
 /// The samples alone are looked at; what a multisine does between them is in
 /// [`Multisine::crest_factor`](crate::Multisine::crest_factor).
@@ -81,7 +84,8 @@ pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, Sign
     Ok(0.5 * range / (std::f64::consts::SQRT_2 * rms(&centred)))
 }
 
-/// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for the lags k = 0 … N − 1.
+/// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for each of the lags k = 0 … N − 1, in the squared
+/// unit of the samples.
 ///
 /// # Source
 /// Dissertation eq. (4.3.1) with cyclic indices.
@@ -89,7 +93,8 @@ pub fn circular_autocorrelation(x: &[f64]) -> Vec<f64> {
     correlate(x, x.len())
 }
 
-/// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for the lags k = 0 … N − 1.
+/// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for each of the lags k = 0 … N − 1, in the squared unit of
+/// the samples.
 ///
 /// # Source
 /// Dissertation eq. (4.3.1), the sum ending with the sequence.
@@ -121,8 +126,8 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     correlation.channel(0)[..x.len()].iter().map(|a| scale * a).collect()
 }
 
-/// Geometric over arithmetic mean of the power of some lines: 1 if all are equal, 0 if one is
-/// missing.
+/// Geometric over arithmetic mean of the power of some lines, a pure number: 1 if all are equal, 0
+/// if one is missing.
 ///
 /// # Errors
 /// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line the spectrum
@@ -159,7 +164,7 @@ pub fn spectral_flatness(
 /// The order of persistent excitation of a periodic signal: how many parameters it can tell
 /// apart. Each line between DC and Nyquist counts twice, DC and Nyquist once.
 ///
-/// Lines weaker than `floor` times the strongest count as absent.
+/// Lines weaker than the part `floor` of the strongest count as absent.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power.
@@ -195,7 +200,7 @@ pub struct Band {
     pub high_hz: f64,
 }
 
-/// From the first to the last line within `drop_db` of the strongest, DC left out of both.
+/// From the first to the last line within `drop_db` (dB) of the strongest, DC left out of both.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the drop, [`SignalError::Silent`] for a signal without power

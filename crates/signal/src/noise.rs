@@ -46,7 +46,7 @@ pub enum Colour {
     /// Power density proportional to 1/f^`exponent`: 1 is pink, 2 brown (a drift), −2 violet (a
     /// differentiated signal). The lowest frequency is half a cycle per record.
     PowerLaw {
-        /// Exponent of the fall, −10 to 10.
+        /// Exponent of the fall, −10 to 10, a pure number.
         exponent: f64,
     },
     /// First-order low-pass (Gauss–Markov): an autocorrelation of exp(−2π f_c |τ|), exactly.
@@ -56,7 +56,8 @@ pub enum Colour {
     },
 }
 
-/// White Gaussian noise of a given standard deviation, independent between channels.
+/// White Gaussian noise of a given standard deviation, in the unit of the record that is to come,
+/// independent between channels.
 ///
 /// # Errors
 /// [`SignalError::Negative`] if the deviation is negative or not finite.
@@ -69,7 +70,8 @@ pub fn white(
     coloured(sampling, channels, standard_deviation, Colour::White, seed)
 }
 
-/// Gaussian noise of a given standard deviation and colour, independent between channels.
+/// Gaussian noise of a given standard deviation, in the unit of the record that is to come, and
+/// colour, independent between channels.
 ///
 /// The deviation is that of the process: a single record scatters about it, the more the fewer
 /// independent values it holds.

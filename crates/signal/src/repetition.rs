@@ -22,8 +22,8 @@ const ALIKE: f64 = 2.0;
 /// Squared mismatch that rounding in the Fourier transforms leaves of one that is zero.
 const ROUNDING: f64 = 1e-12;
 
-/// The shortest whole number of samples after which a signal repeats, if it does so at least once
-/// in full and better than to a tenth of its RMS value.
+/// The shortest whole number of samples after which a signal, in any unit, repeats, if it does so
+/// at least once in full and better than to a tenth of its RMS value.
 ///
 /// A signal that changes slowly also resembles itself a few samples later; lags up to the first at
 /// which it does not are left out. A period that is no whole number of samples is not found, but a
@@ -37,6 +37,9 @@ const ROUNDING: f64 = 1e-12;
 /// assert_eq!(found.period, 25);
 /// assert!(found.mismatch < 1e-14);
 /// ```
+///
+/// # Source
+/// Ours, by the autocorrelation ([`aperiodic_autocorrelation`]).
 pub fn repetition(samples: &[f64]) -> Option<Repetition> {
     let len = samples.len();
     let mean = samples.iter().sum::<f64>() / len as f64;

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// A number as a message shows it: in full where that is short, otherwise with an exponent, so that
-/// 10³⁰⁰ does not take three hundred digits.
+/// A number, in any unit, as a message shows it: in full where that is short, otherwise with an
+/// exponent, so that 10³⁰⁰ does not take three hundred digits.
 ///
 /// ```
 /// use mechid_signal::told;

@@ -15,11 +15,12 @@ const SIGNIFICANT: f64 = 0.01;
 /// Correlations at a number of lags, and how likely pure noise has as much of them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
-    /// Coefficient at each lag; see the function that made it for which lags.
+    /// Coefficient at each lag, a pure number; see the function that made it for which lags.
     pub coefficients: Vec<f64>,
     /// 95 % of the coefficients of white noise are smaller than this: 1.96/√N.
     pub bound: f64,
-    /// Sum of squared coefficients, scaled to follow a χ² distribution for white noise.
+    /// Sum of squared coefficients, dimensionless, scaled to follow a χ² distribution for white
+    /// noise.
     pub statistic: f64,
     /// The share of white-noise records with a larger statistic. Below 0.01 or so the residual is
     /// hardly noise: the model misses something.
@@ -33,7 +34,8 @@ impl Correlation {
     }
 }
 
-/// Autocorrelation of a residual at the lags 1 … `lags`, judged by the statistic of Ljung and Box.
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags 1 … `lags`, judged by
+/// the statistic of Ljung and Box.
 ///
 /// # Errors
 /// [`EstimateError::TooShort`] unless there are more than `lags + 1` samples and lags.
@@ -51,8 +53,9 @@ pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, EstimateE
     Ok(judged(coefficients, statistic, count))
 }
 
-/// Correlation of a residual with an input at the lags −`lags` … `lags`, in that order; at a
-/// positive lag the input comes first. With negative lags it shows feedback from output to input.
+/// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
+/// `lags`, in that order; at a positive lag the input comes first. With negative lags it shows
+/// feedback from output to input.
 ///
 /// The statistic takes the residual as white.
 ///
@@ -85,6 +88,9 @@ pub fn cross_correlation(
 /// # Errors
 /// As [`whiteness`], and [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not
 /// belong together.
+///
+/// # Source
+/// Those of [`whiteness`] and [`cross_correlation`].
 pub fn after_fit(
     residual: &Record,
     fitted: &Record,

@@ -25,6 +25,11 @@ const BAD_SEAM: f64 = 20.0;
 ///
 /// # Errors
 /// As [`Transitions::push`], and [`EstimateError::TooFewRows`].
+///
+/// # Source
+/// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 13 (persistence of
+/// excitation); Belsley, Kuh & Welsch, *Regression Diagnostics* (1980), chapter 3 (conditioning);
+/// the limits are ours.
 pub fn before_fit(
     method: TimeDomain,
     displacement: &Record,
@@ -154,6 +159,9 @@ pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
 ///
 /// The value is the ratio of the two for the channel where it is largest; up to 5 is good, beyond
 /// 20 bad.
+///
+/// # Source
+/// Ours.
 pub fn periodicity(motion: &Record) -> Check {
     let len = motion.len();
     let ratio = |channel: usize| {

@@ -19,6 +19,9 @@ const BAD_CHANGE: f64 = 0.5;
 ///
 /// # Errors
 /// As [`RepeatedPeriods::new`] and [`equation_error`](crate::frequency_domain::equation_error).
+///
+/// # Source
+/// As [`before_fit`](super::before_fit).
 pub fn before_spectral_fit(
     lines: &Lines,
     force: &Record,

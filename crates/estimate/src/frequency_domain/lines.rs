@@ -54,13 +54,16 @@ impl Lines {
         Ok(Self { sampling, lines, plan })
     }
 
-    /// The lines where at least one force channel has an amplitude of `threshold` times
-    /// its largest one or more.
+    /// The lines where at least one force channel has an amplitude of `threshold` (a pure number)
+    /// times its largest one or more.
     ///
     /// A multisine stands far above the noise between its lines: 0.1 separates them.
     ///
     /// # Errors
     /// [`EstimateError::NoExcitedLine`] if the force is zero on all usable lines.
+    ///
+    /// # Source
+    /// Ours.
     pub fn excited(force: &Record, threshold: f64) -> Result<Self, EstimateError> {
         let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
         let amplitudes = all.read(force)?.map(|z| z.norm());
@@ -99,7 +102,7 @@ impl Lines {
         self.lines.iter().map(|&n| n as f64 * omega0).collect()
     }
 
-    /// Complex amplitudes of a record at these lines: lines × channels,
+    /// Complex amplitudes of a record at these lines, in its unit: lines × channels,
     /// scaled as in [`mechid_signal::spectrum`].
     ///
     /// # Errors

@@ -15,6 +15,10 @@ use crate::least_squares::size;
 /// # Errors
 /// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::Model`] if a line stands
 /// on an undamped resonance, DC included.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// chapter 2 (the steady state under a periodic signal, line by line).
 pub fn predict_periodic(
     system: &SecondOrderSystem,
     force: &Record,

@@ -23,6 +23,10 @@ const UNSEEN: f64 = 1e-10;
 /// # Errors
 /// As [`predict`] for [`Extent::Open`]; [`EstimateError::Size`] or [`EstimateError::Signal`] if the
 /// motions do not belong to the force.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares); the motion
+/// is the one from rest and, linear in the start, the free one.
 pub fn fitted_start(
     system: &SecondOrderSystem,
     force: &Record,

@@ -16,6 +16,10 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 /// # Errors
 /// [`EstimateError::Signal`] if the force lies on another time axis, else as
 /// [`EquationOfMotion::solve`].
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 5 (least squares), of the
+/// equation of motion (3.2.1) of the dissertation.
 pub fn equation_of_motion(
     response: &Response,
     force: &Record,

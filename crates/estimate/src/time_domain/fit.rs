@@ -92,6 +92,9 @@ impl TimeDomainFit {
     /// upper half of A from \[0 I\], relative (a pure number), displacements counted in steps of velocity.
     ///
     /// A velocity of the wrong scale shows here, as does a discretisation that does not fit.
+    ///
+    /// # Source
+    /// Ours.
     pub fn kinematic_error(&self) -> f64 {
         let n = self.state_matrix.nrows() / 2;
         let of_velocity = self.state_matrix.view((0, n), (n, n)) - DMatrix::identity(n, n);
@@ -105,6 +108,9 @@ impl TimeDomainFit {
     /// # Errors
     /// [`EstimateError::Size`], [`EstimateError::Signal`], [`EstimateError::Step`] if the record
     /// does not fit.
+    ///
+    /// # Source
+    /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 3 (prediction).
     pub fn one_step_errors(
         &self,
         displacement: &Record,

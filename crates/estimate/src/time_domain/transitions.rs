@@ -16,6 +16,10 @@ const BLOCK: usize = 256;
 ///
 /// Memory does not grow with the records. A long open record can be pushed in pieces that overlap
 /// by one sample; a record from another experiment simply follows.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), chapter 6 (a triangle brought up to
+/// date by rows).
 #[derive(Debug, Clone)]
 pub struct Transitions {
     dof: usize,

@@ -26,7 +26,7 @@ impl Harmonic {
         Ok(Self { amplitude, frequency_hz, phase })
     }
 
-    /// The exact value at `t` seconds.
+    /// The exact value, in N, at `t` seconds.
     pub fn value(&self, t: f64) -> f64 {
         self.amplitude * (TAU * (self.frequency_hz * t).fract() + self.phase).cos()
     }

@@ -8,6 +8,9 @@ use crate::{Record, Sampling, SignalError};
 /// An ideal blow of given momentum, in the unit of the signal times seconds: N·s for a force.
 ///
 /// Sampled, it is one sample of momentum / Δt, the one nearest to its instant.
+///
+/// # Source
+/// Clough & Penzien, *Dynamics of Structures*, the chapter on impulsive loading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impulse {
     momentum: f64,
@@ -44,6 +47,9 @@ impl Impulse {
 
 /// A blow in the shape of half a sine, as an instrumented hammer gives it:
 /// F(t) = F_max sin(π (t − t_0) / d) for t_0 ≤ t ≤ t_0 + d, zero elsewhere.
+///
+/// # Source
+/// Clough & Penzien, *Dynamics of Structures*, the chapter on impulsive loading (half-sine pulse).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HalfSine {
     peak: f64,
@@ -52,7 +58,7 @@ pub struct HalfSine {
 }
 
 impl HalfSine {
-    /// A blow of given peak, start and duration in seconds.
+    /// A blow of given peak (N), start and duration in seconds.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for the peak or the start, [`SignalError::NotPositive`] for the
@@ -64,12 +70,12 @@ impl HalfSine {
         Ok(Self { peak, start, duration })
     }
 
-    /// Its momentum ∫ F dt = 2 F_max d / π.
+    /// Its momentum ∫ F dt = 2 F_max d / π, in N·s.
     pub fn momentum(&self) -> f64 {
         2.0 * self.peak * self.duration / PI
     }
 
-    /// The exact value at `t` seconds.
+    /// The exact value, in N, at `t` seconds.
     pub fn value(&self, t: f64) -> f64 {
         let passed = (t - self.start) / self.duration;
         if (0.0..=1.0).contains(&passed) { self.peak * (PI * passed).sin() } else { 0.0 }

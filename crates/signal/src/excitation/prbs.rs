@@ -62,8 +62,8 @@ pub struct Prbs {
 }
 
 impl Prbs {
-    /// A sequence of `order` stages (2 to 24) with levels ±`amplitude`, each chip held for `hold`
-    /// samples.
+    /// A sequence of `order` stages (2 to 24) with levels ±`amplitude` (N), each chip held for
+    /// `hold` samples.
     ///
     /// # Errors
     /// [`SignalError::Range`] for the order, [`SignalError::Negative`] for the amplitude,
@@ -83,7 +83,7 @@ impl Prbs {
         ((1usize << self.order) - 1).saturating_mul(self.hold)
     }
 
-    /// The levels of one period, one per chip.
+    /// The levels of one period, in N, one per chip.
     pub fn chips(&self) -> Vec<f64> {
         let taps = TAPS[self.order as usize - 2];
         let mut register = (1u32 << self.order) - 1;

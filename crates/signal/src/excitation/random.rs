@@ -18,7 +18,7 @@ pub struct Random {
 }
 
 impl Random {
-    /// White noise of a given standard deviation.
+    /// White noise of a given standard deviation, in N.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for the deviation.

@@ -88,7 +88,7 @@ impl Sweep {
         if to_end >= self.ramp { 1.0 } else { 0.5 - 0.5 * (PI * to_end / self.ramp).cos() }
     }
 
-    /// The exact value at `t` seconds.
+    /// The exact value, in N, at `t` seconds.
     pub fn value(&self, t: f64) -> f64 {
         match self.window(t) {
             0.0 => 0.0,

@@ -1,0 +1,100 @@
+//! Every public item says what its reader needs: errors, units, shapes, and where a formula comes
+//! from.
+//!
+//! The rules read the sources: what a crate's root reaches is public, and a sentence may stand at
+//! the item, at the type it belongs to, or at the head of its file.
+
+mod items;
+mod rules;
+
+use std::path::{Path, PathBuf};
+
+use items::{Item, Source};
+
+/// The crates whose every item others call.
+const LIBRARIES: [&str; 9] =
+    ["signal", "model", "integrate", "estimate", "force", "io", "plot", "problems", "mechid"];
+
+/// Those that compute.
+const NUMERIC: [&str; 6] = ["signal", "model", "integrate", "estimate", "force", "problems"];
+
+fn folder(library: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates").join(library).join("src")
+}
+
+/// Places of the items of some crates that break a rule.
+fn breaches(libraries: &[&str], breaks: impl Fn(&Item) -> bool) -> Vec<String> {
+    let mut found = Vec::new();
+    for library in libraries {
+        let items = Source::of(&folder(library)).items();
+        assert!(items.len() > 5, "{library} has {} public items", items.len());
+        let wrong = items.iter().filter(|item| breaks(item));
+        found.extend(wrong.map(|item| format!("{library}: {}", item.place)));
+    }
+    found
+}
+
+#[track_caller]
+fn none(found: &[String], what: &str) {
+    assert!(found.is_empty(), "{} {what}:\n{}", found.len(), found.join("\n"));
+}
+
+#[test]
+fn what_can_fail_says_how() {
+    none(&breaches(&LIBRARIES, rules::hides_its_errors), "public functions without `# Errors`");
+}
+
+#[test]
+fn what_computes_says_after_whom() {
+    none(&breaches(&NUMERIC, rules::hides_its_source), "public functions without `# Source`");
+}
+
+#[test]
+fn numbers_have_units() {
+    none(&breaches(&NUMERIC, rules::hides_its_units), "public items without a unit");
+}
+
+#[test]
+fn lists_and_matrices_have_shapes() {
+    none(&breaches(&NUMERIC, rules::hides_its_shape), "public items without a shape");
+}
+
+/// The judge of the rules: sentences that a reader would miss.
+#[test]
+fn the_rules_tell_good_from_bad() {
+    let read = |text: &str| Source::of_text(text).items();
+    let bad = "
+        pub fn weighed(mass: f64, x: &DVector<f64>) -> Result<f64, E> {
+            let mut sum = 0.0;
+            for k in 0..3 { sum += x[k] * mass; }
+            Ok(sum)
+        }";
+    let item = &read(bad)[0];
+    assert!(rules::hides_its_errors(item) && rules::hides_its_source(item));
+    assert!(rules::hides_its_units(item) && rules::hides_its_shape(item));
+    let good = format!(
+        "/// Weighs x (m, one entry per degree of freedom) by a mass (kg).
+        ///
+        /// # Errors
+        /// If not.
+        ///
+        /// # Source
+        /// Hamming (1973), chapter 2.
+        {bad}"
+    );
+    let item = &read(&good)[0];
+    assert!(!rules::hides_its_errors(item) && !rules::hides_its_source(item));
+    assert!(!rules::hides_its_units(item) && !rules::hides_its_shape(item));
+    let hidden = "mod a { pub fn unseen() -> Result<f64, E> { Ok(1.0) } }
+        pub(crate) fn inner() -> Result<f64, E> { Ok(1.0) }
+        #[cfg(test)] mod tests { pub fn tested() -> Result<f64, E> { Ok(1.0) } }";
+    assert_eq!(read(hidden).len(), 0);
+    assert_eq!(read(&format!("pub use a::unseen; {hidden}")).len(), 1);
+    // What is only told on, converted or compared needs no source.
+    for plain in ["self.dt", "1.0 / self.dt", "if self.dt > x { x } else { self.dt }"] {
+        let text =
+            format!("pub struct S; impl S {{ pub fn f(&self, x: f64) -> f64 {{ {plain} }} }}");
+        let items = read(&text);
+        assert!(!rules::hides_its_source(&items[1]), "{plain}");
+    }
+}

@@ -1,0 +1,223 @@
+//! What the documentation of an item must hold.
+
+use syn::visit::{self, Visit};
+use syn::{BinOp, Block, FnArg, GenericArgument, PathArguments, ReturnType, Signature, Type};
+
+use crate::items::{Item, Kind};
+
+/// A function that may fail says when.
+pub fn hides_its_errors(item: &Item) -> bool {
+    let Kind::Function { signature, .. } = &item.kind else { return false };
+    let ReturnType::Type(_, returned) = &signature.output else { return false };
+    name(returned).is_some_and(|name| name == "Result") && !has_section(&item.docs, "Errors")
+}
+
+/// A function that computes with numbers says after whom, or its type or file does.
+pub fn hides_its_source(item: &Item) -> bool {
+    let Kind::Function { signature, body: Some(body), .. } = &item.kind else { return false };
+    computes(signature, body)
+        && !has_section(&item.docs, "Source")
+        && !has_section(&item.around, "Source")
+        && !has_section(&item.file, "Source")
+}
+
+/// Where bare numbers come or go, units are named, or that there are none.
+pub fn hides_its_units(item: &Item) -> bool {
+    let carries = |ty: &Type| mentions(ty, &["f64", "DVector", "DMatrix", "DMatrixView"]);
+    carries_some(item, carries) && !says(item, UNITS)
+}
+
+/// Where lists and matrices of numbers come or go, their length or shape is named.
+pub fn hides_its_shape(item: &Item) -> bool {
+    let slice =
+        |ty: &Type| matches!(ty, Type::Reference(of) if matches!(&*of.elem, Type::Slice(_)));
+    let shaped = |ty: &Type| {
+        mentions(ty, &["DVector", "DMatrix", "DMatrixView"])
+            || (slice(ty) || mentions(ty, &["Vec"])) && mentions(ty, &["f64", "Complex"])
+    };
+    carries_some(item, shaped) && !says(item, SHAPES)
+}
+
+/// Words of which one stands for a unit, or for none.
+const UNITS: &[&str] = &[
+    "N",
+    "m",
+    "kg",
+    "s",
+    "Hz",
+    "rad",
+    "N/m",
+    "N·s/m",
+    "N·s",
+    "m/s",
+    "m/s²",
+    "rad/s",
+    "1/s",
+    "m/N",
+    "seconds",
+    "second",
+    "dB",
+    "%",
+    "per cent",
+    "degrees",
+    "unit",
+    "units",
+    "dimensionless",
+    "pure number",
+    "pure numbers",
+    "ratio",
+    "ratios",
+    "share",
+    "part",
+    "fraction",
+    "factor",
+    "probability",
+    "Pa",
+    "Pa·s",
+    "N²",
+    "m²",
+    "N/√s",
+];
+
+/// Words of which one tells a length or a shape.
+const SHAPES: &[&str] = &[
+    "×", "row", "rows", "column", "columns", "each", "per", "square", "length", "samples",
+    "sample", "channels", "channel", "lines", "line", "entries", "n", "one for", "diagonal",
+    "every", "degree", "degrees", "state", "list", "periods",
+];
+
+fn says(item: &Item, words: &[&str]) -> bool {
+    let text = format!("{}\n{}", item.docs, item.around);
+    let parts: Vec<&str> =
+        text.split(|c: char| c.is_whitespace() || ",;:()[]`.".contains(c)).collect();
+    let is = |part: &str, word: &str| match word.chars().all(char::is_lowercase) {
+        // A sentence may begin with it; units are written one way.
+        true if word.len() > 3 => part.eq_ignore_ascii_case(word),
+        _ => part == word,
+    };
+    words.iter().any(|word| match word.contains(' ') {
+        true => text.contains(word),
+        false => parts.iter().any(|part| is(part, word)),
+    })
+}
+
+fn has_section(docs: &str, heading: &str) -> bool {
+    docs.lines().any(|line| line.trim() == format!("# {heading}"))
+}
+
+fn carries_some(item: &Item, carries: impl Fn(&Type) -> bool) -> bool {
+    match &item.kind {
+        Kind::Type => false,
+        Kind::Field(ty) => carries(ty),
+        Kind::Function { signature, .. } => types(signature).iter().any(|ty| carries(ty)),
+    }
+}
+
+fn types(signature: &Signature) -> Vec<&Type> {
+    let mut types: Vec<&Type> = signature
+        .inputs
+        .iter()
+        .filter_map(|input| match input {
+            FnArg::Typed(argument) => Some(&*argument.ty),
+            FnArg::Receiver(_) => None,
+        })
+        .collect();
+    if let ReturnType::Type(_, returned) = &signature.output {
+        types.push(returned);
+    }
+    types
+}
+
+fn name(ty: &Type) -> Option<String> {
+    match ty {
+        Type::Path(path) => path.path.segments.last().map(|segment| segment.ident.to_string()),
+        _ => None,
+    }
+}
+
+/// Whether one of these names is the type or stands in it.
+fn mentions(ty: &Type, names: &[&str]) -> bool {
+    match ty {
+        Type::Reference(inner) => mentions(&inner.elem, names),
+        Type::Slice(inner) => mentions(&inner.elem, names),
+        Type::Array(inner) => mentions(&inner.elem, names),
+        Type::Tuple(inner) => inner.elems.iter().any(|ty| mentions(ty, names)),
+        Type::Path(path) => path.path.segments.iter().any(|segment| {
+            names.iter().any(|name| segment.ident == name) || match &segment.arguments {
+                PathArguments::AngleBracketed(all) => all.args.iter().any(
+                    |argument| matches!(argument, GenericArgument::Type(ty) if mentions(ty, names)),
+                ),
+                _ => false,
+            }
+        }),
+        _ => false,
+    }
+}
+
+/// Arithmetic that a reader sees through: a conversion, a ratio, a sum of two.
+const PLAIN: usize = 2;
+
+/// The same of a body that is one expression: a formula that stands there as it is read.
+const FORMULA: usize = 4;
+
+/// Whether a function with numbers in its signature does more than hand on, compare, convert or
+/// pick.
+fn computes(signature: &Signature, body: &Block) -> bool {
+    let numbers = ["f64", "DVector", "DMatrix", "Complex", "Record", "Spectrum", "Response"];
+    if !types(signature).iter().any(|ty| mentions(ty, &numbers)) || picks(signature) {
+        return false;
+    }
+    let mut work = Work::default();
+    work.visit_block(body);
+    let formula = matches!(&body.stmts[..], [syn::Stmt::Expr(..)]);
+    work.operations > if formula { FORMULA } else { PLAIN }
+}
+
+/// Whether a function returns places, a yes or no, or a view of what is there.
+fn picks(signature: &Signature) -> bool {
+    let ReturnType::Type(_, returned) = &signature.output else { return false };
+    let counts = mentions(returned, &["usize", "bool"]) && !mentions(returned, &["f64"]);
+    counts || matches!(&**returned, Type::Reference(_))
+}
+
+/// Arithmetic on the way through a body.
+#[derive(Default)]
+struct Work {
+    operations: usize,
+}
+
+impl<'ast> Visit<'ast> for Work {
+    fn visit_expr_binary(&mut self, expression: &'ast syn::ExprBinary) {
+        let arithmetic = matches!(
+            expression.op,
+            BinOp::Mul(_)
+                | BinOp::Div(_)
+                | BinOp::Add(_)
+                | BinOp::Sub(_)
+                | BinOp::MulAssign(_)
+                | BinOp::DivAssign(_)
+                | BinOp::AddAssign(_)
+                | BinOp::SubAssign(_)
+        );
+        self.operations += usize::from(arithmetic);
+        visit::visit_expr_binary(self, expression);
+    }
+
+    fn visit_expr_for_loop(&mut self, expression: &'ast syn::ExprForLoop) {
+        self.operations += 1;
+        visit::visit_expr_for_loop(self, expression);
+    }
+
+    /// Which entry is picked is no formula.
+    fn visit_expr_index(&mut self, expression: &'ast syn::ExprIndex) {
+        self.visit_expr(&expression.expr);
+    }
+
+    fn visit_expr_method_call(&mut self, call: &'ast syn::ExprMethodCall) {
+        let solvers = ["lu", "svd", "qr", "schur", "symmetric_eigen", "cholesky", "solve", "exp"];
+        if solvers.iter().any(|name| call.method == name) {
+            self.operations += PLAIN + 1;
+        }
+        visit::visit_expr_method_call(self, call);
+    }
+}
