@@ -21,7 +21,8 @@ pub struct ParameterCovariance {
 }
 
 impl ParameterCovariance {
-    /// From a square matrix.
+    /// From a square matrix, one row and column for each of the parameters, in the products of
+    /// their units.
     pub fn new(parameters: Vec<String>, matrix: &DMatrix<f64>, degrees_of_freedom: usize) -> Self {
         let matrix = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
         Self { parameters, matrix, degrees_of_freedom }

@@ -165,7 +165,7 @@ pub enum IoError {
         at: Place,
         /// Number and name of the column.
         column: String,
-        /// The value found.
+        /// The value found, in the unit of the column.
         value: f64,
     },
     /// The instants of the time column are not equally spaced.

@@ -14,11 +14,11 @@ use crate::IoError;
 /// [`read_system`] reads back.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SystemMatrices {
-    /// M, in kg.
+    /// M, n rows of n entries, in kg.
     pub mass: Vec<Vec<f64>>,
-    /// C, in N·s/m.
+    /// C, likewise n × n, in N·s/m.
     pub damping: Vec<Vec<f64>>,
-    /// K, in N/m.
+    /// K, likewise n × n, in N/m.
     pub stiffness: Vec<Vec<f64>>,
 }
 

@@ -27,9 +27,9 @@ const LIMIT: usize = 100;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RealSchur {
-    /// The Schur vectors Q, in columns.
+    /// The Schur vectors Q, in columns, dimensionless.
     pub q: DMatrix<f64>,
-    /// T, zero below its diagonal blocks.
+    /// T, square, zero below its diagonal blocks, in the unit of the matrix.
     pub t: DMatrix<f64>,
     /// The diagonal blocks of T in order: first row, and size 1 or 2. A block of size 2 may also
     /// hold two real eigenvalues.
@@ -37,8 +37,8 @@ pub struct RealSchur {
 }
 
 impl RealSchur {
-    /// The Schur form of the square matrix `a` by Francis' double-shift QR iteration, with
-    /// exceptional shifts.
+    /// The Schur form of the square matrix `a`, in any unit, by Francis' double-shift QR iteration,
+    /// with exceptional shifts.
     ///
     /// # Errors
     /// [`ModelError::NotConverged`] if the iteration does not converge, as for entries that are not
@@ -79,7 +79,8 @@ impl RealSchur {
         Ok(Self { q, t, blocks })
     }
 
-    /// The eigenvalues in the order of the blocks, of a conjugate pair the one with Im λ > 0 first.
+    /// The eigenvalues, in the unit of the matrix and the order of the blocks, of a conjugate pair
+    /// the one with Im λ > 0 first.
     pub fn eigenvalues(&self) -> Vec<Complex<f64>> {
         self.blocks.iter().flat_map(|&(at, size)| self.block_eigenvalues(at, size)).collect()
     }

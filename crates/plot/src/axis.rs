@@ -51,7 +51,8 @@ impl Axis {
         Axis { scale: Scale::Log10, ..Axis::linear(label, unit) }
     }
 
-    /// Shows `low` to `high` instead of all points; what lies outside is cut off.
+    /// Shows `low` to `high`, in the unit of the axis, instead of all points; what lies outside is
+    /// cut off.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));

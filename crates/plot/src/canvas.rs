@@ -20,7 +20,7 @@ pub struct Stroke {
 }
 
 impl Stroke {
-    /// A solid stroke.
+    /// A solid stroke of this width, px.
     pub const fn solid(color: Color, width: f64) -> Self {
         Stroke { color, width, dash: Dash::Solid }
     }
@@ -56,7 +56,7 @@ pub struct TextStyle {
 }
 
 impl TextStyle {
-    /// Dark, upright, centred text.
+    /// Dark, upright, centred text of this size, px.
     pub const fn new(size: f64) -> Self {
         TextStyle {
             size,
@@ -165,7 +165,7 @@ impl Canvas {
         let _ = writeln!(self.body, r#"<rect x="{x}" y="{y}" width="{w}" height="{h}"{paint}/>"#);
     }
 
-    /// A circle.
+    /// A circle; centre and radius in px.
     pub fn circle(
         &mut self,
         center: Point,
@@ -227,7 +227,7 @@ impl Canvas {
         );
     }
 
-    /// Opens a group that is drawn with the given opacity, from 0 to 1.
+    /// Opens a group that is drawn with the given opacity, a fraction from 0 to 1.
     pub fn open_faded(&mut self, opacity: f64) {
         let _ = writeln!(self.body, r#"<g opacity="{}">"#, num(opacity));
     }

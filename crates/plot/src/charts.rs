@@ -27,16 +27,16 @@ impl<'a> Quantity<'a> {
 pub struct Series<'a> {
     /// Legend label.
     pub name: &'a str,
-    /// Abscissae.
+    /// Abscissae, one for each point, in the unit of the axis.
     pub x: &'a [f64],
-    /// Ordinates.
+    /// Ordinates, one for each point, in the unit of the axis.
     pub y: &'a [f64],
     /// Place in the cycle of looks; `None` follows the order of the series.
     pub slot: Option<usize>,
 }
 
 impl<'a> Series<'a> {
-    /// A series.
+    /// A series of points, `x` and `y` of equal length, in the units of the axes.
     pub const fn new(name: &'a str, x: &'a [f64], y: &'a [f64]) -> Self {
         Series { name, x, y, slot: None }
     }
@@ -69,9 +69,9 @@ pub fn time_and_spectrum(
 pub struct FrequencyResponse<'a> {
     /// Legend label.
     pub name: &'a str,
-    /// Frequencies, in the unit the chart is told; positive.
+    /// Frequencies, one for each point, in the unit the chart is told; positive.
     pub frequency: &'a [f64],
-    /// Magnitudes, positive.
+    /// Magnitudes, one for each point, in the unit the chart is told; positive.
     pub magnitude: &'a [f64],
     /// Phases, degrees.
     pub phase_deg: &'a [f64],
@@ -115,7 +115,8 @@ pub fn bode(
     Figure::new(title).panel(above).panel(below).share_x()
 }
 
-/// Estimates of one coefficient against a swept setting, one marked line for each method, with the true value.
+/// Estimates of one coefficient against a swept setting, one marked line for each method, with the
+/// true value, all in the units of the axes.
 ///
 /// The k-th method always has the k-th look, so several sweeps can be laid side by side.
 pub fn sweep_panel(
@@ -135,7 +136,7 @@ pub fn sweep_panel(
     }
 }
 
-/// A figure of one [`sweep_panel`].
+/// A figure of one [`sweep_panel`], in the units of its axes.
 pub fn sweep(
     title: &str,
     setting: Axis,

@@ -41,28 +41,31 @@ impl Curve {
         }
     }
 
-    /// A line through the points (`x` and `y` of equal length). An empty label keeps the curve out of the legend.
+    /// A line through the points (`x` and `y` of equal length, in the units of the axes). An empty
+    /// label keeps the curve out of the legend.
     pub fn line(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Line, label, x, y)
     }
 
-    /// A line through the points with a marker at each: for sweeps, where the points are what was computed.
+    /// A line through the points, as [`line`](Self::line) takes them in the units of the axes and
+    /// of equal length, with a marker at each: for sweeps, where the points are what was computed.
     pub fn marked_line(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::MarkedLine, label, x, y)
     }
 
-    /// Markers alone: for measurements.
+    /// Markers alone, `x` and `y` of equal length in the units of the axes: for measurements.
     pub fn points(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Points, label, x, y)
     }
 
-    /// A stem from zero (from the bottom of a logarithmic axis) to each point: for line spectra.
+    /// A stem from zero (from the bottom of a logarithmic axis) to each point, in the units of the
+    /// axes: for line spectra.
     pub fn stems(label: impl Into<String>, x: &[f64], y: &[f64]) -> Self {
         Curve::new(Kind::Stems, label, x, y)
     }
 
-    /// A shaded band between `lower` and `upper`: for confidence intervals.
-    /// It takes the look of the curve added after it.
+    /// A shaded band between `lower` and `upper`, one entry of each per abscissa, in the units of
+    /// the axes: for confidence intervals. It takes the look of the curve added after it.
     pub fn band(label: impl Into<String>, x: &[f64], lower: &[f64], upper: &[f64]) -> Self {
         Curve { upper: upper.to_vec(), ..Curve::new(Kind::Band, label, x, lower) }
     }
@@ -108,12 +111,12 @@ impl Curve {
         &self.label
     }
 
-    /// Abscissae.
+    /// Abscissae, one for each point, in the unit of the axis.
     pub fn x(&self) -> &[f64] {
         &self.x
     }
 
-    /// Ordinates; of a band, those of its lower edge.
+    /// Ordinates, one for each point, in the unit of the axis; of a band, those of its lower edge.
     pub fn y(&self) -> &[f64] {
         &self.y
     }
@@ -143,7 +146,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// A horizontal line at the ordinate `y`.
+    /// A horizontal line at the ordinate `y`, in the unit of its axis.
     pub fn horizontal(label: impl Into<String>, y: f64) -> Self {
         Reference {
             label: label.into(),
@@ -154,7 +157,7 @@ impl Reference {
         }
     }
 
-    /// A vertical line at the abscissa `x`.
+    /// A vertical line at the abscissa `x`, in the unit of its axis.
     pub fn vertical(label: impl Into<String>, x: f64) -> Self {
         Reference {
             horizontal: false,
@@ -183,7 +186,7 @@ impl Reference {
         &self.label
     }
 
-    /// Where the line lies.
+    /// Where the line lies, in the unit of its axis.
     pub fn value(&self) -> f64 {
         self.value
     }

@@ -47,7 +47,7 @@ pub enum PlotError {
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
-        /// The offending value.
+        /// The offending value, in the unit of its axis.
         value: f64,
     },
     /// A logarithmic axis cannot show zero or a negative number.
@@ -61,7 +61,7 @@ pub enum PlotError {
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
-        /// The offending value.
+        /// The offending value, in the unit of its axis.
         value: f64,
     },
     /// A reference line lies at a value its axis cannot show.
@@ -69,7 +69,7 @@ pub enum PlotError {
     Reference {
         /// Legend label of the line.
         label: String,
-        /// The offending value.
+        /// The offending value, in the unit of its axis.
         value: f64,
     },
     /// The range asked of an axis is empty, not finite, or not positive on a logarithmic axis.
@@ -77,9 +77,9 @@ pub enum PlotError {
     Range {
         /// Label of the axis.
         axis: String,
-        /// Lower end asked for.
+        /// Lower end asked for, in the unit of the axis.
         low: f64,
-        /// Upper end asked for.
+        /// Upper end asked for, in the unit of the axis.
         high: f64,
     },
     /// The figure is too small for its axes and legends, or not of a finite size.

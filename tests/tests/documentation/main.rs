@@ -15,17 +15,14 @@ use items::{Item, Source};
 const LIBRARIES: [&str; 9] =
     ["signal", "model", "integrate", "estimate", "force", "io", "plot", "problems", "mechid"];
 
-/// Those that compute.
-const NUMERIC: [&str; 6] = ["signal", "model", "integrate", "estimate", "force", "problems"];
-
 fn folder(library: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates").join(library).join("src")
 }
 
 /// Places of the items of some crates that break a rule.
-fn breaches(libraries: &[&str], breaks: impl Fn(&Item) -> bool) -> Vec<String> {
+fn breaches(breaks: impl Fn(&Item) -> bool) -> Vec<String> {
     let mut found = Vec::new();
-    for library in libraries {
+    for library in LIBRARIES {
         let items = Source::of(&folder(library)).items();
         assert!(items.len() > 5, "{library} has {} public items", items.len());
         let wrong = items.iter().filter(|item| breaks(item));
@@ -41,22 +38,37 @@ fn none(found: &[String], what: &str) {
 
 #[test]
 fn what_can_fail_says_how() {
-    none(&breaches(&LIBRARIES, rules::hides_its_errors), "public functions without `# Errors`");
+    none(&breaches(rules::hides_its_errors), "public functions without `# Errors`");
 }
 
 #[test]
 fn what_computes_says_after_whom() {
-    none(&breaches(&NUMERIC, rules::hides_its_source), "public functions without `# Source`");
+    none(&breaches(rules::hides_its_source), "public functions without `# Source`");
 }
 
 #[test]
 fn numbers_have_units() {
-    none(&breaches(&NUMERIC, rules::hides_its_units), "public items without a unit");
+    none(&breaches(rules::hides_its_units), "public items without a unit");
 }
 
 #[test]
 fn lists_and_matrices_have_shapes() {
-    none(&breaches(&NUMERIC, rules::hides_its_shape), "public items without a shape");
+    none(&breaches(rules::hides_its_shape), "public items without a shape");
+}
+
+/// What `cargo test --doc` runs there does something, and says what must come out.
+#[test]
+fn front_pages_have_an_example_that_is_run() {
+    for library in LIBRARIES {
+        let page = std::fs::read_to_string(folder(library).join("lib.rs")).unwrap();
+        let page: Vec<&str> = page.lines().map_while(|line| line.strip_prefix("//!")).collect();
+        let mut fences = page.iter().enumerate().filter(|(_, line)| line.trim() == "```");
+        let (Some((first, _)), Some((last, _))) = (fences.next(), fences.next()) else {
+            panic!("{library} has no example");
+        };
+        let example = page[first..last].join("\n");
+        assert!(example.contains("use mechid") && example.contains("assert"), "{library}");
+    }
 }
 
 /// The judge of the rules: sentences that a reader would miss.

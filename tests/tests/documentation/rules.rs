@@ -77,6 +77,8 @@ const UNITS: &[&str] = &[
     "N²",
     "m²",
     "N/√s",
+    "px",
+    "pixels",
 ];
 
 /// Words of which one tells a length or a shape.
@@ -173,10 +175,10 @@ fn computes(signature: &Signature, body: &Block) -> bool {
     work.operations > if formula { FORMULA } else { PLAIN }
 }
 
-/// Whether a function returns places, a yes or no, or a view of what is there.
+/// Whether a function returns places, words, a yes or no, or a view of what is there.
 fn picks(signature: &Signature) -> bool {
     let ReturnType::Type(_, returned) = &signature.output else { return false };
-    let counts = mentions(returned, &["usize", "bool"]) && !mentions(returned, &["f64"]);
+    let counts = mentions(returned, &["usize", "bool", "String"]) && !mentions(returned, &["f64"]);
     counts || matches!(&**returned, Type::Reference(_))
 }
 

@@ -159,7 +159,8 @@ impl Experiment {
         state.map_err(|source| IoError::Model { file: self.file.clone(), source })
     }
 
-    /// One number per degree of freedom of the system; `what` is how a message calls them.
+    /// One number per degree of freedom of the system, in the unit given; `what` is how a message
+    /// calls them.
     ///
     /// # Errors
     /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].

@@ -33,9 +33,9 @@ pub enum PerDof {
     #[default]
     #[serde(skip)]
     Zero,
-    /// The only degree of freedom.
+    /// The only degree of freedom, in m or m/s.
     One(f64),
-    /// Each degree of freedom.
+    /// Each degree of freedom, in m or m/s.
     Each(Vec<f64>),
 }
 

@@ -14,10 +14,10 @@ pub enum SchemeChoice {
     Exact,
     /// Newmark's method; the average acceleration method unless told otherwise.
     Newmark {
-        /// β, 1/4 by default.
+        /// β, a pure number, 1/4 by default.
         #[serde(default = "quarter")]
         beta: f64,
-        /// γ, 1/2 by default.
+        /// γ, a pure number, 1/2 by default.
         #[serde(default = "half")]
         gamma: f64,
     },
@@ -35,7 +35,7 @@ pub enum SchemeChoice {
     },
     /// Wilson's θ method.
     WilsonTheta {
-        /// θ, 1.4 by default.
+        /// θ, a pure number, 1.4 by default.
         #[serde(default = "wilson")]
         theta: f64,
         /// The force at t + θΔt.
