@@ -7,6 +7,7 @@
 
 mod commands;
 mod markdown;
+mod numbers;
 mod pictures;
 mod session;
 
@@ -192,6 +193,54 @@ fn every_page_can_be_found() {
             document.display()
         );
     }
+}
+
+/// Where a block is a file, the text must say which: what follows the fence is not shown.
+#[test]
+fn readers_are_told_what_to_call_a_file() {
+    for page in chapters().concat() {
+        let page_text = read(&page);
+        let parsed = Page::parse(&page_text);
+        for file in parsed.blocks.iter().filter_map(markdown::Block::file) {
+            let named = parsed.codes.iter().any(|code| code == file);
+            assert!(named, "{}: the text does not say `{file}`", page.display());
+        }
+    }
+}
+
+/// Numbers of three digits and more in the text of introduction and tutorial are those that the
+/// chapter's blocks show or give, rounded to the digits written.
+#[test]
+fn the_tutorial_says_what_its_blocks_show() {
+    let mut looked_at = 0;
+    for chapter in chapters() {
+        let told = ["introduction.md", "tutorial/index.md"];
+        if !told.iter().any(|name| chapter[0].ends_with(name)) {
+            continue;
+        }
+        let pages: Vec<(String, Page)> = chapter
+            .iter()
+            .map(|page| read(page))
+            .map(|text| (text.clone(), Page::parse(&text)))
+            .collect();
+        let blocks = pages.iter().flat_map(|(text, page)| {
+            page.blocks.iter().map(|block| text[block.range.clone()].to_owned())
+        });
+        let shown: Vec<f64> = blocks.flat_map(|block| numbers::all(&block)).collect();
+        for (_, page) in &pages {
+            for number in numbers::written(&page.prose) {
+                let is_shown = shown.iter().any(|shown| number.is_of(*shown));
+                assert!(
+                    is_shown,
+                    "{}: no block of the chapter shows {}",
+                    chapter[0].display(),
+                    number.text
+                );
+                looked_at += 1;
+            }
+        }
+    }
+    assert!(looked_at > 30, "{looked_at} numbers");
 }
 
 /// Every line for a shell, in blocks and in running text, is one that a test holds. Folders are made

@@ -32,6 +32,8 @@ pub struct Page {
     pub blocks: Vec<Block>,
     /// Code in running text.
     pub codes: Vec<String>,
+    /// Running text and tables without the code in them, with blanks between the pieces.
+    pub prose: String,
     /// Targets of links with the depth of the list they stand in.
     pub links: Vec<(usize, String)>,
     pub images: Vec<String>,
@@ -46,8 +48,13 @@ impl Page {
         let mut page = Self { includes: includes.map(String::from).collect(), ..Self::default() };
         let (mut depth, mut heading, mut block) = (0, None::<String>, None::<Block>);
         for (event, range) in Parser::new_ext(text, Options::ENABLE_TABLES).into_offset_iter() {
-            if let Event::Code(code) = &event {
-                page.codes.push(code.to_string());
+            match &event {
+                Event::Code(code) => page.codes.push(code.to_string()),
+                Event::Text(text) if block.is_none() => {
+                    page.prose.push_str(text);
+                    page.prose.push(' ');
+                }
+                _ => {}
             }
             match event {
                 Event::Start(Tag::List(_)) => depth += 1,
