@@ -4,12 +4,20 @@
 
 mod after;
 mod before;
+mod correlation;
+mod linearity;
+mod misfit;
+mod period;
 mod spectral;
 
 use std::fmt;
 
-pub use after::{Correlation, after_fit, cross_correlation, whiteness};
+pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity};
+pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
+pub use linearity::linearity;
+pub use misfit::{after_response_fit, after_spectral_fit};
+pub use period::claimed_period;
 pub use spectral::{before_response_fit, before_spectral_fit};
 
 /// How a check came out.
@@ -37,6 +45,10 @@ pub enum Subject {
     Step,
     /// Whether motion and force belong together.
     Coherence,
+    /// Whether the residual is as large as the noise.
+    Misfit,
+    /// Whether the residual goes with a power of the motion.
+    Linearity,
     /// Whether the residual is white.
     Whiteness,
     /// Whether the residual has anything in common with the force.
@@ -74,6 +86,8 @@ impl fmt::Display for Subject {
             Subject::Periodicity => "periodicity",
             Subject::Step => "step",
             Subject::Coherence => "coherence",
+            Subject::Misfit => "misfit",
+            Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",
             Subject::CrossCorrelation => "cross-correlation",
         })

@@ -76,6 +76,11 @@ pub struct SavitzkyGolay {
 }
 
 impl SavitzkyGolay {
+    /// Samples under the polynomial, 2·half_width + 1.
+    pub fn window(&self) -> usize {
+        2 * self.half_width + 1
+    }
+
     /// A polynomial of `order` through `2 * half_width + 1` samples.
     ///
     /// # Errors
@@ -102,7 +107,7 @@ impl SavitzkyGolay {
     /// [`EstimateError::TooShort`] if the record is shorter than the window,
     /// [`EstimateError::Window`] if the polynomial has no such derivative.
     pub fn differentiate(&self, record: &Record, times: usize) -> Result<Record, EstimateError> {
-        let window = 2 * self.half_width + 1;
+        let window = self.window();
         if record.len() < window {
             return Err(EstimateError::TooShort { samples: record.len(), needed: window });
         }

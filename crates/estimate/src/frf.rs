@@ -30,6 +30,10 @@ pub enum FrfEstimator {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Frf {
     omega: Vec<f64>,
+    /// Numbers of the lines of a segment.
+    lines: Vec<usize>,
+    /// See [`Segments::line_correlation`].
+    line_correlation: Vec<f64>,
     measured: Motion,
     response: Vec<ComplexMatrix>,
     coherence: DMatrix<f64>,
@@ -75,6 +79,8 @@ impl Frf {
         }
         let omega = lines.omega();
         let mut frf = Self {
+            line_correlation: segments.line_correlation(force.len()),
+            lines: lines.as_slice().to_vec(),
             response: Vec::with_capacity(omega.len()),
             coherence: DMatrix::zeros(omega.len(), outputs),
             variance: Vec::with_capacity(omega.len()),
@@ -136,7 +142,17 @@ impl Frf {
                 })
             })
             .collect();
-        Ok(Self { omega, measured, response, coherence, variance, averages })
+        let (lines, line_correlation) = ((0..omega.len()).collect(), vec![1.0]);
+        Ok(Self {
+            omega,
+            lines,
+            line_correlation,
+            measured,
+            response,
+            coherence,
+            variance,
+            averages,
+        })
     }
 
     fn push_line(
@@ -226,6 +242,16 @@ impl Frf {
     /// Angular frequencies, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega
+    }
+
+    /// Number of the line of each frequency; of responses measured elsewhere they are counted.
+    pub(crate) fn lines(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// Correlation of the noise of two lines, by how many lines they are apart.
+    pub(crate) fn line_correlation(&self) -> &[f64] {
+        &self.line_correlation
     }
 
     /// The quantity measured: H is a receptance, a mobility or an accelerance.

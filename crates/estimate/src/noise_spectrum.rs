@@ -148,6 +148,12 @@ impl NoiseSpectrum {
         self.degrees_of_freedom
     }
 
+    /// How many of the covariances are independent of one another; infinite or undefined for known
+    /// noise.
+    pub(crate) fn groups(&self) -> f64 {
+        self.total_degrees_of_freedom / self.degrees_of_freedom
+    }
+
     /// Whether any force is noisy.
     pub fn has_force(&self) -> bool {
         let n = self.dof();

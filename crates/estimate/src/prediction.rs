@@ -1,8 +1,10 @@
 //! What an identified machine would do: for validation on a record that was not fitted.
 
+mod ahead;
 mod periodic;
 mod start;
 
+pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
 pub use self::start::fitted_start;
 
@@ -122,12 +124,23 @@ impl Step {
         let mut next = state.clone();
         for k in 0..samples {
             states.set_column(k, &state);
-            next.gemv(1.0, &self.transition, &state, 0.0);
-            next.gemv(1.0, &self.now, &loads.column(k), 1.0);
-            next.gemv(1.0, &self.next, &loads.column((k + 1) % samples), 1.0);
+            self.advance(&loads, k, &state, &mut next);
             std::mem::swap(&mut state, &mut next);
         }
         (states.transpose(), state)
+    }
+
+    /// From the state at a column of the loads to the next; the first column follows the last.
+    fn advance(
+        &self,
+        loads: &DMatrix<f64>,
+        at: usize,
+        state: &DVector<f64>,
+        next: &mut DVector<f64>,
+    ) {
+        next.gemv(1.0, &self.transition, state, 0.0);
+        next.gemv(1.0, &self.now, &loads.column(at), 1.0);
+        next.gemv(1.0, &self.next, &loads.column((at + 1) % loads.ncols()), 1.0);
     }
 
     /// The state that returns after the period: (I − Φᴺ) z = what rest leads to.

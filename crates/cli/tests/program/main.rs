@@ -1,5 +1,6 @@
 //! What every subcommand has in common: the records it takes, and how it talks.
 
+mod checks;
 mod identification;
 mod info;
 mod modal;

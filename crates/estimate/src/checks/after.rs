@@ -1,8 +1,11 @@
 //! Whether residuals are noise: white, and unrelated to the input.
 
 use mechid_signal::Record;
-use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use super::correlation::{
+    Correlation, autocorrelation, centred, cross_correlation_of_coloured, whiteness,
+    whiteness_beyond,
+};
 use super::{Check, Subject, Verdict};
 use crate::EstimateError;
 
@@ -10,92 +13,31 @@ use crate::EstimateError;
 const ROUNDING: f64 = 1e-9;
 
 /// Noise has a larger statistic in one record of a hundred.
-const SIGNIFICANT: f64 = 0.01;
-
-/// Correlations at a number of lags, and how likely pure noise has as much of them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Correlation {
-    /// Coefficient at each lag, a pure number; see the function that made it for which lags.
-    pub coefficients: Vec<f64>,
-    /// 95 % of the coefficients of white noise are smaller than this: 1.96/√N.
-    pub bound: f64,
-    /// Sum of squared coefficients, dimensionless, scaled to follow a χ² distribution for white
-    /// noise.
-    pub statistic: f64,
-    /// The share of white-noise records with a larger statistic. Below 0.01 or so the residual is
-    /// hardly noise: the model misses something.
-    pub p_value: f64,
-}
-
-impl Correlation {
-    /// How many coefficients exceed the 95 % bound.
-    pub fn outside(&self) -> usize {
-        self.coefficients.iter().filter(|c| c.abs() > self.bound).count()
-    }
-}
-
-/// Autocorrelation of a residual (one value per sample, any unit) at the lags 1 … `lags`, judged by
-/// the statistic of Ljung and Box.
-///
-/// # Errors
-/// [`EstimateError::TooShort`] unless there are more than `lags + 1` samples and lags.
-///
-/// # Source
-/// Ljung & Box (1978), Biometrika 65, 297–303.
-pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, EstimateError> {
-    let e = centred(residual, lags)?;
-    let power: f64 = e.iter().map(|v| v * v).sum();
-    let count = e.len() as f64;
-    let coefficient = |lag: usize| ratio(products(&e[lag..], &e), power);
-    let coefficients: Vec<f64> = (1..=lags).map(coefficient).collect();
-    let weighted = coefficients.iter().enumerate().map(|(at, c)| c * c / (count - (at + 1) as f64));
-    let statistic = count * (count + 2.0) * weighted.sum::<f64>();
-    Ok(judged(coefficients, statistic, count))
-}
-
-/// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
-/// `lags`, in that order; at a positive lag the input comes first. With negative lags it shows
-/// feedback from output to input.
-///
-/// The statistic takes the residual as white.
-///
-/// # Errors
-/// As [`whiteness`], and [`EstimateError::Size`] if the two differ in length.
-///
-/// # Source
-/// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), section 16.6.
-pub fn cross_correlation(
-    residual: &[f64],
-    input: &[f64],
-    lags: usize,
-) -> Result<Correlation, EstimateError> {
-    crate::least_squares::size("samples of the input", residual.len(), input.len())?;
-    let (e, u) = (centred(residual, lags)?, centred(input, lags)?);
-    let power = (products(&e, &e) * products(&u, &u)).sqrt();
-    let before = (1..=lags).rev().map(|lag| products(&u[lag..], &e));
-    let after = (0..=lags).map(|lag| products(&e[lag..], &u));
-    let coefficients: Vec<f64> = before.chain(after).map(|c| ratio(c, power)).collect();
-    let count = e.len() as f64;
-    let statistic = count * coefficients.iter().map(|c| c * c).sum::<f64>();
-    Ok(judged(coefficients, statistic, count))
-}
+pub(super) const SIGNIFICANT: f64 = 0.01;
 
 /// Whether every channel of a residual is white and has nothing in common with the forces that act,
 /// in words; `fitted` is what the residual is left over from, on the same time axis.
 ///
+/// `noise_span` is the number of lags over which noise on the motion correlates the residual: 0
+/// where each sample of it holds the noise of one sample, 1 where it holds that of two which follow
+/// one another ([`missing_force`](crate::errors_ahead)), the window less one after a sliding
+/// polynomial. A residual correlated over that span and no further is told as such. Whether it has
+/// anything in common with the force is judged with the colour it has.
+///
 /// A residual of rounding is good whatever its colour.
 ///
 /// # Errors
-/// As [`whiteness`], and [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not
-/// belong together.
+/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or [`EstimateError::Size`] if the records
+/// do not belong together.
 ///
 /// # Source
-/// Those of [`whiteness`] and [`cross_correlation`].
+/// Those of [`whiteness_beyond`] and [`cross_correlation`](super::cross_correlation).
 pub fn after_fit(
     residual: &Record,
     fitted: &Record,
     force: &Record,
     lags: usize,
+    noise_span: usize,
 ) -> Result<Vec<Check>, EstimateError> {
     residual.check_same_sampling(fitted)?;
     residual.check_same_sampling(force)?;
@@ -106,69 +48,115 @@ pub fn after_fit(
         let size = fitted.column(channel).norm();
         let rounding = residual.column(channel).norm() <= ROUNDING * size;
         let white = whiteness(e, lags)?;
-        checks.push(white.check(Subject::Whiteness, rounding, &format!("residual {number}")));
+        let beyond = whiteness_beyond(e, noise_span, lags)?;
+        let told =
+            Told { subject: Subject::Whiteness, rounding, name: format!("residual {number}") };
+        checks.push(if noise_span > 0 && is_noise(&beyond) && !is_noise(&white) {
+            told.spanned(&white, &beyond, noise_span)
+        } else {
+            told.check(&white)
+        });
+        let colour = colour(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
         let acts =
             |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
         for input in (0..force.channels()).filter(acts) {
-            let cross = cross_correlation(e, force.channel(input), lags)?;
+            let cross = cross_correlation_of_coloured(e, force.channel(input), lags, &colour)?;
             let name = format!("residual {number} with force {}", input + 1);
-            checks.push(cross.check(Subject::CrossCorrelation, rounding, &name));
+            let subject = Subject::CrossCorrelation;
+            checks.push(Told { subject, rounding, name }.check(&cross));
         }
     }
     Ok(checks)
 }
 
-impl Correlation {
-    fn check(&self, subject: Subject, rounding: bool, name: &str) -> Check {
+fn is_noise(correlation: &Correlation) -> bool {
+    correlation.p_value >= SIGNIFICANT
+}
+
+/// The autocorrelation of a residual as far as it counts.
+fn colour(
+    residual: &[f64],
+    lags: usize,
+    span: usize,
+    [white, spanned]: [bool; 2],
+) -> Result<Vec<f64>, EstimateError> {
+    if white {
+        return Ok(vec![1.0]);
+    }
+    let e = centred(residual, lags, span)?;
+    let mut own = if spanned {
+        autocorrelation(&e, span)
+    } else {
+        // What is far apart is known least.
+        let taper = |lag: usize| 1.0 - lag as f64 / (lags + span + 1) as f64;
+        let own = autocorrelation(&e, lags + span);
+        own.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
+    };
+    // Where colours of residual and force hardly meet, what is left must not be smaller than the
+    // error of these coefficients.
+    own[0] += 2.0 / (e.len() as f64).sqrt();
+    Ok(own)
+}
+
+/// What a check is about.
+struct Told {
+    subject: Subject,
+    rounding: bool,
+    name: String,
+}
+
+impl Told {
+    fn check(self, found: &Correlation) -> Check {
+        let Self { subject, rounding, name } = self;
+        let value = found.p_value;
         if rounding {
             let text = format!("{name}: rounding, whatever its correlations");
-            return Check { subject, verdict: Verdict::Good, value: self.p_value, text };
+            return Check { subject, verdict: Verdict::Good, value, text };
         }
-        let (outside, count) = (self.outside(), self.coefficients.len());
-        let (verdict, meaning) = match (subject, self.p_value < SIGNIFICANT) {
-            (Subject::Whiteness, true) => (
+        let (verdict, meaning) = match (subject, is_noise(found)) {
+            (Subject::Whiteness, true) => (Verdict::Good, "white, as noise is"),
+            (Subject::Whiteness, false) => (
                 Verdict::Doubtful,
                 "not white: the noise is coloured, or the model misses something",
             ),
-            (_, true) => {
+            (_, true) => (Verdict::Good, "nothing in common"),
+            (_, false) => {
                 (Verdict::Doubtful, "the model leaves some of the force's doing unexplained")
             }
-            (Subject::Whiteness, false) => (Verdict::Good, "white, as noise is"),
-            (_, false) => (Verdict::Good, "nothing in common"),
         };
-        // A distribution function does not resolve the rest.
-        let p = match self.p_value {
-            p if p < 1e-15 => "p < 1e-15".to_owned(),
-            p if p < 1e-3 => format!("p = {p:.1e}"),
-            p => format!("p = {p:.3}"),
-        };
+        let text = format!("{name}: {}; {meaning}", counted(found));
+        Check { subject, verdict, value, text }
+    }
+
+    /// Of a residual that is correlated over the span of the noise and no further.
+    fn spanned(self, white: &Correlation, beyond: &Correlation, span: usize) -> Check {
+        if self.rounding {
+            return self.check(white);
+        }
         let text = format!(
-            "{name}: {outside} of {count} correlations beyond the 95 % bound of {:.3}, {p}; {meaning}",
-            self.bound
+            "{}: correlated up to lag {span} ({:.2} at lag 1), and no further: beyond it {}; so \
+             does noise on the measured motion, which least squares takes as exact: the parameters \
+             are biased by it, more than their standard errors show",
+            self.name,
+            white.coefficients[0],
+            counted(beyond),
         );
-        Check { subject, verdict, value: self.p_value, text }
+        Check { subject: self.subject, verdict: Verdict::Doubtful, value: white.p_value, text }
     }
 }
 
-fn judged(coefficients: Vec<f64>, statistic: f64, count: f64) -> Correlation {
-    let distribution = ChiSquared::new(coefficients.len() as f64).expect("at least one lag");
-    let p_value = 1.0 - distribution.cdf(statistic);
-    Correlation { coefficients, bound: 1.96 / count.sqrt(), statistic, p_value }
+pub(super) fn counted(found: &Correlation) -> String {
+    let (outside, count) = (found.outside(), found.coefficients.len());
+    let bound = found.bound;
+    let p = p_told(found.p_value);
+    format!("{outside} of {count} correlations beyond the 95 % bound of {bound:.3}, {p}")
 }
 
-fn centred(values: &[f64], lags: usize) -> Result<Vec<f64>, EstimateError> {
-    let needed = lags.max(1) + 2;
-    if lags == 0 || values.len() < needed {
-        return Err(EstimateError::TooShort { samples: values.len(), needed });
+pub(super) fn p_told(p_value: f64) -> String {
+    // A distribution function does not resolve the rest.
+    match p_value {
+        p if p < 1e-15 => "p < 1e-15".to_owned(),
+        p if p < 1e-3 => format!("p = {p:.1e}"),
+        p => format!("p = {p:.3}"),
     }
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    Ok(values.iter().map(|v| v - mean).collect())
-}
-
-fn products(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn ratio(value: f64, power: f64) -> f64 {
-    if power > 0.0 { value / power } else { 0.0 }
 }

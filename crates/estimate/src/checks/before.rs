@@ -6,7 +6,7 @@ use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
 use mechid_signal::{Record, Spectrum};
 
-use super::{Check, Subject, Verdict};
+use super::{Check, Subject, Verdict, claimed_period};
 use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions, equation_of_motion};
 use crate::{EstimateError, Unknowns};
 
@@ -45,6 +45,7 @@ pub fn before_fit(
     checks.push(conditioning(condition, lost));
     if method.extent() == Extent::WholePeriod {
         checks.push(periodicity(displacement));
+        checks.extend(claimed_period(force, force.len()));
     }
     checks.push(step(&rows, method.discretisation())?);
     Ok(checks)
@@ -66,6 +67,7 @@ pub fn before_equation_of_motion(
     checks.push(conditioning(estimate.condition(), estimate.undetermined().len()));
     if extent == Extent::WholePeriod {
         checks.push(periodicity(response.displacement()));
+        checks.extend(claimed_period(force, force.len()));
     }
     if let Ok(system) = estimate.system() {
         let (hz, samples) = fastest_mode(&system, force.sampling().dt())?;

@@ -5,7 +5,7 @@ use mechid_signal::Record;
 use super::before::{
     LINE_FLOOR, conditioning, fastest_mode, grade, periodicity, unknowns_of_an_equation,
 };
-use super::{Check, Subject, Verdict};
+use super::{Check, Subject, Verdict, claimed_period};
 use crate::frequency_domain::{FrequencyData, Lines, Motion, RepeatedPeriods, equation_rows};
 use crate::{Estimate, EstimateError, Frf, Unknowns};
 
@@ -14,8 +14,8 @@ use crate::{Estimate, EstimateError, Frf, Unknowns};
 const DOUBTFUL_CHANGE: f64 = 0.1;
 const BAD_CHANGE: f64 = 0.5;
 
-/// Looks at excitation, conditioning, periodicity and step before the spectra of whole periods of
-/// force (N) and motion are fitted; `lines` belong to one period.
+/// Looks at excitation, conditioning, periodicity (of the motion, and by [`claimed_period`] of the
+/// force) and step before the spectra of whole periods of force (N) and motion are fitted; `lines` belong to one period.
 ///
 /// # Errors
 /// As [`RepeatedPeriods::new`] and [`equation_error`](crate::frequency_domain::equation_error).
@@ -36,11 +36,13 @@ pub fn before_spectral_fit(
         Err(EstimateError::TooFewRows { .. }) => return Ok(vec![excitation]),
         solved => solved?,
     };
+    let period = lines.sampling().len();
     let mut checks = vec![
         excitation,
         conditioning(estimate.condition(), estimate.undetermined().len()),
-        repetition(motion, lines.sampling().len())?,
+        repetition(motion, period)?,
     ];
+    checks.extend(claimed_period(force, period));
     checks.extend(band(&estimate, lines)?);
     Ok(checks)
 }

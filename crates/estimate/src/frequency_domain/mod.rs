@@ -55,6 +55,7 @@ pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use lines::Lines;
 pub use motion::Motion;
+pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{OutputErrorFit, output_error};
 pub use periods::RepeatedPeriods;
 

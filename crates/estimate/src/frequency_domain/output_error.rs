@@ -237,3 +237,28 @@ fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateErr
     }
     Ok(nu * nu / ((nu - n) * (nu - n) - 1.0))
 }
+
+/// What an estimate leaves of the displacement, rows × n, in units of the stated noise: independent
+/// numbers with E|r|² = 1 if the machine and the noise are as stated. Nothing if the noise is not
+/// stated, or some of it is none at all.
+pub(crate) fn in_units_of_noise(
+    data: &FrequencyData,
+    estimate: &Estimate,
+) -> Option<DMatrix<Complex<f64>>> {
+    let noise = data.noise()?;
+    let noise = if noise.has_force() {
+        Noise::Both(noise)
+    } else {
+        Noise::Output(output_weights(noise).ok()?)
+    };
+    let theta = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
+    let mut misfit = Misfit::new(data, estimate.unknowns(), noise);
+    let mut left = DVector::zeros(misfit.residuals());
+    if !misfit.residual(&theta, &mut left) {
+        return None;
+    }
+    let n = data.dof();
+    let part =
+        |row: usize, c: usize| Complex::new(left[2 * (n * row + c)], left[2 * (n * row + c) + 1]);
+    Some(DMatrix::from_fn(data.len(), n, |row, c| part(row, c) / std::f64::consts::SQRT_2))
+}

@@ -3,10 +3,17 @@
 use std::f64::consts::TAU;
 
 use mechid_signal::Record;
+use nalgebra::Complex;
 
 use super::ComplexMatrix;
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
+
+/// Lines less correlated than this count as independent.
+const INDEPENDENT: f64 = 0.01;
+
+/// Lines further apart than this are not looked at: no window ties them together.
+const FARTHEST_LINES: usize = 16;
 
 /// How a record is cut into pieces to average over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +72,33 @@ impl Segments {
         match self {
             Segments::Periods(len) | Segments::Windowed { len, .. } => len,
         }
+    }
+
+    /// Correlation of the errors that noise makes of a frequency response on two lines, by how many
+    /// lines they are apart, 0 first, as far as it is worth speaking of; of a record of `samples`.
+    ///
+    /// Noise and force leak by the window alike from a line to its neighbours, and so do pieces that
+    /// overlap: Σ_j |ρ_j(d)|² over pieces j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop)
+    /// exp(−2πi d k/len), over the same at d = 0.
+    pub(super) fn line_correlation(self, samples: usize) -> Vec<f64> {
+        let Segments::Windowed { len, hop, window } = self else { return vec![1.0] };
+        let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
+        let count = ((samples - len) / hop + 1) as f64;
+        let common = |apart: usize, lines: usize| {
+            let turn = |k: usize| Complex::cis(-TAU * ((lines * k) % len) as f64 / len as f64);
+            let pairs = weights.iter().zip(&weights[apart * hop..]).enumerate();
+            let shared: Complex<f64> = pairs.map(|(k, (a, b))| turn(k) * a * b).sum();
+            let times = if apart == 0 { 1.0 } else { 2.0 * (1.0 - apart as f64 / count).max(0.0) };
+            times * shared.norm_sqr()
+        };
+        let pieces = len.div_ceil(hop);
+        let at = |lines: usize| (0..pieces).map(|apart| common(apart, lines)).sum::<f64>();
+        let own = at(0);
+        let mut correlation: Vec<f64> =
+            (0..FARTHEST_LINES.min(len)).map(|lines| at(lines) / own).collect();
+        let tied = correlation.iter().rposition(|c| *c >= INDEPENDENT).unwrap_or(0);
+        correlation.truncate(tied + 1);
+        correlation
     }
 
     /// Amplitudes of every piece (lines × channels), and how many independent ones they are worth.

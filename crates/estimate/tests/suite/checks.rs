@@ -1,6 +1,8 @@
 //! Checks before and after a fit, predictions for validation, and sweeps.
 
-use mechid_estimate::checks::{Subject, Verdict, before_fit, cross_correlation, whiteness};
+use mechid_estimate::checks::{
+    Subject, Verdict, before_fit, claimed_period, cross_correlation, whiteness, whiteness_beyond,
+};
 use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
 use mechid_estimate::{Estimate, EstimateError, Unknowns, fit_percent, predict, sweep};
 use mechid_model::{InitialState, KyxSign, Response, npi_sampling};
@@ -84,6 +86,50 @@ fn residuals_are_told_from_noise() {
     assert_eq!(cross.coefficients[7], largest);
     assert!((largest - 0.866).abs() < 0.05);
     assert!(whiteness(&e, 0).is_err() && whiteness(&e[..10], 9).is_err());
+}
+
+/// Coefficients of a slow input go together: taken as 51 independent ones, their squares would
+/// exceed the limit of 1 % in one record of ten.
+#[test]
+fn a_slow_input_is_no_more_often_found_in_noise_than_a_fast_one() {
+    let sampling = Sampling::new(1.0 / 128.0, 512).unwrap();
+    let slow = Multisine::flat((6..=60).step_by(2), 2.0, Phases::Schroeder).unwrap();
+    let slow = slow.sample(sampling).unwrap();
+    let fast = noise::white(sampling, 1, 1.0, 9999).unwrap();
+    for input in [slow, fast] {
+        let p = |seed| {
+            let white = noise::white(sampling, 1, 1.0, seed).unwrap();
+            cross_correlation(white.channel(0), input.channel(0), 25).unwrap().p_value
+        };
+        let p: Vec<f64> = (0..2000).map(p).collect();
+        let share = |level: f64| p.iter().filter(|p| **p < level).count();
+        // 20 and 100 expected, with standard deviations of 4.4 and 9.7.
+        let (few, more) = (share(0.01), share(0.05));
+        assert!((5..=38).contains(&few) && (61..=139).contains(&more), "{few} {more}");
+    }
+}
+
+/// Differences of white noise are correlated at lag 1, and their coefficients beyond scatter √1.5
+/// as much as those of white noise.
+#[test]
+fn noise_of_a_known_span_has_nothing_beyond_it() {
+    let sampling = Sampling::new(0.1, 2001).unwrap();
+    let p = |seed, left: f64| {
+        let white = noise::white(sampling, 1, 1.0, seed).unwrap();
+        let w = white.channel(0);
+        let e: Vec<f64> = (2..w.len()).map(|k| w[k] - w[k - 1] + left * w[k - 2]).collect();
+        let [all, beyond] = [whiteness(&e, 25), whiteness_beyond(&e, 1, 25)];
+        [all, beyond].map(|found| found.unwrap().p_value)
+    };
+    let rejected = |left, level: f64| {
+        let found: Vec<[f64; 2]> = (0..1000).map(|seed| p(seed, left)).collect();
+        [0, 1].map(|at| found.iter().filter(|p| p[at] < level).count())
+    };
+    let [all, beyond] = rejected(0.0, 0.05);
+    // 50 expected, with a standard deviation of 7.
+    assert!(all == 1000 && (22..=78).contains(&beyond), "{all} {beyond}");
+    let [_, beyond] = rejected(0.6, 0.01);
+    assert!(beyond > 900, "{beyond}");
 }
 
 #[test]
@@ -196,4 +242,61 @@ fn a_sweep_is_the_same_on_any_number_of_threads_and_finds_the_best() {
     let failing = sweep(&[1.0, 2.0], None, |_| Err::<Estimate, _>(EstimateError::NoDof), |_| {});
     assert_eq!(failing.best(), None);
     assert_eq!(failing.points()[1].outcome, Err(EstimateError::NoDof));
+}
+
+/// Multisines over the whole band and over its lowest hundredth, with the noise of a load cell.
+#[test]
+fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
+    let sampling = Sampling::new(0.01, 1024).unwrap();
+    let wide = || Multisine::flat((5..400).step_by(5), 2.0, Phases::Random { seed: 3 });
+    let slow = || Multisine::flat(1..=5, 2.0, Phases::Schroeder);
+    for (name, force) in [("wide", wide()), ("slow", slow())] {
+        let force = force.unwrap().sample(sampling).unwrap().repeated(4).unwrap();
+        for (share, seeds) in [(0.0, 1), (0.01, 100)] {
+            for seed in 0..seeds {
+                let force = match share {
+                    0.0 => force.clone(),
+                    _ => noise::add_white(&force, NoiseLevel::FractionOfRms(share), seed).unwrap(),
+                };
+                let look = |period: usize| {
+                    let whole = force.len() / period * period;
+                    claimed_period(&force.window(0, whole).unwrap(), period)
+                };
+                for right in [1024, 2048, 4096] {
+                    let said = look(right);
+                    assert!(said.is_none(), "{name} {share} {seed} {right}: {said:?}");
+                }
+                for wrong in [1023, 1025, 1022, 1536, 1365, 700, 1800] {
+                    let found = look(wrong).unwrap_or_else(|| panic!("{name} {share} {wrong}"));
+                    assert_eq!(found.verdict, Verdict::Bad);
+                    // What repeats every fifth of it does so after 205 samples to the nearest.
+                    assert!(found.value > 200.0, "{name} {wrong}: {found}");
+                }
+            }
+        }
+    }
+    // One claimed period that holds one and a half; a fifth of the period is no whole number.
+    let force = wide().unwrap().sample(sampling).unwrap().repeated(2).unwrap();
+    let found = claimed_period(&force.window(0, 1536).unwrap(), 1536).unwrap();
+    assert_eq!(found.value, 1024.0, "{found}");
+}
+
+/// What never repeats, what hardly varies, and what is still most of the time.
+#[test]
+fn nothing_is_said_of_a_force_that_does_not_repeat() {
+    let sampling = Sampling::new(0.01, 1000).unwrap();
+    for seed in 0..50 {
+        let random = noise::white(sampling, 1, 1.0, seed).unwrap();
+        for period in [1000, 500, 333] {
+            let window = random.window(0, 1000 / period * period).unwrap();
+            assert_eq!(claimed_period(&window, period), None, "{seed} {period}");
+        }
+    }
+    let of = |values: Vec<f64>| Record::from_channel(sampling, values).unwrap();
+    let still = of(vec![0.1; 1000]);
+    let hit = of((0..1000).map(|k| f64::from((600..605).contains(&k))).collect());
+    let ramp = of((0..1000).map(f64::from).collect());
+    for force in [still, hit, ramp] {
+        assert_eq!(claimed_period(&force, 1000), None);
+    }
 }

@@ -14,6 +14,7 @@ mod modal;
 mod monte_carlo;
 mod noise;
 mod refined;
+mod response_checks;
 mod silverbox;
 mod time_domain;
 mod time_domain_invariance;

@@ -114,7 +114,7 @@ fn residuals_are_judged_channel_by_channel() {
     let white = noise::white(sampling, 2, 1.0, 3).unwrap();
     let force = noise::white(sampling, 2, 1.0, 4).unwrap();
     let fitted = noise::white(sampling, 2, 100.0, 5).unwrap();
-    let checks = after_fit(&white, &fitted, &force, 20).unwrap();
+    let checks = after_fit(&white, &fitted, &force, 20, 0).unwrap();
     // Each residual alone and with each force.
     assert_eq!(checks.len(), 6);
     assert!(checks.iter().all(|c| c.verdict == Verdict::Good), "{checks:?}");
@@ -126,7 +126,7 @@ fn residuals_are_judged_channel_by_channel() {
         _ => white.data()[(k, 1)] + 0.7 * white.data()[(k - 1, 1)],
     });
     let residual = Record::new(sampling, data).unwrap();
-    let checks = after_fit(&residual, &fitted, &force, 20).unwrap();
+    let checks = after_fit(&residual, &fitted, &force, 20, 0).unwrap();
     let doubtful: Vec<usize> =
         (0..6).filter(|at| checks[*at].verdict == Verdict::Doubtful).collect();
     assert_eq!(doubtful, [2, 3], "{checks:?}");
@@ -135,11 +135,11 @@ fn residuals_are_judged_channel_by_channel() {
     // As rounding the same residual says nothing, and a force that never changes is left out.
     let large = Record::new(sampling, fitted.data() * 1e10).unwrap();
     let still = Record::new(sampling, DMatrix::from_element(2000, 1, 3.0)).unwrap();
-    let checks = after_fit(&residual, &large, &still, 20).unwrap();
+    let checks = after_fit(&residual, &large, &still, 20, 0).unwrap();
     assert_eq!(checks.len(), 2);
     assert!(checks.iter().all(|c| c.verdict == Verdict::Good));
     let other = fitted.window(0, 100).unwrap();
-    assert!(matches!(after_fit(&residual, &other, &force, 20), Err(EstimateError::Signal(_))));
+    assert!(matches!(after_fit(&residual, &other, &force, 20, 0), Err(EstimateError::Signal(_))));
 }
 
 /// Judge: the closed form of the problems, which shares nothing with the estimators.

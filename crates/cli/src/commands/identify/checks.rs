@@ -29,23 +29,29 @@ pub struct CheckRow {
 
 /// Everything looked at; `files` are the names of the records.
 pub fn rows(fitted: &Fitted, files: &[&str]) -> Result<Vec<CheckRow>, CliError> {
-    let name = |at: usize| (files.len() > 1).then(|| files[at].to_owned());
     let mut rows = Vec::new();
+    let mut add = |when, at: usize, checks: &[Check]| {
+        let name = (files.len() > 1).then(|| files[at].to_owned());
+        rows.extend(checks.iter().map(|check| CheckRow::new(when, name.clone(), check)));
+    };
     for (at, checks) in fitted.before.iter().enumerate() {
-        rows.extend(checks.iter().map(|check| CheckRow::new("before", name(at), check)));
+        add("before", at, checks);
+    }
+    for (at, checks) in fitted.after.iter().enumerate() {
+        add("after", at, checks);
     }
     for (at, residual) in fitted.residuals.iter().enumerate() {
-        let checks = of_residual(residual)?;
-        rows.extend(checks.iter().map(|check| CheckRow::new("after", name(at), check)));
+        add("after", at, &of_residual(residual)?);
     }
     Ok(rows)
 }
 
 /// Nothing if there are too few samples to tell.
 fn of_residual(residual: &Residual) -> Result<Vec<Check>, CliError> {
-    match LAGS.min(residual.left.len() / SAMPLES_PER_LAG) {
+    let Residual { left, fitted, force, noise_span } = residual;
+    match LAGS.min(left.len().saturating_sub(*noise_span) / SAMPLES_PER_LAG) {
         0 => Ok(Vec::new()),
-        lags => Ok(after_fit(&residual.left, &residual.fitted, &residual.force, lags)?),
+        lags => Ok(after_fit(left, fitted, force, lags, *noise_span)?),
     }
 }
 

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use clap::ValueEnum;
-use mechid::estimate::checks::{Check, before_spectral_fit};
+use mechid::estimate::checks::{Check, after_spectral_fit, before_spectral_fit};
 use mechid::estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
@@ -45,6 +45,8 @@ pub enum BetweenSamples {
 pub struct Fitted {
     pub domain: &'static str,
     pub estimator: &'static str,
+    /// Spectra were fitted by least squares, where another method allows for noise.
+    pub least_squares: bool,
     pub estimate: Estimate,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
@@ -52,6 +54,8 @@ pub struct Fitted {
     pub frequency: Option<(Lines, FrequencyData)>,
     /// What was looked at before the fit, record by record.
     pub before: Vec<Vec<Check>>,
+    /// What was looked at after the fit beside the residuals, record by record.
+    pub after: Vec<Vec<Check>>,
     /// What the fit leaves of each record; empty where that is not a row of samples.
     pub residuals: Vec<Residual>,
     /// How the machine found is made to move under a measured force.
@@ -84,6 +88,8 @@ pub struct Residual {
     /// What it is left of, to tell rounding from noise.
     pub fitted: Record,
     pub force: Record,
+    /// Lags over which noise on the motion correlates it.
+    pub noise_span: usize,
 }
 
 /// Fits the spectra of the windows of one or several records, each on the lines that `choose` finds
@@ -112,6 +118,7 @@ pub fn frequency_domain(
     };
     let data = together(&RepeatedPeriods::mean)?;
     let mut misfit = None;
+    let fewest = spectra.iter().map(|(_, periods)| periods.count()).min().unwrap_or(1);
     let (estimator, estimate) = match method {
         Method::LeastSquares => (
             "least squares on the equation of motion, in the frequency domain",
@@ -126,8 +133,8 @@ pub fn frequency_domain(
             )
         }
         Method::MaximumLikelihood => {
-            let fewest = spectra.iter().map(|(_, periods)| periods.count()).min().unwrap_or(1);
-            let data = match pooling(fewest, &mut remarks) {
+            remarks.extend(of_pooling(fewest));
+            let data = match pooling(fewest) {
                 None => data.clone(),
                 Some(pooling) => together(&|periods| periods.mean_with_noise(pooling))?,
             };
@@ -137,20 +144,25 @@ pub fn frequency_domain(
             ("maximum likelihood, in the frequency domain", fit.estimate)
         }
     };
-    let mut before = Vec::new();
-    for (measured, (lines, _)) in records.iter().zip(&spectra) {
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for (measured, (lines, periods)) in records.iter().zip(&spectra) {
         let (motion, kind) = measured.motion();
         before.push(before_spectral_fit(lines, &measured.force, motion, kind, unknowns)?);
+        let own = lines.as_slice().len() as f64 / data.len() as f64;
+        let fitted = own * estimate.parameters().len() as f64;
+        after.push(Vec::from_iter(of_noise(periods, &estimate, fitted)?));
     }
     let lines = spectra.swap_remove(0).0;
     let residuals = steady_residuals(records, &estimate)?;
     Ok(Fitted {
         domain: "frequency",
         estimator,
+        least_squares: method == Method::LeastSquares,
         estimate,
         equations: 2 * data.len(),
         frequency: Some((lines, data)),
         before,
+        after,
         residuals,
         course: Course::Steady,
         misfit,
@@ -158,22 +170,35 @@ pub fn frequency_domain(
     })
 }
 
+/// What is left against the noise of the periods, if these are several.
+fn of_noise(
+    periods: &RepeatedPeriods,
+    estimate: &Estimate,
+    fitted: f64,
+) -> Result<Option<Check>, CliError> {
+    let Some(pooling) = pooling(periods.count()) else { return Ok(None) };
+    Ok(after_spectral_fit(&periods.mean_with_noise(pooling)?, estimate, fitted))
+}
+
 /// How the noise of so many periods is averaged over the lines; nothing if it does not show.
-fn pooling(periods: usize, remarks: &mut Vec<String>) -> Option<Pooling> {
+fn pooling(periods: usize) -> Option<Pooling> {
     match periods {
-        1 => {
-            remarks.push(
-                "one period does not show its noise: it was taken as white on the motion, of the \
-                 level the residual has"
-                    .into(),
-            );
-            None
-        }
-        few @ 2..8 => {
-            remarks.push(format!("{few} periods are few: one noise level for all lines"));
-            Some(Pooling::AllLines)
-        }
+        0 | 1 => None,
+        2..8 => Some(Pooling::AllLines),
         _ => Some(Pooling::PerLine),
+    }
+}
+
+/// What to say of weights from so many periods.
+fn of_pooling(periods: usize) -> Option<String> {
+    match periods {
+        0 | 1 => Some(
+            "one period does not show its noise: it was taken as white on the motion, of the level \
+             the residual has"
+                .into(),
+        ),
+        few @ 2..8 => Some(format!("{few} periods are few: one noise level for all lines")),
+        _ => None,
     }
 }
 
@@ -199,6 +224,7 @@ pub fn steady_residuals(
             left: Record::new(motion.sampling(), motion.data() - predicted.data())?,
             fitted: motion,
             force: measured.force.clone(),
+            noise_span: 0,
         });
     }
     Ok(residuals)

@@ -22,6 +22,7 @@ use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
 use mechid::plot::Figure;
 use mechid::signal::Record;
 
+use self::checks::CheckRow;
 use self::excited::{Band, choose_lines};
 use self::fit::{BetweenSamples, Fitted, Method};
 use self::mass::KnownMass;
@@ -259,9 +260,21 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         system: SystemMatrices::from(&system),
         covariance: covariance(estimate),
     };
-    let misfit = fitted.misfit.iter().map(ToString::to_string);
-    report.remarks = fitted.remarks.iter().cloned().chain(misfit).chain(doubts(&report)).collect();
+    let of_method = of_least_squares(fitted, &report.checks);
+    report.remarks =
+        fitted.remarks.iter().cloned().chain(doubts(&report)).chain(of_method).collect();
     Ok(report)
+}
+
+/// What a residual that is no noise can come from, where another method would leave less.
+fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
+    let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
+    (fitted.least_squares && warned("after") && !warned("before")).then(|| {
+        "least squares takes the measured motion as exact, and noise on it biases the parameters; \
+         that alone can be what the warnings after the fit tell of. With --method \
+         maximum-likelihood, which allows for noise, they speak of the machine"
+            .into()
+    })
 }
 
 fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, CliError> {

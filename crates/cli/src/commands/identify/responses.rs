@@ -1,14 +1,17 @@
 //! Fits frequency responses.
 
-use mechid::estimate::Unknowns;
-use mechid::estimate::checks::before_response_fit;
+use mechid::estimate::checks::{
+    Check, after_response_fit, before_response_fit, claimed_period, linearity,
+};
 use mechid::estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid::estimate::time_domain::{Discretisation, Extent};
+use mechid::estimate::{Estimate, EstimateError, Unknowns};
 use mechid::signal::Record;
 
 use super::course::Course;
 use super::fit::{Fitted, Method, Misfit, one_motion_of, steady_residuals};
 use super::measurement::Measurement;
+use super::report::Lines;
 use crate::commands::frf::responses::{Estimator, Responses, SegmentArgs};
 use crate::error::CliError;
 
@@ -48,15 +51,30 @@ pub fn fit(
             ("maximum likelihood on frequency responses, weighted by their coherence", fit.estimate)
         }
     };
-    let look = |r: &Responses| Ok(before_response_fit(&r.frf, &r.driven, unknowns)?);
-    let before = responses.iter().map(look).collect::<Result<_, CliError>>()?;
     let periodic = segments.are_periods();
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for (measured, r) in records.iter().zip(&responses) {
+        let mut checks = before_response_fit(&r.frf, &r.driven, unknowns)?;
+        if periodic {
+            checks.extend(claimed_period(&measured.force, measured.period));
+        }
+        before.push(checks);
+        let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / data.len() as f64;
+        let fitted = own * found.parameters().len() as f64;
+        let mut checks = after_response_fit(&r.frf, &r.driven, &found, fitted)?;
+        if !periodic {
+            checks.extend(of_linearity(measured, r, &found)?);
+        }
+        after.push(checks);
+    }
     Ok(Fitted {
         domain: "frequency",
         estimator: name,
+        least_squares: method == Some(Method::LeastSquares),
         equations: 2 * data.len(),
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
+        after,
         residuals: if periodic { steady_residuals(records, &found)? } else { Vec::new() },
         course: match periodic {
             true => Course::Steady,
@@ -69,4 +87,19 @@ pub fn fit(
         remarks: one_motion_of(&records[0]),
         estimate: found,
     })
+}
+
+/// Between the first and the last line fitted; nothing of a free machine, which has no displacement to
+/// take powers of.
+fn of_linearity(
+    measured: &Measurement,
+    responses: &Responses,
+    found: &Estimate,
+) -> Result<Option<Check>, CliError> {
+    let (motion, kind) = measured.motion();
+    let used = Lines::of(&responses.lines);
+    match linearity(found, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
+        Err(EstimateError::Model(_)) => Ok(None),
+        looked => Ok(Some(looked?)),
+    }
 }

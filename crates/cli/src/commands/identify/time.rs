@@ -2,10 +2,8 @@
 
 use clap::{Args, ValueEnum};
 use mechid::estimate::checks::{before_equation_of_motion, before_fit};
-use mechid::estimate::time_domain::{
-    Discretisation, Extent, TimeDomain, TimeDomainFit, Transitions,
-};
-use mechid::estimate::{EquationOfMotion, Estimate, Unknowns};
+use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
 use mechid::signal::{Interpolation, Record};
 
 use super::course::Course;
@@ -118,13 +116,16 @@ impl TimeArgs {
         let estimate = rows.solve(unknowns)?;
         // Says what the data leave open, before anything is made of it.
         estimate.system()?;
-        let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate));
+        let span = self.noise_span();
+        let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate, span));
         Ok(Fitted {
             domain: "time",
             estimator: "least squares on the equation of motion, sample by sample",
+            least_squares: false,
             equations: rows.rows(),
             frequency: None,
             before,
+            after: Vec::new(),
             residuals: residuals.collect::<Result<_, _>>()?,
             course: self.course(Discretisation::FirstOrderHold),
             misfit: None,
@@ -156,25 +157,30 @@ impl TimeArgs {
             before.push(before_fit(TimeDomain::new(discretisation, extent), x, v, force)?);
         }
         let fit = rows.fit(discretisation, unknowns)?;
-        let residuals = match factor {
-            // Intermediate points are not independent: their correlations say nothing.
-            Some(_) => Vec::new(),
-            None => {
-                let left = prepared.iter().map(|p| left_of_step(p, &fit, extent));
-                left.collect::<Result<_, _>>()?
-            }
+        let estimate = fit.into_estimate();
+        let between_points = factor.zip(interpolation);
+        let left = |p: &Prepared| -> Result<Residual, CliError> {
+            let [left, fitted] =
+                missing_force(&estimate, p.states(), discretisation, extent, between_points)?;
+            let force = p.force.window(0, left.len())?;
+            // An error of a measured state is in the interval before it and in the one after.
+            let noise_span = self.noise_span() + 1;
+            Ok(Residual { left, fitted, force, noise_span })
         };
+        let residuals = prepared.iter().map(left).collect::<Result<_, _>>()?;
         Ok(Fitted {
             domain: "time",
             estimator: between.estimator(),
+            least_squares: false,
             equations: rows.rows(),
             frequency: None,
             before,
+            after: Vec::new(),
             residuals,
             course: self.course(discretisation),
             misfit: None,
             remarks: self.remarks(prepared),
-            estimate: fit.into_estimate(),
+            estimate,
         })
     }
 
@@ -183,6 +189,14 @@ impl TimeArgs {
             // What was differentiated by its spectrum is predicted by it.
             Some(Derivatives::Spectral) => Course::Steady,
             _ => Course::Sampled { discretisation, extent: self.extent() },
+        }
+    }
+
+    /// Samples apart that the noise of one sample still reaches.
+    fn noise_span(&self) -> usize {
+        match &self.derivatives {
+            Some(Derivatives::SavitzkyGolay(filter)) => filter.window() - 1,
+            _ => 0,
         }
     }
 
@@ -208,7 +222,11 @@ impl TimeArgs {
 }
 
 /// F − M ẍ − C ẋ − K x, left of the inertia.
-fn left_of_equation(p: &Prepared, estimate: &Estimate) -> Option<Result<Residual, CliError>> {
+fn left_of_equation(
+    p: &Prepared,
+    estimate: &Estimate,
+    noise_span: usize,
+) -> Option<Result<Residual, CliError>> {
     let a = p.acceleration.as_ref()?;
     let inertia = a.data() * estimate.mass().transpose();
     let left = p.force.data()
@@ -216,20 +234,9 @@ fn left_of_equation(p: &Prepared, estimate: &Estimate) -> Option<Result<Residual
         - p.velocity.data() * estimate.damping().transpose()
         - p.displacement.data() * estimate.stiffness().transpose();
     let record = |data| Record::new(a.sampling(), data);
-    let residual =
-        || Ok(Residual { left: record(left)?, fitted: record(inertia)?, force: p.force.clone() });
+    let residual = || {
+        let (left, fitted) = (record(left)?, record(inertia)?);
+        Ok(Residual { left, fitted, force: p.force.clone(), noise_span })
+    };
     Some(residual())
-}
-
-/// What one step predicts wrong of the velocity.
-fn left_of_step(p: &Prepared, fit: &TimeDomainFit, extent: Extent) -> Result<Residual, CliError> {
-    let [x, v, force] = p.states();
-    let errors = fit.one_step_errors(x, v, force, extent)?;
-    let n = v.channels();
-    let sampling = v.sampling().with_len(errors.nrows())?;
-    Ok(Residual {
-        left: Record::new(sampling, errors.columns(n, n).into_owned())?,
-        fitted: v.window(0, errors.nrows())?,
-        force: force.window(0, errors.nrows())?,
-    })
 }

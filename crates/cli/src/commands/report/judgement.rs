@@ -8,9 +8,9 @@ use crate::commands::identify;
 use crate::commands::identify::checks::CheckRow;
 use crate::text_table::significant;
 
-/// Residual power over what the noise explains, beyond which standard errors are wrong by more than
-/// a factor of √2.
-const MISFIT: f64 = 2.0;
+/// Residual power over what the noise explains, below which standard errors are too large by more
+/// than a factor of √2.
+const OVERSTATED: f64 = 0.5;
 
 /// A prediction of another record below this fit, in per cent, leaves as much as it explains.
 const POOR_FIT: f64 = 50.0;
@@ -39,12 +39,9 @@ pub fn doubts(contents: &Contents<'_>) -> Vec<String> {
     };
     let mut doubts: Vec<String> = verdict(Verdict::Bad).collect();
     doubts.extend(identify::doubts(report));
-    if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| !is_explained(misfit.ratio))
-    {
-        let why = match misfit.ratio > MISFIT {
-            true => "the model misses something, and the standard errors are too small",
-            false => "the noise was taken as larger than it is, and so were the standard errors",
-        };
+    // Of too large a residual the checks tell.
+    if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| misfit.ratio < OVERSTATED) {
+        let why = "the noise was taken as larger than it is, and so were the standard errors";
         doubts.push(format!("{misfit}: {why}"));
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
@@ -66,12 +63,15 @@ pub fn merits(contents: &Contents<'_>) -> Vec<String> {
     if !subjects.is_empty() {
         merits.push(format!(
             "{} of {} checks of data and fit are good: {}",
-            good.count(),
+            good.clone().count(),
             report.checks.len(),
             subjects.join(", ")
         ));
     }
-    if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| is_explained(misfit.ratio)) {
+    let subject = Subject::Misfit.to_string();
+    let explained = good.clone().any(|check| check.subject == subject);
+    let misfit = contents.found.fitted.misfit.filter(|misfit| misfit.ratio >= OVERSTATED);
+    if let Some(misfit) = misfit.filter(|_| explained) {
         merits.push(format!("{misfit}; 1 is expected"));
     }
     merits.extend(predicted(contents).filter(|(fit, _)| is_predicted(*fit)).map(|(_, text)| text));
@@ -87,10 +87,6 @@ pub fn advice(contents: &Contents<'_>) -> Option<&'static str> {
         "Where the motion is noisy, least squares leaves more of a resonance behind than --method \
          maximum-likelihood.",
     )
-}
-
-fn is_explained(ratio: f64) -> bool {
-    (1.0 / MISFIT..=MISFIT).contains(&ratio)
 }
 
 fn is_predicted(fit_percent: f64) -> bool {

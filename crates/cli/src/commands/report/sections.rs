@@ -229,8 +229,8 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, CliError> {
         (judgement::list(contents, "after"))
         @if contents.found.report.checks.iter().any(|check| check.when == "after") {
             p.note {
-                "p is the share of records of white noise that show as much correlation. The test against a \
-                 force takes the residual as white and the force as broad. In white noise 5 % of the lags lie outside the bounds."
+                "p is the share of experiments with nothing but noise left that look as bad. The test \
+                 against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."
             }
         }
         @if let Some(advice) = judgement::advice(contents) { p.note { (advice) } }

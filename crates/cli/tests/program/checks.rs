@@ -1,0 +1,152 @@
+//! What `mechid identify` looks at before and after a fit, whatever the estimator.
+
+use std::path::Path;
+
+use mechid::model::{InitialState, Response, Sdof, SecondOrderSystem};
+use mechid::signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_problems::{exact_foh, exact_harmonic_periodic};
+use serde_json::Value;
+
+use crate::mechid;
+
+fn oscillator() -> SecondOrderSystem {
+    Sdof::new(2.0, 6.0, 800.0).unwrap().system()
+}
+
+fn noisy(record: &Record, share: f64, seed: u64) -> Record {
+    noise::add_white(record, NoiseLevel::FractionOfRms(share), seed).unwrap()
+}
+
+/// Columns time, f, x and v; noise of a share of the RMS on both motions.
+fn write(folder: &Path, name: &str, force: &Record, motion: &Response, share: f64) {
+    let motions = [(motion.displacement(), 1), (motion.velocity(), 2)];
+    let [x, v] = motions.map(|(record, seed)| match share {
+        0.0 => record.clone(),
+        _ => noisy(record, share, seed),
+    });
+    let columns = [("f", force), ("x", &x), ("v", &v)];
+    let columns = columns.map(|(name, record)| (name.to_owned(), record.channel(0)));
+    let text = mechid::io::csv_text(force.sampling(), &columns);
+    std::fs::write(folder.join(name), text).unwrap();
+}
+
+/// Four periods of 256 samples.
+fn periodic(folder: &Path, name: &str, seed: u64, share: f64) {
+    let force = Multisine::flat(4..=60, 2.0, Phases::Random { seed }).unwrap();
+    let force = force.sample(Sampling::new(0.01, 256).unwrap()).unwrap().repeated(4).unwrap();
+    let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    write(folder, name, &force, &motion, share);
+}
+
+/// Verdicts and texts of all checks of a subject.
+fn checks(folder: &Path, arguments: &str, subject: &str) -> Vec<(String, String)> {
+    let report: Value =
+        serde_json::from_str(&mechid(folder, &format!("{arguments} --json"))).unwrap();
+    let of = |check: &Value, field: &str| check[field].as_str().unwrap().to_owned();
+    let all = report["checks"].as_array().unwrap();
+    let those = all.iter().filter(|check| check["subject"] == subject);
+    those.map(|check| (of(check, "verdict"), of(check, "text"))).collect()
+}
+
+fn verdicts(folder: &Path, arguments: &str, subject: &str) -> Vec<String> {
+    checks(folder, arguments, subject).into_iter().map(|check| check.0).collect()
+}
+
+#[test]
+fn a_wrong_period_is_warned_of_however_the_spectra_are_fitted() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    periodic(folder, "p.csv", 1, 0.01);
+    for method in ["least-squares", "instrumental", "maximum-likelihood"] {
+        let common = format!(
+            "identify p.csv --force f --displacement x --lines 4:60 --method {method} --period"
+        );
+        assert_eq!(verdicts(folder, &format!("{common} 256"), "periodicity"), ["good"], "{method}");
+        for (wrong, said) in [
+            (255, "the period is 256 samples"),
+            (257, "the period is 256 samples"),
+            (384, "the force repeats every 256 samples"),
+        ] {
+            let found = checks(folder, &format!("{common} {wrong}"), "periodicity");
+            let told = found.iter().any(|(verdict, text)| verdict == "bad" && text.contains(said));
+            assert!(told, "{method} {wrong}: {found:?}");
+        }
+    }
+    let from_frf = "identify p.csv --force f --displacement x --from-frf h1 --period";
+    assert!(verdicts(folder, &format!("{from_frf} 256"), "periodicity").is_empty());
+    assert_eq!(verdicts(folder, &format!("{from_frf} 255"), "periodicity"), ["bad"]);
+}
+
+#[test]
+fn every_way_to_fit_is_looked_at_afterwards_record_by_record() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    periodic(folder, "p.csv", 1, 0.01);
+    periodic(folder, "q.csv", 2, 0.01);
+    let spectra = "identify p.csv q.csv --force f --displacement x --period 256";
+    for method in ["--method least-squares", "--method instrumental", "--method maximum-likelihood"]
+    {
+        for subject in ["misfit", "whiteness", "cross-correlation"] {
+            let found = verdicts(folder, &format!("{spectra} {method}"), subject);
+            assert_eq!(found.len(), 2, "{method} {subject}");
+            if method.ends_with("likelihood") {
+                assert_eq!(found, ["good", "good"], "{subject}");
+            }
+        }
+    }
+    let samples = "identify p.csv q.csv --force f --displacement x --velocity v --domain time";
+    for more in ["--extent period", "--between-samples held", "--derivatives spectral"] {
+        let samples = match more {
+            "--derivatives spectral" => samples.replace(" --velocity v", ""),
+            _ => samples.into(),
+        };
+        for subject in ["whiteness", "cross-correlation"] {
+            assert_eq!(verdicts(folder, &format!("{samples} {more}"), subject).len(), 2, "{more}");
+        }
+    }
+}
+
+/// The force is linear between the samples: without noise only rounding is left.
+#[test]
+fn a_refined_fit_is_judged_from_measured_sample_to_measured_sample() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let force = noise::white(Sampling::new(0.01, 600).unwrap(), 1, 5.0, 3).unwrap();
+    let motion = exact_foh(&oscillator(), &force, &InitialState::rest(1)).unwrap();
+    write(folder, "clean.csv", &force, &motion, 0.0);
+    write(folder, "noisy.csv", &force, &motion, 0.001);
+    let refined = "--force f --displacement x --velocity v --domain time \
+                   --between-samples linear --refine 4 --interpolation linear";
+    for subject in ["whiteness", "cross-correlation"] {
+        let found = verdicts(folder, &format!("identify clean.csv {refined} --mass 2"), subject);
+        assert_eq!(found.len(), 1);
+    }
+    let wrong = format!("identify clean.csv {refined} --mass 2.2");
+    assert_eq!(verdicts(folder, &wrong, "cross-correlation"), ["doubtful"]);
+    let [(verdict, text)] =
+        &checks(folder, &format!("identify noisy.csv {refined}"), "whiteness")[..]
+    else {
+        panic!("one channel");
+    };
+    assert_eq!(verdict, "doubtful");
+    assert!(text.contains("correlated up to lag 1 (-0."), "{text}");
+    assert!(text.contains("which least squares takes as exact"), "{text}");
+}
+
+#[test]
+fn a_fit_of_responses_to_a_random_force_is_judged_line_by_line() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let force = noise::white(Sampling::new(0.01, 1 << 14).unwrap(), 1, 5.0, 7).unwrap();
+    let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    write(folder, "r.csv", &force, &motion, 0.05);
+    let common = "identify r.csv --force f --displacement x --segment 2048 --band-hz 0.5:12 \
+                  --from-frf h1";
+    for subject in ["misfit", "linearity", "whiteness"] {
+        assert_eq!(verdicts(folder, common, subject), ["good"], "{subject}");
+    }
+    let wrong = format!("{common} --mass 2.2");
+    for subject in ["misfit", "whiteness"] {
+        assert_eq!(verdicts(folder, &wrong, subject), ["doubtful"], "{subject}");
+    }
+}

@@ -1,0 +1,177 @@
+//! Correlations over lags, and how likely noise alone has as much of them.
+
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use crate::EstimateError;
+
+/// Correlations at a number of lags, and how likely pure noise has as much of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Correlation {
+    /// Coefficient at each lag, a pure number; see the function that made it for which lags.
+    pub coefficients: Vec<f64>,
+    /// 95 % of the coefficients of noise are smaller than this; 1.96/√N for white noise.
+    pub bound: f64,
+    /// Sum of squared coefficients, each over its variance for noise; dimensionless.
+    pub statistic: f64,
+    /// The share of records of noise with a larger statistic. Below 0.01 or so the residual is
+    /// hardly noise: the model misses something.
+    pub p_value: f64,
+}
+
+impl Correlation {
+    /// How many coefficients exceed the 95 % bound.
+    pub fn outside(&self) -> usize {
+        self.coefficients.iter().filter(|c| c.abs() > self.bound).count()
+    }
+}
+
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags 1 … `lags`, judged by
+/// the statistic of Ljung and Box.
+///
+/// # Errors
+/// [`EstimateError::TooShort`] unless there are more than `lags + 1` samples and lags.
+///
+/// # Source
+/// Ljung & Box (1978), Biometrika 65, 297–303.
+pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, EstimateError> {
+    whiteness_beyond(residual, 0, lags)
+}
+
+/// Autocorrelation of a residual (one value per sample, any unit) at the lags `span + 1` … `span +
+/// lags`, where noise that is
+/// correlated over `span` lags and no more has none: the difference of two noisy samples that
+/// follow one another has a span of 1.
+///
+/// The correlation within the span, taken from the residual itself, makes the coefficients beyond
+/// it scatter more, and together; the statistic is judged with that.
+///
+/// # Errors
+/// As [`whiteness`], with `span` samples more.
+///
+/// # Source
+/// Bartlett (1946), Supplement to the JRSS 8, 27–41, for the scatter of the coefficients; Box (1954),
+/// Annals of Mathematical Statistics 25, 290–302, for the distribution of their squares.
+pub fn whiteness_beyond(
+    residual: &[f64],
+    span: usize,
+    lags: usize,
+) -> Result<Correlation, EstimateError> {
+    let e = centred(residual, lags, span)?;
+    let own = autocorrelation(&e, span + lags);
+    let count = e.len() as f64;
+    let coefficients = own[span + 1..].to_vec();
+    let together = correlated(&own[..=span], &own[..=span], lags);
+    let weight = |lag: usize| count * (count + 2.0) / (count - lag as f64);
+    let squares = (span + 1..).zip(&coefficients).map(|(lag, c)| c * c * weight(lag));
+    Ok(Correlation::judged(squares.sum(), &together, coefficients, count))
+}
+
+/// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
+/// `lags`, in that order; at a positive lag the input comes first. With negative lags it shows
+/// feedback from output to input.
+///
+/// The statistic takes the residual as white, the input as it is: coefficients of a coloured input
+/// go together.
+///
+/// # Errors
+/// As [`whiteness`], and [`EstimateError::Size`] if the two differ in length.
+///
+/// # Source
+/// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), section 16.6; Box (1954),
+/// Annals of Mathematical Statistics 25, 290–302, for the distribution of the sum of squares.
+pub fn cross_correlation(
+    residual: &[f64],
+    input: &[f64],
+    lags: usize,
+) -> Result<Correlation, EstimateError> {
+    cross_correlation_of_coloured(residual, input, lags, &[1.0])
+}
+
+/// The same of a residual that is correlated itself: `colour` has its coefficients at the lags 0,
+/// 1 … as far as they count.
+pub(super) fn cross_correlation_of_coloured(
+    residual: &[f64],
+    input: &[f64],
+    lags: usize,
+    colour: &[f64],
+) -> Result<Correlation, EstimateError> {
+    crate::least_squares::size("samples of the input", residual.len(), input.len())?;
+    let (e, u) = (centred(residual, lags, 0)?, centred(input, lags, 0)?);
+    let power = (products(&e, &e) * products(&u, &u)).sqrt();
+    let before = (1..=lags).rev().map(|lag| products(&u[lag..], &e));
+    let after = (0..=lags).map(|lag| products(&e[lag..], &u));
+    let coefficients: Vec<f64> = before.chain(after).map(|c| ratio(c, power)).collect();
+    let count = e.len() as f64;
+    let own = autocorrelation(&u, (2 * lags + colour.len()).min(u.len() - 1));
+    let together = correlated(colour, &own, coefficients.len());
+    let weight = |at: usize| count * count / (count - at.abs_diff(lags) as f64);
+    let squares = coefficients.iter().enumerate().map(|(at, c)| c * c * weight(at));
+    Ok(Correlation::judged(squares.sum(), &together, coefficients, count))
+}
+
+impl Correlation {
+    /// A sum of squares of coefficients whose covariance, times the number of samples, depends on
+    /// the lag between them alone: `together` at the lags 0, 1 …
+    fn judged(sum: f64, together: &[f64], coefficients: Vec<f64>, count: f64) -> Self {
+        // An input that is nearly all in phase with the residual's colour has next to no scatter.
+        let variance = together[0].max(f64::EPSILON);
+        let p_value = share_above(sum, coefficients.len(), together);
+        let bound = 1.96 * (variance / count).sqrt();
+        Self { coefficients, bound, statistic: sum / variance, p_value }
+    }
+}
+
+/// The probability that the sum of squares of `terms` normal numbers of mean zero is above `sum`,
+/// where the covariance of two depends on their distance alone: `together` at 0, 1 …, zero beyond.
+///
+/// The sum has nearly the distribution of g χ²(h) with its own mean and variance.
+fn share_above(sum: f64, terms: usize, together: &[f64]) -> f64 {
+    let squares = together.iter().enumerate().take(terms).map(|(apart, c)| {
+        let pairs = if apart == 0 { terms } else { 2 * (terms - apart) };
+        pairs as f64 * c * c
+    });
+    share_above_of(sum, terms as f64 * together[0], squares.sum())
+}
+
+/// The probability that a sum of squares is above `sum`, where the covariance of what is squared has
+/// the trace `mean` and its square the trace `square`.
+pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
+    if mean <= 0.0 {
+        return if sum > 0.0 { 0.0 } else { 1.0 };
+    }
+    let distribution = ChiSquared::new(mean * mean / square).expect("positive degrees of freedom");
+    distribution.sf(sum * mean / square)
+}
+
+/// Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two
+/// autocorrelations given at 0, 1 … and zero beyond.
+pub(super) fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
+    let last = a.len() as isize - 1;
+    let at = |of: &[f64], lag: isize| of.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
+    (0..lags as isize).map(|j| (-last..=last).map(|k| at(a, k) * at(b, k + j)).sum()).collect()
+}
+
+/// Coefficients at the lags 0 … `lags`.
+pub(super) fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
+    let power = products(centred, centred);
+    let at =
+        |lag: usize| if lag == 0 { 1.0 } else { ratio(products(&centred[lag..], centred), power) };
+    (0..=lags).map(at).collect()
+}
+
+pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, EstimateError> {
+    let needed = lags.max(1) + span + 2;
+    if lags == 0 || values.len() < needed {
+        return Err(EstimateError::TooShort { samples: values.len(), needed });
+    }
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    Ok(values.iter().map(|v| v - mean).collect())
+}
+
+fn products(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn ratio(value: f64, power: f64) -> f64 {
+    if power > 0.0 { value / power } else { 0.0 }
+}
