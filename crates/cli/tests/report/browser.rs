@@ -54,7 +54,8 @@ fn a_browser_shows_it_without_complaint_on_screen_and_telephone() {
     fs::write(folder.path().join("rig.csv"), record).unwrap();
     let mut arguments = USUAL.to_vec();
     arguments[3] = &long;
-    mechid(folder.path(), &[&arguments[..], &["--title", &long]].concat());
+    let more = ["rig.csv", "--validate", "rig.csv", "--title", &long];
+    mechid(folder.path(), &[&arguments[..], &more].concat());
     for width in [390, 1280] {
         let Some((seen, console)) = browse(folder.path(), width) else {
             eprintln!("skipped: no Chromium on this machine");

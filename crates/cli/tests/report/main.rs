@@ -344,6 +344,13 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
     let (_, merits) =
         remarks.iter().find(|(heading, _)| heading.starts_with("What speaks")).unwrap();
     assert!(merits.contains("noisy.csv, samples 1 to 512"), "{merits}");
+    // What was fitted proves nothing, unless other samples of it were.
+    for (more, proves) in [(&[][..], false), (&["--periods", "1", "--validate-start", "257"], true)]
+    {
+        mechid(folder.path(), &[&USUAL[..], &["--validate", "rig.csv"], more].concat());
+        assert_eq!(page(folder.path()).contains("of every motion is predicted"), proves);
+        assert_eq!(page(folder.path()).contains("agreement proves little"), !proves);
+    }
 }
 
 /// Lines are those of a segment, not of the record. Judge: the oscillator whose motion under sines

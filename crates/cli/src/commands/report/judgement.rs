@@ -33,11 +33,7 @@ pub fn list(contents: &Contents<'_>, when: &str) -> Markup {
 /// What the reader should know before believing the numbers, the worst first.
 pub fn doubts(contents: &Contents<'_>) -> Vec<String> {
     let report = &contents.found.report;
-    let verdict = |verdict: Verdict| {
-        let own = report.checks.iter().filter(move |check| check.verdict == verdict.to_string());
-        own.map(|check| format!("{}: {}", check.subject, check.sentence()))
-    };
-    let mut doubts: Vec<String> = verdict(Verdict::Bad).collect();
+    let mut doubts = found_out(&report.checks, Verdict::Bad);
     doubts.extend(identify::doubts(report));
     // Of too large a residual the checks tell.
     if let Some(misfit) = contents.found.fitted.misfit.filter(|misfit| misfit.ratio < OVERSTATED) {
@@ -45,8 +41,31 @@ pub fn doubts(contents: &Contents<'_>) -> Vec<String> {
         doubts.push(format!("{misfit}: {why}"));
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
-    doubts.extend(verdict(Verdict::Doubtful));
+    doubts.extend(found_out(&report.checks, Verdict::Doubtful));
     doubts
+}
+
+/// The checks with this verdict, a sentence for each subject.
+fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
+    let verdict = verdict.to_string();
+    let mut sentences: Vec<(&str, String)> = Vec::new();
+    for check in checks.iter().filter(|check| check.verdict == verdict) {
+        let subject = check.subject.as_str();
+        if sentences.iter().any(|(told, _)| *told == subject) {
+            continue;
+        }
+        let of_subject = || checks.iter().filter(|check| check.subject == subject);
+        let alike = of_subject().filter(|check| check.verdict == verdict).count();
+        let all = of_subject().count();
+        sentences.push((
+            subject,
+            match alike {
+                1 => format!("{subject}: {}", check.sentence()),
+                _ => format!("{subject}: {alike} of {all} checks, such as {}", check.sentence()),
+            },
+        ));
+    }
+    sentences.into_iter().map(|(_, sentence)| sentence).collect()
 }
 
 /// What gives cause to believe them.
@@ -74,7 +93,11 @@ pub fn merits(contents: &Contents<'_>) -> Vec<String> {
     if let Some(misfit) = misfit.filter(|_| explained) {
         merits.push(format!("{misfit}; 1 is expected"));
     }
-    merits.extend(predicted(contents).filter(|(fit, _)| is_predicted(*fit)).map(|(_, text)| text));
+    if !was_fitted(contents) {
+        merits.extend(
+            predicted(contents).filter(|(fit, _)| is_predicted(*fit)).map(|(_, text)| text),
+        );
+    }
     merits
 }
 
@@ -93,6 +116,20 @@ fn is_predicted(fit_percent: f64) -> bool {
     fit_percent >= POOR_FIT
 }
 
+/// Whether samples that were predicted had been fitted: then the prediction proves little.
+pub fn was_fitted(contents: &Contents<'_>) -> bool {
+    let report = &contents.found.report;
+    report.validation.iter().any(|predicted| {
+        let overlaps = |first: usize, last: usize| {
+            first <= predicted.last_sample && predicted.first_sample <= last
+        };
+        report.records.iter().any(|record| {
+            let window = &record.window;
+            record.file == predicted.file && overlaps(window.first_sample, window.last_sample)
+        })
+    })
+}
+
 /// How well another record is predicted: the poorest channel, in per cent and in words.
 fn predicted(contents: &Contents<'_>) -> impl Iterator<Item = (f64, String)> {
     let validation = contents.found.report.validation.iter();
@@ -103,7 +140,7 @@ fn predicted(contents: &Contents<'_>) -> impl Iterator<Item = (f64, String)> {
         Some((
             least,
             format!(
-                "{}, samples {first} to {last}, which were not fitted: at least {} % of every motion is predicted",
+                "{}, samples {first} to {last}: at least {} % of every motion is predicted",
                 validation.file,
                 significant(least, 3)
             ),

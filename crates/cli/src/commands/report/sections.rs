@@ -287,6 +287,7 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, CliError> {
         p {
             "The identified machine under the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
             ", against the motion measured there."
+            @if judgement::was_fitted(contents) { " Some of these samples were fitted, so agreement proves little." }
         }
         (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
         p.note { "Fit: 100 % less the size of the difference over that of the motion about its mean; 0 % is no better than the mean." }
