@@ -38,7 +38,9 @@ use crate::outcome::Outcome;
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
   mechid report rotor.csv --force fx,fy --displacement x,y --period 1024 --reconstruct-force \\
-      --title 'Rotor at 3000 rpm' --output rotor.html")]
+      --title 'Rotor at 3000 rpm' --output rotor.html
+  mechid report a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
+      --validate c.csv --output rig.html")]
 pub struct PageArgs {
     #[command(flatten)]
     identification: Identification,
