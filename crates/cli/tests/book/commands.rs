@@ -69,7 +69,6 @@ impl Workspace {
             .collect::<Result<_, _>>()?;
         let has = |kind: &str| package.is_some_and(|p| !targets(p, kind).is_empty());
         match task {
-            "run" if own.last() == Some(&"--example") => self.lists_examples(own),
             "run" if !chosen.is_empty() || has("bin") => Ok(()),
             "test" if !chosen.is_empty() => test_knows(&chosen[0], own, settings),
             "bench" if has("bench") => Ok(()),
@@ -90,18 +89,6 @@ impl Workspace {
 
     fn package(&self, name: &str) -> Option<&Value> {
         self.metadata["packages"].as_array().unwrap().iter().find(|p| p["name"] == name)
-    }
-
-    /// Without a name cargo tells which examples there are, and fails.
-    fn lists_examples(&self, options: &[&str]) -> Result<(), String> {
-        let mut arguments = vec!["run", "--offline"];
-        arguments.extend(options);
-        let output = Command::new(env!("CARGO")).current_dir(&self.root).args(arguments).output();
-        let told = String::from_utf8(output.unwrap().stderr).unwrap();
-        match told.contains("Available examples:\n    0") {
-            true => Ok(()),
-            false => Err(told),
-        }
     }
 
     /// The folder's package brings the program of this book.
@@ -217,7 +204,7 @@ fn what_is_not_there_is_found() {
     let workspace = Workspace::of(&crate::root());
     for line in [
         "cargo run --package mechid-cli -- identify",
-        "cargo run --package mechid --example",
+        "cargo run --package mechid --example 01_identify_a_record",
         "cargo bench -p mechid-integrate",
         "MECHID_BLESS=1 cargo test -p mechid-cli --test book fits # and so on",
         "cargo install --path crates/cli",
