@@ -267,7 +267,7 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
 }
 
 /// What a residual that is no noise can come from, where another method would leave less.
-fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
+pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     (fitted.least_squares && warned("after") && !warned("before")).then(|| {
         "least squares takes the measured motion as exact, and noise on it biases the parameters; \

@@ -236,11 +236,14 @@ pub fn correlations(part: &Part<'_>, found: &[Correlations]) -> Result<Drawn, Cl
             figure = figure.panel(panel);
         }
     }
-    drawn(
-        part.id("correlations"),
-        figure,
-        "Autocorrelation of what the fit leaves, and its correlation with the force; 95 % of the stems of white noise stay between the dashed lines.".into(),
-    )
+    let spanned = match found.iter().map(|channel| channel.span).max() {
+        None | Some(0) => String::new(),
+        Some(span) => format!(" Noise on the motion correlates it over {span} lags by itself."),
+    };
+    let caption = format!(
+        "Autocorrelation of what the fit leaves, and its correlation with the force; 95 % of the stems of white noise stay between the dashed lines.{spanned}"
+    );
+    drawn(part.id("correlations"), figure, caption)
 }
 
 /// The force found and the one measured.

@@ -42,6 +42,7 @@ pub fn doubts(contents: &Contents<'_>) -> Vec<String> {
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
     doubts.extend(found_out(&report.checks, Verdict::Doubtful));
+    doubts.extend(identify::of_least_squares(&contents.found.fitted, &report.checks));
     doubts
 }
 
@@ -99,17 +100,6 @@ pub fn merits(contents: &Contents<'_>) -> Vec<String> {
         );
     }
     merits
-}
-
-/// What to do about a force that the residual still knows.
-pub fn advice(contents: &Contents<'_>) -> Option<&'static str> {
-    let report = &contents.found.report;
-    let cross = Subject::CrossCorrelation.to_string();
-    let left = report.checks.iter().any(|check| check.subject == cross && check.is_conspicuous());
-    (left && report.domain == "frequency" && contents.found.fitted.misfit.is_none()).then_some(
-        "Where the motion is noisy, least squares leaves more of a resonance behind than --method \
-         maximum-likelihood.",
-    )
 }
 
 fn is_predicted(fit_percent: f64) -> bool {

@@ -23,6 +23,8 @@ pub struct Residual {
 /// Correlations of one channel of a residual.
 pub struct Correlations {
     pub own: Correlation,
+    /// Lags over which noise on the motion correlates it.
+    pub span: usize,
     /// With each force that acts, by its degree of freedom counted from 0.
     pub forces: Vec<(usize, Correlation)>,
 }
@@ -54,7 +56,8 @@ pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
 
 /// At the lags at which `mechid identify` judges the residual.
 fn correlations(residual: &fit::Residual) -> Result<Vec<Correlations>, CliError> {
-    let lags = LAGS.min(residual.left.len() / SAMPLES_PER_LAG);
+    let span = residual.noise_span;
+    let lags = LAGS.min(residual.left.len().saturating_sub(span) / SAMPLES_PER_LAG);
     if lags == 0 {
         return Ok(Vec::new());
     }
@@ -64,7 +67,7 @@ fn correlations(residual: &fit::Residual) -> Result<Vec<Correlations>, CliError>
         let own = residual.left.channel(channel);
         let with = |c: usize| Ok((c, cross_correlation(own, force.channel(c), lags)?));
         let forces = acting().map(with).collect::<Result<_, CliError>>()?;
-        Ok(Correlations { own: whiteness(own, lags)?, forces })
+        Ok(Correlations { own: whiteness(own, lags)?, span, forces })
     };
     (0..residual.left.channels()).map(of).collect()
 }

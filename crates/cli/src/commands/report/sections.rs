@@ -233,7 +233,6 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, CliError> {
                  against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."
             }
         }
-        @if let Some(advice) = judgement::advice(contents) { p.note { (advice) } }
     })
 }
 
