@@ -1,6 +1,6 @@
 //! What can go wrong between the command line and the result.
 
-use mechid::signal::told;
+use mechid::signal::{told, told_to};
 
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
@@ -123,8 +123,9 @@ pub enum CliError {
     /// No line of the band is driven.
     #[error(
         "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
-         {first_hz:.6} and {last_hz:.6} Hz",
-        low_hz = told(*low_hz), high_hz = told(*high_hz)
+         {first_hz} and {last_hz} Hz",
+        low_hz = told(*low_hz), high_hz = told(*high_hz),
+        first_hz = told_to(*first_hz, 6), last_hz = told_to(*last_hz, 6)
     )]
     EmptyBand {
         /// Lower end asked for, in Hz.

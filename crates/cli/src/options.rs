@@ -48,6 +48,9 @@ pub struct RecordArgs {
     /// is a column called after its node and direction, such as 12+Z, and brings its time axis.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
+    /// Lines of text above the table, such as an instrument writes them, to leave out: a count
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    pub skip_lines: u64,
     /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
     /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
     /// column called time or t]
@@ -99,7 +102,7 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 impl RecordArgs {
     /// The file as a table.
     pub fn table(&self) -> Result<Table, CliError> {
-        Ok(Table::read(&self.record)?)
+        Ok(Table::read_below(&self.record, self.skip_lines)?)
     }
 
     /// The time axis asked for, that of the file, or the time column found by its name.

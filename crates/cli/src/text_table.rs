@@ -20,6 +20,38 @@ pub fn text_table(rows: &[Vec<String>]) -> String {
     text
 }
 
+/// Columns that fit beside one another on a page.
+const PAGE: usize = 100;
+
+/// As [`text_table`], in several tables one below the other where one would be too wide; each begins
+/// with the first column, and has no rows that say nothing more. The first table has the first
+/// columns, as many as stay `together`.
+pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
+    let columns = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let part = |chosen: &[usize]| {
+        let pick = |row: &Vec<String>| -> Vec<String> {
+            chosen.iter().map(|c| row.get(*c).cloned().unwrap_or_default()).collect()
+        };
+        let says = |row: &Vec<String>| row.iter().skip(1).any(|cell| !cell.is_empty());
+        text_table(&rows.iter().map(pick).filter(says).collect::<Vec<_>>())
+    };
+    let fits = |chosen: &[usize]| part(chosen).lines().all(|line| line.chars().count() <= PAGE);
+    if fits(&(0..columns).collect::<Vec<_>>()) {
+        return text_table(rows);
+    }
+    let mut pages = vec![(0..together.min(columns)).collect::<Vec<usize>>()];
+    for column in together..columns {
+        let last = pages.len() - 1;
+        let wider = [pages[last].as_slice(), &[column]].concat();
+        if last > 0 && fits(&wider) {
+            pages[last] = wider;
+        } else {
+            pages.push(vec![0, column]);
+        }
+    }
+    pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
+}
+
 /// `value` with so many significant digits; scientific where plain notation would be long.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
@@ -56,6 +88,24 @@ mod tests {
     fn columns_are_aligned() {
         let rows = [["a", "value"], ["long name", "1"]].map(|r| r.map(String::from).to_vec());
         assert_eq!(text_table(&rows), "a          value\nlong name      1\n");
+    }
+
+    #[test]
+    fn a_table_too_wide_for_a_page_goes_on_below() {
+        let row = |of: &str| (0..9).map(|c| format!("{of}{c} of twenty letters")).collect();
+        let rows: Vec<Vec<String>> = vec![row("a"), row("b")];
+        let text = paged_table(&rows, 2);
+        let pages: Vec<&str> = text.split("\n\n").collect();
+        assert!(text.lines().all(|line| line.chars().count() <= 100), "{text}");
+        assert_eq!(pages.len(), 4, "{text}");
+        assert!(pages.iter().all(|page| page.starts_with("a0 of ")), "{text}");
+        for cell in rows.concat() {
+            let times = if cell.contains("0 of") { 4 } else { 1 };
+            assert_eq!(text.matches(&cell).count(), times, "{cell}");
+        }
+        // Nothing changes where a page is wide enough.
+        let narrow: Vec<Vec<String>> = rows.iter().map(|row| row[..4].to_vec()).collect();
+        assert_eq!(paged_table(&narrow, 2), text_table(&narrow));
     }
 
     #[test]

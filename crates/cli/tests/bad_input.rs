@@ -114,6 +114,22 @@ fn ragged_rows() {
 }
 
 #[test]
+fn lines_above_the_table() {
+    let text = format!("Analyser 7\nRate;250\n\n{}", good());
+    let parts = ["a.csv: the table seems to begin on line 4, with 3 fields", "--skip-lines 3"];
+    identify(&text, "", &parts);
+    refused(&text, "info a.csv", &parts);
+    // Too many: the names are gone.
+    identify(&text, "--skip-lines 4 --sample-rate 250", &["a.csv has no column \"force\""]);
+}
+
+#[test]
+fn json_for_a_record() {
+    let parts = ["a.csv is JSON, no table of samples", "simulate", "force --system"];
+    identify("{ \"system\": { \"mass\": 1 } }", "", &parts);
+}
+
+#[test]
 fn empty_record() {
     identify("", "", &["a.csv holds no data: it is empty"]);
     identify("time,force,x\n", "", &["a.csv holds no data: there is a header and nothing below"]);

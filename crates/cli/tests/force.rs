@@ -76,10 +76,11 @@ fn the_force_of_the_record_comes_back() {
     // Noise of 1 % on the displacement, more at the lines far above the resonance; what is seen
     // is within what is stated, give or take one draw.
     assert!(seen < 3.0 * stated / size, "seen {seen:.3}, stated {:.3}", stated / size);
+    // Lines 4 to 60, 0.5 Hz apart, and no others.
     let amplitude = column(&folder.join("lines.csv"), "amplitude");
-    assert!((amplitude[10] - 2.0).abs() < 0.2, "{}", amplitude[10]);
-    assert_eq!(amplitude.len(), 129);
-    assert!(amplitude[70] < 1e-12, "a line that was not chosen: {}", amplitude[70]);
+    let frequency = column(&folder.join("lines.csv"), "frequency_hz");
+    assert_eq!((frequency.len(), frequency[0], frequency[56]), (57, 2.0, 30.0));
+    assert!((amplitude[6] - 2.0).abs() < 0.2, "{}", amplitude[6]);
     let drawing = std::fs::read_to_string(folder.join("force.svg")).unwrap();
     assert!(drawing.starts_with("<svg") && drawing.contains("Frequency"));
 }
@@ -177,4 +178,16 @@ fn bad_requests_say_what_to_change() {
     }
     let missing = format!("force run.csv --system nowhere.json {displacement}");
     assert!(mechid(folder, &missing).unwrap_err().contains("nowhere.json"));
+}
+
+#[test]
+fn the_noise_of_a_channel_has_the_unit_of_its_motion() {
+    let folder = experiment();
+    let common = "force run.csv --system machine.json --period 256 --method shrinkage";
+    for (motion, unit) in [("displacement", "m"), ("velocity", "m/s"), ("acceleration", "m/s²")] {
+        let found = report(folder.path(), &format!("{common} --{motion} {motion}"));
+        let chosen = found["chosen"].as_array().unwrap();
+        let noise = chosen.iter().find(|c| c["name"] == "noise of channel 1").unwrap();
+        assert_eq!(noise["unit"], unit);
+    }
 }

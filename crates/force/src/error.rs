@@ -1,7 +1,7 @@
 //! What can keep a force from being reconstructed.
 
 use mechid_model::{Matrix, ModelError};
-use mechid_signal::SignalError;
+use mechid_signal::{SignalError, told_to};
 
 /// A force that cannot be reconstructed; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -94,10 +94,11 @@ pub enum ForceError {
     },
     /// The measured channels do not show a force at this line.
     #[error(
-        "at line {line} (ω = {omega:.6} rad/s) the machine transmits nothing of the force on \
+        "at line {line} (ω = {} rad/s) the machine transmits nothing of the force on \
          degree of freedom {dof} (counted from 0) to the measured channels (reciprocal \
          condition {reciprocal_condition:.1e}): leave the line out, measure another degree of \
-         freedom or quantity, or name fewer forces"
+         freedom or quantity, or name fewer forces",
+        told_to(*omega, 6)
     )]
     NotTransmitted {
         /// The line.
@@ -111,8 +112,9 @@ pub enum ForceError {
     },
     /// The dynamic stiffness is singular: no periodic response exists at this line.
     #[error(
-        "at line {line} (ω = {omega:.6} rad/s) the dynamic stiffness is singular: an undamped \
-         resonance has no periodic response; leave the line out"
+        "at line {line} (ω = {} rad/s) the dynamic stiffness is singular: an undamped \
+         resonance has no periodic response; leave the line out",
+        told_to(*omega, 6)
     )]
     Resonance {
         /// The line.

@@ -60,9 +60,32 @@ pub enum IoError {
         /// How.
         what: String,
     },
-    /// The file has a text encoding this reader does not know.
-    #[error("{file} is UTF-16 text; save it as UTF-8 (in a spreadsheet: \"CSV UTF-8\")")]
-    Encoding {
+    /// The file is JSON, which holds descriptions and reports.
+    #[error(
+        "{file} is JSON, no table of samples: simulate, sweep and stability read the description of \
+         an experiment, force --system and modal read a machine or a report of identify"
+    )]
+    JsonRecord {
+        /// The file.
+        file: String,
+    },
+    /// Text stands above the table.
+    #[error(
+        "{file}: the table seems to begin on line {line}, with {fields} fields; if so, leave out what \
+         stands above it with --skip-lines {}",
+        line - 1
+    )]
+    AboveTable {
+        /// The file.
+        file: String,
+        /// Line of the file with the header, or with the first row of numbers.
+        line: u64,
+        /// Fields of the table.
+        fields: usize,
+    },
+    /// Lines are to be skipped where there are none.
+    #[error("{file} is no text: it has no lines to skip")]
+    NothingToSkip {
         /// The file.
         file: String,
     },

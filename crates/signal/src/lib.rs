@@ -39,6 +39,7 @@
 //! | values between samples | [`resample`] |
 
 pub mod crest;
+mod driven;
 mod error;
 pub mod excitation;
 pub mod lines;
@@ -55,6 +56,7 @@ pub mod spectrum;
 mod told;
 
 pub use crest::CrestSearch;
+pub use driven::driven_lines;
 pub use error::SignalError;
 pub use multisine::Multisine;
 pub use noise::NoiseLevel;
@@ -64,4 +66,4 @@ pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
-pub use told::told;
+pub use told::{told, told_to};

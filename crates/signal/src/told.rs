@@ -15,7 +15,31 @@ pub fn told(value: f64) -> impl fmt::Display {
     Told(value)
 }
 
+/// The same with so many decimals where it is shown in full.
+///
+/// ```
+/// use mechid_signal::told_to;
+///
+/// assert_eq!(told_to(0.25, 6).to_string(), "0.250000");
+/// assert_eq!(told_to(1e300, 6).to_string(), "1e300");
+/// ```
+pub fn told_to(value: f64, decimals: usize) -> impl fmt::Display {
+    ToldTo(value, decimals)
+}
+
 struct Told(f64);
+
+struct ToldTo(f64, usize);
+
+impl fmt::Display for ToldTo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(value, decimals) = self;
+        match IN_FULL.contains(&value.abs()) || *value == 0.0 {
+            true => write!(f, "{value:.decimals$}"),
+            false => Told(*value).fmt(f),
+        }
+    }
+}
 
 /// Magnitudes that are short enough in full.
 const IN_FULL: std::ops::Range<f64> = 1e-5..1e15;
@@ -33,7 +57,7 @@ impl fmt::Display for Told {
 
 #[cfg(test)]
 mod tests {
-    use super::told;
+    use super::{told, told_to};
 
     #[test]
     fn short_numbers_in_full_and_long_ones_with_an_exponent() {
@@ -51,6 +75,19 @@ mod tests {
             (f64::NEG_INFINITY, "-inf"),
         ] {
             assert_eq!(told(value).to_string(), text);
+        }
+    }
+
+    #[test]
+    fn decimals_only_where_the_number_is_shown_in_full() {
+        for (value, text) in [
+            (0.0, "0.000"),
+            (-23.4375, "-23.438"),
+            (1e300, "1e300"),
+            (2e-9, "2e-9"),
+            (f64::INFINITY, "inf"),
+        ] {
+            assert_eq!(told_to(value, 3).to_string(), text);
         }
     }
 }

@@ -114,3 +114,38 @@ fn what_cannot_be_shown_is_told() {
     assert!(text.contains("left out: time axis: b.csv: the time steps are not uniform"), "{text}");
     super::refused(folder.path(), "info b.csv --time time");
 }
+
+#[test]
+fn a_table_below_other_lines_and_in_utf16_is_the_same_table() {
+    let folder = folder();
+    let text = fs::read_to_string(folder.path().join("timed.csv")).unwrap();
+    let told = mechid(folder.path(), "info timed.csv");
+    fs::write(folder.path().join("above.csv"), format!("Analyser 7\n\nRate 100\n{text}")).unwrap();
+    let above = mechid(folder.path(), "info above.csv --skip-lines 3");
+    assert_eq!(above, told.replace("timed.csv", "above.csv"));
+    let text = format!("\u{feff}{text}");
+    let wide: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    fs::write(folder.path().join("wide.csv"), wide).unwrap();
+    let wide = mechid(folder.path(), "info wide.csv");
+    let told = told.replace(
+        "timed.csv: text, fields between commas",
+        "wide.csv: text, fields between commas, in UTF-16",
+    );
+    assert_eq!(wide, told);
+}
+
+/// The mean of whole periods of a sine is zero, of which summing leaves a rounding; an offset of as
+/// little as 1e-12 of the sine is none.
+#[test]
+fn a_mean_of_zero_is_told_as_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("t,sine,offset\n");
+    for k in 0..300 {
+        let sine = 1e3 * (TAU * f64::from(k) / 50.0).sin();
+        writeln!(text, "{k},{sine:?},{:?}", sine + 1e-9).unwrap();
+    }
+    fs::write(folder.path().join("a.csv"), text).unwrap();
+    let report = info(&folder, "a.csv --columns sine,offset");
+    assert_eq!(report["channels"][0]["mean"], 0.0);
+    close(&report["channels"][1]["mean"], 1e-9, 1e-11);
+}

@@ -3,6 +3,7 @@
 mod checks;
 mod identification;
 mod info;
+mod lines;
 mod modal;
 mod records;
 mod reference;

@@ -154,3 +154,30 @@ fn settings_belong_to_what_is_swept() {
     let thinned = told("sweep a.json --decimate 0.0625,0.125 --estimator euler --json");
     assert_eq!(errors(&thinned), [errors(&rates)[1], errors(&rates)[0]]);
 }
+
+#[test]
+fn a_machine_of_many_parameters_fits_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let experiment = r#"{
+        "system": { "mass": [[10, 0], [0, 12]], "damping": [[180, -20], [-20, 160]],
+                    "stiffness": [[5000, -900], [-900, 7000]] },
+        "sampling": { "samples": 256, "rate_hz": 64 },
+        "excitation": [{ "lines": "1:2:99", "amplitude": 5, "phases": "schroeder" },
+                       { "dof": 2, "lines": "2:2:100", "amplitude": 5, "phases": "schroeder" }]
+    }"#;
+    fs::write(folder.path().join("a.json"), experiment).unwrap();
+    let text = super::mechid(
+        folder.path(),
+        "sweep a.json --npi 2:2:6 --estimator least-squares --unknown-mass",
+    );
+    let blocks: Vec<&str> = text.split("\n\n").filter(|block| block.starts_with("NPI ")).collect();
+    assert_eq!(blocks.len(), 4, "{text}");
+    for row in blocks.iter().flat_map(|block| block.lines()) {
+        assert!(row.chars().count() <= 100, "{row}");
+    }
+    for name in ["m11", "m22", "c12", "c21", "k11", "k21", "k22"] {
+        assert_eq!(text.matches(&format!("{name} (")).count(), 1, "{name}\n{text}");
+    }
+    // Each block of parameters has a row per setting, and the truth.
+    assert!(blocks[1..].iter().all(|b| b.lines().count() == 5 && b.contains("\ntrue ")), "{text}");
+}

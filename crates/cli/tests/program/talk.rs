@@ -1,5 +1,6 @@
 //! How the program talks: scripts for shells, no colours into pipes, nothing when told to be quiet.
 
+use std::f64::consts::PI;
 use std::fs;
 use std::process::Command;
 
@@ -64,4 +65,30 @@ fn quiet_success_says_nothing_and_quiet_failure_says_what_is_wrong() {
     assert_eq!(mechid(folder.path(), "info a.csv --quiet"), "");
     let message = refused(folder.path(), "info a.csv --columns x --quiet");
     assert!(message.starts_with("error: a.csv has no column \"x\""), "{message}");
+}
+
+/// A random walk where a motion should be: warnings and notes, a line each and no gaps.
+#[test]
+fn warnings_stand_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("time,f,x\n");
+    let (mut noise, mut x) = (1_u32, 0.0);
+    for k in 0..256 {
+        noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        let f: f64 = [3, 7, 11].iter().map(|n| (f64::from(n * k) / 64.0 * PI).sin()).sum();
+        x += f64::from(noise >> 16) - 32_768.0;
+        text += &format!("{},{f},{x}\n", 0.01 * f64::from(k));
+    }
+    fs::write(folder.path().join("a.csv"), text).unwrap();
+    let told = mechid(folder.path(), "identify a.csv --force f --displacement x --period 128");
+    let lines: Vec<&str> = told.lines().collect();
+    let of = |kind: &str| -> Vec<usize> {
+        (0..lines.len()).filter(|at| lines[*at].starts_with(kind)).collect()
+    };
+    for kind in ["warning, ", "note: "] {
+        let at = of(kind);
+        assert!(at.len() > 1, "{told}");
+        assert!(at.windows(2).all(|pair| pair[1] == pair[0] + 1), "{told}");
+        assert_eq!(lines[at[0] - 1], "", "{told}");
+    }
 }

@@ -1,6 +1,8 @@
 //! How a text tells fields, comments and numbers.
 
-use std::io::{self, BufRead, Read as _};
+use std::io::{self, BufRead, Read};
+
+use csv::{Reader, ReaderBuilder, Trim};
 
 /// What stands between two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,6 +65,22 @@ pub(crate) fn detect(text: &[u8]) -> Delimiter {
         .into_iter()
         .find(|byte| usual(*byte))
         .map_or(Delimiter::Blanks, Delimiter::Byte)
+}
+
+/// The fields of a line that stand between blanks.
+pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// The rows of a text whose fields stand between delimiters.
+pub(crate) fn fields<R: Read>(text: R, delimiter: u8) -> Reader<R> {
+    ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter)
+        .comment(Some(COMMENT))
+        .trim(Trim::All)
+        .from_reader(text)
 }
 
 fn outside_quotes(line: &[u8], byte: u8) -> bool {

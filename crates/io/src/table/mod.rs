@@ -2,6 +2,7 @@
 
 mod column;
 mod dialect;
+mod preamble;
 mod source;
 mod text;
 mod time_axis;
@@ -33,7 +34,9 @@ use crate::{IoError, mat, uff};
 ///   decimal comma is understood.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
 ///   numbers only. A second row without any number holds their units.
-/// - Lines that start with `#`, and empty lines, are left out.
+/// - Lines that start with `#`, and empty lines, are left out; so are lines above the table, if
+///   [`Table::read_below`] says how many there are.
+/// - UTF-16 is understood where the file begins with a byte order mark.
 ///
 /// A column is chosen by its name, or by its number counted from 1; one that nobody asks for may
 /// hold anything. Only numbers are held, never the text.
@@ -41,6 +44,7 @@ use crate::{IoError, mat, uff};
 pub struct Table {
     file: String,
     gzip: bool,
+    utf16: bool,
     names: Vec<String>,
     contents: Contents,
 }
@@ -67,31 +71,42 @@ impl Table {
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Table::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::from_source(Source::open(path.as_ref())?)
+        Self::read_below(path, 0)
+    }
+
+    /// The table in a file that begins below some lines of text, which a measuring program wrote
+    /// above it.
+    ///
+    /// # Errors
+    /// As [`Table::read`], and [`IoError::NothingToSkip`] if the file is no text.
+    pub fn read_below(path: impl AsRef<Path>, lines: u64) -> Result<Self, IoError> {
+        Self::from_source(Source::open(path.as_ref())?, lines)
     }
 
     /// The table in the bytes of a file; `file` is how messages call it.
     ///
     /// # Errors
     /// [`IoError::Empty`] without data, [`IoError::Ragged`] where the number of fields changes,
-    /// [`IoError::Encoding`] for UTF-16, [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
+    /// [`IoError::AboveTable`] where that is because something stands above it,
+    /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
     /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`].
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
-        Self::from_source(Source::new(file.into(), bytes)?)
+        Self::from_source(Source::new(file.into(), bytes)?, 0)
     }
 
-    fn from_source(mut source: Source<'_>) -> Result<Self, IoError> {
-        let (file, gzip) = (source.file.clone(), source.gzip);
+    fn from_source(mut source: Source<'_>, skip: u64) -> Result<Self, IoError> {
+        let (file, gzip, utf16) = (source.file.clone(), source.gzip, source.utf16);
         let contents = match source.kind() {
-            Kind::Text => text::read(source)?,
+            Kind::Text => text::read(source, skip)?,
+            Kind::Json => return Err(IoError::JsonRecord { file }),
+            Kind::Mat5 | Kind::Uff if skip > 0 => return Err(IoError::NothingToSkip { file }),
             Kind::Mat5 => mat::read(&file, &source.bytes()?)?,
             Kind::Uff => uff::read(&file, &source.bytes()?)?,
-            Kind::Utf16 => return Err(IoError::Encoding { file }),
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
         let names = contents.columns.iter().map(|column| column.name.clone()).collect();
-        Ok(Self { file, gzip, names, contents })
+        Ok(Self { file, gzip, utf16, names, contents })
     }
 
     /// How messages call the file.
@@ -101,8 +116,9 @@ impl Table {
 
     /// What a person calls its format.
     pub fn format(&self) -> String {
+        let encoding = if self.utf16 { ", in UTF-16" } else { "" };
         let around = if self.gzip { ", in gzip" } else { "" };
-        format!("{}{around}", self.contents.format)
+        format!("{}{encoding}{around}", self.contents.format)
     }
 
     /// Number of columns, nameless ones included.

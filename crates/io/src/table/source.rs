@@ -1,15 +1,19 @@
-//! The bytes of a file, out of their gzip if they are in one, and what format they are.
+//! The bytes of a file, out of their gzip if they are in one, text as UTF-8, and what format they are.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read as _};
 use std::path::Path;
 
+use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
 use crate::IoError;
 
 /// Bytes asked of the operating system at a time.
 const CHUNK: usize = 1 << 16;
+
+/// What some programs put before UTF-8.
+pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// Bytes by which a format is told.
 const HEAD: u64 = 512;
@@ -19,6 +23,8 @@ pub(crate) struct Source<'a> {
     pub file: String,
     /// Whether it is read through gzip.
     pub gzip: bool,
+    /// Whether it was UTF-16 and is read as UTF-8.
+    pub utf16: bool,
     /// Its first bytes, which stand in `reader` too.
     head: Vec<u8>,
     pub reader: Box<dyn BufRead + 'a>,
@@ -28,7 +34,7 @@ pub(crate) struct Source<'a> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Text,
-    Utf16,
+    Json,
     /// MATLAB level 5, which its versions 5 to 7.2 write.
     Mat5,
     /// HDF5, which MATLAB writes since version 7.3 on request.
@@ -49,24 +55,25 @@ impl<'a> Source<'a> {
 
     /// Looks at the first bytes of a stream; `file` is how messages call it.
     pub fn new(file: String, mut raw: impl BufRead + 'a) -> Result<Self, IoError> {
-        let (mut magic, mut gzip) = (Vec::new(), false);
+        let (mut magic, mut gzip, mut utf16) = (Vec::new(), false, false);
         let looked = raw.by_ref().take(2).read_to_end(&mut magic).and_then(|_| {
             gzip = magic == [0x1f, 0x8b];
             let whole = Cursor::new(magic).chain(raw);
-            let mut stream: Box<dyn BufRead + 'a> = if gzip {
+            let stream: Box<dyn BufRead + 'a> = if gzip {
                 Box::new(BufReader::with_capacity(CHUNK, MultiGzDecoder::new(whole)))
             } else {
                 Box::new(whole)
             };
-            let mut head = Vec::new();
-            stream.by_ref().take(HEAD).read_to_end(&mut head)?;
+            let (mut head, mut stream) = peek(stream)?;
+            utf16 = is_utf16(&head);
+            if utf16 {
+                let text = DecodeReaderBytesBuilder::new().strip_bom(true).build(stream);
+                (head, stream) = peek(Box::new(BufReader::with_capacity(CHUNK, text)))?;
+            }
             Ok((head, stream))
         });
         match looked {
-            Ok((head, rest)) => {
-                let reader = Box::new(Cursor::new(head.clone()).chain(rest));
-                Ok(Self { file, gzip, head, reader })
-            }
+            Ok((head, reader)) => Ok(Self { file, gzip, utf16, head, reader }),
             Err(source) => Err(failed(&file, gzip, source)),
         }
     }
@@ -74,9 +81,7 @@ impl<'a> Source<'a> {
     /// What format the file has.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
-        if head.starts_with(&[0xff, 0xfe]) || head.starts_with(&[0xfe, 0xff]) {
-            Kind::Utf16
-        } else if head.starts_with(b"MATLAB 5.0 MAT-file") {
+        if head.starts_with(b"MATLAB 5.0 MAT-file") {
             Kind::Mat5
         } else if head.starts_with(b"MATLAB 7.3 MAT-file") || head.starts_with(b"\x89HDF\r\n") {
             Kind::Hdf5
@@ -84,6 +89,8 @@ impl<'a> Source<'a> {
             Kind::Uff
         } else if head.contains(&0) {
             Kind::Unknown
+        } else if is_json(head) {
+            Kind::Json
         } else {
             Kind::Text
         }
@@ -96,6 +103,30 @@ impl<'a> Source<'a> {
             Ok(_) => Ok(bytes),
             Err(source) => Err(failed(&self.file, self.gzip, source)),
         }
+    }
+}
+
+/// The first bytes of a stream, and the stream with them still in it.
+fn peek<'a>(mut stream: Box<dyn BufRead + 'a>) -> io::Result<(Vec<u8>, Box<dyn BufRead + 'a>)> {
+    let mut head = Vec::new();
+    stream.by_ref().take(HEAD).read_to_end(&mut head)?;
+    Ok((head.clone(), Box::new(Cursor::new(head).chain(stream))))
+}
+
+/// Whether the first bytes are the byte order mark of UTF-16, and not that of UTF-32.
+fn is_utf16(head: &[u8]) -> bool {
+    let little = head.starts_with(&[0xff, 0xfe]) && !head.starts_with(&[0xff, 0xfe, 0, 0]);
+    little || head.starts_with(&[0xfe, 0xff])
+}
+
+/// Whether a text begins as an object of JSON does, or a list of objects.
+fn is_json(head: &[u8]) -> bool {
+    let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
+    let mut marks = text.iter().filter(|b| !b.is_ascii_whitespace());
+    match (marks.next(), marks.next()) {
+        (Some(b'{'), Some(b'"' | b'}') | None) => true,
+        (Some(b'['), Some(b'{')) => true,
+        _ => false,
     }
 }
 

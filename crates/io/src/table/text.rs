@@ -2,49 +2,42 @@
 
 use std::io::{self, BufRead, Read};
 
-use csv::{ByteRecord, ReaderBuilder, Trim};
+use csv::ByteRecord;
 
 use super::column::{Axis, Column, Lines, Place, Unusable};
-use super::source::{Source, failed};
-use super::{Contents, dialect};
+use super::source::{BYTE_ORDER_MARK, Source, failed};
+use super::{Contents, dialect, preamble};
 use crate::IoError;
 use dialect::{COMMENT, Delimiter, number};
 
-/// The table in a text.
-pub(crate) fn read(source: Source<'_>) -> Result<Contents, IoError> {
+/// The table in a text, below some lines that are skipped.
+pub(crate) fn read(source: Source<'_>, skip: u64) -> Result<Contents, IoError> {
     let Source { file, gzip, mut reader, .. } = source;
     let wrong = |e| failed(&file, gzip, e);
-    let start = dialect::first_lines(&mut reader).map_err(wrong)?;
-    let text = start.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&start);
-    let delimiter = dialect::detect(text);
-    let mut stream = NumberedLines::new(text.chain(reader));
-    let mut rows = Rows::new(&file, delimiter);
-    match delimiter {
-        Delimiter::Blanks => {
-            while let Some((line, content)) = stream.next_line().map_err(wrong)? {
-                let words = content.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-                let fields: ByteRecord = words.collect();
-                if fields.get(0).is_some_and(|word| word[0] != COMMENT) {
-                    rows.push(line, &fields)?;
-                }
-            }
-        }
-        Delimiter::Byte(byte) => {
-            let mut reader = ReaderBuilder::new()
-                .has_headers(false)
-                .flexible(true)
-                .delimiter(byte)
-                .comment(Some(COMMENT))
-                .trim(Trim::All)
-                .from_reader(stream);
-            let mut fields = ByteRecord::new();
-            while reader.read_byte_record(&mut fields).map_err(|e| wrong(plain(e)))? {
-                let from = fields.position().map_or(0, csv::Position::line);
-                rows.push(reader.get_ref().row_from(from), &fields)?;
-            }
-        }
+    for _ in 0..skip {
+        reader.skip_until(b'\n').map_err(wrong)?;
     }
-    rows.finish(delimiter.name())
+    let start = dialect::first_lines(&mut reader).map_err(wrong)?;
+    let text = start.strip_prefix(BYTE_ORDER_MARK).unwrap_or(&start);
+    let delimiter = dialect::detect(text);
+    let mut stream = NumberedLines::new(text.chain(reader), skip);
+    let mut rows = Rows::new(&file, delimiter);
+    let taken = match delimiter {
+        Delimiter::Blanks => rows.take_words(&mut stream, wrong),
+        Delimiter::Byte(byte) => rows.take_fields(stream, byte, wrong),
+    };
+    let first = rows.shape.map(|shape| shape.line);
+    let contents = taken.and_then(|()| rows.finish(delimiter.name()));
+    let Some(table) = preamble::table(text).filter(|table| first < Some(skip + table.line)) else {
+        return contents;
+    };
+    match contents {
+        // Whatever else is wrong, it is no wonder.
+        Err(IoError::Ragged { .. }) => {}
+        Ok(contents) if contents.columns.len() < table.fields => {}
+        other => return other,
+    }
+    Err(IoError::AboveTable { line: skip + table.line, fields: table.fields, file })
 }
 
 /// What the operating system or the decompressor said, without the csv reader's words around it.
@@ -61,15 +54,18 @@ struct NumberedLines<R> {
     line: Vec<u8>,
     /// Bytes of `line` that were handed out.
     given: usize,
-    /// Lines read so far.
+    /// Number of the line before the first.
+    first: u64,
+    /// Number of the line read last.
     count: u64,
     /// First and last of each run of lines that hold no row: empty ones and comments.
     idle: Vec<(u64, u64)>,
 }
 
 impl<R: BufRead> NumberedLines<R> {
-    fn new(text: R) -> Self {
-        Self { text, line: Vec::new(), given: 0, count: 0, idle: Vec::new() }
+    /// A text that follows so many lines.
+    fn new(text: R, first: u64) -> Self {
+        Self { text, line: Vec::new(), given: 0, first, count: first, idle: Vec::new() }
     }
 
     /// The next line and its number.
@@ -94,8 +90,9 @@ impl<R: BufRead> NumberedLines<R> {
         Ok(Some((self.count, &self.line)))
     }
 
-    /// The first line from `line` on that holds a row.
+    /// The first line from `line` on, of those handed out, that holds a row.
     fn row_from(&self, line: u64) -> u64 {
+        let line = self.first + line;
         let after = self.idle.partition_point(|(first, _)| *first <= line);
         match after.checked_sub(1).map(|run| self.idle[run]) {
             Some((_, last)) if last >= line => last + 1,
@@ -136,9 +133,10 @@ struct Rows<'a> {
     empty: Vec<(u64, usize)>,
 }
 
-/// Fields of the first row: all of them, and up to the last that is not empty.
+/// The first row: its line, and its fields, all of them and up to the last that is not empty.
 #[derive(Debug, Clone, Copy)]
 struct Shape {
+    line: u64,
     width: usize,
     filled: usize,
 }
@@ -158,6 +156,37 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// Every row of a text with blanks between its fields.
+    fn take_words(
+        &mut self,
+        stream: &mut NumberedLines<impl BufRead>,
+        wrong: impl Fn(io::Error) -> IoError,
+    ) -> Result<(), IoError> {
+        while let Some((line, content)) = stream.next_line().map_err(&wrong)? {
+            let fields: ByteRecord = dialect::words(content).collect();
+            if fields.get(0).is_some_and(|word| word[0] != COMMENT) {
+                self.push(line, &fields)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Every row of a text with a delimiter between its fields.
+    fn take_fields(
+        &mut self,
+        stream: NumberedLines<impl BufRead>,
+        delimiter: u8,
+        wrong: impl Fn(io::Error) -> IoError,
+    ) -> Result<(), IoError> {
+        let mut reader = dialect::fields(stream, delimiter);
+        let mut fields = ByteRecord::new();
+        while reader.read_byte_record(&mut fields).map_err(|e| wrong(plain(e)))? {
+            let from = fields.position().map_or(0, csv::Position::line);
+            self.push(reader.get_ref().row_from(from), &fields)?;
+        }
+        Ok(())
+    }
+
     /// One more row.
     fn push(&mut self, line: u64, fields: &ByteRecord) -> Result<(), IoError> {
         if fields.iter().all(<[u8]>::is_empty) {
@@ -175,7 +204,7 @@ impl<'a> Rows<'a> {
         let filled = fields.iter().rposition(|field| !field.is_empty()).map_or(0, |last| last + 1);
         match self.shape {
             None => {
-                let shape = Shape { width: fields.len(), filled };
+                let shape = Shape { line, width: fields.len(), filled };
                 self.shape = Some(shape);
                 self.columns = (0..shape.width).map(|_| new_column()).collect();
                 if self.take_header(fields) {

@@ -82,7 +82,13 @@ impl Binary {
         match (field(7), field(13)) {
             (Some(order @ 1..=2), Some(2)) => Ok(Some(Self { is_big_endian: order == 2 })),
             (Some(1..=2), Some(format)) => Err(id.fault(format!(
-                "floating point format {format} of a dataset 58b is not known here, only 2 (IEEE 754)"
+                "floating point format {format}{} of a dataset 58b is not read, only 2 (IEEE 754): \
+                 export it as IEEE 754, or printed",
+                match format {
+                    1 => " (DEC VMS)",
+                    3 => " (IBM 5/370)",
+                    _ => "",
+                }
             ))),
             _ => Err(id.fault("the byte order of a dataset 58b is neither 1 nor 2")),
         }

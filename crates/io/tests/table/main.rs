@@ -141,9 +141,79 @@ fn files_without_data_are_refused() {
     assert_eq!(refused(""), "a.csv holds no data: it is empty");
     assert_eq!(refused("\n\n# only a comment\n"), "a.csv holds no data: it is empty");
     assert_eq!(refused("t,f\n"), "a.csv holds no data: there is a header and nothing below it");
-    let utf16 = b"\xff\xfet\0,\0f\0";
-    assert!(matches!(Table::parse("a.csv", utf16), Err(IoError::Encoding { .. })));
+    let utf32 = b"\xff\xfe\0\0t\0\0\0,\0\0\0f\0\0\0";
+    assert!(matches!(Table::parse("a.csv", utf32), Err(IoError::UnknownFormat { .. })));
     assert!(matches!(Table::read("no/such.csv"), Err(IoError::Read { .. })));
+}
+
+#[test]
+fn utf16_is_read_in_either_byte_order() {
+    let text = "\u{feff}t [µs]\tκ\r\n0\t1,5\r\n1\t−\r\n";
+    for encode in [u16::to_le_bytes, u16::to_be_bytes] {
+        let mut bytes: Vec<u8> = text.encode_utf16().flat_map(encode).collect();
+        let table = Table::parse("a.txt", &bytes).unwrap();
+        assert_eq!(table.names(), ["t [µs]", "κ"]);
+        assert_eq!(table.format(), "text, fields between tabs, in UTF-16");
+        assert_eq!(table.column("t [µs]").unwrap(), [0.0, 1.0]);
+        let e = table.column("κ").unwrap_err().to_string();
+        assert_eq!(e, "a.txt, line 3, column 2 \"κ\": \"−\" is not a number");
+        // Cut within the last end of a line: what is left of it is no row.
+        bytes.pop();
+        let e = Table::parse("a.txt", &bytes).unwrap_err();
+        assert!(matches!(e, IoError::Ragged { got: 1, .. }), "{e}");
+    }
+}
+
+#[test]
+fn json_is_no_record() {
+    for text in ["{}", "{", "\u{feff}{\n  \"system\": 3 }", "[ { \"a\": 1 } ]"] {
+        let e = Table::parse("a.json", text.as_bytes()).unwrap_err();
+        assert!(matches!(e, IoError::JsonRecord { .. }), "{text}: {e}");
+        assert!(e.to_string().starts_with("a.json is JSON, no table of samples: simulate"), "{e}");
+    }
+    assert_eq!(table("{a},[b]\n1,2\n").names(), ["{a}", "[b]"]);
+    assert_eq!(table("[a],[b]\n1,2\n").names(), ["[a]", "[b]"]);
+}
+
+/// What an instrument writes above its table, and below it the same three columns.
+const ABOVE: [&str; 3] = [
+    "Analyser 7\n",
+    "Device: shaker, left\nDate;2024-03-01\n\nChannel 1 2 3\n",
+    "a\nb\nc\nd\ne\nf\ng\nh\ni\n",
+];
+
+#[test]
+fn what_stands_above_the_table_is_left_out_when_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for above in ABOVE {
+        for below in ["t,f,x\ns,N,m\n0,1,2\n1,2,3\n2,1,1\n", "0 1 2\n1 2 3\n2 1 1\n"] {
+            let text = format!("{above}{below}");
+            let lines = above.lines().count() as u64;
+            let e = refused(&text);
+            let begins = format!("begin on line {}, with 3 fields", lines + 1);
+            assert!(e.contains(&begins) && e.ends_with(&format!("--skip-lines {lines}")), "{e}");
+            let path = folder.path().join("a.csv");
+            std::fs::write(&path, &text).unwrap();
+            let told = Table::read_below(&path, lines).unwrap();
+            let alone = table(below);
+            assert_eq!((told.names(), told.len()), (alone.names(), 3), "{text}");
+            assert_eq!(told.column("3").unwrap(), [2.0, 3.0, 1.0]);
+            // Lines are those of the file.
+            let mut rows = text.lines().count() as u64;
+            assert_eq!(told.place(2).to_string(), format!("line {rows}"));
+            std::fs::write(&path, text + "3,4\n").unwrap();
+            rows += 1;
+            let e = Table::read_below(&path, lines).unwrap_err().to_string();
+            assert!(e.contains(&format!("a.csv, line {rows}: ")), "{e}");
+        }
+    }
+    // Comments are no such thing, nor is a row that is wrong further down.
+    assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: 1 fields"));
+    let path = folder.path().join("a.csv");
+    std::fs::write(&path, "t,f\n0,1\n").unwrap();
+    assert!(matches!(Table::read_below(&path, 9), Err(IoError::Empty { .. })));
+    std::fs::write(&path, "MATLAB 5.0 MAT-file").unwrap();
+    assert!(matches!(Table::read_below(&path, 1), Err(IoError::NothingToSkip { .. })));
 }
 
 #[test]

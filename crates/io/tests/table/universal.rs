@@ -152,7 +152,10 @@ fn broken_files_are_refused_with_the_line() {
     assert!(e.contains("cut short"), "{e}");
     let vax = String::from_utf8_lossy(SINGLE).replace("58b     1     2", "58b     1     1");
     let e = Table::parse("a.unv", vax.as_bytes()).unwrap_err().to_string();
-    assert!(e.starts_with("a.unv, line 18: floating point format 1 of a dataset 58b"), "{e}");
+    assert!(
+        e.starts_with("a.unv, line 18: floating point format 1 (DEC VMS) of a dataset 58b"),
+        "{e}"
+    );
     let only_nodes = "    -1\n    15\n         1\n    -1\n";
     let e = Table::parse("a.unv", only_nodes.as_bytes()).unwrap_err().to_string();
     assert_eq!(e, "a.unv holds no data: it has no dataset 58");

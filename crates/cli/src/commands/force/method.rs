@@ -2,9 +2,9 @@
 
 use clap::ValueEnum;
 use mechid::force::{
-    Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Noise, OPEN_UNKNOWNS, Rule,
-    Start, Tuning, continuous, discretised, frequency_domain, inner_lines, kalman, regularised,
-    with_uncertain_system,
+    Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Noise, OPEN_UNKNOWNS,
+    Quantity, Rule, Start, Tuning, continuous, discretised, frequency_domain, inner_lines, kalman,
+    regularised, with_uncertain_system,
 };
 use mechid::model::SecondOrderSystem;
 
@@ -208,15 +208,29 @@ fn filtered(
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
     }
     chosen.push(("unknowns let through".into(), found.unknowns, ""));
-    for (channel, level) in (1..).zip(&found.noise) {
-        chosen.push((format!("noise of channel {channel}"), *level, ""));
-    }
+    chosen.extend(noise_levels(motion, &found.noise));
     let method = match filter {
         Filter::Tikhonov(_) => "Tikhonov regularisation",
         Filter::TruncatedSvd(_) => "truncated singular value decomposition",
         _ => "mean of the force given the measurement (shrinkage)",
     };
     Ok(Found { force, method, why, counts_noise: true, chosen })
+}
+
+/// The noise of every channel measured, in its own unit.
+fn noise_levels<'a>(
+    motion: &'a Motion,
+    noise: &'a [f64],
+) -> impl Iterator<Item = (String, f64, &'static str)> + 'a {
+    let levels = (1..).zip(motion.measured.channels().iter().zip(noise));
+    levels.map(|(number, (channel, level))| {
+        let unit = match channel.quantity {
+            Quantity::Displacement => "m",
+            Quantity::Velocity => "m/s",
+            Quantity::Acceleration => "m/s²",
+        };
+        (format!("noise of channel {number}"), *level, unit)
+    })
 }
 
 fn smoothed(
@@ -246,9 +260,7 @@ fn smoothed(
     for (dof, walk) in forced.iter().zip(&found.walk) {
         chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
     }
-    for (channel, level) in (1..).zip(&found.noise) {
-        chosen.push((format!("noise of channel {channel}"), *level, ""));
-    }
+    chosen.extend(noise_levels(motion, &found.noise));
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
     Ok(Found { force, method, why, counts_noise: true, chosen })
 }

@@ -62,7 +62,8 @@ pub struct ForceArgs {
     /// Where the force goes: time, force and standard error, in s and N
     #[arg(long, short, value_name = "FORCE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Where its spectrum goes: frequency in Hz, amplitude in N, phase in degrees
+    /// Where its spectrum goes, on the lines of --lines or on all: frequency in Hz, amplitude in N,
+    /// phase in degrees
     #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
     spectrum: Option<PathBuf>,
     #[command(flatten)]
@@ -88,7 +89,8 @@ impl ForceArgs {
             outcome = outcome.with_file(path, text);
         }
         if let Some(path) = &self.spectrum {
-            outcome = outcome.with_file(path, report::spectrum_text(force));
+            outcome =
+                outcome.with_file(path, report::spectrum_text(force, request.lines.as_deref()));
         }
         outcome.with_plot(&self.plot, || Ok(report::figure(found.method, force, &request.forced)))
     }

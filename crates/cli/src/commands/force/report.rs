@@ -107,8 +107,9 @@ impl Report {
             });
         }
         let _ = write!(text, "\n{}", text_table(&rows));
-        for remark in &self.remarks {
-            let _ = write!(text, "\nnote: {remark}\n");
+        let notes: String = self.remarks.iter().map(|r| format!("note: {r}\n")).collect();
+        if !notes.is_empty() {
+            let _ = write!(text, "\n{notes}");
         }
         text
     }
@@ -131,9 +132,11 @@ pub fn columns(force: &IdentifiedForce) -> Vec<(String, &[f64])> {
     columns
 }
 
-/// The spectrum as text: frequency in Hz, then amplitude in N and phase in degrees of each force.
-pub fn spectrum_text(force: &IdentifiedForce) -> String {
+/// The spectrum as text: frequency in Hz, then amplitude in N and phase in degrees of each force; of
+/// the lines asked for, or of all.
+pub fn spectrum_text(force: &IdentifiedForce, lines: Option<&[usize]>) -> String {
     let spectrum = force.spectrum();
+    let all: Vec<usize> = (0..spectrum.len()).collect();
     let dofs = spectrum.channels();
     let mut text = String::from("frequency_hz");
     for dof in 0..dofs {
@@ -141,7 +144,7 @@ pub fn spectrum_text(force: &IdentifiedForce) -> String {
         let _ = write!(text, ",{amplitude},{phase}");
     }
     text.push('\n');
-    for n in 0..spectrum.len() {
+    for &n in lines.unwrap_or(&all) {
         let _ = write!(text, "{:?}", spectrum.frequency_hz(n));
         for dof in 0..dofs {
             let line = spectrum.line(n, dof);

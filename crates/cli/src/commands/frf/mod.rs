@@ -36,7 +36,7 @@ pub struct FrfArgs {
     #[arg(long, value_enum, default_value_t = Estimator::H1)]
     estimator: Estimator,
     /// Spectral lines of a segment: all, odd, even, or numbers and ranges first:step:last such as
-    /// 1:2:335 [default: every line that carries force]
+    /// 1:2:335 [default: every line whose force stands out of its noise]
     #[arg(long, value_name = "LINES", conflicts_with = "band_hz")]
     lines: Option<LineSpec>,
     /// Use the lines with force between two frequencies, in Hz
@@ -57,7 +57,9 @@ impl FrfArgs {
     /// Reads, averages, and tells.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let measured = self.channels.measure(&self.input)?;
-        let choose = |force: &_| choose_lines(force, self.lines.as_ref(), self.band_hz);
+        let choose = |force: &_, period: usize| {
+            choose_lines(force, period, self.lines.as_ref(), self.band_hz)
+        };
         let found = Responses::of(&measured, &self.segments, self.estimator, choose)?;
         let report = Report::new(&measured, &found, self.estimator);
         let mut outcome = Outcome::new(report.text(), &report)?

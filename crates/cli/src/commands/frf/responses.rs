@@ -107,15 +107,16 @@ impl Responses {
         measured: &Measurement,
         segments: &SegmentArgs,
         estimator: Estimator,
-        choose: impl Fn(&Record) -> Result<Vec<usize>, CliError>,
+        choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     ) -> Result<Self, CliError> {
         let segments = segments.segments(measured.period);
         let force = &measured.force;
-        let one = match segments {
-            Segments::Periods(period) => force.period_mean(period)?,
-            Segments::Windowed { len, .. } => force.window(0, len)?,
+        let len = segments.samples();
+        let chosen = match segments {
+            Segments::Periods(period) => choose(force, period)?,
+            Segments::Windowed { len, .. } => choose(&force.window(0, len)?, len)?,
         };
-        let lines = Lines::new(one.sampling(), choose(&one)?)?;
+        let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
         let acts = |dof: &usize| force.channel(*dof).iter().any(|f| *f != 0.0);
         let driven: Vec<usize> = (0..force.channels()).filter(acts).collect();
         let acting: Vec<&[f64]> = driven.iter().map(|dof| force.channel(*dof)).collect();

@@ -3,7 +3,7 @@
 use std::str::FromStr;
 
 use mechid::io::LineSpec;
-use mechid::signal::{Record, Spectrum, lines};
+use mechid::signal::{Record, driven_lines, lines};
 
 use crate::error::CliError;
 
@@ -27,29 +27,22 @@ impl FromStr for Band {
     }
 }
 
-/// A line is excited if it carries at least this part of the strongest line of its force: far above
-/// rounding and quantisation, far below any line that somebody meant to drive.
-const EXCITED: f64 = 1e-3;
-
-/// A force whose strongest line is below this part of its peak value does not move at all: what its
-/// spectrum shows is the rounding of a constant.
-const ROUNDING: f64 = 1e-12;
-
-/// The lines of one period of the force to identify from: the choice as it stands; without one, all
-/// excited lines (of the band).
+/// The lines of one period of the force, of `period` samples, to identify from: the choice as it
+/// stands; without one, all lines that are driven (of the band).
 ///
 /// # Errors
-/// [`CliError::StillForce`] if there is no excited line at all, [`CliError::NoExcitedLine`] and
-/// [`CliError::EmptyBand`] if no chosen line is excited.
+/// [`CliError::StillForce`] if there is no driven line at all, [`CliError::NoExcitedLine`] and
+/// [`CliError::EmptyBand`] if no chosen line is driven.
 pub fn choose_lines(
     force: &Record,
+    period: usize,
     spec: Option<&LineSpec>,
     band: Option<Band>,
 ) -> Result<Vec<usize>, CliError> {
-    let sampling = force.sampling();
-    let excited = excited_lines(force);
+    let sampling = force.sampling().with_len(period)?;
+    let excited = driven_lines(force, period)?;
     let (Some(&first), Some(&last)) = (excited.first(), excited.last()) else {
-        return Err(CliError::StillForce { period: force.len() });
+        return Err(CliError::StillForce { period });
     };
     if let Some(spec) = spec {
         let chosen = spec.lines(sampling)?;
@@ -72,20 +65,6 @@ pub fn choose_lines(
     Ok(chosen)
 }
 
-fn excited_lines(force: &Record) -> Vec<usize> {
-    let spectrum = Spectrum::of(force);
-    let mut full = lines::full(force.sampling());
-    let limits: Vec<f64> = (0..force.channels())
-        .map(|c| {
-            let peak = force.channel(c).iter().fold(0.0_f64, |p, f| p.max(f.abs()));
-            let strongest = full.iter().map(|n| spectrum.line(*n, c).norm()).fold(0.0, f64::max);
-            if strongest > ROUNDING * peak { EXCITED * strongest } else { f64::INFINITY }
-        })
-        .collect();
-    full.retain(|n| (0..limits.len()).any(|c| spectrum.line(*n, c).norm() >= limits[c]));
-    full
-}
-
 #[cfg(test)]
 mod tests {
     use mechid::signal::{Multisine, Phases, Sampling};
@@ -99,7 +78,7 @@ mod tests {
         let force = force.sample(sampling).unwrap();
         let choose = |spec: Option<&str>, band: Option<&str>| {
             let spec = spec.map(|s| s.parse::<LineSpec>().unwrap());
-            choose_lines(&force, spec.as_ref(), band.map(|b| b.parse().unwrap()))
+            choose_lines(&force, 64, spec.as_ref(), band.map(|b| b.parse().unwrap()))
         };
         assert_eq!(choose(None, None).unwrap(), [3, 5, 7]);
         // The choice stands as it is, undriven lines and all.

@@ -97,13 +97,13 @@ pub struct Residual {
 pub fn frequency_domain(
     records: &[Measurement],
     unknowns: &Unknowns,
-    choose: impl Fn(&Record) -> Result<Vec<usize>, CliError>,
+    choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     method: Method,
 ) -> Result<Fitted, CliError> {
     let mut spectra = Vec::new();
     for measured in records {
         let (motion, kind) = measured.motion();
-        let chosen = choose(&measured.force.period_mean(measured.period)?)?;
+        let chosen = choose(&measured.force, measured.period)?;
         let lines = Lines::new(measured.force.sampling().with_len(measured.period)?, chosen)?;
         let periods = RepeatedPeriods::new(&lines, &measured.force, motion, kind)?;
         spectra.push((lines, periods));

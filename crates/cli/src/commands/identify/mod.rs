@@ -79,7 +79,7 @@ pub struct Identification {
     #[arg(long, value_name = "DOMAIN", value_enum, default_value_t = Domain::Frequency)]
     domain: Domain,
     /// Spectral lines: all, odd, even, or numbers and ranges first:step:last such as 1:2:335
-    /// [default: every line that carries force]
+    /// [default: every line whose force stands out of its noise]
     #[arg(long, value_name = "LINES", conflicts_with = "band_hz")]
     lines: Option<LineSpec>,
     /// Use the lines with force between two frequencies, in Hz
@@ -156,7 +156,7 @@ impl Identification {
             records.push(self.channels.measure(&input)?);
         }
         let unknowns = self.mass.unknowns(records[0].force.channels())?;
-        let choose = |force: &Record| self.choose(force);
+        let choose = |force: &Record, period: usize| self.choose(force, period);
         let fitted = match (self.domain, self.from_frf) {
             (Domain::Time, _) => self.time.fit(&records, &unknowns, self.between_samples)?,
             (Domain::Frequency, Some(estimator)) => {
@@ -177,9 +177,9 @@ impl Identification {
         Ok(Identified { records, validated, fitted, report })
     }
 
-    /// The lines of one period of a force that are fitted.
-    pub fn choose(&self, force: &Record) -> Result<Vec<usize>, CliError> {
-        choose_lines(force, self.lines.as_ref(), self.band_hz)
+    /// The lines of one period, of so many samples, of a force that are fitted.
+    pub fn choose(&self, force: &Record, period: usize) -> Result<Vec<usize>, CliError> {
+        choose_lines(force, period, self.lines.as_ref(), self.band_hz)
     }
 
     /// Refuses what the domain chosen would leave unheard.

@@ -134,13 +134,10 @@ impl Report {
         for check in self.checks.iter().filter(|check| !check.is_conspicuous()) {
             text += &format!("{}: {}\n", check.subject, check.sentence());
         }
-        for check in self.checks.iter().filter(|check| check.is_conspicuous()) {
-            text += &format!("\nwarning, {}: {}\n", check.subject, check.sentence());
-        }
-        for remark in &self.remarks {
-            text += &format!("\nnote: {remark}\n");
-        }
-        text
+        let conspicuous = self.checks.iter().filter(|check| check.is_conspicuous());
+        text +=
+            &paragraph(conspicuous.map(|c| format!("warning, {}: {}", c.subject, c.sentence())));
+        text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
     /// What a picture of it is called: the record and its modes.
@@ -224,6 +221,12 @@ impl Report {
         }
         text_table(&rows)
     }
+}
+
+/// Lines with an empty one above them; nothing if there is none.
+fn paragraph(lines: impl Iterator<Item = String>) -> String {
+    let lines: String = lines.map(|line| line + "\n").collect();
+    if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
 impl Window {

@@ -23,7 +23,7 @@ use crate::error::CliError;
 pub fn fit(
     records: &[Measurement],
     unknowns: &Unknowns,
-    choose: impl Fn(&Record) -> Result<Vec<usize>, CliError>,
+    choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     (estimator, segments): (Estimator, &SegmentArgs),
     method: Option<Method>,
 ) -> Result<Fitted, CliError> {

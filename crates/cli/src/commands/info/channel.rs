@@ -55,6 +55,11 @@ pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
+/// The mean, or zero where it is nothing but the rounding of samples of this RMS value.
+fn settled(mean: f64, rms: f64) -> f64 {
+    if mean.abs() < 4.0 * f64::EPSILON * rms { 0.0 } else { mean }
+}
+
 impl Channel {
     /// Measures a channel whose step, in s, may be unknown.
     pub fn of(
@@ -68,7 +73,8 @@ impl Channel {
         let extreme =
             |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or(0.0);
         let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
-        let (mean, rms, peak) = (mean(&values), measures::rms(&values), measures::peak(&values));
+        let (rms, peak) = (measures::rms(&values), measures::peak(&values));
+        let mean = settled(mean(&values), rms);
         let spectrum_peaks = spectrum_peaks(values, mean, repeats, dt)?;
         Ok(Self {
             column,

@@ -137,8 +137,7 @@ impl PageArgs {
         let lines = match found.fitted.frequency {
             // Lines of segments are not those of the record.
             Some(_) if found.fitted.course == Course::Steady => {
-                let period = measured.force.period_mean(measured.period)?;
-                Some(self.identification.choose(&period)?)
+                Some(self.identification.choose(&measured.force, measured.period)?)
             }
             _ => None,
         };

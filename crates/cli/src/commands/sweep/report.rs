@@ -10,7 +10,7 @@ use super::samples::Estimator;
 use super::settings::Kind;
 use crate::commands::identify::report::{CONFIDENCE, Uncertain};
 use crate::error::CliError;
-use crate::text_table::{compact, significant, text_table};
+use crate::text_table::{compact, paged_table, significant, text_table};
 
 /// Everything `mechid sweep` has to say.
 #[derive(Debug, Serialize)]
@@ -173,6 +173,7 @@ impl Report {
         };
         let mut header =
             vec![setting, "step (s)".into(), "samples per cycle".into(), "error (%)".into()];
+        let general = header.len();
         header.extend(names.iter().map(|p| format!("{} ({})", p.name, p.unit)));
         let mut rows = vec![header];
         for point in &self.points {
@@ -193,7 +194,7 @@ impl Report {
             truth.extend(names.iter().map(value));
             rows.push(truth);
         }
-        text_table(&rows)
+        paged_table(&rows, general)
     }
 
     fn best_table(&self) -> String {
