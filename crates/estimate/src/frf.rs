@@ -1,11 +1,13 @@
 //! Frequency response functions and coherence from measured forces and motions.
 
+mod average;
 mod cross_spectra;
 mod segments;
 
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
+pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
 pub use self::segments::{Segments, Window};
 use crate::EstimateError;
@@ -65,33 +67,11 @@ impl Frf {
         lines: impl IntoIterator<Item = usize>,
         estimator: FrfEstimator,
     ) -> Result<Self, EstimateError> {
-        force.check_same_sampling(motion)?;
-        let (inputs, outputs) = (force.channels(), motion.channels());
-        if estimator == FrfEstimator::H2 && inputs > 1 && inputs != outputs {
-            let what = "channels of the motion, for H2";
-            return Err(EstimateError::Size { what, expected: inputs, got: outputs });
-        }
         let lines = Lines::new(force.window(0, segments.samples())?.sampling(), lines)?;
-        let (forces, averages) = segments.amplitudes(&lines, force)?;
-        let (motions, _) = segments.amplitudes(&lines, motion)?;
-        if forces.len() <= inputs {
-            return Err(EstimateError::TooFewAverages { got: forces.len(), needed: inputs + 1 });
-        }
-        let omega = lines.omega();
-        let mut frf = Self {
-            line_correlation: segments.line_correlation(force.len()),
-            lines: lines.as_slice().to_vec(),
-            response: Vec::with_capacity(omega.len()),
-            coherence: DMatrix::zeros(omega.len(), outputs),
-            variance: Vec::with_capacity(omega.len()),
-            omega,
-            measured,
-            averages,
-        };
-        for line in 0..frf.omega.len() {
-            frf.push_line(line, &CrossSpectra::new(line, &forces, &motions), estimator)?;
-        }
-        Ok(frf)
+        let mut average =
+            FrfAverage::new(lines, [force.channels(), motion.channels()], measured, segments)?;
+        average.push(force, motion)?;
+        average.frf(estimator)
     }
 
     /// Measured elsewhere: per frequency a matrix motions × forces, and the coherence of every

@@ -42,7 +42,7 @@ mod unknowns;
 pub use equation_of_motion::EquationOfMotion;
 pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
-pub use frf::{Frf, FrfEstimator, Segments, Window};
+pub use frf::{Frf, FrfAverage, FrfEstimator, Segments, Window};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
 pub use modal::{IdentifiedMode, Uncertain, identified_modes};

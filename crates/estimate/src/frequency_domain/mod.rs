@@ -54,6 +54,7 @@ pub use data::FrequencyData;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use lines::Lines;
+pub(crate) use lines::check_sampling;
 pub use motion::Motion;
 pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{OutputErrorFit, output_error};

@@ -16,12 +16,22 @@ use crate::EstimateError;
 /// the chapters on nonparametric noise models and on periodic excitations.
 #[derive(Debug, Clone)]
 pub struct RepeatedPeriods {
-    omega: Vec<f64>,
+    lines: Lines,
     measured: Motion,
     dof: usize,
-    /// Per period: lines × 2n, first the motions as measured, then the forces.
-    amplitudes: Vec<DMatrix<Complex<f64>>>,
+    /// Periods to come, by which they are split into halves.
+    expected: usize,
+    count: usize,
+    /// Of all periods, and of the first and the second half of those expected: lines × 2n, first the
+    /// motions as measured, then the forces.
+    sum: DMatrix<Complex<f64>>,
+    half_sums: [DMatrix<Complex<f64>>; 2],
+    /// Per line Σ (z − z̄)(z − z̄)ᴴ over the periods so far, 2n×2n.
+    scatter: Vec<DMatrix<Complex<f64>>>,
 }
+
+/// A force whose periods differ from their mean by this part of it, in the RMS, repeats to rounding.
+const REPEATS: f64 = 1e-12;
 
 impl RepeatedPeriods {
     /// Splits records of several whole periods; `lines` belong to one period, and the
@@ -37,37 +47,97 @@ impl RepeatedPeriods {
         motion: &Record,
         measured: Motion,
     ) -> Result<Self, EstimateError> {
-        force.check_same_sampling(motion)?;
-        let period = lines.sampling().len();
-        // The window also refuses records shorter than a period.
-        super::lines::check_sampling(lines.sampling(), force.window(0, period)?.sampling())?;
-        let dof = force.channels();
-        if motion.channels() != dof || dof == 0 {
-            let (got, expected) = (motion.channels(), dof.max(1));
-            return Err(EstimateError::Size { what: "channels of the motion", got, expected });
+        let periods = force.len() / lines.sampling().len();
+        let mut all = Self::expecting(lines, force.channels(), measured, periods);
+        all.push(force, motion)?;
+        Ok(all)
+    }
+
+    /// No periods yet of a machine of `dof` degrees of freedom; `periods` are to come, a few at a time:
+    /// memory does not grow with their number.
+    pub fn expecting(lines: &Lines, dof: usize, measured: Motion, periods: usize) -> Self {
+        let zero = DMatrix::zeros(lines.as_slice().len(), 2 * dof);
+        Self {
+            lines: lines.clone(),
+            measured,
+            dof,
+            expected: periods,
+            count: 0,
+            half_sums: [zero.clone(), zero.clone()],
+            scatter: vec![DMatrix::zeros(2 * dof, 2 * dof); zero.nrows()],
+            sum: zero,
         }
-        let amplitudes = (0..force.len() / period)
-            .map(|p| {
-                let mut both = DMatrix::zeros(lines.as_slice().len(), 2 * dof);
-                both.columns_mut(0, dof).copy_from(&lines.read_window(motion, p * period));
-                both.columns_mut(dof, dof).copy_from(&lines.read_window(force, p * period));
-                both
-            })
-            .collect();
-        Ok(Self { omega: lines.omega(), measured, dof, amplitudes })
+    }
+
+    /// Adds the whole periods of a stretch of force (N) and motion, one period or more; an incomplete
+    /// one at its end is left out.
+    ///
+    /// # Errors
+    /// As [`RepeatedPeriods::new`]; then nothing is added.
+    pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), EstimateError> {
+        force.check_same_sampling(motion)?;
+        let period = self.lines.sampling().len();
+        // The window also refuses records shorter than a period.
+        super::lines::check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
+        let dof = self.dof.max(1);
+        for (what, got) in [
+            ("channels of the force", force.channels()),
+            ("channels of the motion", motion.channels()),
+        ] {
+            if got != dof {
+                return Err(EstimateError::Size { what, got, expected: dof });
+            }
+        }
+        for start in (0..force.len() / period).map(|p| p * period) {
+            let mut both = DMatrix::zeros(self.sum.nrows(), 2 * dof);
+            both.columns_mut(0, dof).copy_from(&self.lines.read_window(motion, start));
+            both.columns_mut(dof, dof).copy_from(&self.lines.read_window(force, start));
+            self.add(&both);
+        }
+        Ok(())
+    }
+
+    /// # Source
+    /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
+    fn add(&mut self, period: &DMatrix<Complex<f64>>) {
+        if self.count > 0 {
+            let before = self.count as f64;
+            let weight = Complex::from(before / (before + 1.0));
+            for (line, scatter) in self.scatter.iter_mut().enumerate() {
+                let mean = self.sum.row(line).unscale(before);
+                let deviation = (period.row(line) - mean).transpose();
+                scatter.gerc(weight, &deviation, &deviation, Complex::from(1.0));
+            }
+        }
+        let half = self.expected / 2;
+        if self.count < half {
+            self.half_sums[0] += period;
+        }
+        if self.count >= self.expected - half {
+            self.half_sums[1] += period;
+        }
+        self.sum += period;
+        self.count += 1;
     }
 
     /// Number of whole periods.
     pub fn count(&self) -> usize {
-        self.amplitudes.len()
+        self.count
+    }
+
+    /// The lines that are read of each.
+    pub fn lines(&self) -> &Lines {
+        &self.lines
     }
 
     /// The mean over all periods, without a statement on its noise.
     ///
     /// # Errors
-    /// As [`FrequencyData::from_amplitudes`].
+    /// As [`FrequencyData::from_amplitudes`], and [`EstimateError::TooFewAverages`] if there is no
+    /// period.
     pub fn mean(&self) -> Result<FrequencyData, EstimateError> {
-        self.mean_of(0..self.count())
+        self.at_least(1)?;
+        self.data(self.sum.unscale(self.count as f64))
     }
 
     /// The mean over all periods with the noise that their scatter shows.
@@ -82,14 +152,13 @@ impl RepeatedPeriods {
     /// odd number is left out): two measurements of the same signal with independent noise.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewAverages`] if there is only one period.
+    /// [`EstimateError::TooFewAverages`] if there is only one period, or not yet all of those
+    /// expected.
     pub fn halves(&self) -> Result<(FrequencyData, FrequencyData), EstimateError> {
-        let count = self.count();
-        if count < 2 {
-            return Err(EstimateError::TooFewAverages { got: count, needed: 2 });
-        }
-        let half = count / 2;
-        Ok((self.mean_of(0..half)?, self.mean_of(count - half..count)?))
+        self.at_least(self.expected.max(2))?;
+        let count = (self.expected / 2) as f64;
+        let [first, second] = &self.half_sums;
+        Ok((self.data(first.unscale(count))?, self.data(second.unscale(count))?))
     }
 
     /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
@@ -100,59 +169,38 @@ impl RepeatedPeriods {
     /// # Errors
     /// [`EstimateError::TooFewAverages`] if there is only one period.
     pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, EstimateError> {
-        let count = self.count();
-        if count < 2 {
-            return Err(EstimateError::TooFewAverages { got: count, needed: 2 });
-        }
-        let mean = self.mean_amplitudes(0..count);
+        self.at_least(2)?;
+        let count = self.count;
         // Of the mean: the scatter of one period, divided by their number once more.
         let scale = Complex::from(1.0 / ((count - 1) * count) as f64);
-        let covariance = (0..self.omega.len()).map(|line| self.scatter(line, &mean) * scale);
         let noise = NoiseSpectrum::of_measured(
-            &self.omega,
-            covariance.collect(),
+            &self.lines.omega(),
+            self.scatter.iter().map(|scatter| scatter * scale).collect(),
             self.measured,
             count - 1,
             pooling,
         )?;
-        Ok(if self.force_repeats(&mean) { noise.with_exact_force() } else { noise })
-    }
-
-    /// Σ (z − z̄)(z − z̄)ᴴ over the periods, 2n×2n.
-    fn scatter(&self, line: usize, mean: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
-        let size = 2 * self.dof;
-        let mut sum = DMatrix::zeros(size, size);
-        for period in &self.amplitudes {
-            let deviation = |c: usize| period[(line, c)] - mean[(line, c)];
-            for j in 0..size {
-                for i in 0..size {
-                    sum[(i, j)] += deviation(i) * deviation(j).conj();
-                }
-            }
-        }
-        sum
+        Ok(if self.force_repeats() { noise.with_exact_force() } else { noise })
     }
 
     /// Whether the force is the same in every period, to rounding: a computed one, not measured.
-    fn force_repeats(&self, mean: &DMatrix<Complex<f64>>) -> bool {
-        let force = mean.columns(self.dof, self.dof);
-        let rounding = 1e-12 * force.norm();
-        self.amplitudes.iter().all(|p| (p.columns(self.dof, self.dof) - force).norm() <= rounding)
+    fn force_repeats(&self) -> bool {
+        let (n, count) = (self.dof, self.count as f64);
+        let scatter = self.scatter.iter().map(|s| (n..2 * n).map(|i| s[(i, i)].re).sum::<f64>());
+        let rms = (scatter.sum::<f64>() / count).sqrt();
+        rms <= REPEATS * self.sum.columns(n, n).norm() / count
     }
 
-    fn mean_of(&self, periods: std::ops::Range<usize>) -> Result<FrequencyData, EstimateError> {
-        let mean = self.mean_amplitudes(periods);
+    fn at_least(&self, needed: usize) -> Result<(), EstimateError> {
+        match self.count {
+            got if got < needed => Err(EstimateError::TooFewAverages { got, needed }),
+            _ => Ok(()),
+        }
+    }
+
+    fn data(&self, mean: DMatrix<Complex<f64>>) -> Result<FrequencyData, EstimateError> {
         let n = self.dof;
         let (motion, force) = (mean.columns(0, n).into_owned(), mean.columns(n, n).into_owned());
-        FrequencyData::from_amplitudes(self.omega.clone(), force, motion, self.measured)
-    }
-
-    fn mean_amplitudes(&self, periods: std::ops::Range<usize>) -> DMatrix<Complex<f64>> {
-        let count = periods.len() as f64;
-        let mut mean = DMatrix::zeros(self.omega.len(), 2 * self.dof);
-        for period in &self.amplitudes[periods] {
-            mean += period;
-        }
-        mean.unscale(count)
+        FrequencyData::from_amplitudes(self.lines.omega(), force, motion, self.measured)
     }
 }

@@ -8,7 +8,8 @@ use crate::EstimateError;
 /// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
 const FORCE_TOLERANCE: f64 = 1e-10;
 
-/// Averaged cross-spectra of one line.
+/// Cross-spectra of one line: summed over pieces, then averaged.
+#[derive(Debug, Clone)]
 pub(super) struct CrossSpectra {
     force: ComplexMatrix,
     pub(super) motion_force: ComplexMatrix,
@@ -16,24 +17,29 @@ pub(super) struct CrossSpectra {
 }
 
 impl CrossSpectra {
-    pub(super) fn new(line: usize, forces: &[ComplexMatrix], motions: &[ComplexMatrix]) -> Self {
-        let (inputs, outputs) = (forces[0].ncols(), motions[0].ncols());
-        let mut spectra = Self {
+    pub(super) fn new(inputs: usize, outputs: usize) -> Self {
+        Self {
             force: DMatrix::zeros(inputs, inputs),
             motion_force: DMatrix::zeros(outputs, inputs),
             motion: DMatrix::zeros(outputs, outputs),
-        };
-        for (force, motion) in forces.iter().zip(motions) {
-            let (f, x) = (force.row(line).transpose(), motion.row(line).transpose());
-            spectra.force += &f * f.adjoint();
-            spectra.motion_force += &x * f.adjoint();
-            spectra.motion += &x * x.adjoint();
         }
-        let count = Complex::new(forces.len() as f64, 0.0);
-        spectra.force /= count;
-        spectra.motion_force /= count;
-        spectra.motion /= count;
-        spectra
+    }
+
+    /// Adds the amplitudes of one piece.
+    pub(super) fn add(&mut self, f: &DVector<Complex<f64>>, x: &DVector<Complex<f64>>) {
+        self.force += f * f.adjoint();
+        self.motion_force += x * f.adjoint();
+        self.motion += x * x.adjoint();
+    }
+
+    /// The mean over so many pieces.
+    pub(super) fn mean(&self, pieces: usize) -> Self {
+        let count = Complex::new(pieces as f64, 0.0);
+        Self {
+            force: &self.force / count,
+            motion_force: &self.motion_force / count,
+            motion: &self.motion / count,
+        }
     }
 
     /// S_FF⁻¹, refused where the forces do not act independently.

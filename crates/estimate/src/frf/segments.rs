@@ -75,24 +75,23 @@ impl Segments {
     }
 
     /// Correlation of the errors that noise makes of a frequency response on two lines, by how many
-    /// lines they are apart, 0 first, as far as it is worth speaking of; of a record of `samples`.
+    /// lines they are apart, 0 first, as far as it is worth speaking of; of so many pieces.
     ///
     /// Noise and force leak by the window alike from a line to its neighbours, and so do pieces that
     /// overlap: Σ_j |ρ_j(d)|² over pieces j hops apart, with ρ_j(d) = Σ w(k) w(k + j hop)
     /// exp(−2πi d k/len), over the same at d = 0.
-    pub(super) fn line_correlation(self, samples: usize) -> Vec<f64> {
+    pub(super) fn line_correlation(self, pieces: usize) -> Vec<f64> {
         let Segments::Windowed { len, hop, window } = self else { return vec![1.0] };
         let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
-        let count = ((samples - len) / hop + 1) as f64;
         let common = |apart: usize, lines: usize| {
             let turn = |k: usize| Complex::cis(-TAU * ((lines * k) % len) as f64 / len as f64);
             let pairs = weights.iter().zip(&weights[apart * hop..]).enumerate();
             let shared: Complex<f64> = pairs.map(|(k, (a, b))| turn(k) * a * b).sum();
-            let times = if apart == 0 { 1.0 } else { 2.0 * (1.0 - apart as f64 / count).max(0.0) };
+            let times = if apart == 0 { 1.0 } else { 2.0 * (1.0 - apart as f64 / pieces as f64).max(0.0) };
             times * shared.norm_sqr()
         };
-        let pieces = len.div_ceil(hop);
-        let at = |lines: usize| (0..pieces).map(|apart| common(apart, lines)).sum::<f64>();
+        let overlapping = len.div_ceil(hop);
+        let at = |lines: usize| (0..overlapping).map(|apart| common(apart, lines)).sum::<f64>();
         let own = at(0);
         let mut correlation: Vec<f64> =
             (0..FARTHEST_LINES.min(len)).map(|lines| at(lines) / own).collect();
@@ -101,28 +100,38 @@ impl Segments {
         correlation
     }
 
-    /// Amplitudes of every piece (lines × channels), and how many independent ones they are worth.
-    pub(super) fn amplitudes(
-        self,
-        lines: &Lines,
-        record: &Record,
-    ) -> Result<(Vec<ComplexMatrix>, f64), EstimateError> {
+    /// Samples from the start of one piece to that of the next.
+    pub fn hop(self) -> usize {
         match self {
-            Segments::Periods(len) => {
-                let count = record.len() / len;
-                let pieces = (0..count).map(|p| lines.read_window(record, p * len));
-                Ok((pieces.collect(), count as f64))
-            }
+            Segments::Periods(len) => len,
+            Segments::Windowed { hop, .. } => hop,
+        }
+    }
+
+    /// What the samples of a piece are weighted with, if anything.
+    pub(super) fn weights(self) -> Result<Option<Vec<f64>>, EstimateError> {
+        match self {
+            Segments::Periods(_) => Ok(None),
             Segments::Windowed { len, hop, .. } if hop == 0 || hop > len => {
                 Err(EstimateError::Hop { len, hop })
             }
-            Segments::Windowed { len, hop, window } => {
-                let weights: Vec<f64> = (0..len).map(|k| window.weight(k, len)).collect();
-                let count = (record.len() - len) / hop + 1;
-                let pieces = (0..count).map(|p| windowed(lines, record, p * hop, &weights));
-                Ok((pieces.collect(), count as f64 / overlap_loss(&weights, hop, count)))
+            Segments::Windowed { len, window, .. } => {
+                Ok(Some((0..len).map(|k| window.weight(k, len)).collect()))
             }
         }
+    }
+}
+
+/// Amplitudes of a piece, lines × channels.
+pub(super) fn amplitudes(
+    lines: &Lines,
+    record: &Record,
+    start: usize,
+    weights: Option<&[f64]>,
+) -> ComplexMatrix {
+    match weights {
+        None => lines.read_window(record, start),
+        Some(weights) => windowed(lines, record, start, weights),
     }
 }
 
@@ -141,7 +150,7 @@ fn windowed(lines: &Lines, record: &Record, start: usize, window: &[f64]) -> Com
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
-fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
+pub(super) fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
     let power: f64 = window.iter().map(|w| w * w).sum();
     let common = |apart: usize| {
         let shared = window.iter().zip(&window[apart * hop..]).map(|(a, b)| a * b).sum::<f64>();

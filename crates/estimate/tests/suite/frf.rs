@@ -1,8 +1,8 @@
 //! Frequency response functions: against the closed-form receptance, and what noise does to them.
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
-use mechid_estimate::frequency_domain::{Motion, equation_error, output_error};
-use mechid_estimate::{EstimateError, Frf, FrfEstimator, Segments, Unknowns, Window};
+use mechid_estimate::frequency_domain::{Lines, Motion, equation_error, output_error};
+use mechid_estimate::{EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
@@ -357,4 +357,37 @@ fn what_cannot_be_estimated_is_refused() {
     for value in [0.0, 1.1] {
         assert_eq!(coherence(value), Err(EstimateError::Coherence { value }));
     }
+}
+
+#[test]
+fn segments_may_come_a_few_at_a_time() {
+    let (force, motion, _) = steady(&bearing(), 9);
+    for (segments, hop) in [
+        (Segments::Periods(128), 128),
+        (Segments::hann(128), 64),
+        (Segments::Windowed { len: 128, hop: 50, window: Window::Blackman }, 50),
+    ] {
+        let all = 1..=20;
+        let estimate = |f, x| {
+            let h1 = FrfEstimator::H1;
+            Frf::estimate(f, x, Motion::Displacement, segments, all.clone(), h1).unwrap()
+        };
+        let whole = estimate(&force, &motion);
+        let lines = Lines::new(force.sampling().with_len(128).unwrap(), all.clone()).unwrap();
+        let mut average = FrfAverage::new(lines, [2, 2], Motion::Displacement, segments).unwrap();
+        // Three segments at a time, the last stretch cut where the record ends.
+        for start in (0..force.len()).step_by(3 * hop) {
+            let len = (2 * hop + 128).min(force.len() - start);
+            let [f, x] = [&force, &motion].map(|record| record.window(start, len).unwrap());
+            average.push(&f, &x).unwrap();
+        }
+        assert_eq!(average.frf(FrfEstimator::H1).unwrap(), whole);
+        assert_ne!(
+            estimate(&force.window(0, 900).unwrap(), &motion.window(0, 900).unwrap()),
+            whole
+        );
+    }
+    let lines = Lines::new(force.sampling(), [3]).unwrap();
+    let average = FrfAverage::new(lines, [2, 2], Motion::Displacement, Segments::hann(128));
+    assert!(matches!(average, Err(EstimateError::Size { expected: 128, got: 1152, .. })));
 }

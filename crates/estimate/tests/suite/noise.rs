@@ -290,3 +290,57 @@ fn noise_that_cannot_weigh_is_refused() {
     let e = instrumental_variables(&short, &periods.mean().unwrap(), &unknowns).unwrap_err();
     assert!(matches!(e, EstimateError::Size { expected: 1, got: 40, .. }));
 }
+
+/// Judge: the scatter about the mean by its definition, in two passes.
+#[test]
+fn periods_may_come_a_few_at_a_time() {
+    let setup = setup(&bearing(), 7, Motion::Velocity);
+    let add = |record: &Record, seed| {
+        noise::add_white(record, NoiseLevel::FractionOfRms(0.03), seed).unwrap()
+    };
+    let (force, motion) = (add(&setup.force, 1), add(&setup.motion, 2));
+    let whole = RepeatedPeriods::new(&setup.lines, &force, &motion, setup.measured).unwrap();
+    let mut parts = RepeatedPeriods::expecting(&setup.lines, 2, setup.measured, 7);
+    for (start, len) in [(0, 1), (1, 3), (4, 1), (5, 2)] {
+        assert!(parts.halves().is_err());
+        let part = |record: &Record| record.window(128 * start, 128 * len).unwrap();
+        parts.push(&part(&force), &part(&motion)).unwrap();
+    }
+    assert_eq!(parts.count(), 7);
+    assert_eq!(parts.mean().unwrap(), whole.mean().unwrap());
+    assert_eq!(parts.halves().unwrap(), whole.halves().unwrap());
+    let noise = parts.noise(Pooling::PerLine).unwrap();
+    assert_eq!(noise, whole.noise(Pooling::PerLine).unwrap());
+
+    let spectra: Vec<FrequencyData> = (0..7)
+        .map(|p| {
+            let [f, x] = [&force, &motion].map(|r| r.window(128 * p, 128).unwrap());
+            FrequencyData::read(&setup.lines, &f, &x, setup.measured).unwrap()
+        })
+        .collect();
+    for line in [0, 17, 39] {
+        let z = |p: usize| {
+            let (x, f) = (spectra[p].displacement().row(line), spectra[p].force().row(line));
+            DMatrix::from_fn(4, 1, |i, _| if i < 2 { x[i] } else { f[i - 2] })
+        };
+        let mean = (0..7).map(z).sum::<DMatrix<_>>().unscale(7.0);
+        let scatter = (0..7).map(|p| (z(p) - &mean) * (z(p) - &mean).adjoint());
+        let expected = scatter.sum::<DMatrix<_>>().unscale(6.0 * 7.0);
+        let error = (noise.covariance(line) - &expected).norm() / expected.norm();
+        assert!(error < 1e-12, "line {line}: {error:e}");
+    }
+}
+
+#[test]
+fn halves_need_all_periods_that_were_expected() {
+    let setup = setup(&oscillator(), 4, Motion::Displacement);
+    let mut periods = RepeatedPeriods::expecting(&setup.lines, 1, setup.measured, 6);
+    assert_eq!(periods.mean().unwrap_err(), EstimateError::TooFewAverages { got: 0, needed: 1 });
+    periods.push(&setup.force, &setup.motion).unwrap();
+    let missing = EstimateError::TooFewAverages { got: 4, needed: 6 };
+    assert_eq!(periods.halves().unwrap_err(), missing);
+    periods.push(&setup.force, &setup.motion).unwrap();
+    assert!(periods.halves().is_ok());
+    let short = setup.force.window(0, 100).unwrap();
+    assert!(matches!(periods.push(&short, &short), Err(EstimateError::Signal(_))));
+}
