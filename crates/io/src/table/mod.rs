@@ -2,7 +2,10 @@
 
 mod column;
 mod dialect;
+mod numbered_lines;
 mod preamble;
+mod record_file;
+mod rows;
 mod source;
 mod text;
 mod time_axis;
@@ -10,12 +13,14 @@ mod time_unit;
 
 use std::path::Path;
 
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Record, Sampling, SignalError};
 use nalgebra::DMatrix;
 
 pub use self::column::Place;
 pub(crate) use self::column::{Axis, Column, Lines};
+pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source};
+use self::text::TextReader;
 pub use self::time_axis::TimeAxis;
 use crate::{IoError, mat, uff};
 
@@ -80,7 +85,7 @@ impl Table {
     /// # Errors
     /// As [`Table::read`], and [`IoError::NothingToSkip`] if the file is no text.
     pub fn read_below(path: impl AsRef<Path>, lines: u64) -> Result<Self, IoError> {
-        Self::from_source(Source::open(path.as_ref())?, lines)
+        Ok(Self::first_rows(Source::open(path.as_ref())?, lines, usize::MAX)?.0)
     }
 
     /// The table in the bytes of a file; `file` is how messages call it.
@@ -91,13 +96,25 @@ impl Table {
     /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
     /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`].
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
-        Self::from_source(Source::new(file.into(), bytes)?, 0)
+        Ok(Self::first_rows(Source::new(file.into(), bytes)?, 0, usize::MAX)?.0)
     }
 
-    fn from_source(mut source: Source<'_>, skip: u64) -> Result<Self, IoError> {
+    /// The table below some lines of text, of a text at most the first `limit` rows or few more; and
+    /// whether these are all.
+    fn first_rows(
+        mut source: Source<'_>,
+        skip: u64,
+        limit: usize,
+    ) -> Result<(Self, bool), IoError> {
         let (file, gzip, utf16) = (source.file.clone(), source.gzip, source.utf16);
+        let mut whole = true;
         let contents = match source.kind() {
-            Kind::Text => text::read(source, skip)?,
+            Kind::Text => {
+                let mut text = TextReader::open(source, skip, None)?;
+                // One more than may be held, to see whether there is one.
+                whole = !text.read(limit.saturating_add(1))?;
+                text.finish()?
+            }
             Kind::Json => return Err(IoError::JsonRecord { file }),
             Kind::Mat5 | Kind::Uff if skip > 0 => return Err(IoError::NothingToSkip { file }),
             Kind::Mat5 => mat::read(&file, &source.bytes()?)?,
@@ -106,7 +123,7 @@ impl Table {
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
         let names = contents.columns.iter().map(|column| column.name.clone()).collect();
-        Ok(Self { file, gzip, utf16, names, contents })
+        Ok((Self { file, gzip, utf16, names, contents }, whole))
     }
 
     /// How messages call the file.
@@ -256,23 +273,33 @@ impl Table {
         time: &TimeAxis<'_>,
         wanted: &[impl AsRef<str>],
     ) -> Result<Record, IoError> {
+        let columns = self.record_columns(time, wanted)?;
+        let sampling = self.sampling(time, wanted)?;
+        let channels: Vec<&[f64]> =
+            columns.iter().map(|c| self.values(*c)).collect::<Result<_, _>>()?;
+        let mut data = DMatrix::zeros(sampling.len(), channels.len());
+        for (mut into, channel) in data.column_iter_mut().zip(channels) {
+            into.copy_from_slice(channel);
+        }
+        self.signal(Record::new(sampling, data))
+    }
+
+    /// The indices of the columns `wanted`, each used once, and not for the instants too.
+    fn record_columns(
+        &self,
+        time: &TimeAxis<'_>,
+        wanted: &[impl AsRef<str>],
+    ) -> Result<Vec<usize>, IoError> {
         let mut used: Vec<&str> = Vec::new();
         if let TimeAxis::Column(column) = time {
             used.push(column);
         }
         used.extend(wanted.iter().map(AsRef::as_ref));
-        let columns = self.distinct(&used)?;
-        let sampling = self.sampling(time, wanted)?;
-        let channels: Vec<&[f64]> = columns[used.len() - wanted.len()..]
-            .iter()
-            .map(|c| self.values(*c))
-            .collect::<Result<_, _>>()?;
-        let mut data = DMatrix::zeros(sampling.len(), channels.len());
-        for (mut into, channel) in data.column_iter_mut().zip(channels) {
-            into.copy_from_slice(channel);
-        }
-        Record::new(sampling, data)
-            .map_err(|source| IoError::Signal { file: self.file.clone(), source })
+        Ok(self.distinct(&used)?.split_off(used.len() - wanted.len()))
+    }
+
+    fn signal<T>(&self, made: Result<T, SignalError>) -> Result<T, IoError> {
+        made.map_err(|source| IoError::Signal { file: self.file.clone(), source })
     }
 
     /// The indices of columns, each used once.

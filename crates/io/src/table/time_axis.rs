@@ -2,7 +2,7 @@
 
 use mechid_signal::Sampling;
 
-use super::{Axis, Table, time_unit};
+use super::{Axis, Place, Table, time_unit};
 use crate::IoError;
 
 /// The time axis of columns of a [`Table`].
@@ -39,13 +39,13 @@ impl TimeAxis<'_> {
     pub(super) fn sampling(&self, table: &Table, columns: &[usize]) -> Result<Sampling, IoError> {
         let signal = |source| IoError::Signal { file: table.file().into(), source };
         match *self {
-            TimeAxis::RateHz(rate_hz) if rate_hz > 0.0 && (1.0 / rate_hz).is_normal() => {
+            TimeAxis::RateHz(rate_hz) => {
+                let sampling = at_rate(table.file(), rate_hz, 1)?;
                 for column in columns {
                     check_rate(table, *column, rate_hz)?;
                 }
-                Sampling::from_rate_hz(rate_hz, common_length(table, columns)?).map_err(signal)
+                sampling.with_len(common_length(table, columns)?).map_err(signal)
             }
-            TimeAxis::RateHz(rate_hz) => Err(IoError::SampleRate { rate_hz }),
             TimeAxis::Column(column) => {
                 let column = table.find(column)?;
                 let unit = time_unit::unit(&table.contents.columns[column]);
@@ -137,25 +137,79 @@ fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError>
     }
 }
 
+/// A time axis of known rate.
+pub(super) fn at_rate(file: &str, rate_hz: f64, len: usize) -> Result<Sampling, IoError> {
+    if !(rate_hz > 0.0 && (1.0 / rate_hz).is_normal()) {
+        return Err(IoError::SampleRate { rate_hz });
+    }
+    Sampling::from_rate_hz(rate_hz, len)
+        .map_err(|source| IoError::Signal { file: file.into(), source })
+}
+
 /// The mean step, in s, of instants in `unit` s that are equally spaced.
 fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError> {
-    let file = || table.file().to_owned();
-    let mut steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() {
-        return Err(IoError::SingleSample { file: file() });
+    let mut steps = Steps::default();
+    for (k, time) in times.iter().enumerate() {
+        steps.push(*time, || table.place(k));
     }
-    let (_, &mut usual, _) = steps.select_nth_unstable_by(middle, f64::total_cmp);
-    let off = |k: usize| (times[k + 1] - times[k] - usual).abs();
-    let worst = (0..steps.len()).max_by(|a, b| off(*a).total_cmp(&off(*b))).unwrap_or_default();
-    // Also refuses time that stands still or runs backwards, and steps that overflow.
-    if usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual {
-        return Ok(unit * (times[times.len() - 1] - times[0]) / steps.len() as f64);
+    steps.step(table.file(), unit)
+}
+
+/// Steps whose median is the usual one: the first ones, so that not all need be held.
+const USUAL: usize = 1024;
+
+/// The steps of instants that come one by one.
+#[derive(Debug, Default)]
+pub(super) struct Steps {
+    instants: usize,
+    first: f64,
+    last: f64,
+    /// The first ones.
+    beginning: Vec<f64>,
+    shortest: Option<(f64, Place)>,
+    longest: Option<(f64, Place)>,
+}
+
+impl Steps {
+    /// The next instant, and where it stands.
+    pub fn push(&mut self, time: f64, place: impl Fn() -> Place) {
+        if self.instants == 0 {
+            self.first = time;
+        } else {
+            let step = time - self.last;
+            if self.beginning.len() < USUAL {
+                self.beginning.push(step);
+            }
+            if self.shortest.is_none_or(|(shortest, _)| step < shortest) {
+                self.shortest = Some((step, place()));
+            }
+            if self.longest.is_none_or(|(longest, _)| step > longest) {
+                self.longest = Some((step, place()));
+            }
+        }
+        self.last = time;
+        self.instants += 1;
     }
-    Err(IoError::NonUniformTime {
-        file: file(),
-        at: table.place(worst + 1),
-        step: unit * (times[worst + 1] - times[worst]),
-        usual: unit * usual,
-    })
+
+    /// The mean step, in s, of instants in `unit` s, if they are equally spaced.
+    pub fn step(mut self, file: &str, unit: f64) -> Result<f64, IoError> {
+        let (Some(shortest), Some(longest)) = (self.shortest, self.longest) else {
+            return Err(IoError::SingleSample { file: file.into() });
+        };
+        let middle = self.beginning.len() / 2;
+        let (_, &mut usual, _) = self.beginning.select_nth_unstable_by(middle, f64::total_cmp);
+        let off = |(step, _): (f64, Place)| (step - usual).abs();
+        let worst = if off(shortest) > off(longest) { shortest } else { longest };
+        // Also refuses time that stands still or runs backwards, and steps that overflow.
+        if usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual {
+            return Ok(unit * (self.last - self.first) / (self.instants - 1) as f64);
+        }
+        let (step, at) = worst;
+        Err(IoError::NonUniformTime {
+            file: file.into(),
+            at,
+            step: unit * step,
+            usual: unit * usual,
+        })
+    }
 }

@@ -2,6 +2,7 @@
 
 mod matlab;
 mod packed;
+mod stretches;
 mod universal;
 
 use mechid_io::{IoError, Table, TimeAxis, csv_text};

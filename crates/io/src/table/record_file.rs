@@ -1,0 +1,251 @@
+//! Records of any length, read as often and as little at a time as is asked for.
+
+use std::fs;
+use std::ops::{ControlFlow, Range};
+use std::path::{Path, PathBuf};
+
+use mechid_signal::Sampling;
+use nalgebra::DMatrix;
+
+use super::column::{Lines, Unusable};
+use super::source::{Kind, Source};
+use super::text::TextReader;
+use super::time_axis::{self, Steps};
+use super::{Table, TimeAxis, time_unit};
+use crate::IoError;
+
+/// Rows taken from a text at a time.
+const CHUNK: usize = 4096;
+
+/// A record file whose samples need not all be held.
+///
+/// A text of more rows than may be held is read again for each pass over its samples, in memory that
+/// does not grow with it. Shorter ones, other formats, and what can be read only once (a pipe) are
+/// held whole.
+///
+/// ```
+/// use mechid_io::{IoError, RecordFile, TimeAxis};
+///
+/// let path = std::env::temp_dir().join("mechid-record-file.csv");
+/// std::fs::write(&path, "t,f\n0,1\n1,2\n2,3\n3,4\n4,5\n").unwrap();
+/// let file = RecordFile::open(&path, 0, 2)?;
+/// assert!(!file.is_whole());
+/// let survey = file.survey(&TimeAxis::Column("t"), &["f"])?;
+/// assert_eq!((survey.sampling.len(), survey.means[0]), (5, 3.0));
+/// // Samples 2 to 5, two at a time.
+/// let mut sums = Vec::new();
+/// file.blocks(&["f"], 1..5, 2, 2, &mut |block| -> Result<(), IoError> {
+///     sums.push(block.sum());
+///     Ok(())
+/// })?;
+/// assert_eq!(sums, [5.0, 9.0]);
+/// # std::fs::remove_file(path).unwrap();
+/// # Ok::<(), IoError>(())
+/// ```
+#[derive(Debug)]
+pub struct RecordFile {
+    path: PathBuf,
+    skip: u64,
+    /// All samples, or the first ones.
+    head: Table,
+    whole: bool,
+}
+
+/// What one pass over some columns tells of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Survey {
+    /// Their time axis.
+    pub sampling: Sampling,
+    /// Mean of each, in its unit.
+    pub means: Vec<f64>,
+    /// Largest magnitude of each, in its unit.
+    pub peaks: Vec<f64>,
+}
+
+/// Some rows of the columns of a file.
+struct Chunk<'a> {
+    /// The first sample, counted from 0.
+    first: usize,
+    columns: &'a [&'a [f64]],
+    lines: &'a Lines,
+}
+
+impl RecordFile {
+    /// Opens a file below some lines of text; of a text at most `held` rows are held.
+    ///
+    /// # Errors
+    /// As [`Table::read_below`].
+    pub fn open(path: impl AsRef<Path>, skip: u64, held: usize) -> Result<Self, IoError> {
+        let path = path.as_ref().to_owned();
+        let source = Source::open(&path)?;
+        let again = fs::metadata(&path).is_ok_and(|m| m.is_file()) && source.kind() == Kind::Text;
+        let limit = if again { held } else { usize::MAX };
+        let (head, whole) = Table::first_rows(source, skip, limit)?;
+        Ok(Self { path, skip, head, whole })
+    }
+
+    /// The table; only the first of its samples if the file is not held whole.
+    pub fn head(&self) -> &Table {
+        &self.head
+    }
+
+    /// Whether [`RecordFile::head`] has all samples.
+    pub fn is_whole(&self) -> bool {
+        self.whole
+    }
+
+    /// Reads the columns `wanted` to the end: their time axis, and what they hold.
+    ///
+    /// # Errors
+    /// As [`Table::record`].
+    pub fn survey(
+        &self,
+        time: &TimeAxis<'_>,
+        wanted: &[impl AsRef<str>],
+    ) -> Result<Survey, IoError> {
+        let mut columns = self.head.record_columns(time, wanted)?;
+        let count = columns.len();
+        let instants = match time {
+            TimeAxis::Column(name) if !self.whole => Some(self.head.find(name)?),
+            _ => None,
+        };
+        columns.extend(instants);
+        let (mut len, mut sums, mut peaks) = (0, vec![0.0; count], vec![0.0_f64; count]);
+        let mut steps = Steps::default();
+        let known = if self.whole { Some(self.head.sampling(time, wanted)?) } else { None };
+        self.chunks(&columns, &mut |chunk| {
+            for (c, values) in chunk.columns[..count].iter().enumerate() {
+                sums[c] = values.iter().fold(sums[c], |sum, v| sum + v);
+                peaks[c] = values.iter().fold(peaks[c], |peak, v| peak.max(v.abs()));
+            }
+            if instants.is_some() {
+                for (k, time) in (chunk.first..).zip(chunk.columns[count]) {
+                    steps.push(*time, || chunk.lines.place(k));
+                }
+            }
+            len = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
+            Ok::<_, IoError>(ControlFlow::Continue(()))
+        })?;
+        let sampling = match (known, instants) {
+            (Some(sampling), _) => sampling,
+            (None, Some(column)) => {
+                let unit = time_unit::unit(&self.head.contents.columns[column]);
+                let dt = steps.step(self.head.file(), unit)?;
+                self.head.signal(Sampling::new(dt, len))?
+            }
+            (None, None) => match time {
+                TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
+                // A text gives its columns none: that is what this says.
+                _ => self.head.sampling(time, wanted)?,
+            },
+        };
+        let means = sums.into_iter().map(|sum| sum / len as f64).collect();
+        Ok(Survey { sampling, means, peaks })
+    }
+
+    /// Takes the samples `window` of the columns `wanted` in blocks of so many rows, each beginning
+    /// `advance` rows after the one before (samples × columns); the last block may be shorter.
+    ///
+    /// # Errors
+    /// As [`Table::column`], [`IoError::Read`] if the file has become shorter, and whatever `take`
+    /// gives.
+    ///
+    /// # Panics
+    /// If `rows` or `advance` is 0, or `advance` is more than `rows`.
+    pub fn blocks<E: From<IoError>>(
+        &self,
+        wanted: &[impl AsRef<str>],
+        window: Range<usize>,
+        rows: usize,
+        advance: usize,
+        take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        assert!(0 < advance && advance <= rows, "blocks of {rows} rows, {advance} apart");
+        let columns =
+            wanted.iter().map(|w| self.head.find(w.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        let mut held: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
+        let (mut end, mut fresh) = (window.start, false);
+        self.chunks(&columns, &mut |chunk| {
+            let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
+            let mut next = window.start.max(chunk.first);
+            // A few rows at a time: a table in memory is one chunk.
+            while next < last.min(window.end) {
+                let upto = last.min(window.end).min(next + rows);
+                for (values, column) in held.iter_mut().zip(chunk.columns) {
+                    values.extend_from_slice(&column[next - chunk.first..upto - chunk.first]);
+                }
+                (next, end, fresh) = (upto, upto, true);
+                while held.first().is_some_and(|values| values.len() >= rows) {
+                    take(matrix(&held, rows))?;
+                    held.iter_mut().for_each(|values| drop(values.drain(..advance)));
+                    fresh = held.first().is_some_and(|values| values.len() > rows - advance);
+                }
+            }
+            Ok::<_, E>(if last < window.end {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            })
+        })?;
+        if end < window.end {
+            let source = std::io::ErrorKind::UnexpectedEof.into();
+            return Err(IoError::Read { file: self.head.file().into(), source }.into());
+        }
+        match held.first().map_or(0, Vec::len) {
+            rest if rest > 0 && fresh => take(matrix(&held, rest)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Every sample of some columns, by their indices, in order; stops where `take` says so.
+    fn chunks<E: From<IoError>>(
+        &self,
+        columns: &[usize],
+        take: &mut dyn FnMut(Chunk<'_>) -> Result<ControlFlow<()>, E>,
+    ) -> Result<(), E> {
+        if self.whole {
+            let values = columns.iter().map(|c| self.head.values(*c));
+            let values = values.collect::<Result<Vec<_>, _>>()?;
+            let lines = &self.head.contents.lines;
+            return take(Chunk { first: 0, columns: &values, lines }).map(|_| ());
+        }
+        let source = Source::open(&self.path)?;
+        let mut reader = TextReader::open(source, self.skip, Some(columns.to_vec()))?;
+        let mut first = 0;
+        loop {
+            let more = reader.read(CHUNK)?;
+            let rows = reader.rows();
+            let values = columns.iter().map(|c| rows.column(*c).values.as_deref().ok());
+            if let Some(columns) = values.collect::<Option<Vec<_>>>()
+                && take(Chunk { first, columns: &columns, lines: rows.lines() })?.is_break()
+            {
+                return Ok(());
+            }
+            first = rows.samples();
+            rows.forget();
+            if !more {
+                break;
+            }
+        }
+        // What is wrong is told column by column, as of a table that is held.
+        for column in columns {
+            if let Err(why) = &reader.rows().column(*column).values {
+                return Err(self.unusable(*column, why).into());
+            }
+        }
+        Ok(())
+    }
+
+    fn unusable(&self, column: usize, why: &Unusable) -> IoError {
+        why.error(self.head.file(), self.head.label(column))
+    }
+}
+
+/// The first rows of some columns.
+fn matrix(columns: &[Vec<f64>], rows: usize) -> DMatrix<f64> {
+    let mut matrix = DMatrix::zeros(rows, columns.len());
+    for (mut into, column) in matrix.column_iter_mut().zip(columns) {
+        into.copy_from_slice(&column[..rows]);
+    }
+    matrix
+}
