@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mechid::io::{Table, TimeAxis};
+use mechid::io::{RecordFile, Table, TimeAxis};
 use mechid::signal::Record;
 
 use crate::error::CliError;
@@ -105,6 +105,11 @@ impl RecordArgs {
         Ok(Table::read_below(&self.record, self.skip_lines)?)
     }
 
+    /// The file, of which so many rows are held.
+    pub fn file(&self, held: usize) -> Result<RecordFile, CliError> {
+        Ok(RecordFile::open(&self.record, self.skip_lines, held)?)
+    }
+
     /// The time axis asked for, that of the file, or the time column found by its name.
     pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
         match (self.sample_rate, &self.time) {
@@ -115,14 +120,18 @@ impl RecordArgs {
         }
     }
 
+    /// The same, where there must be one.
+    pub fn needed_time_axis<'a>(&'a self, table: &'a Table) -> Result<TimeAxis<'a>, CliError> {
+        self.time_axis(table).ok_or_else(|| CliError::NoTimeAxis {
+            file: table.file().into(),
+            available: table.available(),
+        })
+    }
+
     /// The columns `wanted` as the channels of a record: whole, then detrended, then windowed to
     /// `periods` periods.
     pub fn window(&self, table: &Table, wanted: &[impl AsRef<str>]) -> Result<Record, CliError> {
-        let time = self.time_axis(table).ok_or_else(|| CliError::NoTimeAxis {
-            file: table.file().into(),
-            available: table.available(),
-        })?;
-        let mut record = table.record(&time, wanted)?;
+        let mut record = table.record(&self.needed_time_axis(table)?, wanted)?;
         if self.detrend == Some(Detrend::Mean) {
             record = record.without_mean();
         }
@@ -141,7 +150,8 @@ impl RecordArgs {
         if len > left { Err(self.outside(file, len, samples)) } else { Ok((start, len)) }
     }
 
-    fn outside(&self, file: &str, len: usize, samples: usize) -> CliError {
+    /// That the window is not all there.
+    pub fn outside(&self, file: &str, len: usize, samples: usize) -> CliError {
         CliError::Window {
             file: file.into(),
             first: self.start,

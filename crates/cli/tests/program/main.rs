@@ -7,6 +7,7 @@ mod lines;
 mod modal;
 mod records;
 mod reference;
+mod stretches;
 mod sweep;
 mod talk;
 

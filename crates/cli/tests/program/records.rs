@@ -42,7 +42,7 @@ fn records() -> (tempfile::TempDir, [&'static str; 6]) {
 }
 
 /// Columns of doubles as a MATLAB file of level 5.
-fn matlab(columns: &[(String, &[f64])], packed: bool) -> Vec<u8> {
+pub fn matlab(columns: &[(String, &[f64])], packed: bool) -> Vec<u8> {
     let mut file = b"MATLAB 5.0 MAT-file, by hand".to_vec();
     file.resize(124, b' ');
     file.extend(b"\x00\x01IM");

@@ -87,7 +87,8 @@ impl Segments {
             let turn = |k: usize| Complex::cis(-TAU * ((lines * k) % len) as f64 / len as f64);
             let pairs = weights.iter().zip(&weights[apart * hop..]).enumerate();
             let shared: Complex<f64> = pairs.map(|(k, (a, b))| turn(k) * a * b).sum();
-            let times = if apart == 0 { 1.0 } else { 2.0 * (1.0 - apart as f64 / pieces as f64).max(0.0) };
+            let times =
+                if apart == 0 { 1.0 } else { 2.0 * (1.0 - apart as f64 / pieces as f64).max(0.0) };
             times * shared.norm_sqr()
         };
         let overlapping = len.div_ceil(hop);

@@ -20,7 +20,8 @@ use crate::outcome::Outcome;
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
 /// With a periodic excitation the periods are the segments that are averaged (--period says how long
-/// one is). With a random excitation say --segment: segments overlap under a window.
+/// one is). With a random excitation say --segment: segments overlap under a window. A long text is
+/// read a stretch at a time and not held.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
@@ -56,12 +57,12 @@ pub struct FrfArgs {
 impl FrfArgs {
     /// Reads, averages, and tells.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let measured = self.channels.measure(&self.input)?;
+        let recorded = self.channels.record(&self.input, self.segments.hold())?;
         let choose = |force: &_, period: usize| {
             choose_lines(force, period, self.lines.as_ref(), self.band_hz)
         };
-        let found = Responses::of(&measured, &self.segments, self.estimator, choose)?;
-        let report = Report::new(&measured, &found, self.estimator);
+        let found = Responses::of(&recorded, &self.segments, self.estimator, choose)?;
+        let report = Report::new(&recorded.held, &found, self.estimator);
         let mut outcome = Outcome::new(report.text(), &report)?
             .with_plot(&self.plot, || Ok(picture::figure(&report)))?;
         if let Some(path) = &self.output {

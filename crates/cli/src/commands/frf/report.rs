@@ -81,7 +81,7 @@ impl Report {
         Self {
             file: measured.file.clone(),
             first_sample: measured.first_sample,
-            last_sample: measured.first_sample + measured.force.len() - 1,
+            last_sample: measured.last_sample(),
             sample_rate_hz: measured.force.sampling().rate_hz(),
             estimator: estimator.name(),
             segments: SegmentRow::of(found),

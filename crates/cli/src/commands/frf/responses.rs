@@ -2,10 +2,10 @@
 
 use clap::{Args, ValueEnum};
 use mechid::estimate::frequency_domain::Lines;
-use mechid::estimate::{Frf, FrfEstimator, Segments, Window};
+use mechid::estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
 use mechid::signal::Record;
 
-use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::measurement::{Hold, Recorded, STRETCH};
 use crate::error::CliError;
 use crate::options::at_least_one;
 
@@ -74,6 +74,11 @@ impl SegmentArgs {
         self.segment.is_none()
     }
 
+    /// What must be held of a record: segments are averaged one after another.
+    pub fn hold(&self) -> Hold {
+        self.segment.map_or(Hold::Periods, Hold::Samples)
+    }
+
     /// The segments of a window with periods of so many samples.
     pub fn segments(&self, period: usize) -> Segments {
         let Some(len) = self.segment else { return Segments::Periods(period) };
@@ -104,31 +109,36 @@ impl Responses {
     /// From the forces that act to the first kind of motion measured, on the lines that `choose`
     /// finds in a segment of the force.
     pub fn of(
-        measured: &Measurement,
+        recorded: &Recorded,
         segments: &SegmentArgs,
         estimator: Estimator,
         choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     ) -> Result<Self, CliError> {
-        let segments = segments.segments(measured.period);
-        let force = &measured.force;
+        let held = &recorded.held;
+        let segments = segments.segments(held.period);
+        let (force, driven) = (&held.force, held.driven.clone());
         let len = segments.samples();
         let chosen = match segments {
             Segments::Periods(period) => choose(force, period)?,
             Segments::Windowed { len, .. } => choose(&force.window(0, len)?, len)?,
         };
         let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
-        let acts = |dof: &usize| force.channel(*dof).iter().any(|f| *f != 0.0);
-        let driven: Vec<usize> = (0..force.channels()).filter(acts).collect();
-        let acting: Vec<&[f64]> = driven.iter().map(|dof| force.channel(*dof)).collect();
-        let acting = Record::from_channels(force.sampling(), &acting)?;
-        let (motion, kind) = measured.motion();
-        let estimator = match estimator {
+        let (motion, kind) = held.motion();
+        let channels = [driven.len(), motion.channels()];
+        let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;
+        let (hop, at_once) = (segments.hop(), (STRETCH / segments.hop()).max(1));
+        let (samples, advance) = ((at_once - 1) * hop + len, at_once * hop);
+        recorded.stretches(samples, advance, &mut |stretch| {
+            let acting: Vec<&[f64]> =
+                driven.iter().map(|dof| stretch.force.channel(*dof)).collect();
+            let acting = Record::from_channels(stretch.force.sampling(), &acting)?;
+            Ok(average.push(&acting, stretch.motion().0)?)
+        })?;
+        let frf = average.frf(match estimator {
             Estimator::H1 => FrfEstimator::H1,
             Estimator::H2 => FrfEstimator::H2,
             Estimator::Hv => FrfEstimator::Hv,
-        };
-        let chosen = lines.as_slice().iter().copied();
-        let frf = Frf::estimate(&acting, motion, kind, segments, chosen, estimator)?;
+        })?;
         Ok(Self { frf, lines, driven, segments })
     }
 }

@@ -14,7 +14,7 @@ use mechid::model::SecondOrderSystem;
 use mechid::signal::Record;
 
 use super::course::Course;
-use super::measurement::Measurement;
+use super::measurement::{Measurement, Recorded, STRETCH};
 use crate::error::CliError;
 
 /// How the parameters are found from the spectra.
@@ -95,30 +95,29 @@ pub struct Residual {
 /// Fits the spectra of the windows of one or several records, each on the lines that `choose` finds
 /// in a period of its force.
 pub fn frequency_domain(
-    records: &[Measurement],
+    records: &[Recorded],
     unknowns: &Unknowns,
     choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     method: Method,
 ) -> Result<Fitted, CliError> {
     let mut spectra = Vec::new();
-    for measured in records {
-        let (motion, kind) = measured.motion();
-        let chosen = choose(&measured.force, measured.period)?;
-        let lines = Lines::new(measured.force.sampling().with_len(measured.period)?, chosen)?;
-        let periods = RepeatedPeriods::new(&lines, &measured.force, motion, kind)?;
-        spectra.push((lines, periods));
+    for recorded in records {
+        let held = &recorded.held;
+        let chosen = choose(&held.force, held.period)?;
+        let lines = Lines::new(held.force.sampling().with_len(held.period)?, chosen)?;
+        spectra.push((periods(recorded, &lines)?, lines));
     }
-    let mut remarks = one_motion_of(&records[0]);
+    let mut remarks = one_motion_of(&records[0].held);
     let together = |of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, EstimateError>| {
-        let mut all = of(&spectra[0].1)?;
-        for (_, periods) in &spectra[1..] {
+        let mut all = of(&spectra[0].0)?;
+        for (periods, _) in &spectra[1..] {
             all = all.and(&of(periods)?)?;
         }
         Ok::<_, CliError>(all)
     };
     let data = together(&RepeatedPeriods::mean)?;
     let mut misfit = None;
-    let fewest = spectra.iter().map(|(_, periods)| periods.count()).min().unwrap_or(1);
+    let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
     let (estimator, estimate) = match method {
         Method::LeastSquares => (
             "least squares on the equation of motion, in the frequency domain",
@@ -145,14 +144,14 @@ pub fn frequency_domain(
         }
     };
     let (mut before, mut after) = (Vec::new(), Vec::new());
-    for (measured, (lines, periods)) in records.iter().zip(&spectra) {
-        let (motion, kind) = measured.motion();
-        before.push(before_spectral_fit(lines, &measured.force, motion, kind, unknowns)?);
+    for (Recorded { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
+        let (motion, kind) = held.motion();
+        before.push(before_spectral_fit(lines, &held.force, motion, kind, unknowns)?);
         let own = lines.as_slice().len() as f64 / data.len() as f64;
         let fitted = own * estimate.parameters().len() as f64;
         after.push(Vec::from_iter(of_noise(periods, &estimate, fitted)?));
     }
-    let lines = spectra.swap_remove(0).0;
+    let lines = spectra.swap_remove(0).1;
     let residuals = steady_residuals(records, &estimate)?;
     Ok(Fitted {
         domain: "frequency",
@@ -168,6 +167,18 @@ pub fn frequency_domain(
         misfit,
         remarks,
     })
+}
+
+/// All periods of a record, a stretch at a time.
+fn periods(recorded: &Recorded, lines: &Lines) -> Result<RepeatedPeriods, CliError> {
+    let Measurement { force, period, periods, .. } = &recorded.held;
+    let kind = recorded.held.motion().1;
+    let mut all = RepeatedPeriods::expecting(lines, force.channels(), kind, *periods);
+    let samples = period * (STRETCH / period).max(1);
+    recorded.stretches(samples, samples, &mut |stretch| {
+        Ok(all.push(&stretch.force, stretch.motion().0)?)
+    })?;
+    Ok(all)
 }
 
 /// What is left against the noise of the periods, if these are several.
@@ -209,15 +220,15 @@ pub fn one_motion_of(measured: &Measurement) -> Vec<String> {
     Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
 }
 
-/// The motion that is left when the machine's steady state under the measured force is taken away,
-/// means apart.
+/// The motion that is left of what is held when the machine's steady state under the measured force
+/// is taken away, means apart.
 pub fn steady_residuals(
-    records: &[Measurement],
+    records: &[Recorded],
     estimate: &Estimate,
 ) -> Result<Vec<Residual>, CliError> {
     let system = estimate.system()?;
     let mut residuals = Vec::new();
-    for measured in records {
+    for Recorded { held: measured, .. } in records {
         let motion = measured.motion().0.without_mean();
         let predicted = Course::Steady.predict(&system, measured)?.swap_remove(0).predicted;
         residuals.push(Residual {

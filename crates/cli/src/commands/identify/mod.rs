@@ -26,7 +26,7 @@ use self::checks::CheckRow;
 use self::excited::{Band, choose_lines};
 use self::fit::{BetweenSamples, Fitted, Method};
 use self::mass::KnownMass;
-use self::measurement::{ChannelArgs, Measurement};
+use self::measurement::{ChannelArgs, Hold, Measurement, Recorded};
 use self::report::{
     CONFIDENCE, Fit, Lines, ModeRow, ParameterRow, RecordRow, Report, Uncertain, Window,
 };
@@ -44,6 +44,10 @@ use crate::outcome::Outcome;
 /// cut into segments with --from-frf. In the time domain any record will do: displacement, velocity
 /// and acceleration for the equation of motion itself, or displacement and velocity with an
 /// assumption on the force between the samples; what was not measured, --derivatives finds.
+///
+/// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
+/// it, the checks look at the first 262144 samples. Held whole are windows for --extent period,
+/// --derivatives, --refine, --validate, a plot in the time domain, and one long period.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
@@ -139,7 +143,12 @@ const CONSPICUOUS: f64 = 0.05;
 impl IdentifyArgs {
     /// Reads, identifies, and tells.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let found = self.identification.identify()?;
+        let hold = match (&self.plot.plot, self.identification.domain) {
+            // The picture is of the motion, not of spectra.
+            (Some(_), Domain::Time) => Hold::Whole,
+            _ => self.identification.hold(),
+        };
+        let found = self.identification.identify(hold)?;
         let report = &found.report;
         Outcome::new(report.text(), report)?
             .with_plot(&self.plot, || found.picture(&report.title()))
@@ -147,15 +156,24 @@ impl IdentifyArgs {
 }
 
 impl Identification {
+    /// How much of a record must be held to fit it.
+    pub fn hold(&self) -> Hold {
+        match self.domain {
+            Domain::Time if !self.time.goes_sample_by_sample() => Hold::Whole,
+            Domain::Time => Hold::Samples(0),
+            Domain::Frequency => self.segments.hold(),
+        }
+    }
+
     /// Reads and identifies.
-    pub fn identify(&self) -> Result<Identified, CliError> {
+    pub fn identify(&self, hold: Hold) -> Result<Identified, CliError> {
         self.check_options()?;
-        let mut records = vec![self.channels.measure(&self.input)?];
+        let mut records = vec![self.channels.record(&self.input, hold)?];
         for record in &self.more {
             let input = RecordArgs { record: record.clone(), ..self.input.clone() };
-            records.push(self.channels.measure(&input)?);
+            records.push(self.channels.record(&input, hold)?);
         }
-        let unknowns = self.mass.unknowns(records[0].force.channels())?;
+        let unknowns = self.mass.unknowns(records[0].held.force.channels())?;
         let choose = |force: &Record, period: usize| self.choose(force, period);
         let fitted = match (self.domain, self.from_frf) {
             (Domain::Time, _) => self.time.fit(&records, &unknowns, self.between_samples)?,
@@ -168,6 +186,7 @@ impl Identification {
                 fit::frequency_domain(&records, &unknowns, choose, method)?
             }
         };
+        let records: Vec<Measurement> = records.into_iter().map(Recorded::into_held).collect();
         let mut report = report(&records, &fitted)?;
         let validated = self.validation.measure(&self.input, &self.channels, fitted.course)?;
         if let Some(other) = &validated {
@@ -260,9 +279,14 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         system: SystemMatrices::from(&system),
         covariance: covariance(estimate),
     };
+    let looked_at = records.iter().filter_map(|record| {
+        let (first, last) = (record.first_sample, record.held_to()?);
+        let file = &record.file;
+        Some(format!("checks of single samples looked at samples {first} to {last} of {file} only"))
+    });
     let of_method = of_least_squares(fitted, &report.checks);
-    report.remarks =
-        fitted.remarks.iter().cloned().chain(doubts(&report)).chain(of_method).collect();
+    let remarks = fitted.remarks.iter().cloned().chain(looked_at).chain(doubts(&report));
+    report.remarks = remarks.chain(of_method).collect();
     Ok(report)
 }
 

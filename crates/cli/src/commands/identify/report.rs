@@ -234,7 +234,7 @@ impl Window {
     pub fn of(measured: &Measurement) -> Self {
         Self {
             first_sample: measured.first_sample,
-            last_sample: measured.first_sample + measured.period * measured.periods - 1,
+            last_sample: measured.last_sample(),
             period_samples: measured.period,
             periods: measured.periods,
             sample_rate_hz: measured.force.sampling().rate_hz(),

@@ -10,7 +10,7 @@ use mechid::signal::Record;
 
 use super::course::Course;
 use super::fit::{Fitted, Method, Misfit, one_motion_of, steady_residuals};
-use super::measurement::Measurement;
+use super::measurement::{Measurement, Recorded};
 use super::report::Lines;
 use crate::commands::frf::responses::{Estimator, Responses, SegmentArgs};
 use crate::error::CliError;
@@ -21,13 +21,13 @@ use crate::error::CliError;
 /// # Errors
 /// [`CliError::InstrumentalResponses`] for instrumental variables.
 pub fn fit(
-    records: &[Measurement],
+    records: &[Recorded],
     unknowns: &Unknowns,
     choose: impl Fn(&Record, usize) -> Result<Vec<usize>, CliError>,
     (estimator, segments): (Estimator, &SegmentArgs),
     method: Option<Method>,
 ) -> Result<Fitted, CliError> {
-    let estimate = |measured| Responses::of(measured, segments, estimator, &choose);
+    let estimate = |recorded| Responses::of(recorded, segments, estimator, &choose);
     let responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
     let mut data: Option<FrequencyData> = None;
     for r in &responses {
@@ -53,17 +53,17 @@ pub fn fit(
     };
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
-    for (measured, r) in records.iter().zip(&responses) {
+    for (Recorded { held, .. }, r) in records.iter().zip(&responses) {
         let mut checks = before_response_fit(&r.frf, &r.driven, unknowns)?;
         if periodic {
-            checks.extend(claimed_period(&measured.force, measured.period));
+            checks.extend(claimed_period(&held.force, held.period));
         }
         before.push(checks);
         let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / data.len() as f64;
         let fitted = own * found.parameters().len() as f64;
         let mut checks = after_response_fit(&r.frf, &r.driven, &found, fitted)?;
         if !periodic {
-            checks.extend(of_linearity(measured, r, &found)?);
+            checks.extend(of_linearity(held, r, &found)?);
         }
         after.push(checks);
     }
@@ -84,7 +84,7 @@ pub fn fit(
             },
         },
         misfit,
-        remarks: one_motion_of(&records[0]),
+        remarks: one_motion_of(&records[0].held),
         estimate: found,
     })
 }

@@ -9,7 +9,7 @@ use mechid::signal::{Interpolation, Record};
 use super::course::Course;
 use super::derivatives::{Derivatives, Prepared};
 use super::fit::{BetweenSamples, Fitted, Residual};
-use super::measurement::Measurement;
+use super::measurement::{Recorded, STRETCH};
 use crate::error::CliError;
 use crate::options::at_least_one;
 
@@ -84,33 +84,66 @@ impl TimeArgs {
         Some((self.refine?, way))
     }
 
+    /// Whether every sample is fitted with its neighbours only, and the window is no whole.
+    pub fn goes_sample_by_sample(&self) -> bool {
+        self.extent() == Extent::Open && self.derivatives.is_none() && self.refine.is_none()
+    }
+
     /// Fits the samples of one or several windows: the equation of motion itself where there is an
     /// acceleration and nothing else is asked for, otherwise what leads from one sample to the next.
     pub fn fit(
         &self,
-        records: &[Measurement],
+        records: &[Recorded],
         unknowns: &Unknowns,
         between: Option<BetweenSamples>,
     ) -> Result<Fitted, CliError> {
-        let prepare = |measured| Prepared::of(measured, self.derivatives.as_ref());
+        let prepare = |r: &Recorded| Prepared::of(&r.held, self.derivatives.as_ref());
         let prepared: Vec<Prepared> = records.iter().map(prepare).collect::<Result<_, _>>()?;
         if between.is_some() && prepared.iter().any(|p| p.twice_differentiated) {
             return Err(CliError::TwiceDifferentiated);
         }
         match between {
-            None if prepared[0].acceleration.is_some() => self.at_samples(&prepared, unknowns),
-            _ => self.step_by_step(&prepared, unknowns, between),
+            None if prepared[0].acceleration.is_some() => {
+                self.at_samples(records, &prepared, unknowns)
+            }
+            _ => self.step_by_step(records, &prepared, unknowns, between),
         }
     }
 
-    fn at_samples(&self, prepared: &[Prepared], unknowns: &Unknowns) -> Result<Fitted, CliError> {
+    /// Goes through a record in stretches of which each but the first begins with the last `overlap`
+    /// samples of the one before; in one, where samples cannot be told apart from the whole.
+    fn stretches(
+        &self,
+        recorded: &Recorded,
+        overlap: usize,
+        take: &mut dyn FnMut(&Prepared) -> Result<(), CliError>,
+    ) -> Result<(), CliError> {
+        let advance = match self.goes_sample_by_sample() {
+            true => STRETCH,
+            false => recorded.held.force.len(),
+        };
+        recorded.stretches(advance + overlap, advance, &mut |stretch| {
+            take(&Prepared::of(stretch, self.derivatives.as_ref())?)
+        })
+    }
+
+    fn at_samples(
+        &self,
+        records: &[Recorded],
+        prepared: &[Prepared],
+        unknowns: &Unknowns,
+    ) -> Result<Fitted, CliError> {
         let mut rows = EquationOfMotion::new(unknowns.dof());
         let mut before = Vec::new();
-        for p in prepared {
+        for (recorded, p) in records.iter().zip(prepared) {
+            self.stretches(recorded, 0, &mut |p| {
+                let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
+                let [a, v, x] =
+                    [response.acceleration(), response.velocity(), response.displacement()]
+                        .map(|r| r.data().as_view());
+                Ok(rows.push_rows(a, v, x, p.force.data().as_view())?)
+            })?;
             let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
-            let [a, v, x] = [response.acceleration(), response.velocity(), response.displacement()]
-                .map(|r| r.data().as_view());
-            rows.push_rows(a, v, x, p.force.data().as_view())?;
             before.push(before_equation_of_motion(&response, &p.force, unknowns, self.extent())?);
         }
         let estimate = rows.solve(unknowns)?;
@@ -136,6 +169,7 @@ impl TimeArgs {
 
     fn step_by_step(
         &self,
+        records: &[Recorded],
         prepared: &[Prepared],
         unknowns: &Unknowns,
         between: Option<BetweenSamples>,
@@ -146,14 +180,18 @@ impl TimeArgs {
         let (factor, interpolation) = self.refinement().unzip();
         let mut rows = Transitions::new(unknowns.dof(), dt / factor.unwrap_or(1) as f64)?;
         let mut before = Vec::new();
-        for p in prepared {
-            let [x, v, force] = p.states();
-            match (factor, interpolation) {
-                (Some(factor), Some(interpolation)) => {
-                    rows.push_refined([x, v, force], extent, factor, interpolation)?;
+        for (recorded, p) in records.iter().zip(prepared) {
+            self.stretches(recorded, usize::from(extent == Extent::Open), &mut |p| {
+                let [x, v, force] = p.states();
+                match (factor, interpolation) {
+                    (Some(factor), Some(interpolation)) => {
+                        rows.push_refined([x, v, force], extent, factor, interpolation)?;
+                    }
+                    _ => rows.push(x, v, force, extent)?,
                 }
-                _ => rows.push(x, v, force, extent)?,
-            }
+                Ok(())
+            })?;
+            let [x, v, force] = p.states();
             before.push(before_fit(TimeDomain::new(discretisation, extent), x, v, force)?);
         }
         let fit = rows.fit(discretisation, unknowns)?;

@@ -23,7 +23,7 @@ use self::receptance::Receptance;
 use self::reconstruction::Reconstruction;
 use self::residual::Residual;
 use crate::commands::identify::course::{Compared, Course};
-use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::measurement::{Hold, Measurement};
 use crate::commands::identify::report::Report;
 use crate::commands::identify::{Identification, Identified};
 use crate::error::CliError;
@@ -33,7 +33,7 @@ use crate::outcome::Outcome;
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
 ///
 /// Takes the options of `mechid identify`. The file needs nothing else: it can be sent, printed and
-/// kept, and ends with the command that writes it again.
+/// kept, and ends with the command that writes it again. The records are held whole, to be drawn.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
@@ -105,7 +105,7 @@ struct Printed<'a> {
 impl PageArgs {
     /// Reads, identifies, draws and writes.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let found = self.identification.identify()?;
+        let found = self.identification.identify(Hold::Whole)?;
         let contents = self.contents(&found)?;
         let page = page::html(&contents)?;
         let html = self.output.display().to_string();

@@ -65,7 +65,7 @@ impl Receptance {
 
 fn of_periods(measured: &Measurement) -> Result<FrequencyData, CliError> {
     let force = &measured.force;
-    let chosen = choose_lines(&force.period_mean(measured.period)?, None, None)?;
+    let chosen = choose_lines(force, measured.period, None, None)?;
     let lines = Lines::new(force.sampling().with_len(measured.period)?, chosen)?;
     let (motion, kind) = measured.motion();
     Ok(RepeatedPeriods::new(&lines, force, motion, kind)?.mean()?)
