@@ -15,7 +15,7 @@ pub fn told(value: f64) -> impl fmt::Display {
     Told(value)
 }
 
-/// The same with so many decimals where it is shown in full.
+/// A number, in any unit, as [`told`] shows it, with so many decimals where that is in full.
 ///
 /// ```
 /// use mechid_signal::told_to;

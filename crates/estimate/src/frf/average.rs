@@ -49,6 +49,9 @@ impl FrfAverage {
     /// # Errors
     /// [`EstimateError::Signal`] if the records have not the same time axis or not the time step of
     /// the lines, [`EstimateError::Size`] for another number of channels.
+    ///
+    /// # Source
+    /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), EstimateError> {
         force.check_same_sampling(motion)?;
         crate::least_squares::size("channels of the force", self.inputs, force.channels())?;

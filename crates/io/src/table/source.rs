@@ -123,11 +123,10 @@ fn is_utf16(head: &[u8]) -> bool {
 fn is_json(head: &[u8]) -> bool {
     let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
     let mut marks = text.iter().filter(|b| !b.is_ascii_whitespace());
-    match (marks.next(), marks.next()) {
-        (Some(b'{'), Some(b'"' | b'}') | None) => true,
-        (Some(b'['), Some(b'{')) => true,
-        _ => false,
-    }
+    matches!(
+        (marks.next(), marks.next()),
+        (Some(b'{'), Some(b'"' | b'}') | None) | (Some(b'['), Some(b'{'))
+    )
 }
 
 /// What a reading error says: of the file, or of the gzip around it.
