@@ -65,8 +65,8 @@ pub fn after_spectral_fit(data: &FrequencyData, estimate: &Estimate, fitted: f64
 
 /// Whether what an estimate leaves of frequency responses is as large as their coherence says, and
 /// whether it has nothing in common from line to line beyond what the window ties together. The
-/// forces act at the degrees of freedom `force_dof`, as for [`Frf::data`]; `fitted` as for
-/// [`after_spectral_fit`].
+/// forces act at the degrees of freedom `force_dof`, as for [`Frf::data`]; `fitted`, a pure number, as
+/// for [`after_spectral_fit`].
 ///
 /// Both allow for lines that the window and the overlap of the segments correlate; of responses
 /// measured elsewhere the lines are taken as independent. The size is judged if the averages are

@@ -79,7 +79,7 @@ fn linear(force: &Record) -> Record {
     exact_harmonic_periodic(&oscillator(), force).unwrap().displacement().clone()
 }
 
-/// The level is 1 %, of 200 runs 2 with a standard deviation of 1.4. Products of a hundred lines are
+/// The level is 1 %, of 100 runs 1 with a standard deviation of 1. Products of a hundred lines are
 /// not quite normally distributed, so that their sum exceeds its limit in 2 to 3 % (of 400 runs, by
 /// the same experiments).
 #[test]
@@ -93,7 +93,7 @@ fn checks_of_responses_seldom_find_fault_with_a_right_machine() {
         (Segments::hann(512), FrfEstimator::Hv, [0.2, 0.2]),
     ] {
         let random = Random { segments, estimator, noise, mass: None };
-        let rates = faulted(200, |seed| verdicts(&random.checks(seed, linear)));
+        let rates = faulted(100, |seed| verdicts(&random.checks(seed, linear)));
         assert!(
             rates[0] < 0.04 && rates[1] < 0.06 && rates[2] < 0.04,
             "{segments:?}, {estimator:?}: {rates:?}"
