@@ -56,6 +56,24 @@ pub enum CliError {
         /// Columns that `--force` names.
         forces: usize,
     },
+    /// A column measures something else than it is used for.
+    #[error(
+        "{file}: column {column} is in {unit}, a unit of {measures}; {option} takes columns of {wanted}"
+    )]
+    Unit {
+        /// The file.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+        /// The unit that its name or the line of units says.
+        unit: &'static str,
+        /// What that measures.
+        measures: mechid::io::Quantity,
+        /// The option that names the column.
+        option: &'static str,
+        /// What it asks for.
+        wanted: mechid::io::Quantity,
+    },
     /// Not one motion column per degree of freedom of the machine.
     #[error(
         "{option} names {got} columns, the machine has {dofs} degrees of freedom: name one for \

@@ -11,6 +11,7 @@ mod options;
 mod outcome;
 mod progress;
 mod text_table;
+mod units;
 
 use std::process::ExitCode;
 

@@ -80,6 +80,12 @@ pub fn compact(value: f64, digits: usize) -> String {
     }
 }
 
+/// Lines with an empty one above them; nothing if there is none.
+pub fn paragraph(lines: impl Iterator<Item = String>) -> String {
+    let lines: String = lines.map(|line| line + "\n").collect();
+    if lines.is_empty() { lines } else { format!("\n{lines}") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

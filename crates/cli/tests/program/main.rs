@@ -10,6 +10,7 @@ mod reference;
 mod stretches;
 mod sweep;
 mod talk;
+mod units;
 
 use std::path::Path;
 

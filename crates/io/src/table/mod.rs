@@ -10,6 +10,7 @@ mod source;
 mod text;
 mod time_axis;
 mod time_unit;
+mod unit;
 
 use std::path::Path;
 
@@ -22,6 +23,7 @@ pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source};
 use self::text::TextReader;
 pub use self::time_axis::TimeAxis;
+pub use self::unit::{Quantity, Unit};
 use crate::{IoError, mat, uff};
 
 /// The columns of a record file, whatever its format.
@@ -164,6 +166,16 @@ impl Table {
     /// If there is no such column.
     pub fn about(&self, column: usize) -> &str {
         &self.contents.columns[column].about
+    }
+
+    /// The unit of a force or a motion that a column says to be in, by its index counted from 0:
+    /// at the end of its name in brackets (`Force [kN]`, `x (µm)`) or after a stroke (`F / kN`), or
+    /// in the line of units. Nothing here is rescaled by it.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn unit(&self, column: usize) -> Option<Unit> {
+        Unit::of(&self.names[column], self.about(column))
     }
 
     /// Single numbers that the file holds beside its columns.

@@ -131,7 +131,7 @@ impl ForceArgs {
             .enumerate()
             .map(|(dof, found)| found || request.forced.contains(&dof))
             .collect();
-        let mut remarks = Vec::new();
+        let mut remarks: Vec<String> = motion.converted.iter().cloned().collect();
         if machine.covariance.is_some() && !found.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \

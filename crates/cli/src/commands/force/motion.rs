@@ -2,12 +2,14 @@
 
 use clap::Args;
 use mechid::force::{Channel, Measurement, Quantity};
+use mechid::io;
 use mechid::model::Response;
 use mechid::signal::Record;
 use nalgebra::DMatrix;
 
 use crate::error::CliError;
 use crate::options::RecordArgs;
+use crate::units::ToSi;
 
 /// Which columns hold what; one entry per degree of freedom, in the machine's order.
 #[derive(Debug, Args)]
@@ -33,6 +35,8 @@ pub struct Motion {
     pub measured: Measurement,
     /// Periods in the window; 1 for an open record.
     pub periods: usize,
+    /// Which columns were in other than SI units.
+    pub converted: Option<String>,
 }
 
 impl MotionArgs {
@@ -48,13 +52,14 @@ impl MotionArgs {
             ("--velocity", Quantity::Velocity, &self.velocity),
             ("--acceleration", Quantity::Acceleration, &self.acceleration),
         ];
-        let (mut wanted, mut channels) = (Vec::new(), Vec::new());
+        let (mut wanted, mut roles, mut channels) = (Vec::new(), Vec::new(), Vec::new());
         for (option, quantity, columns) in groups {
             if !columns.is_empty() && columns.len() != dofs {
                 return Err(CliError::MotionCount { option, got: columns.len(), dofs });
             }
             for (dof, column) in columns.iter().enumerate().filter(|(_, c)| *c != NOT_MEASURED) {
                 wanted.push(column);
+                roles.push((column, held(quantity), option));
                 channels.push(Channel { dof, quantity });
             }
         }
@@ -62,7 +67,8 @@ impl MotionArgs {
             return Err(CliError::NoMotion);
         }
         let table = input.table()?;
-        let mut record = input.window(&table, &wanted)?;
+        let units = ToSi::of(&table, &roles)?;
+        let mut record = units.record(input.window(&table, &wanted)?)?;
         let mut periods = 1;
         if periodic {
             let period = input.period.unwrap_or(record.len());
@@ -70,7 +76,16 @@ impl MotionArgs {
             record = record.period_mean(period)?;
         }
         let measured = Measurement::new(record, channels)?;
-        Ok(Motion { file: table.file().into(), measured, periods })
+        Ok(Motion { file: table.file().into(), measured, periods, converted: units.remark })
+    }
+}
+
+/// What a column holds that was measured as this.
+fn held(quantity: Quantity) -> io::Quantity {
+    match quantity {
+        Quantity::Displacement => io::Quantity::Displacement,
+        Quantity::Velocity => io::Quantity::Velocity,
+        Quantity::Acceleration => io::Quantity::Acceleration,
     }
 }
 

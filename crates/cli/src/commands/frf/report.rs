@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::responses::{Estimator, Responses};
 use crate::commands::identify::measurement::Measurement;
-use crate::text_table::{compact, significant, text_table};
+use crate::text_table::{compact, paragraph, significant, text_table};
 
 /// Everything `mechid frf` has to say.
 #[derive(Debug, Serialize)]
@@ -27,6 +27,8 @@ pub struct Report {
     pub frequency_hz: Vec<f64>,
     pub responses: Vec<Response>,
     pub coherence: Vec<Coherence>,
+    /// What to know of the numbers.
+    pub remarks: Vec<String>,
 }
 
 /// How the record was cut.
@@ -94,6 +96,7 @@ impl Report {
             frequency_hz: frf.omega().iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence: coherence.collect(),
+            remarks: measured.converted.iter().cloned().collect(),
         }
     }
 
@@ -137,7 +140,7 @@ impl Report {
             ]);
         }
         text += &text_table(&rows);
-        text
+        text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
     /// One row per frequency.

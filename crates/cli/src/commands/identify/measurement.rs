@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use clap::Args;
 use mechid::estimate::frequency_domain::Motion;
-use mechid::io::RecordFile;
+use mechid::io::{Quantity, RecordFile};
 use mechid::signal::{Record, Sampling};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::CliError;
 use crate::options::{Detrend, RecordArgs};
+use crate::units::{Role, ToSi};
 
 /// Which columns hold what; one column per degree of freedom, in the same order everywhere.
 #[derive(Debug, Clone, Args)]
@@ -70,6 +71,8 @@ pub struct Measurement {
     pub periods: usize,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub driven: Vec<usize>,
+    /// Which columns were in other than SI units.
+    pub converted: Option<String>,
 }
 
 /// A measurement that can be gone through from beginning to end, however long it is.
@@ -87,6 +90,7 @@ struct Source {
     columns: ChannelArgs,
     /// Of each column used, taken away from it.
     offsets: DVector<f64>,
+    units: ToSi,
     /// Samples, counted from 0.
     window: Range<usize>,
     sampling: Sampling,
@@ -165,6 +169,7 @@ impl Source {
         for (mut column, offset) in block.column_iter_mut().zip(&self.offsets) {
             column.add_scalar_mut(-offset);
         }
+        self.units.convert(&mut block);
         let sampling = self.sampling.with_len(block.nrows())?;
         let mut next = block.column_iter();
         let mut take = |columns: &[String]| {
@@ -188,6 +193,7 @@ impl Source {
             period: force.len(),
             periods: 1,
             driven: Vec::new(),
+            converted: self.units.remark.clone(),
             force,
         })
     }
@@ -199,6 +205,7 @@ impl ChannelArgs {
         self.check_counts()?;
         let file = input.file(HELD)?;
         let used = self.used();
+        let units = ToSi::of(file.head(), &self.roles())?;
         let survey = file.survey(&input.needed_time_axis(file.head())?, &used)?;
         let name = file.head().file().to_owned();
         let (start, len) = input.span(&name, survey.sampling.len())?;
@@ -210,7 +217,7 @@ impl ChannelArgs {
         let peaks = survey.peaks;
         let sampling = survey.sampling;
         let window = start..start + len;
-        let source = Source { file, columns: self.clone(), offsets, window, sampling };
+        let source = Source { file, columns: self.clone(), offsets, units, window, sampling };
         let held = hold.samples(len, period);
         let mut first = None;
         source.file.blocks(&used, start..start + held, held, held, &mut |block| {
@@ -233,9 +240,22 @@ impl ChannelArgs {
 
     /// The columns used, forces first.
     fn used(&self) -> Vec<&String> {
+        self.roles().into_iter().map(|(column, ..)| column).collect()
+    }
+
+    /// The columns used and what they are to hold, forces first.
+    fn roles(&self) -> Vec<Role<'_>> {
         let forces = self.force.iter().filter(|c| *c != NO_FORCE);
-        let groups = [&self.displacement, &self.velocity, &self.acceleration];
-        forces.chain(groups.into_iter().flatten()).collect()
+        let forces = forces.map(|column| (column, Quantity::Force, "--force"));
+        let motions = [
+            (&self.displacement, Quantity::Displacement, "--displacement"),
+            (&self.velocity, Quantity::Velocity, "--velocity"),
+            (&self.acceleration, Quantity::Acceleration, "--acceleration"),
+        ];
+        let motions = motions.into_iter().flat_map(|(columns, quantity, option)| {
+            columns.iter().map(move |column| (column, quantity, option))
+        });
+        forces.chain(motions).collect()
     }
 
     /// The degrees of freedom whose force is not zero throughout; `peaks` are those of the columns

@@ -192,6 +192,7 @@ impl Identification {
         if let Some(other) = &validated {
             let system = fitted.estimate.system()?;
             report.validation = Some(Validation::of(other, &system, fitted.course)?);
+            report.remarks.extend(other.converted.clone().filter(|_| other.file != report.file));
         }
         Ok(Identified { records, validated, fitted, report })
     }
@@ -285,8 +286,9 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         Some(format!("checks of single samples looked at samples {first} to {last} of {file} only"))
     });
     let of_method = of_least_squares(fitted, &report.checks);
-    let remarks = fitted.remarks.iter().cloned().chain(looked_at).chain(doubts(&report));
-    report.remarks = remarks.chain(of_method).collect();
+    let converted = records.iter().filter_map(|record| record.converted.clone());
+    let remarks = converted.chain(fitted.remarks.iter().cloned()).chain(looked_at);
+    report.remarks = remarks.chain(doubts(&report)).chain(of_method).collect();
     Ok(report)
 }
 

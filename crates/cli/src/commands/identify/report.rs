@@ -10,7 +10,7 @@ use super::checks::CheckRow;
 use super::measurement::Measurement;
 use super::validation::Validation;
 use crate::error::CliError;
-use crate::text_table::{compact, significant, text_table};
+use crate::text_table::{compact, paragraph, significant, text_table};
 
 /// Level of the confidence intervals.
 pub const CONFIDENCE: f64 = 0.95;
@@ -221,12 +221,6 @@ impl Report {
         }
         text_table(&rows)
     }
-}
-
-/// Lines with an empty one above them; nothing if there is none.
-fn paragraph(lines: impl Iterator<Item = String>) -> String {
-    let lines: String = lines.map(|line| line + "\n").collect();
-    if lines.is_empty() { lines } else { format!("\n{lines}") }
 }
 
 impl Window {

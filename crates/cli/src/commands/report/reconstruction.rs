@@ -89,7 +89,7 @@ fn motion(source: &Measurement, periodic: bool) -> Result<Motion, CliError> {
         record = record.period_mean(source.period)?;
     }
     let measured = force::Measurement::new(record, channels)?;
-    Ok(Motion { file: source.file.clone(), measured, periods: source.periods })
+    Ok(Motion { file: source.file.clone(), measured, periods: source.periods, converted: None })
 }
 
 /// What a period has on these lines.

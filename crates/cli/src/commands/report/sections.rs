@@ -51,6 +51,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, CliError> {
                 (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts(contents, part) }.html())
                 (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
             }
+            @if let Some(converted) = &part.measured.converted { p.note { (converted) "." } }
             div.figures { @for drawn in &drawn { (figure(drawn)) } }
         })
     })?;

@@ -159,7 +159,9 @@ impl SweepArgs {
         let found = self.sweep(settings, reference.as_ref(), run);
         let (file, samples) = (measured.file.clone(), measured.period);
         let how = (natural_frequency_hz, &rate_hz as &dyn Fn(f64) -> f64);
-        self.report(file, samples, &found, reference.as_ref(), how)
+        let mut report = self.report(file, samples, &found, reference.as_ref(), how)?;
+        report.remarks.extend(measured.converted.clone());
+        Ok(report)
     }
 
     fn natural_frequency_hz(&self, system: &SecondOrderSystem) -> Result<f64, CliError> {

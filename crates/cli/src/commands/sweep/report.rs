@@ -10,7 +10,7 @@ use super::samples::Estimator;
 use super::settings::Kind;
 use crate::commands::identify::report::{CONFIDENCE, Uncertain};
 use crate::error::CliError;
-use crate::text_table::{compact, paged_table, significant, text_table};
+use crate::text_table::{compact, paged_table, paragraph, significant, text_table};
 
 /// Everything `mechid sweep` has to say.
 #[derive(Debug, Serialize)]
@@ -28,6 +28,8 @@ pub struct Report {
     best_setting: f64,
     /// The same, where the settings are NPI.
     best_npi: Option<f64>,
+    /// What to know of the numbers.
+    pub remarks: Vec<String>,
 }
 
 /// What came out at one setting.
@@ -127,6 +129,7 @@ impl Report {
             points,
             best_setting,
             best_npi: (setting == Kind::Npi).then_some(best_setting),
+            remarks: Vec::new(),
         }
     }
 
@@ -161,7 +164,8 @@ impl Report {
         text += if only_best { ".\n" } else { "; ± is one standard error.\n" };
         let (name, unit) = self.setting.label();
         let best = format!("Best: {name} {} {unit}", compact(self.best_setting, 6));
-        text + best.trim_end() + "\n"
+        text += best.trim_end();
+        text + "\n" + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
     fn table(&self) -> String {

@@ -1,0 +1,188 @@
+//! Units of forces and motions that columns say by their names or in a line of units.
+
+use std::fmt;
+
+/// What numbers measure, as far as a unit tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// In N.
+    Force,
+    /// In m.
+    Displacement,
+    /// In m/s.
+    Velocity,
+    /// In m/s².
+    Acceleration,
+}
+
+impl Quantity {
+    /// Its unit in the SI.
+    pub fn si(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Displacement => "m",
+            Self::Velocity => "m/s",
+            Self::Acceleration => "m/s²",
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Force => "force",
+            Self::Displacement => "displacement",
+            Self::Velocity => "velocity",
+            Self::Acceleration => "acceleration",
+        })
+    }
+}
+
+/// A unit of a force or a motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// As it is commonly written.
+    pub name: &'static str,
+    /// What it measures.
+    pub quantity: Quantity,
+    /// How many N, m, m/s or m/s² it is.
+    pub in_si: f64,
+}
+
+/// Standard gravity, in m/s².
+const G: f64 = 9.80665;
+
+/// An inch, in m.
+const INCH: f64 = 0.0254;
+
+const fn unit(name: &'static str, quantity: Quantity, in_si: f64) -> Unit {
+    Unit { name, quantity, in_si }
+}
+
+/// Exact by definition: the pound since 1959, g and with it the kilopond since 1901.
+const UNITS: [Unit; 32] = {
+    use Quantity::{Acceleration, Displacement, Force, Velocity};
+    [
+        unit("N", Force, 1.0),
+        unit("mN", Force, 1e-3),
+        unit("daN", Force, 10.0),
+        unit("kN", Force, 1e3),
+        unit("MN", Force, 1e6),
+        unit("kgf", Force, G),
+        unit("kp", Force, G),
+        unit("lbf", Force, 0.45359237 * G),
+        unit("kip", Force, 453.59237 * G),
+        unit("m", Displacement, 1.0),
+        unit("cm", Displacement, 1e-2),
+        unit("mm", Displacement, 1e-3),
+        unit("µm", Displacement, 1e-6),
+        unit("um", Displacement, 1e-6),
+        unit("nm", Displacement, 1e-9),
+        unit("in", Displacement, INCH),
+        unit("mil", Displacement, 1e-3 * INCH),
+        unit("mils", Displacement, 1e-3 * INCH),
+        unit("ft", Displacement, 12.0 * INCH),
+        unit("m/s", Velocity, 1.0),
+        unit("cm/s", Velocity, 1e-2),
+        unit("mm/s", Velocity, 1e-3),
+        unit("µm/s", Velocity, 1e-6),
+        unit("in/s", Velocity, INCH),
+        unit("ft/s", Velocity, 12.0 * INCH),
+        unit("m/s²", Acceleration, 1.0),
+        unit("cm/s²", Acceleration, 1e-2),
+        unit("mm/s²", Acceleration, 1e-3),
+        unit("in/s²", Acceleration, INCH),
+        unit("ft/s²", Acceleration, 12.0 * INCH),
+        unit("g", Acceleration, G),
+        unit("gal", Acceleration, 1e-2),
+    ]
+};
+
+/// Units that a name may end with after `_` or a blank: those that no other word ends with.
+const BARE: [&str; 6] = ["kN", "mm", "µm", "um", "mm/s", "m/s²"];
+
+impl Unit {
+    /// The unit that a column says: at the end of its `name`, in brackets (`Force [kN]`, `x (mm)`)
+    /// or after a stroke (`F / kN`), without them where no word is like it (`x_mm`), or as the
+    /// whole of what the line of units has for it, `about`.
+    pub fn of(name: &str, about: &str) -> Option<Self> {
+        Self::at_end(name.trim()).or_else(|| Self::known(about))
+    }
+
+    fn at_end(name: &str) -> Option<Self> {
+        for (open, close) in [('[', ']'), ('(', ')')] {
+            if let Some(inner) = name.strip_suffix(close) {
+                return inner.rfind(open).and_then(|at| Self::known(&inner[at + 1..]));
+            }
+        }
+        // `F/kN` and `v / mm/s`: the quantity stands before the first stroke.
+        if let Some((before, unit)) = name.split_once('/')
+            && Self::known(before).is_none()
+            && let Some(unit) = Self::known(unit)
+        {
+            return Some(unit);
+        }
+        let (_, unit) = name.rsplit_once(['_', ' '])?;
+        Self::known(unit).filter(|unit| BARE.contains(&unit.name))
+    }
+
+    /// A unit as people write it.
+    fn known(text: &str) -> Option<Self> {
+        let text = text.trim().trim_matches(['[', ']', '(', ')']).trim();
+        let text = text.replace('μ', "µ").replace("um/", "µm/").replace("sec", "s");
+        let text = text.replace("^2", "²").replace("**2", "²").replace("s2", "s²");
+        let text = text.replace("/s/s", "/s²").replace("m s-2", "m/s²").replace("m s-1", "m/s");
+        UNITS.into_iter().find(|unit| unit.name == text)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_read_where_people_write_them() {
+        use Quantity::{Acceleration, Displacement, Force, Velocity};
+        for (name, about, quantity, in_si) in [
+            ("Force [kN]", "", Force, 1e3),
+            ("x (mm)", "", Displacement, 1e-3),
+            ("F / kN", "", Force, 1e3),
+            ("F/N", "", Force, 1.0),
+            ("v / mm/s", "", Velocity, 1e-3),
+            ("Acc [m/s^2]", "", Acceleration, 1.0),
+            ("Acc (m/s2)", "", Acceleration, 1.0),
+            ("a [g]", "", Acceleration, 9.80665),
+            ("Shaft x [µm]", "", Displacement, 1e-6),
+            ("Shaft x [μm]", "", Displacement, 1e-6),
+            ("x_mm", "", Displacement, 1e-3),
+            ("Disp um", "", Displacement, 1e-6),
+            ("Disp", "[mil]", Displacement, 25.4e-6),
+            ("Load", "lbf", Force, 4.448_221_615_260_5),
+            ("Vibration", "in/sec", Velocity, 0.0254),
+        ] {
+            let unit = Unit::of(name, about).unwrap_or_else(|| panic!("{name} {about}"));
+            assert_eq!(unit.quantity, quantity, "{name} {about}");
+            assert!((unit.in_si / in_si - 1.0).abs() < 1e-15, "{name} {about}: {}", unit.in_si);
+        }
+    }
+
+    #[test]
+    fn what_is_no_unit_is_left_alone() {
+        for (name, about) in [
+            ("force", ""),
+            ("force_in", ""),
+            ("x_m", ""),
+            ("velocity_N", ""),
+            ("channel g", ""),
+            ("Force [shaker 1]", ""),
+            ("Force [V]", ""),
+            ("mm", ""),
+            ("m/s", ""),
+            ("time [s]", "s"),
+            ("x", "driving point"),
+            ("", ""),
+        ] {
+            assert_eq!(Unit::of(name, about), None, "{name} {about}");
+        }
+    }
+}
