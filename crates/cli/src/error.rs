@@ -56,6 +56,18 @@ pub enum CliError {
         /// Columns that `--force` names.
         forces: usize,
     },
+    /// A machine that was found cannot be led through a record.
+    #[error(
+        "{file}: the machine found is unstable, its free motion grows by a factor of e in {} s: it \
+         cannot be led through this record; fit a longer record, other lines, or fewer parameters",
+        crate::text_table::significant(1.0 / rate, 3)
+    )]
+    Diverges {
+        /// The record.
+        file: String,
+        /// Rate of growth, in 1/s.
+        rate: f64,
+    },
     /// A column measures something else than it is used for.
     #[error(
         "{file}: column {column} is in {unit}, a unit of {measures}; {option} takes columns of {wanted}"

@@ -1,6 +1,6 @@
 //! What can be wrong with an integration.
 
-use mechid_signal::told;
+use mechid_signal::{told, told_to};
 
 /// An integration that cannot be set up or carried out; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -92,9 +92,9 @@ pub enum IntegrateError {
     },
     /// The step makes the free motion of a stable system grow.
     #[error(
-        "{scheme} is unstable at Δt = {dt} s: spectral radius {spectral_radius:.6}; {}",
+        "{scheme} is unstable at Δt = {dt} s: spectral radius {radius}; {}",
         limit_text(*.critical_step),
-        dt = told(*dt)
+        dt = told(*dt), radius = told_to(*spectral_radius, 6)
     )]
     Unstable {
         /// The scheme's name.

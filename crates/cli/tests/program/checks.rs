@@ -4,10 +4,10 @@ use std::path::Path;
 
 use mechid::model::{InitialState, Response, Sdof, SecondOrderSystem};
 use mechid::signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
-use mechid_problems::{exact_foh, exact_harmonic_periodic};
+use mechid_problems::{exact_foh, exact_harmonic_periodic, exact_zoh};
 use serde_json::Value;
 
-use crate::mechid;
+use crate::{mechid, refused};
 
 fn oscillator() -> SecondOrderSystem {
     Sdof::new(2.0, 6.0, 800.0).unwrap().system()
@@ -145,8 +145,30 @@ fn a_fit_of_responses_to_a_random_force_is_judged_line_by_line() {
     for subject in ["misfit", "linearity", "whiteness"] {
         assert_eq!(verdicts(folder, common, subject), ["good"], "{subject}");
     }
+    let heading = mechid(folder, common);
+    assert!(heading.starts_with("r.csv: samples 1 to 16384, 100 Hz\n"), "{heading}");
     let wrong = format!("{common} --mass 2.2");
     for subject in ["misfit", "whiteness"] {
         assert_eq!(verdicts(folder, &wrong, subject), ["doubtful"], "{subject}");
     }
+}
+
+#[test]
+fn an_unstable_machine_is_not_led_through_a_long_record() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    // A negative spring, as a magnetic bearing without its control: e-fold in 0.100 s.
+    let one = |value: f64| nalgebra::DMatrix::from_element(1, 1, value);
+    let system = SecondOrderSystem::new(one(1.0), one(0.0), one(-100.0)).unwrap();
+    let rest = InitialState::rest(1);
+    let force = noise::white(Sampling::new(0.01, 200).unwrap(), 1, 5.0, 7).unwrap();
+    write(folder, "fit.csv", &force, &exact_zoh(&system, &force, &rest).unwrap(), 0.0);
+    let force = noise::white(Sampling::new(0.01, 20_000).unwrap(), 1, 5.0, 8).unwrap();
+    write(folder, "long.csv", &force, &exact_zoh(&oscillator(), &force, &rest).unwrap(), 0.0);
+    let common = "identify fit.csv --force f --displacement x --velocity v --domain time \
+                  --between-samples held";
+    mechid(folder, common);
+    let told = refused(folder, &format!("{common} --validate long.csv"));
+    assert!(told.starts_with("error: long.csv: the machine found is unstable"), "{told}");
+    assert!(told.contains("by a factor of e in 0.100 s"), "{told}");
 }

@@ -20,7 +20,7 @@ pub(super) const SIGNIFICANT: f64 = 0.01;
 ///
 /// `noise_span` is the number of lags over which noise on the motion correlates the residual: 0
 /// where each sample of it holds the noise of one sample, 1 where it holds that of two which follow
-/// one another ([`missing_force`](crate::errors_ahead)), the window less one after a sliding
+/// one another ([`missing_force`](crate::missing_force())), the window less one after a sliding
 /// polynomial. A residual correlated over that span and no further is told as such. Whether it has
 /// anything in common with the force is judged with the colour it has.
 ///

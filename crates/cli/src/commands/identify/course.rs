@@ -2,8 +2,8 @@
 
 use mechid::estimate::frequency_domain::Motion;
 use mechid::estimate::time_domain::{Discretisation, Extent};
-use mechid::estimate::{fitted_start, predict, predict_periodic};
-use mechid::model::{Response, SecondOrderSystem};
+use mechid::estimate::{EstimateError, fitted_start, predict, predict_periodic};
+use mechid::model::{InitialState, Response, SecondOrderSystem};
 use mechid::signal::Record;
 
 use super::measurement::Measurement;
@@ -34,19 +34,11 @@ impl Course {
         system: &SecondOrderSystem,
         measured: &Measurement,
     ) -> Result<Vec<Compared>, CliError> {
-        let force = &measured.force;
-        let rest = mechid::model::InitialState::rest(system.dof());
         let motions = measured.motions();
-        let response = match self {
-            Course::Steady => predict_periodic(system, force)?,
-            Course::Sampled { discretisation, extent: Extent::Open } => {
-                let start = fitted_start(system, force, discretisation, &motions)?;
-                predict(system, force, discretisation, Extent::Open, &start)?
-            }
-            Course::Sampled { discretisation, extent } => {
-                predict(system, force, discretisation, extent, &rest)?
-            }
-        };
+        let response = self.response(system, measured).map_err(|reason| match growth(system) {
+            Some(rate) => CliError::Diverges { file: measured.file.clone(), rate },
+            None => reason.into(),
+        })?;
         let compared = |(kind, record): (Motion, &Record)| {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             match self {
@@ -61,6 +53,30 @@ impl Course {
         };
         Ok(motions.into_iter().map(compared).collect())
     }
+
+    fn response(
+        self,
+        system: &SecondOrderSystem,
+        measured: &Measurement,
+    ) -> Result<Response, EstimateError> {
+        let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
+        match self {
+            Course::Steady => predict_periodic(system, force),
+            Course::Sampled { discretisation, extent: Extent::Open } => {
+                let start = fitted_start(system, force, discretisation, &measured.motions())?;
+                predict(system, force, discretisation, Extent::Open, &start)
+            }
+            Course::Sampled { discretisation, extent } => {
+                predict(system, force, discretisation, extent, &rest)
+            }
+        }
+    }
+}
+
+/// The rate, in 1/s, at which the free motion grows; nothing if it does not.
+fn growth(system: &SecondOrderSystem) -> Option<f64> {
+    let eigenvalues = system.eigenvalues().ok()?;
+    eigenvalues.iter().map(|l| l.re).filter(|rate| *rate > 0.0).max_by(f64::total_cmp)
 }
 
 fn channels(response: &Response, kind: Motion) -> &Record {

@@ -23,6 +23,7 @@ use mechid::plot::Figure;
 use mechid::signal::Record;
 
 use self::checks::CheckRow;
+use self::course::Course;
 use self::excited::{Band, choose_lines};
 use self::fit::{BetweenSamples, Fitted, Method};
 use self::mass::KnownMass;
@@ -261,6 +262,7 @@ fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> 
         domain: fitted.domain,
         estimator: fitted.estimator,
         window: Window::of(&records[0]),
+        repeats: fitted.course == Course::Steady,
         lines: fitted.frequency.as_ref().map(|(lines, _)| Lines::of(lines)),
         confidence: CONFIDENCE,
         parameters: parameters(fitted)?,

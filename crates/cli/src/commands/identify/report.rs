@@ -22,6 +22,9 @@ pub struct Report {
     pub domain: &'static str,
     pub estimator: &'static str,
     pub window: Window,
+    /// Whether the windows are whole periods.
+    #[serde(skip)]
+    pub repeats: bool,
     /// Lines used; none in the time domain.
     pub lines: Option<Lines>,
     pub confidence: f64,
@@ -158,8 +161,8 @@ impl Report {
         let mut text = String::new();
         for RecordRow { file, window } in &self.records {
             let rate = compact(window.sample_rate_hz, 8);
-            let periods = match (&self.lines, window.periods) {
-                (None, _) => String::new(),
+            let periods = match (self.repeats, window.periods) {
+                (false, _) => String::new(),
                 (_, 1) => format!(", 1 period of {}", window.period_samples),
                 (_, n) => format!(", {n} periods of {}", window.period_samples),
             };

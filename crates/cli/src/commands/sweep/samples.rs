@@ -10,11 +10,9 @@ use mechid::io::{Experiment, ResponseKind};
 use mechid::model::Response;
 use mechid::signal::{Record, Sampling};
 
+use crate::commands::identify::excited::choose_lines;
 use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
-
-/// A line is used if it carries at least this part of the strongest line of its force.
-const EXCITED: f64 = 1e-3;
 
 /// How a machine is found from a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -125,7 +123,8 @@ impl Samples {
                 return Ok(equation_of_motion(&response, &self.force, unknowns)?);
             }
             Estimator::LeastSquares | Estimator::MaximumLikelihood => {
-                let lines = Lines::excited(&self.force.period_mean(self.period)?, EXCITED)?;
+                let chosen = choose_lines(&self.force, self.period, None, None)?;
+                let lines = Lines::new(self.force.sampling().with_len(self.period)?, chosen)?;
                 let (kind, motion) = &self.motions[0];
                 let data = RepeatedPeriods::new(&lines, &self.force, motion, *kind)?.mean()?;
                 return Ok(match estimator {
