@@ -37,4 +37,4 @@ pub use experiment::{
 pub use line_spec::LineSpec;
 pub use output::{OutputFile, write_all};
 pub use system::{SystemMatrices, read_system};
-pub use table::{Place, Quantity, RecordFile, Survey, Table, TimeAxis, Unit};
+pub use table::{Inventory, Place, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

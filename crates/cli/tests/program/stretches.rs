@@ -7,8 +7,8 @@ use mechid::signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use mechid_problems::exact_harmonic_periodic;
 use serde_json::Value;
 
-use super::mechid;
 use super::records::matlab;
+use super::{mechid, refused};
 
 const PERIOD: usize = 1000;
 
@@ -83,4 +83,109 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     }
     let report = both("frf --segment 1024 --lines 1:40");
     assert_eq!(report["last_sample"], samples);
+}
+
+/// Samples of which a text is not held whole.
+const SPIKED: usize = 270_000;
+
+/// A column alternating between 3 and 1, but for one sample of 80 near the end, and a sine of eight
+/// samples; as text, line by line.
+fn spiked() -> (Vec<String>, Vec<(String, Vec<f64>)>) {
+    let mut square: Vec<f64> = (0..SPIKED).map(|k| if k % 2 == 0 { 3.0 } else { 1.0 }).collect();
+    square[SPIKED - 2] = 80.0;
+    let sine = (0..SPIKED).map(|k| (k as f64 * std::f64::consts::FRAC_PI_4).sin()).collect();
+    let times = (0..SPIKED).map(|k| k as f64 / 64.0).collect();
+    let named = |name: &str, values| (name.to_owned(), values);
+    let columns = vec![named("time", times), named("square", square), named("sine", sine)];
+    let rows = (0..SPIKED)
+        .map(|k| format!("{},{},{:?}", columns[0].1[k], columns[1].1[k], columns[2].1[k]));
+    let lines = std::iter::once("time,square,sine".to_owned()).chain(rows).collect();
+    (lines, columns)
+}
+
+#[test]
+fn levels_of_a_long_text_are_those_of_all_of_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (lines, columns) = spiked();
+    fs::write(folder.path().join("rec.csv"), lines.join("\n")).unwrap();
+    let columns: Vec<(String, &[f64])> =
+        columns.iter().map(|(name, values)| (name.clone(), values.as_slice())).collect();
+    fs::write(folder.path().join("rec.mat"), matlab(&columns, false)).unwrap();
+    let run = |file: &str, arguments: &str| -> Value {
+        let told = mechid(folder.path(), &format!("info {file} --time time {arguments} --json"));
+        serde_json::from_str(&told).unwrap()
+    };
+    for arguments in [
+        "",
+        "--columns sine,square,sine --detrend mean",
+        "--start 5001 --period 1000 --periods 265",
+    ] {
+        let (text, matlab) = (run("rec.csv", arguments), run("rec.mat", arguments));
+        for field in ["samples", "window", "sampling", "left_out"] {
+            assert_eq!(text[field], matlab[field], "{arguments}: {field}");
+        }
+        let channels = text["channels"].as_array().unwrap().len();
+        assert_eq!(channels, 3, "{arguments}");
+        for channel in 0..channels {
+            for level in ["name", "mean", "rms", "peak", "crest_factor", "minimum", "maximum"] {
+                let of = |report: &Value| report["channels"][channel][level].clone();
+                assert_eq!(of(&text), of(&matlab), "{arguments}: {level} of {channel}");
+            }
+        }
+        assert_eq!(matlab["remarks"].as_array().unwrap().len(), 0, "{arguments}");
+    }
+
+    let report = run("rec.csv", "--columns square");
+    let square = &report["channels"][0];
+    let n = SPIKED as f64;
+    let close = |level: &str, truth: f64| {
+        let value = square[level].as_f64().unwrap();
+        assert!((value / truth - 1.0).abs() < 1e-12, "{level}: {value}, truth {truth}");
+    };
+    close("mean", 2.0 + 77.0 / n);
+    close("rms", (5.0 + (80.0 * 80.0 - 9.0) / n).sqrt());
+    close("peak", 80.0);
+    close("minimum", 1.0);
+    // Of the part in which there is no spike.
+    assert_eq!(square["period"]["samples"], 2);
+    assert_eq!(
+        report["remarks"][0],
+        "period, mismatch and strongest lines looked at samples 1 to 262144 of rec.csv only; \
+         the levels count all samples up to 270000"
+    );
+    // All of a short window is looked at, wherever it stands.
+    let report = run("rec.csv", "--columns square --start 269001");
+    assert_eq!(report["remarks"].as_array().unwrap().len(), 0);
+    assert_eq!(report["channels"][0]["peak"], 80.0);
+    assert!(report["channels"][0]["period"].is_null());
+}
+
+#[test]
+fn what_is_wrong_near_the_end_of_a_long_text_is_told_with_its_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut lines, _) = spiked();
+    let mut spoil = |line: usize, as_it_is: &str| {
+        let was = std::mem::replace(&mut lines[line - 1], as_it_is.to_owned());
+        fs::write(folder.path().join("bad.csv"), lines.join("\n")).unwrap();
+        lines[line - 1] = was;
+    };
+    spoil(269_501, "4210.921875,NaN,0");
+    let what = "bad.csv, line 269501";
+    let message = refused(folder.path(), "info bad.csv --columns sine,square");
+    assert!(message.contains(what) && message.contains("square"), "{message}");
+    let report = mechid(folder.path(), "info bad.csv --json");
+    let report: Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["channels"].as_array().unwrap().len(), 2);
+    assert_eq!(report["channels"][1]["name"], "sine");
+    assert!(report["left_out"][0].as_str().unwrap().contains(what), "{report}");
+
+    spoil(269_501, "9999,1,0");
+    let message = refused(folder.path(), "info bad.csv --time time");
+    assert!(message.contains("not uniform") && message.contains("269501"), "{message}");
+    let report = mechid(folder.path(), "info bad.csv");
+    assert!(report.contains("left out: time axis: bad.csv: the time steps"), "{report}");
+
+    spoil(269_501, "4210.921875,1");
+    let message = refused(folder.path(), "info bad.csv --columns sine");
+    assert!(message.contains(what), "{message}");
 }

@@ -2,6 +2,7 @@
 
 mod column;
 mod dialect;
+mod inventory;
 mod numbered_lines;
 mod preamble;
 mod record_file;
@@ -19,6 +20,7 @@ use nalgebra::DMatrix;
 
 pub use self::column::Place;
 pub(crate) use self::column::{Axis, Column, Lines};
+pub use self::inventory::{Inventory, Tally};
 pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source};
 use self::text::TextReader;

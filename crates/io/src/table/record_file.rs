@@ -8,10 +8,11 @@ use mechid_signal::Sampling;
 use nalgebra::DMatrix;
 
 use super::column::{Lines, Unusable};
+use super::rows::Rows;
 use super::source::{Kind, Source};
 use super::text::TextReader;
 use super::time_axis::{self, Steps};
-use super::{Table, TimeAxis, time_unit};
+use super::{Table, TimeAxis};
 use crate::IoError;
 
 /// Rows taken from a text at a time.
@@ -47,7 +48,7 @@ pub struct RecordFile {
     path: PathBuf,
     skip: u64,
     /// All samples, or the first ones.
-    head: Table,
+    pub(super) head: Table,
     whole: bool,
 }
 
@@ -69,6 +70,9 @@ struct Chunk<'a> {
     columns: &'a [&'a [f64]],
     lines: &'a Lines,
 }
+
+/// What rows read again go to, with the first of them; says whether to go on.
+type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
     /// Opens a file below some lines of text; of a text at most `held` rows are held.
@@ -128,11 +132,7 @@ impl RecordFile {
         })?;
         let sampling = match (known, instants) {
             (Some(sampling), _) => sampling,
-            (None, Some(column)) => {
-                let unit = time_unit::unit(&self.head.contents.columns[column]);
-                let dt = steps.step(self.head.file(), unit)?;
-                self.head.signal(Sampling::new(dt, len))?
-            }
+            (None, Some(column)) => self.sampling_of(column, steps, len)?,
             (None, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
                 // A text gives its columns none: that is what this says.
@@ -160,12 +160,30 @@ impl RecordFile {
         advance: usize,
         take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), E>,
     ) -> Result<(), E> {
-        assert!(0 < advance && advance <= rows, "blocks of {rows} rows, {advance} apart");
         let columns =
             wanted.iter().map(|w| self.head.find(w.as_ref())).collect::<Result<Vec<_>, _>>()?;
+        self.blocks_at(&columns, window, rows, advance, take)
+    }
+
+    /// As [`RecordFile::blocks`], of columns by their indices, counted from 0.
+    ///
+    /// # Errors
+    /// As [`RecordFile::blocks`].
+    ///
+    /// # Panics
+    /// As [`RecordFile::blocks`], and if there is no such column.
+    pub fn blocks_at<E: From<IoError>>(
+        &self,
+        columns: &[usize],
+        window: Range<usize>,
+        rows: usize,
+        advance: usize,
+        take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        assert!(0 < advance && advance <= rows, "blocks of {rows} rows, {advance} apart");
         let mut held: Vec<Vec<f64>> = vec![Vec::new(); columns.len()];
         let (mut end, mut fresh) = (window.start, false);
-        self.chunks(&columns, &mut |chunk| {
+        self.chunks(columns, &mut |chunk| {
             let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             let mut next = window.start.max(chunk.first);
             // A few rows at a time: a table in memory is one chunk.
@@ -209,24 +227,13 @@ impl RecordFile {
             let lines = &self.head.contents.lines;
             return take(Chunk { first: 0, columns: &values, lines }).map(|_| ());
         }
-        let source = Source::open(&self.path)?;
-        let mut reader = TextReader::open(source, self.skip, Some(columns.to_vec()))?;
-        let mut first = 0;
-        loop {
-            let more = reader.read(CHUNK)?;
-            let rows = reader.rows();
+        let mut reader = self.rows(columns, &mut |first, rows| {
             let values = columns.iter().map(|c| rows.column(*c).values.as_deref().ok());
-            if let Some(columns) = values.collect::<Option<Vec<_>>>()
-                && take(Chunk { first, columns: &columns, lines: rows.lines() })?.is_break()
-            {
-                return Ok(());
+            match values.collect::<Option<Vec<_>>>() {
+                Some(columns) => take(Chunk { first, columns: &columns, lines: rows.lines() }),
+                None => Ok(ControlFlow::Continue(())),
             }
-            first = rows.samples();
-            rows.forget();
-            if !more {
-                break;
-            }
-        }
+        })?;
         // What is wrong is told column by column, as of a table that is held.
         for column in columns {
             if let Err(why) = &reader.rows().column(*column).values {
@@ -236,7 +243,30 @@ impl RecordFile {
         Ok(())
     }
 
-    fn unusable(&self, column: usize, why: &Unusable) -> IoError {
+    /// Reads a text again, of some columns the numbers, a few rows at a time of which `take` is told
+    /// the first one; stops where it says so. What is left says what is wrong with a column.
+    pub(super) fn rows<E: From<IoError>>(
+        &self,
+        columns: &[usize],
+        take: &mut TakeRows<'_, E>,
+    ) -> Result<TextReader<'static>, E> {
+        let mut once = columns.to_vec();
+        once.sort_unstable();
+        once.dedup();
+        let mut reader = TextReader::open(Source::open(&self.path)?, self.skip, Some(once))?;
+        let mut first = 0;
+        loop {
+            let more = reader.read(CHUNK)?;
+            let rows = reader.rows();
+            if take(first, rows)?.is_break() || !more {
+                return Ok(reader);
+            }
+            first = rows.samples();
+            rows.forget();
+        }
+    }
+
+    pub(super) fn unusable(&self, column: usize, why: &Unusable) -> IoError {
         why.error(self.head.file(), self.head.label(column))
     }
 }

@@ -65,6 +65,21 @@ fn surveys_and_tables_agree() {
         assert!((survey.means[0] - mean).abs() < 1e-15 && survey.means[1] == -survey.means[0]);
         let rate = file.survey(&TimeAxis::RateHz(8.0), &["f"]).unwrap();
         assert_eq!((rate.sampling.dt(), rate.sampling.len()), (0.125, 9001));
+        // The same column twice, and one that cannot be used.
+        let inventory = file.inventory(&[1, 3, 1, 2], Some(0)).unwrap();
+        assert_eq!(inventory.samples, 9001);
+        assert_eq!(inventory.sampling.unwrap().unwrap(), record.sampling());
+        for (&(at, column), mean) in [(0, 1), (1, 3), (2, 1), (3, 2)].iter().zip([0, 1, 0, 0]) {
+            match (&inventory.columns[at], table.values(column)) {
+                (Ok(tally), Ok(values)) => {
+                    assert_eq!(tally.samples, 9001);
+                    assert!((tally.mean - survey.means[mean]).abs() < 1e-15);
+                    assert_eq!(values.len(), 9001);
+                }
+                (Err(told), Err(why)) => assert_eq!(told.to_string(), why.to_string()),
+                (told, why) => panic!("column {column}: {told:?}, held {why:?}"),
+            }
+        }
         assert_eq!(file.head().names(), table.names());
         assert_eq!(file.head().about(3), "m");
     }

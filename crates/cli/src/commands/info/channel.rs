@@ -2,8 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use mechid::signal::{Record, Repetition, Sampling, SignalError, Spectrum, measures, repetition};
+use mechid::signal::{Record, Repetition, Sampling, SignalError, Spectrum, repetition};
 use serde::Serialize;
+
+use super::levels::Levels;
 
 /// Spectral lines told of a channel.
 const STRONGEST: usize = 3;
@@ -51,13 +53,25 @@ pub struct Period {
     pub mismatch: f64,
 }
 
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
+/// What is gathered of a channel, block by block.
+#[derive(Debug, Default)]
+pub struct Gathered {
+    levels: Levels,
+    /// The first samples, which are looked at together.
+    held: Vec<f64>,
+    mean_of_held: f64,
 }
 
-/// The mean, or zero where it is nothing but the rounding of samples of this RMS value.
-fn settled(mean: f64, rms: f64) -> f64 {
-    if mean.abs() < 4.0 * f64::EPSILON * rms { 0.0 } else { mean }
+impl Gathered {
+    /// The next samples; whole blocks are held until there are `hold` of them.
+    pub fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
+        self.levels.push(values)?;
+        if self.held.len() < hold {
+            self.held.extend_from_slice(values);
+            self.mean_of_held = self.levels.mean();
+        }
+        Ok(())
+    }
 }
 
 impl Channel {
@@ -66,24 +80,21 @@ impl Channel {
         column: usize,
         name: String,
         about: String,
-        values: Vec<f64>,
+        gathered: Gathered,
         dt: Option<f64>,
     ) -> Result<Self, SignalError> {
-        let repeats = repetition(&values);
-        let extreme =
-            |pick: fn(f64, f64) -> f64| values.iter().copied().reduce(pick).unwrap_or(0.0);
-        let (minimum, maximum) = (extreme(f64::min), extreme(f64::max));
-        let (rms, peak) = (measures::rms(&values), measures::peak(&values));
-        let mean = settled(mean(&values), rms);
-        let spectrum_peaks = spectrum_peaks(values, mean, repeats, dt)?;
+        let Gathered { levels, held, mean_of_held } = gathered;
+        let repeats = repetition(&held);
+        let spectrum_peaks = spectrum_peaks(held, mean_of_held, repeats, dt)?;
+        let Levels { peak, minimum, maximum, .. } = levels;
         Ok(Self {
             column,
             name,
             about,
-            mean,
-            rms,
+            mean: levels.mean(),
+            rms: levels.rms(),
             peak,
-            crest_factor: (peak > 0.0).then(|| peak / rms),
+            crest_factor: (peak > 0.0).then(|| peak / levels.rms()),
             minimum,
             maximum,
             spectrum_peaks,

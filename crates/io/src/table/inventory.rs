@@ -1,0 +1,125 @@
+//! What a file holds, column by column, whether it can be used or not.
+
+use std::ops::ControlFlow;
+
+use mechid_signal::Sampling;
+
+use super::time_axis::Steps;
+use super::{RecordFile, time_unit};
+use crate::IoError;
+
+/// What one reading of a file to its end tells of columns of which some may be of no use.
+#[derive(Debug)]
+pub struct Inventory {
+    /// Number of samples that most columns of the file have; in text, all of them.
+    pub samples: usize,
+    /// Of each column asked for what it holds, or why it cannot be used.
+    pub columns: Vec<Result<Tally, IoError>>,
+    /// The time axis that the column of instants gives, if there is one, or why it gives none.
+    pub sampling: Option<Result<Sampling, IoError>>,
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tally {
+    /// Number of its samples.
+    pub samples: usize,
+    /// Their mean, in the unit of the column.
+    pub mean: f64,
+}
+
+impl RecordFile {
+    /// Reads columns to the end, by their indices, counted from 0; and a time axis from the column
+    /// `instants`, in the unit that it says.
+    ///
+    /// # Errors
+    /// What is wrong with a column or the time axis is told there, as by
+    /// [`Table::column`](super::Table::column) and [`Table::sampling`](super::Table::sampling);
+    /// what is wrong with the file, as by [`Table::read_below`](super::Table::read_below), is an
+    /// error.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn inventory(
+        &self,
+        columns: &[usize],
+        instants: Option<usize>,
+    ) -> Result<Inventory, IoError> {
+        if !self.is_whole() {
+            return self.inventory_of_text(columns, instants);
+        }
+        let tally = |column: &usize| {
+            let values = self.head.values(*column)?;
+            Ok(Tally { samples: values.len(), mean: mean(values.iter().sum(), values.len()) })
+        };
+        let sampling = |column: usize| {
+            let mut steps = Steps::default();
+            let times = self.head.values(column)?;
+            for (k, time) in times.iter().enumerate() {
+                steps.push(*time, || self.head.place(k));
+            }
+            self.sampling_of(column, steps, times.len())
+        };
+        Ok(Inventory {
+            samples: self.head.len(),
+            columns: columns.iter().map(tally).collect(),
+            sampling: instants.map(sampling),
+        })
+    }
+
+    fn inventory_of_text(
+        &self,
+        columns: &[usize],
+        instants: Option<usize>,
+    ) -> Result<Inventory, IoError> {
+        // What a sum of nothing is.
+        let mut sums = vec![-0.0; columns.len()];
+        let mut steps = Steps::default();
+        let read: Vec<usize> = columns.iter().copied().chain(instants).collect();
+        let mut reader = self.rows(&read, &mut |first, rows| {
+            for (sum, column) in sums.iter_mut().zip(columns) {
+                let values = rows.column(*column).values.iter().flatten();
+                *sum = values.fold(*sum, |sum, value| sum + value);
+            }
+            for times in instants.iter().flat_map(|column| &rows.column(*column).values) {
+                for (k, time) in (first..).zip(times) {
+                    steps.push(*time, || rows.lines().place(k));
+                }
+            }
+            Ok::<_, IoError>(ControlFlow::Continue(()))
+        })?;
+        let rows = reader.rows();
+        let samples = rows.samples();
+        let usable = |column: usize| match &rows.column(column).values {
+            Ok(_) => Ok(()),
+            Err(why) => Err(self.unusable(column, why)),
+        };
+        let tallies = columns.iter().zip(sums);
+        let tally = |(column, sum): (&usize, f64)| {
+            usable(*column).map(|()| Tally { samples, mean: mean(sum, samples) })
+        };
+        Ok(Inventory {
+            samples,
+            columns: tallies.map(tally).collect(),
+            sampling: instants.map(|column| {
+                usable(column).and_then(|()| self.sampling_of(column, steps, samples))
+            }),
+        })
+    }
+
+    /// So many samples at the instants of a column.
+    pub(super) fn sampling_of(
+        &self,
+        column: usize,
+        steps: Steps,
+        len: usize,
+    ) -> Result<Sampling, IoError> {
+        let unit = time_unit::unit(&self.head.contents.columns[column]);
+        let dt = steps.step(self.head.file(), unit)?;
+        self.head.signal(Sampling::new(dt, len))
+    }
+}
+
+fn mean(sum: f64, samples: usize) -> f64 {
+    sum / samples as f64
+}
