@@ -182,9 +182,8 @@ fn anchors_at_ten_steps_per_period() {
         let found = percent(scheme).0;
         assert!((found - elongation).abs() < 0.5e-4 + 1e-9, "{}: {found}", scheme.name());
     }
-    // Bathe & Wilson (1973) and Bathe (1982), figures of section 9.4, at Δt/T = 0.1 as far as a
-    // curve can be read: Houbolt above 12 %, Wilson (θ = 1.4) about 6 %, Newmark about 3 % period
-    // elongation, and Houbolt decaying by far the most, Newmark not at all.
+    // The order of the decays is that of the curves of Bathe & Wilson (1973), from memory of them:
+    // Houbolt by far the most, Wilson (θ = 1.4) some, Newmark none.
     let decay =
         [&houbolt as &dyn Scheme, &wilson, &Newmark::AVERAGE_ACCELERATION].map(|s| percent(s).1);
     assert!(decay[0] > 2.0 * decay[1] && decay[1] > 1.0 && decay[2].abs() < 1e-9, "{decay:?}");
