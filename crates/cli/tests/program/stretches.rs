@@ -85,6 +85,58 @@ fn a_long_text_gives_what_the_record_in_memory_gives() {
     assert_eq!(report["last_sample"], samples);
 }
 
+/// A sweep goes through the record once for all settings, in stretches that are no multiple of the
+/// factors: as if each n-th row had been written into a file of its own.
+#[test]
+fn a_sweep_of_a_long_text_takes_every_nth_row() {
+    let folder = records();
+    let run = |arguments: &str| -> Value {
+        serde_json::from_str(&mechid(folder.path(), &format!("{arguments} --json"))).unwrap()
+    };
+    let text = fs::read_to_string(folder.path().join("rec.csv")).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let thin = |factor: usize| {
+        let rows: Vec<&str> = rows.lines().step_by(factor).collect();
+        fs::write(folder.path().join("thin.csv"), [header, &rows.join("\n")].join("\n")).unwrap();
+    };
+    let sweep = |options: &str| {
+        let of = |file: &str| {
+            let report = run(&format!("sweep {file} --force f --displacement x {options}"));
+            report.to_string().replace(file, "rec")
+        };
+        let report = of("rec.csv");
+        assert_eq!(report, of("rec.mat"), "{options}");
+        serde_json::from_str::<Value>(&report).unwrap()
+    };
+    for (swept, identified, factor) in [
+        ("--velocity v --decimate 3,7", "--velocity v --domain time", 7),
+        (
+            "--velocity v --acceleration a --estimator equation-of-motion --decimate 1,3",
+            "--velocity v --acceleration a --domain time",
+            3,
+        ),
+        (
+            "--period 1000 --estimator least-squares --decimate 1,5",
+            "--period 200 --lines 1:40 --method least-squares",
+            5,
+        ),
+    ] {
+        let report = sweep(swept);
+        let point = report["points"].as_array().unwrap();
+        let point = point.iter().find(|p| p["setting"] == f64::from(factor)).unwrap();
+        thin(factor as usize);
+        let own = run(&format!("identify thin.csv --force f --displacement x {identified}"));
+        for own in own["parameters"].as_array().unwrap() {
+            let swept = point["parameters"].as_array().unwrap();
+            let swept = swept.iter().find(|p| p["name"] == own["name"]).unwrap();
+            for number in ["value", "standard_error"] {
+                let (a, b) = (swept[number].as_f64().unwrap(), own[number].as_f64().unwrap());
+                assert!((a / b - 1.0).abs() < 1e-9, "{swept} {own}");
+            }
+        }
+    }
+}
+
 /// Samples of which a text is not held whole.
 const SPIKED: usize = 270_000;
 

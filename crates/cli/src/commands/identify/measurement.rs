@@ -145,13 +145,17 @@ impl Recorded {
     }
 
     /// Goes through the window in stretches of so many samples, each beginning `advance` samples
-    /// after the one before; the last may be shorter.
+    /// after the one before; the last may be shorter. A window that is held and fits into one is
+    /// not read again.
     pub fn stretches(
         &self,
         samples: usize,
         advance: usize,
         take: &mut dyn FnMut(&Measurement) -> Result<(), CliError>,
     ) -> Result<(), CliError> {
+        if self.held.held_to().is_none() && self.held.force.len() <= samples {
+            return take(&self.held);
+        }
         let mut first = self.held.first_sample;
         let window = self.source.window.clone();
         let columns = self.source.columns.used();

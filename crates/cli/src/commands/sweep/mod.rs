@@ -1,23 +1,27 @@
 //! `mechid sweep`: how an estimator does over a range of sampling steps.
 
+mod gathered;
 mod report;
 mod samples;
 mod settings;
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use mechid::estimate::{Sweep, SweepPoint, Unknowns, sweep};
+use mechid::estimate::{Estimate, Sweep, SweepPoint, Unknowns, sweep};
 use mechid::io::{Experiment, read_system};
 use mechid::model::SecondOrderSystem;
 
-use self::report::{Point, Report};
-use self::samples::{Estimator, Samples};
+use self::gathered::{Estimator, Gathered, Thinned};
+use self::report::{Failure, Point, Report};
+use self::samples::Samples;
 use self::settings::{Kind, SettingArgs};
 use super::identify::mass::KnownMass;
-use super::identify::measurement::ChannelArgs;
+use super::identify::measurement::{ChannelArgs, Recorded};
 use crate::error::CliError;
 use crate::options::{PlotArgs, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
@@ -31,7 +35,9 @@ use crate::outcome::Outcome;
 ///
 /// Of a measured record every n-th sample is taken, with nothing filtered; columns and window are
 /// chosen as in "mechid identify". Without --reference the standard errors are compared, which know
-/// nothing of bias.
+/// nothing of bias. A long text is gone through once for all settings, a stretch at a time, and not
+/// held; of spectra one long period is, and the lines that are driven are found in the first 262144
+/// samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid sweep examples/machine.json --npi 2,4,8 --estimator euler
@@ -114,17 +120,20 @@ impl SweepArgs {
         };
         let run = |setting: &f64| {
             let at = experiment.clone().with_rate_hz(rate_hz(*setting));
-            Samples::simulated(&at)?.find(self.estimator, &unknowns)
+            let measured = Samples::simulated(&at)?;
+            let mut gathered = Gathered::new(self.estimator, &measured, samples, 1)?;
+            gathered.push(&measured)?;
+            gathered.solve(&unknowns)
         };
-        let found = self.sweep(settings, Some(&system), run);
+        let found = self.sweep(settings, Some(&system), |setting| run(setting).map_err(Arc::new));
         let file = experiment.file().to_owned();
         let hz = Some(natural_frequency_hz);
         self.report(file, samples, &found, Some(&system), (hz, &rate_hz))
     }
 
     fn over_record(&self) -> Result<Report, CliError> {
-        let measured = self.channels.measure(&self.input)?;
-        let whole = Samples::measured(&measured);
+        let recorded = self.channels.record(&self.input, self.estimator.hold())?;
+        let measured = &recorded.held;
         let unknowns = match &self.mass {
             Some(mass) => mass.unknowns(measured.force.channels())?,
             None => Unknowns::unknown_mass(measured.force.channels())?,
@@ -149,9 +158,12 @@ impl SweepArgs {
             }
         };
         // What cannot be taken from this record at all is said before anything runs.
-        settings.iter().try_for_each(|setting| decimation(*setting).map(drop))?;
-        let run =
-            |setting: &f64| whole.decimated(decimation(*setting)?)?.find(self.estimator, &unknowns);
+        let factors = settings.iter().map(|s| decimation(*s)).collect::<Result<Vec<_>, _>>()?;
+        let gathered = self.gather(&recorded, &factors)?;
+        let run = |setting: &f64| {
+            let thinned = gathered[&decimation(*setting)?].as_ref().map_err(Arc::clone)?;
+            Ok(thinned.solve(&unknowns)?)
+        };
         let rate_hz = |setting: f64| match kind {
             Kind::RateHz => setting,
             Kind::Npi | Kind::Decimation => own_hz / setting,
@@ -161,7 +173,40 @@ impl SweepArgs {
         let how = (natural_frequency_hz, &rate_hz as &dyn Fn(f64) -> f64);
         let mut report = self.report(file, samples, &found, reference.as_ref(), how)?;
         report.remarks.extend(measured.converted.clone());
+        if let (true, Some(last)) = (self.estimator.is_of_spectra(), measured.held_to()) {
+            let (first, file) = (measured.first_sample, &measured.file);
+            report.remarks.push(format!(
+                "the lines that are driven were found in samples {first} to {last} of {file}"
+            ));
+        }
         Ok(report)
+    }
+
+    /// Goes through a record once, for all of these decimations.
+    fn gather(
+        &self,
+        recorded: &Recorded,
+        factors: &[usize],
+    ) -> Result<BTreeMap<usize, Result<Thinned, Failure>>, CliError> {
+        let (held, estimator) = (&recorded.held, self.estimator);
+        let beginning = Samples::measured(held);
+        let start = |factor: &usize| {
+            let none = Thinned::new(estimator, *factor, held, &beginning);
+            (*factor, none.map_err(Arc::new))
+        };
+        let mut gathered: BTreeMap<_, _> = factors.iter().map(start).collect();
+        let samples = estimator.stretch(held.period);
+        recorded.stretches(samples, samples, &mut |stretch| {
+            let stretch = Samples::measured(stretch);
+            for thinned in gathered.values_mut() {
+                // What goes wrong at one setting leaves the others alone.
+                if let Some(Err(reason)) = thinned.as_mut().ok().map(|t| t.push(&stretch)) {
+                    *thinned = Err(Arc::new(reason));
+                }
+            }
+            Ok(())
+        })?;
+        Ok(gathered)
     }
 
     fn natural_frequency_hz(&self, system: &SecondOrderSystem) -> Result<f64, CliError> {
@@ -177,8 +222,8 @@ impl SweepArgs {
         &self,
         settings: &[f64],
         reference: Option<&SecondOrderSystem>,
-        run: impl Fn(&f64) -> Result<mechid::estimate::Estimate, CliError> + Sync,
-    ) -> Sweep<f64, CliError> {
+        run: impl Fn(&f64) -> Result<Estimate, Failure> + Sync,
+    ) -> Sweep<f64, Failure> {
         let bar = match self.report.quiet {
             true => ProgressBar::hidden(),
             // Hides itself where nobody watches.
@@ -193,12 +238,12 @@ impl SweepArgs {
         &self,
         file: String,
         samples_per_period: usize,
-        found: &Sweep<f64, CliError>,
+        found: &Sweep<f64, Failure>,
         reference: Option<&SecondOrderSystem>,
         (natural_frequency_hz, rate_hz): (Option<f64>, &dyn Fn(f64) -> f64),
     ) -> Result<Report, CliError> {
         let (kind, _) = self.settings.chosen();
-        let point = |point: &SweepPoint<f64, CliError>| {
+        let point = |point: &SweepPoint<f64, Failure>| {
             Point::new(kind, point, reference, 1.0 / rate_hz(point.setting), natural_frequency_hz)
         };
         let points = found.points().iter().map(point).collect::<Result<Vec<_>, _>>()?;
@@ -218,8 +263,8 @@ impl SweepArgs {
 }
 
 /// What went wrong at the first setting, in its own words.
-fn nothing_found(found: &Sweep<f64, CliError>) -> CliError {
-    let describe = |point: &SweepPoint<f64, CliError>| CliError::EmptySweep {
+fn nothing_found(found: &Sweep<f64, Failure>) -> CliError {
+    let describe = |point: &SweepPoint<f64, Failure>| CliError::EmptySweep {
         setting: point.setting,
         reason: report::failure(point).unwrap_or_default(),
     };

@@ -1,12 +1,14 @@
 //! What a sweep found, for people and for programs.
 
+use std::sync::Arc;
+
 use mechid::estimate::{Estimate, SweepPoint};
 use mechid::model::SecondOrderSystem;
 use mechid::plot::charts::{self, Quantity, Series};
 use mechid::plot::{Axis, Figure};
 use serde::Serialize;
 
-use super::samples::Estimator;
+use super::gathered::Estimator;
 use super::settings::Kind;
 use crate::commands::identify::report::{CONFIDENCE, Uncertain};
 use crate::error::CliError;
@@ -59,8 +61,11 @@ struct Parameter {
     true_value: Option<f64>,
 }
 
+/// What went wrong at a setting, or at all that take the same samples.
+pub type Failure = Arc<CliError>;
+
 /// Why a setting gave no estimate.
-pub fn failure(point: &SweepPoint<f64, CliError>) -> Option<String> {
+pub fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
     match &point.outcome {
         Ok(found) => found.system().err().map(|reason| reason.to_string()),
         Err(reason) => Some(reason.to_string()),
@@ -70,7 +75,7 @@ pub fn failure(point: &SweepPoint<f64, CliError>) -> Option<String> {
 impl Point {
     pub fn new(
         kind: Kind,
-        point: &SweepPoint<f64, CliError>,
+        point: &SweepPoint<f64, Failure>,
         reference: Option<&SecondOrderSystem>,
         step_s: f64,
         natural_frequency_hz: Option<f64>,

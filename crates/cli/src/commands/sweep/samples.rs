@@ -1,73 +1,38 @@
-//! Samples to identify from, simulated or measured, and the estimators.
+//! Samples to identify from, simulated or measured.
 
-use clap::ValueEnum;
-use mechid::estimate::frequency_domain::{
-    Lines, Motion, RepeatedPeriods, equation_error, output_error,
-};
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
-use mechid::estimate::{Estimate, Unknowns};
+use std::borrow::Cow;
+
+use mechid::estimate::frequency_domain::Motion;
+use mechid::estimate::time_domain::Extent;
 use mechid::io::{Experiment, ResponseKind};
 use mechid::model::Response;
 use mechid::signal::{Record, Sampling};
+use nalgebra::DMatrix;
 
-use crate::commands::identify::excited::choose_lines;
 use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
 
-/// How a machine is found from a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Estimator {
-    /// From sample to sample by Euler's rule, the dissertation's; biased in proportion to the step
-    Euler,
-    /// From sample to sample, the force held between them
-    Held,
-    /// From sample to sample, the force linear between them
-    Linear,
-    /// The equation of motion at the samples, with the acceleration
-    EquationOfMotion,
-    /// Least squares on the spectra of force and motion
-    LeastSquares,
-    /// Maximum likelihood on the spectra of force and motion
-    MaximumLikelihood,
-}
-
-impl Estimator {
-    /// The estimator in words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Estimator::Euler => "Euler's rule",
-            Estimator::Held => "force held between samples",
-            Estimator::Linear => "force linear between samples",
-            Estimator::EquationOfMotion => "equation of motion at the samples",
-            Estimator::LeastSquares => "least squares on the spectra",
-            Estimator::MaximumLikelihood => "maximum likelihood on the spectra",
-        }
-    }
-}
-
 /// Forces and motions on one time axis.
 #[derive(Debug)]
-pub struct Samples {
-    force: Record,
-    motions: Vec<(Motion, Record)>,
-    /// Samples in a period.
-    period: usize,
-    extent: Extent,
+pub struct Samples<'a> {
+    pub force: Cow<'a, Record>,
+    motions: Vec<(Motion, Cow<'a, Record>)>,
+    pub extent: Extent,
 }
 
-impl Samples {
+impl<'a> Samples<'a> {
     /// What an experiment as described would measure.
     pub fn simulated(experiment: &Experiment) -> Result<Self, CliError> {
         let simulation = mechid::simulate(experiment)?;
         let motion = &simulation.measured_response;
+        let own = |record: &Record| Cow::Owned(record.clone());
         Ok(Self {
-            force: simulation.measured_force.clone(),
+            force: own(&simulation.measured_force),
             motions: vec![
-                (Motion::Displacement, motion.displacement().clone()),
-                (Motion::Velocity, motion.velocity().clone()),
-                (Motion::Acceleration, motion.acceleration().clone()),
+                (Motion::Displacement, own(motion.displacement())),
+                (Motion::Velocity, own(motion.velocity())),
+                (Motion::Acceleration, own(motion.acceleration())),
             ],
-            period: experiment.samples(),
             extent: match experiment.response {
                 ResponseKind::Periodic => Extent::WholePeriod,
                 ResponseKind::FromRest | ResponseKind::From(_) => Extent::Open,
@@ -75,71 +40,85 @@ impl Samples {
         })
     }
 
-    /// The window of a record, taken as open from sample to sample.
-    pub fn measured(measured: &Measurement) -> Self {
+    /// Those of a record, taken as open from sample to sample.
+    pub fn measured(measured: &'a Measurement) -> Self {
         let motions = measured.motions().into_iter();
         Self {
-            force: measured.force.clone(),
-            motions: motions.map(|(kind, record)| (kind, record.clone())).collect(),
-            period: measured.period,
+            force: Cow::Borrowed(&measured.force),
+            motions: motions.map(|(kind, record)| (kind, Cow::Borrowed(record))).collect(),
             extent: Extent::Open,
         }
     }
 
-    /// Every `factor`-th sample, from the first on.
-    ///
-    /// # Errors
-    /// [`CliError::DecimatedPeriod`] if a period is no whole number of them.
-    pub fn decimated(&self, factor: usize) -> Result<Self, CliError> {
-        if !self.period.is_multiple_of(factor) && self.period < self.force.len() {
-            return Err(CliError::DecimatedPeriod { period: self.period, factor });
-        }
-        let thin = |record: &Record| {
-            let len = record.len().div_ceil(factor);
+    /// Every `factor`-th sample, from the `first` on, counted from 0.
+    pub fn every(&self, factor: usize, first: usize) -> Result<Samples<'static>, CliError> {
+        self.map(|record| {
+            let len = (record.len() - first).div_ceil(factor);
             let sampling = Sampling::new(record.sampling().dt() * factor as f64, len)?;
             let data = record.data();
-            let every = |k: usize, channel: usize| data[(k * factor, channel)];
-            Record::new(sampling, nalgebra::DMatrix::from_fn(len, data.ncols(), every))
+            let every = |k: usize, channel: usize| data[(first + k * factor, channel)];
+            Ok(Record::new(sampling, DMatrix::from_fn(len, data.ncols(), every))?)
+        })
+    }
+
+    /// The last of them.
+    pub fn last(&self) -> Result<Samples<'static>, CliError> {
+        self.map(|record| Ok(record.window(record.len() - 1, 1)?))
+    }
+
+    /// These and then those of a later stretch.
+    pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, CliError> {
+        let join = |own: &Record, later: &Record| {
+            let (before, len) = (own.len(), own.len() + later.len());
+            let mut data = DMatrix::zeros(len, own.channels());
+            data.rows_mut(0, before).copy_from(own.data());
+            data.rows_mut(before, later.len()).copy_from(later.data());
+            let record = Record::new(own.sampling().with_len(len)?, data)?;
+            Ok::<_, CliError>(Cow::Owned(record))
         };
-        let motions = self.motions.iter().map(|(kind, record)| Ok((*kind, thin(record)?)));
-        Ok(Self {
-            force: thin(&self.force)?,
+        let pairs = self.motions.iter().zip(&later.motions);
+        let motions = pairs.map(|((kind, own), (_, later))| Ok((*kind, join(own, later)?)));
+        Ok(Samples {
+            force: join(&self.force, &later.force)?,
             motions: motions.collect::<Result<_, CliError>>()?,
-            period: self.period.div_ceil(factor),
             extent: self.extent,
         })
     }
 
-    /// The machine behind these samples.
-    pub fn find(&self, estimator: Estimator, unknowns: &Unknowns) -> Result<Estimate, CliError> {
-        let discretisation = match estimator {
-            Estimator::Euler => Discretisation::Euler,
-            Estimator::Held => Discretisation::ZeroOrderHold,
-            Estimator::Linear => Discretisation::FirstOrderHold,
-            Estimator::EquationOfMotion => {
-                let [x, v, a] = [Motion::Displacement, Motion::Velocity, Motion::Acceleration]
-                    .map(|kind| self.motion(kind));
-                let response = Response::new(x?.clone(), v?.clone(), a?.clone())?;
-                return Ok(equation_of_motion(&response, &self.force, unknowns)?);
-            }
-            Estimator::LeastSquares | Estimator::MaximumLikelihood => {
-                let chosen = choose_lines(&self.force, self.period, None, None)?;
-                let lines = Lines::new(self.force.sampling().with_len(self.period)?, chosen)?;
-                let (kind, motion) = &self.motions[0];
-                let data = RepeatedPeriods::new(&lines, &self.force, motion, *kind)?.mean()?;
-                return Ok(match estimator {
-                    Estimator::LeastSquares => equation_error(&data, unknowns)?,
-                    _ => output_error(&data, unknowns)?.estimate,
-                });
-            }
-        };
-        let method = TimeDomain::new(discretisation, self.extent);
-        let (x, v) = (self.motion(Motion::Displacement)?, self.motion(Motion::Velocity)?);
-        Ok(method.fit(x, v, &self.force, unknowns)?.into_estimate())
+    /// One kind of motion.
+    ///
+    /// # Errors
+    /// [`CliError::SweepMotion`] if it was not measured.
+    pub fn motion(&self, wanted: Motion) -> Result<&Record, CliError> {
+        let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
+        found.map(|(_, record)| record.as_ref()).ok_or(CliError::SweepMotion { wanted })
     }
 
-    fn motion(&self, wanted: Motion) -> Result<&Record, CliError> {
-        let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
-        found.map(|(_, record)| record).ok_or(CliError::SweepMotion { wanted })
+    /// The first kind of motion there is.
+    pub fn first_motion(&self) -> (Motion, &Record) {
+        (self.motions[0].0, &self.motions[0].1)
+    }
+
+    /// All three motions.
+    ///
+    /// # Errors
+    /// As [`Samples::motion`].
+    pub fn response(&self) -> Result<Response, CliError> {
+        let [x, v, a] = [Motion::Displacement, Motion::Velocity, Motion::Acceleration]
+            .map(|kind| self.motion(kind));
+        Ok(Response::new(x?.clone(), v?.clone(), a?.clone())?)
+    }
+
+    fn map(
+        &self,
+        of: impl Fn(&Record) -> Result<Record, CliError>,
+    ) -> Result<Samples<'static>, CliError> {
+        let motions =
+            self.motions.iter().map(|(kind, record)| Ok((*kind, Cow::Owned(of(record)?))));
+        Ok(Samples {
+            force: Cow::Owned(of(&self.force)?),
+            motions: motions.collect::<Result<_, CliError>>()?,
+            extent: self.extent,
+        })
     }
 }
