@@ -13,7 +13,7 @@ mod spectral;
 use std::fmt;
 
 pub use after::after_fit;
-pub use before::{before_equation_of_motion, before_fit, periodicity};
+pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
 pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
 pub use linearity::linearity;
 pub use misfit::{after_response_fit, after_spectral_fit};

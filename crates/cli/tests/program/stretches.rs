@@ -2,8 +2,12 @@
 
 use std::fs;
 
+use mechid::estimate::Unknowns;
+use mechid::estimate::derivatives::SavitzkyGolay;
+use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
+use mechid::io::{Table, TimeAxis};
 use mechid::model::Sdof;
-use mechid::signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid::signal::{Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use mechid_problems::exact_harmonic_periodic;
 use serde_json::Value;
 
@@ -133,6 +137,65 @@ fn a_sweep_of_a_long_text_takes_every_nth_row() {
                 let (a, b) = (swept[number].as_f64().unwrap(), own[number].as_f64().unwrap());
                 assert!((a / b - 1.0).abs() < 1e-9, "{swept} {own}");
             }
+        }
+    }
+}
+
+/// What a fit in the time domain makes of all samples at once, where the program goes from stretch to
+/// stretch.
+#[test]
+fn stretches_of_a_long_text_meet_as_in_one_record() {
+    let folder = records();
+    let table = Table::read(folder.path().join("rec.csv")).unwrap();
+    let [f, x, v] =
+        ["f", "x", "v"].map(|name| table.record(&TimeAxis::Column("time"), &[name]).unwrap());
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let steps = |how, extent| TimeDomain::new(how, extent);
+    let smooth = SavitzkyGolay::new(10, 4).unwrap().motion(&x).unwrap();
+    let [own_x, own_v] = [smooth.displacement(), smooth.velocity()];
+    let refined = steps(Discretisation::Euler, Extent::Open);
+    let refined = refined.fit_refined([&x, &v, &f], &unknowns, 8, Interpolation::Linear);
+    let whole = steps(Discretisation::FirstOrderHold, Extent::WholePeriod);
+    let closed = whole.fit(own_x, own_v, &f, &unknowns);
+    for (options, judge) in [
+        (
+            "--velocity v --extent period --plot p.svg",
+            whole.fit(&x, &v, &f, &unknowns).unwrap().into_estimate(),
+        ),
+        (
+            "--velocity v --between-samples euler --refine 8 --interpolation linear",
+            refined.unwrap().into_estimate(),
+        ),
+        ("--derivatives savitzky-golay:21:4", equation_of_motion(&smooth, &f, &unknowns).unwrap()),
+        (
+            "--derivatives savitzky-golay:21:4 --extent period --between-samples linear",
+            closed.unwrap().into_estimate(),
+        ),
+    ] {
+        let options = format!("--force f --displacement x --domain time {options} --json");
+        let told = mechid(folder.path(), &format!("identify rec.csv {options}"));
+        let report: Value = serde_json::from_str(&told).unwrap();
+        assert!(report["remarks"].to_string().contains("samples 1 to 262144"), "{options}");
+        for (found, p) in report["parameters"].as_array().unwrap().iter().zip(judge.parameters()) {
+            for (what, judge) in [("value", p.value), ("standard_error", p.standard_error)] {
+                let found = found[what].as_f64().unwrap();
+                assert!((found / judge - 1.0).abs() < 1e-9, "{options}: {what} {found} {judge}");
+            }
+        }
+        let checks = report["checks"].as_array().unwrap().iter();
+        let seam = checks.filter(|check| check["subject"] == "periodicity").collect::<Vec<_>>();
+        assert_eq!(seam.len(), usize::from(options.contains("period")), "{options}");
+        if options.contains("--plot") {
+            let bend = |k: usize| {
+                let at = |k: usize| x.channel(0)[k % x.len()];
+                at(k + x.len() - 1) - 2.0 * at(k) + at(k + 1)
+            };
+            let usual = (1..262_143).map(|k| bend(k).powi(2)).sum::<f64>() / 262_142.0;
+            let judge = bend(0).abs().max(bend(x.len() - 1).abs()) / usual.sqrt();
+            let found = seam[0]["value"].as_f64().unwrap();
+            assert!((found / judge - 1.0).abs() < 1e-6, "{found} {judge}");
+            let picture = fs::read_to_string(folder.path().join("p.svg")).unwrap();
+            assert!(picture.contains("</svg>"));
         }
     }
 }

@@ -165,16 +165,29 @@ pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
 /// # Source
 /// Ours.
 pub fn periodicity(motion: &Record) -> Check {
-    let len = motion.len();
+    periodicity_across(motion, motion)
+}
+
+/// As [`periodicity`], of a period too long to be held: what is usual is taken from its `beginning`;
+/// `end` is its last two samples, or more (samples × channels, the same quantity and channels).
+///
+/// # Panics
+/// If `end` has fewer channels.
+///
+/// # Source
+/// Ours.
+pub fn periodicity_across(beginning: &Record, end: &Record) -> Check {
     let ratio = |channel: usize| {
-        let x = motion.channel(channel);
-        let curvature = |k: usize| x[(k + len - 1) % len] - 2.0 * x[k] + x[(k + 1) % len];
-        let inside: f64 = (1..len.saturating_sub(1)).map(|k| curvature(k).powi(2)).sum();
-        let usual = (inside / len.saturating_sub(2).max(1) as f64).sqrt();
-        let seam = curvature(0).abs().max(curvature(len - 1).abs());
+        let (x, end) = (beginning.channel(channel), end.channel(channel));
+        let [last_but_one, last] = [2, 1].map(|back| end[(2 * end.len() - back) % end.len()]);
+        let curvature = |x: [f64; 3]| x[0] - 2.0 * x[1] + x[2];
+        let inside: f64 = x.windows(3).map(|x| curvature([x[0], x[1], x[2]]).powi(2)).sum();
+        let usual = (inside / x.len().saturating_sub(2).max(1) as f64).sqrt();
+        let after = curvature([last, x[0], x[1 % x.len()]]);
+        let seam = after.abs().max(curvature([last_but_one, last, x[0]]).abs());
         if seam == 0.0 { 0.0 } else { seam / usual }
     };
-    let value = (0..motion.channels()).map(ratio).fold(0.0, f64::max);
+    let value = (0..beginning.channels()).map(ratio).fold(0.0, f64::max);
     let (verdict, meaning) = match value {
         v if v < DOUBTFUL_SEAM => (Verdict::Good, "as a whole period should"),
         v if v < BAD_SEAM => (Verdict::Doubtful, "hardly a steady state over one whole period"),

@@ -27,8 +27,8 @@ pub struct Compared {
 }
 
 impl Course {
-    /// Every motion measured beside the one predicted. An open record starts where its motion is met
-    /// best.
+    /// Every motion measured, as far as it is held, beside the one predicted. An open record starts
+    /// where its motion is met best.
     pub fn predict(
         self,
         system: &SecondOrderSystem,
@@ -62,7 +62,10 @@ impl Course {
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
         match self {
             Course::Steady => predict_periodic(system, force),
-            Course::Sampled { discretisation, extent: Extent::Open } => {
+            // Nor does the beginning of a long period return to itself.
+            Course::Sampled { discretisation, extent }
+                if extent == Extent::Open || measured.held_to().is_some() =>
+            {
                 let start = fitted_start(system, force, discretisation, &measured.motions())?;
                 predict(system, force, discretisation, Extent::Open, &start)
             }

@@ -1,5 +1,6 @@
 //! Velocity and acceleration where only one of displacement and acceleration was measured.
 
+use std::ops::Range;
 use std::str::FromStr;
 
 use mechid::estimate::derivatives::{
@@ -8,7 +9,7 @@ use mechid::estimate::derivatives::{
 use mechid::model::Response;
 use mechid::signal::Record;
 
-use super::measurement::Measurement;
+use super::measurement::{Measurement, joined};
 use crate::error::CliError;
 
 /// How the motions that were not measured are found.
@@ -102,6 +103,34 @@ impl Prepared {
             }
             _ => Err(CliError::NothingToDerive),
         }
+    }
+
+    /// Some of the samples, counted from 0.
+    pub fn window(self, samples: Range<usize>) -> Result<Self, CliError> {
+        if samples == (0..self.force.len()) {
+            return Ok(self);
+        }
+        let cut = |record: &Record| record.window(samples.start, samples.len());
+        Ok(Self {
+            displacement: cut(&self.displacement)?,
+            velocity: cut(&self.velocity)?,
+            acceleration: self.acceleration.as_ref().map(cut).transpose()?,
+            force: cut(&self.force)?,
+            ..self
+        })
+    }
+
+    /// These samples and after them the first of others.
+    pub fn followed_by(&self, others: &Self) -> Result<Self, CliError> {
+        let join = |own: &Record, other: &Record| joined(own, &other.window(0, 1)?);
+        let pair = self.acceleration.as_ref().zip(others.acceleration.as_ref());
+        Ok(Self {
+            displacement: join(&self.displacement, &others.displacement)?,
+            velocity: join(&self.velocity, &others.velocity)?,
+            acceleration: pair.map(|(own, other)| join(own, other)).transpose()?,
+            force: join(&self.force, &others.force)?,
+            ..*self
+        })
     }
 
     /// Displacement, velocity and acceleration together, if there is an acceleration.

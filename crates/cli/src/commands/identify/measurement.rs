@@ -96,6 +96,15 @@ struct Source {
     sampling: Sampling,
 }
 
+/// A record and then the samples of a later one.
+pub fn joined(record: &Record, later: &Record) -> Result<Record, CliError> {
+    let (before, len) = (record.len(), record.len() + later.len());
+    let mut data = DMatrix::zeros(len, record.channels());
+    data.rows_mut(0, before).copy_from(record.data());
+    data.rows_mut(before, later.len()).copy_from(later.data());
+    Ok(Record::new(record.sampling().with_len(len)?, data)?)
+}
+
 impl Measurement {
     /// The first kind of motion measured, and what it is.
     pub fn motion(&self) -> (&Record, Motion) {

@@ -47,8 +47,9 @@ use crate::outcome::Outcome;
 /// assumption on the force between the samples; what was not measured, --derivatives finds.
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
-/// it, the checks look at the first 262144 samples. Held whole are windows for --extent period,
-/// --derivatives, --refine, --validate, a plot in the time domain, and one long period.
+/// it, the checks and a plot in the time domain look at the first 262144 samples. Held whole are
+/// windows for spectral --derivatives, for --interpolation by a spline or band-limited, and for
+/// --validate, and one long period.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
@@ -144,12 +145,7 @@ const CONSPICUOUS: f64 = 0.05;
 impl IdentifyArgs {
     /// Reads, identifies, and tells.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let hold = match (&self.plot.plot, self.identification.domain) {
-            // The picture is of the motion, not of spectra.
-            (Some(_), Domain::Time) => Hold::Whole,
-            _ => self.identification.hold(),
-        };
-        let found = self.identification.identify(hold)?;
+        let found = self.identification.identify(self.identification.hold())?;
         let report = &found.report;
         Outcome::new(report.text(), report)?
             .with_plot(&self.plot, || found.picture(&report.title()))
@@ -160,8 +156,7 @@ impl Identification {
     /// How much of a record must be held to fit it.
     pub fn hold(&self) -> Hold {
         match self.domain {
-            Domain::Time if !self.time.goes_sample_by_sample() => Hold::Whole,
-            Domain::Time => Hold::Samples(0),
+            Domain::Time => self.time.hold(),
             Domain::Frequency => self.segments.hold(),
         }
     }

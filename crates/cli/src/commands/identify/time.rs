@@ -1,7 +1,9 @@
 //! Fits sample by sample.
 
 use clap::{Args, ValueEnum};
-use mechid::estimate::checks::{before_equation_of_motion, before_fit};
+use mechid::estimate::checks::{
+    Check, Subject, before_equation_of_motion, before_fit, periodicity_across,
+};
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
 use mechid::signal::{Interpolation, Record};
@@ -9,7 +11,7 @@ use mechid::signal::{Interpolation, Record};
 use super::course::Course;
 use super::derivatives::{Derivatives, Prepared};
 use super::fit::{BetweenSamples, Fitted, Residual};
-use super::measurement::{Recorded, STRETCH};
+use super::measurement::{Hold, Measurement, Recorded, STRETCH};
 use crate::error::CliError;
 use crate::options::at_least_one;
 
@@ -84,9 +86,14 @@ impl TimeArgs {
         Some((self.refine?, way))
     }
 
-    /// Whether every sample is fitted with its neighbours only, and the window is no whole.
-    pub fn goes_sample_by_sample(&self) -> bool {
-        self.extent() == Extent::Open && self.derivatives.is_none() && self.refine.is_none()
+    /// How much of a record must be held: all of it where every sample needs all others.
+    pub fn hold(&self) -> Hold {
+        match (&self.derivatives, self.interpolation) {
+            (Some(Derivatives::Spectral), _) => Hold::Whole,
+            (_, Some(Between::Spline | Between::BandLimited)) => Hold::Whole,
+            (Some(Derivatives::SavitzkyGolay(filter)), _) => Hold::Samples(filter.window()),
+            (None, _) => Hold::Samples(0),
+        }
     }
 
     /// Fits the samples of one or several windows: the equation of motion itself where there is an
@@ -110,21 +117,92 @@ impl TimeArgs {
         }
     }
 
-    /// Goes through a record in stretches of which each but the first begins with the last `overlap`
-    /// samples of the one before; in one, where samples cannot be told apart from the whole.
+    /// Goes through a record in stretches of which each but the first begins with the last sample of
+    /// the one before, and says which is the last; in one, where every sample needs all others.
     fn stretches(
         &self,
         recorded: &Recorded,
-        overlap: usize,
-        take: &mut dyn FnMut(&Prepared) -> Result<(), CliError>,
+        take: &mut dyn FnMut(Prepared, bool) -> Result<(), CliError>,
     ) -> Result<(), CliError> {
-        let advance = match self.goes_sample_by_sample() {
-            true => STRETCH,
-            false => recorded.held.force.len(),
+        let held = &recorded.held;
+        let advance = match self.hold() {
+            Hold::Whole => held.force.len(),
+            _ => (STRETCH / self.refine.unwrap_or(1)).max(1),
         };
-        recorded.stretches(advance + overlap, advance, &mut |stretch| {
-            take(&Prepared::of(stretch, self.derivatives.as_ref())?)
+        // A sliding polynomial has no middle at the first and last samples it sees.
+        let margin = self.noise_span() / 2;
+        recorded.stretches(advance + 1 + 2 * margin, advance, &mut |stretch| {
+            let len = stretch.force.len();
+            let first = stretch.first_sample == held.first_sample;
+            let last = stretch.first_sample + len - 1 == held.last_sample();
+            let inside = if first { 0 } else { margin }..if last { len } else { len - margin };
+            take(Prepared::of(stretch, self.derivatives.as_ref())?.window(inside)?, last)
         })
+    }
+
+    /// What a window is as far as it is held.
+    fn extent_of(&self, held: &Measurement) -> Extent {
+        if held.held_to().is_some() { Extent::Open } else { self.extent() }
+    }
+
+    /// With what was seen before the fit, whether a period that is not held whole is one, by its last
+    /// samples.
+    fn with_seam(
+        &self,
+        mut seen: Vec<Check>,
+        recorded: &Recorded,
+        p: &Prepared,
+        end: Option<Record>,
+    ) -> Vec<Check> {
+        let long = self.extent() == Extent::WholePeriod && recorded.held.held_to().is_some();
+        if let Some(end) = end.filter(|_| long) {
+            let step = seen.iter().position(|check| check.subject == Subject::Step);
+            seen.insert(step.unwrap_or(seen.len()), periodicity_across(&p.displacement, &end));
+        }
+        seen
+    }
+
+    /// Gathers the samples of a record; the displacements of its last two.
+    fn push_instants(
+        &self,
+        recorded: &Recorded,
+        rows: &mut EquationOfMotion,
+    ) -> Result<Option<Record>, CliError> {
+        let mut end = None;
+        self.stretches(recorded, &mut |p, last| {
+            let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
+            // The next stretch begins with the last sample of this one.
+            let own = if last { p.force.len() } else { p.force.len() - 1 };
+            let [a, v, x] = [response.acceleration(), response.velocity(), response.displacement()]
+                .map(|r| r.data().rows(0, own));
+            rows.push_rows(a, v, x, p.force.data().rows(0, own))?;
+            end = last_two(&p)?;
+            Ok(())
+        })?;
+        Ok(end)
+    }
+
+    /// Gathers what leads from sample to sample of a record that begins as `held`; the displacements
+    /// of its last two.
+    fn push_steps(
+        &self,
+        recorded: &Recorded,
+        held: &Prepared,
+        rows: &mut Transitions,
+    ) -> Result<Option<Record>, CliError> {
+        let (extent, mut end) = (self.extent(), None);
+        self.stretches(recorded, &mut |p, last| {
+            end = last_two(&p)?;
+            if let Some((factor, interpolation)) = self.refinement() {
+                return Ok(rows.push_refined(p.states(), extent, factor, interpolation)?);
+            }
+            // After the last sample of a period comes its first.
+            let closes = last && extent == Extent::WholePeriod;
+            let p = if closes { p.followed_by(held)? } else { p };
+            let [x, v, force] = p.states();
+            Ok(rows.push(x, v, force, Extent::Open)?)
+        })?;
+        Ok(end)
     }
 
     fn at_samples(
@@ -136,15 +214,11 @@ impl TimeArgs {
         let mut rows = EquationOfMotion::new(unknowns.dof());
         let mut before = Vec::new();
         for (recorded, p) in records.iter().zip(prepared) {
-            self.stretches(recorded, 0, &mut |p| {
-                let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
-                let [a, v, x] =
-                    [response.acceleration(), response.velocity(), response.displacement()]
-                        .map(|r| r.data().as_view());
-                Ok(rows.push_rows(a, v, x, p.force.data().as_view())?)
-            })?;
+            let end = self.push_instants(recorded, &mut rows)?;
             let Some(response) = p.response()? else { return Err(CliError::TimeDomainMotions) };
-            before.push(before_equation_of_motion(&response, &p.force, unknowns, self.extent())?);
+            let extent = self.extent_of(&recorded.held);
+            let seen = before_equation_of_motion(&response, &p.force, unknowns, extent)?;
+            before.push(self.with_seam(seen, recorded, p, end));
         }
         let estimate = rows.solve(unknowns)?;
         // Says what the data leave open, before anything is made of it.
@@ -175,37 +249,29 @@ impl TimeArgs {
         between: Option<BetweenSamples>,
     ) -> Result<Fitted, CliError> {
         let between = between.unwrap_or(BetweenSamples::Linear);
-        let (discretisation, extent) = (between.discretisation(), self.extent());
+        let discretisation = between.discretisation();
         let dt = prepared[0].force.sampling().dt();
-        let (factor, interpolation) = self.refinement().unzip();
-        let mut rows = Transitions::new(unknowns.dof(), dt / factor.unwrap_or(1) as f64)?;
+        let steps = self.refine.unwrap_or(1) as f64;
+        let mut rows = Transitions::new(unknowns.dof(), dt / steps)?;
         let mut before = Vec::new();
         for (recorded, p) in records.iter().zip(prepared) {
-            self.stretches(recorded, usize::from(extent == Extent::Open), &mut |p| {
-                let [x, v, force] = p.states();
-                match (factor, interpolation) {
-                    (Some(factor), Some(interpolation)) => {
-                        rows.push_refined([x, v, force], extent, factor, interpolation)?;
-                    }
-                    _ => rows.push(x, v, force, extent)?,
-                }
-                Ok(())
-            })?;
+            let end = self.push_steps(recorded, p, &mut rows)?;
             let [x, v, force] = p.states();
-            before.push(before_fit(TimeDomain::new(discretisation, extent), x, v, force)?);
+            let method = TimeDomain::new(discretisation, self.extent_of(&recorded.held));
+            before.push(self.with_seam(before_fit(method, x, v, force)?, recorded, p, end));
         }
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
-        let between_points = factor.zip(interpolation);
-        let left = |p: &Prepared| -> Result<Residual, CliError> {
+        let left = |(recorded, p): (&Recorded, &Prepared)| -> Result<Residual, CliError> {
+            let extent = self.extent_of(&recorded.held);
             let [left, fitted] =
-                missing_force(&estimate, p.states(), discretisation, extent, between_points)?;
+                missing_force(&estimate, p.states(), discretisation, extent, self.refinement())?;
             let force = p.force.window(0, left.len())?;
             // An error of a measured state is in the interval before it and in the one after.
             let noise_span = self.noise_span() + 1;
             Ok(Residual { left, fitted, force, noise_span })
         };
-        let residuals = prepared.iter().map(left).collect::<Result<_, _>>()?;
+        let residuals = records.iter().zip(prepared).map(left).collect::<Result<_, _>>()?;
         Ok(Fitted {
             domain: "time",
             estimator: between.estimator(),
@@ -257,6 +323,12 @@ impl TimeArgs {
         }
         remarks
     }
+}
+
+/// The displacements of the last two samples.
+fn last_two(p: &Prepared) -> Result<Option<Record>, CliError> {
+    let (x, len) = (&p.displacement, p.displacement.len());
+    Ok(if len < 2 { None } else { Some(x.window(len - 2, 2)?) })
 }
 
 /// F − M ẍ − C ẋ − K x, left of the inertia.

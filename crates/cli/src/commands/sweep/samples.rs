@@ -9,7 +9,7 @@ use mechid::model::Response;
 use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
-use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::measurement::{Measurement, joined};
 use crate::error::CliError;
 
 /// Forces and motions on one time axis.
@@ -68,14 +68,7 @@ impl<'a> Samples<'a> {
 
     /// These and then those of a later stretch.
     pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, CliError> {
-        let join = |own: &Record, later: &Record| {
-            let (before, len) = (own.len(), own.len() + later.len());
-            let mut data = DMatrix::zeros(len, own.channels());
-            data.rows_mut(0, before).copy_from(own.data());
-            data.rows_mut(before, later.len()).copy_from(later.data());
-            let record = Record::new(own.sampling().with_len(len)?, data)?;
-            Ok::<_, CliError>(Cow::Owned(record))
-        };
+        let join = |own, later| Ok::<_, CliError>(Cow::Owned(joined(own, later)?));
         let pairs = self.motions.iter().zip(&later.motions);
         let motions = pairs.map(|((kind, own), (_, later))| Ok((*kind, join(own, later)?)));
         Ok(Samples {
