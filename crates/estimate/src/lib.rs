@@ -46,6 +46,8 @@ pub use frf::{Frf, FrfAverage, FrfEstimator, Segments, Window};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
 pub use modal::{IdentifiedMode, Uncertain, identified_modes};
-pub use prediction::{fit_percent, fitted_start, missing_force, predict, predict_periodic};
+pub use prediction::{
+    StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,
+};
 pub use sweep::{Sweep, SweepPoint, sweep};
 pub use unknowns::{Parameter, Unknowns};

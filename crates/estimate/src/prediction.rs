@@ -6,7 +6,7 @@ mod start;
 
 pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
-pub use self::start::fitted_start;
+pub use self::start::{StartFit, fitted_start};
 
 use mechid_model::{InitialState, Response, SecondOrderSystem};
 use mechid_signal::Record;

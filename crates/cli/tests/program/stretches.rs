@@ -2,9 +2,10 @@
 
 use std::fs;
 
-use mechid::estimate::Unknowns;
 use mechid::estimate::derivatives::SavitzkyGolay;
+use mechid::estimate::frequency_domain::Motion;
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
+use mechid::estimate::{Unknowns, fit_percent, fitted_start, predict};
 use mechid::io::{Table, TimeAxis};
 use mechid::model::Sdof;
 use mechid::signal::{Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
@@ -197,6 +198,39 @@ fn stretches_of_a_long_text_meet_as_in_one_record() {
             let picture = fs::read_to_string(folder.path().join("p.svg")).unwrap();
             assert!(picture.contains("</svg>"));
         }
+    }
+}
+
+/// How much of a record is predicted, of one in stretches as of all samples at once.
+#[test]
+fn a_long_text_is_predicted_as_one_record() {
+    let folder = records();
+    let table = Table::read(folder.path().join("rec.csv")).unwrap();
+    let [f, x, v] =
+        ["f", "x", "v"].map(|name| table.record(&TimeAxis::Column("time"), &[name]).unwrap());
+    let told = mechid(
+        folder.path(),
+        "identify rec.csv --force f --displacement x --velocity v --domain time --periods 1 \
+         --period 1000 --validate rec.csv --validate-start 501 --json",
+    );
+    let report: Value = serde_json::from_str(&told).unwrap();
+    let [start, samples] = [500, x.len() - 500];
+    assert_eq!(report["validation"]["last_sample"], x.len());
+    let part = |record: &Record| record.window(start, samples).unwrap();
+    let [f, x, v] = [part(&f), part(&x), part(&v)];
+    let number = |at: usize| report["parameters"][at]["value"].as_f64().unwrap();
+    let system = Sdof::new(number(0), number(1), number(2)).unwrap().system();
+    let hold = Discretisation::FirstOrderHold;
+    let measured = [(Motion::Displacement, &x), (Motion::Velocity, &v)];
+    let start = fitted_start(&system, &f, hold, &measured).unwrap();
+    let judge = predict(&system, &f, hold, Extent::Open, &start).unwrap();
+    for (at, (record, predicted)) in
+        [(&x, judge.displacement()), (&v, judge.velocity())].into_iter().enumerate()
+    {
+        let judge = fit_percent(record, predicted).unwrap()[0];
+        let found = report["validation"]["channels"][at]["fit_percent"].as_f64().unwrap();
+        assert!((found - judge).abs() < 1e-9 * judge.abs(), "{found} {judge}");
+        assert!(found > 20.0 && found < 99.9, "{found}");
     }
 }
 

@@ -9,6 +9,7 @@ use crate::EstimateError;
 use crate::frequency_domain::Motion;
 use crate::least_squares::size;
 use crate::time_domain::{Discretisation, Extent};
+use crate::triangular::TriangularFactor;
 
 /// Relative singular value below which a direction of the start does not show in the motion.
 const UNSEEN: f64 = 1e-10;
@@ -33,42 +34,140 @@ pub fn fitted_start(
     discretisation: Discretisation,
     measured: &[(Motion, &Record)],
 ) -> Result<InitialState, EstimateError> {
-    let n = system.dof();
-    for (_, record) in measured {
-        size("channels of the motion", n, record.channels())?;
-        record.check_same_sampling(force)?;
+    let mut fit = StartFit::new(system, discretisation)?;
+    fit.push(force, measured)?;
+    fit.start()
+}
+
+/// The start of a record that comes in stretches, as [`fitted_start`] finds it: memory does not grow
+/// with the record.
+///
+/// # Source
+/// That of [`fitted_start`]; chapter 6 there (a triangle brought up to date by rows).
+#[derive(Debug, Clone)]
+pub struct StartFit {
+    system: SecondOrderSystem,
+    discretisation: Discretisation,
+    /// Where the motions have come to that are superposed: free ones from each unit start, and the
+    /// one from rest under the force.
+    runs: Vec<InitialState>,
+    /// Of each channel measured the columns \[free motions | what the forced one leaves\].
+    channels: Vec<TriangularFactor>,
+    /// Of each channel measured the sum of squares.
+    sizes: Vec<f64>,
+}
+
+impl StartFit {
+    /// Nothing seen yet.
+    ///
+    /// # Errors
+    /// [`EstimateError::Model`] if the machine has no degree of freedom.
+    pub fn new(
+        system: &SecondOrderSystem,
+        discretisation: Discretisation,
+    ) -> Result<Self, EstimateError> {
+        let n = system.dof();
+        let unit = |at: usize| state(&DVector::from_fn(2 * n, |k, _| f64::from(k == at)), n);
+        let mut runs = (0..2 * n).map(unit).collect::<Result<Vec<_>, _>>()?;
+        runs.push(InitialState::rest(n));
+        let (channels, sizes) = (Vec::new(), Vec::new());
+        Ok(Self { system: system.clone(), discretisation, runs, channels, sizes })
     }
-    let run = |force: &Record, start: &InitialState| {
-        let response = predict(system, force, discretisation, Extent::Open, start)?;
-        Ok::<_, EstimateError>(stacked(measured, |kind, _| channels(&response, kind)))
-    };
-    let still = Record::new(force.sampling(), DMatrix::zeros(force.len(), n))?;
-    let mut free = Vec::new();
-    for at in 0..2 * n {
-        free.push(run(
-            &still,
-            &state(&DVector::from_fn(2 * n, |row, _| f64::from(row == at)), n)?,
-        )?);
-    }
-    let mut free = DMatrix::from_columns(&free);
-    let gap = stacked(measured, |_, record| record) - run(force, &InitialState::rest(n))?;
-    let lengths: Vec<f64> = free
-        .column_iter_mut()
-        .map(|mut column| {
-            let length = column.norm();
-            if length > 0.0 {
-                column.unscale_mut(length);
+
+    /// Takes the next stretch, which begins with the last sample of the one before: force (N) and the
+    /// motions measured, the same kinds each time (samples × degrees of freedom).
+    ///
+    /// # Errors
+    /// As [`predict`] for [`Extent::Open`]; [`EstimateError::Size`] or [`EstimateError::Signal`] if
+    /// the motions do not belong to the force, [`EstimateError::Overflow`].
+    pub fn push(
+        &mut self,
+        force: &Record,
+        measured: &[(Motion, &Record)],
+    ) -> Result<(), EstimateError> {
+        let (n, len) = (self.system.dof(), force.len());
+        for (_, record) in measured {
+            size("channels of the motion", n, record.channels())?;
+            record.check_same_sampling(force)?;
+        }
+        let still = Record::new(force.sampling(), DMatrix::zeros(len, n))?;
+        let mut responses = Vec::new();
+        for (at, run) in self.runs.iter_mut().enumerate() {
+            let force = if at < 2 * n { &still } else { force };
+            let response = predict(&self.system, force, self.discretisation, Extent::Open, run)?;
+            *run = last(&response)?;
+            responses.push(response);
+        }
+        let seen = usize::from(!self.channels.is_empty());
+        if seen == 0 {
+            let channels = n * measured.len();
+            self.channels = vec![TriangularFactor::new(2 * n + 1); channels];
+            self.sizes = vec![0.0; channels];
+        }
+        let all =
+            measured.iter().flat_map(|(kind, record)| (0..n).map(move |c| (*kind, record, c)));
+        for ((kind, record, c), (factor, size)) in
+            all.zip(self.channels.iter_mut().zip(&mut self.sizes))
+        {
+            let own = record.channel(c);
+            let column = |at: usize| channels(&responses[at], kind).channel(c);
+            let rows = DMatrix::from_fn(len - seen, 2 * n + 1, |k, at| match at {
+                gap if gap == 2 * n => own[seen + k] - column(gap)[seen + k],
+                free => column(free)[seen + k],
+            });
+            if !factor.push(&[rows.as_view()]) {
+                return Err(EstimateError::Overflow);
             }
-            length
-        })
-        .collect();
-    let svd = free.svd(true, true);
-    let floor = UNSEEN * svd.singular_values.max();
-    let mut found = svd.solve(&gap, floor).expect("both sides were computed");
-    for (value, length) in found.iter_mut().zip(lengths) {
-        *value = if length > 0.0 { *value / length } else { 0.0 };
+            *size += own[seen..].iter().map(|x| x * x).sum::<f64>();
+        }
+        Ok(())
     }
-    state(&found, n)
+
+    /// The start that fits all stretches so far.
+    ///
+    /// # Errors
+    /// [`EstimateError::TooFewRows`] if there was none.
+    pub fn start(&self) -> Result<InitialState, EstimateError> {
+        let n = self.system.dof();
+        if self.channels.is_empty() {
+            return Err(EstimateError::TooFewRows { rows: 0, unknowns: 2 * n });
+        }
+        let width = 2 * n + 1;
+        let mut rows = DMatrix::zeros(self.channels.len() * width, width);
+        for (at, (factor, size)) in self.channels.iter().zip(&self.sizes).enumerate() {
+            let scale = if *size > 0.0 { size.sqrt() } else { 1.0 };
+            rows.rows_mut(at * width, width).copy_from(&factor.r().unscale(scale));
+        }
+        let gap = rows.column(2 * n).into_owned();
+        let mut free = rows.remove_column(2 * n);
+        let lengths: Vec<f64> = free
+            .column_iter_mut()
+            .map(|mut column| {
+                let length = column.norm();
+                if length > 0.0 {
+                    column.unscale_mut(length);
+                }
+                length
+            })
+            .collect();
+        let svd = free.svd(true, true);
+        let floor = UNSEEN * svd.singular_values.max();
+        let mut found = svd.solve(&gap, floor).expect("both sides were computed");
+        for (value, length) in found.iter_mut().zip(lengths) {
+            *value = if length > 0.0 { *value / length } else { 0.0 };
+        }
+        state(&found, n)
+    }
+}
+
+/// The state at the last sample; rest, where its squares are too small to be told from 0.
+fn last(response: &Response) -> Result<InitialState, EstimateError> {
+    let of = |record: &Record| record.data().row(record.len() - 1).transpose();
+    let (x, v) = (of(response.displacement()), of(response.velocity()));
+    if x.amax().max(v.amax()) < f64::MIN_POSITIVE.sqrt() {
+        return Ok(InitialState::rest(x.len()));
+    }
+    Ok(InitialState::new(x, v)?)
 }
 
 fn state(values: &DVector<f64>, n: usize) -> Result<InitialState, EstimateError> {
@@ -81,21 +180,4 @@ fn channels(response: &Response, kind: Motion) -> &Record {
         Motion::Velocity => response.velocity(),
         Motion::Acceleration => response.acceleration(),
     }
-}
-
-/// All channels one below the other, each over the norm of its measurement.
-fn stacked<'a>(
-    measured: &[(Motion, &'a Record)],
-    of: impl Fn(Motion, &'a Record) -> &'a Record,
-) -> DVector<f64> {
-    let mut all = Vec::new();
-    for (kind, record) in measured {
-        let from = of(*kind, record);
-        for channel in 0..record.channels() {
-            let norm = record.column(channel).norm();
-            let scale = if norm > 0.0 { norm } else { 1.0 };
-            all.extend(from.channel(channel).iter().map(|x| x / scale));
-        }
-    }
-    DVector::from_vec(all)
 }

@@ -7,7 +7,7 @@ use mechid_estimate::checks::{
 use mechid_estimate::frequency_domain::{Lines, Motion};
 use mechid_estimate::time_domain::{Discretisation, Extent};
 use mechid_estimate::{
-    EstimateError, Frf, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
+    EstimateError, Frf, StartFit, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
 };
 use mechid_model::{InitialState, KyxSign, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, exact_foh, exact_harmonic_periodic};
@@ -177,6 +177,18 @@ fn a_start_is_found_from_any_kind_of_motion() {
         let found = fitted_start(&system, &force, hold, &measured).unwrap();
         assert!((found.displacement() - truth.displacement()).amax() < 1e-9);
         assert!((found.velocity() - truth.velocity()).amax() < 1e-9);
+        // Stretches of it that share a sample tell the same.
+        let mut fit = StartFit::new(&system, hold).unwrap();
+        for (start, len) in [(0, 7), (6, 2), (7, 393)] {
+            let part = |record: &Record| record.window(start, len).unwrap();
+            let parts = measured.iter().map(|(kind, record)| (*kind, part(record)));
+            let parts: Vec<(Motion, Record)> = parts.collect();
+            let parts: Vec<_> = parts.iter().map(|(kind, record)| (*kind, record)).collect();
+            fit.push(&part(&force), &parts).unwrap();
+        }
+        let joined = fit.start().unwrap();
+        assert!((joined.displacement() - truth.displacement()).amax() < 1e-9);
+        assert!((joined.velocity() - truth.velocity()).amax() < 1e-9);
         let predicted = predict(&system, &force, hold, Extent::Open, &found).unwrap();
         let fit = fit_percent(motion.velocity(), predicted.velocity()).unwrap();
         assert!(fit.iter().all(|fit| *fit > 100.0 - 1e-6));
@@ -186,6 +198,9 @@ fn a_start_is_found_from_any_kind_of_motion() {
     let found = fitted_start(&system, &force, hold, &[(Motion::Displacement, &noisy)]).unwrap();
     let rms = motion.displacement().data().norm() / (2.0f64 * 400.0).sqrt();
     assert!((found.displacement() - truth.displacement()).amax() < 0.1 * rms);
+
+    let nothing = StartFit::new(&system, hold).unwrap().start();
+    assert!(matches!(nothing, Err(EstimateError::TooFewRows { rows: 0, .. })));
 
     // A free mass: where it stands does not show in its acceleration.
     let one = |value: f64| DMatrix::from_element(1, 1, value);

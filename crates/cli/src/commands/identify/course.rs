@@ -35,10 +35,8 @@ impl Course {
         measured: &Measurement,
     ) -> Result<Vec<Compared>, CliError> {
         let motions = measured.motions();
-        let response = self.response(system, measured).map_err(|reason| match growth(system) {
-            Some(rate) => CliError::Diverges { file: measured.file.clone(), rate },
-            None => reason.into(),
-        })?;
+        let response =
+            self.response(system, measured).map_err(|reason| failed(reason, system, measured))?;
         let compared = |(kind, record): (Motion, &Record)| {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             match self {
@@ -76,13 +74,26 @@ impl Course {
     }
 }
 
+/// Why there is no prediction.
+pub fn failed(
+    reason: EstimateError,
+    system: &SecondOrderSystem,
+    measured: &Measurement,
+) -> CliError {
+    match growth(system) {
+        Some(rate) => CliError::Diverges { file: measured.file.clone(), rate },
+        None => reason.into(),
+    }
+}
+
 /// The rate, in 1/s, at which the free motion grows; nothing if it does not.
 fn growth(system: &SecondOrderSystem) -> Option<f64> {
     let eigenvalues = system.eigenvalues().ok()?;
     eigenvalues.iter().map(|l| l.re).filter(|rate| *rate > 0.0).max_by(f64::total_cmp)
 }
 
-fn channels(response: &Response, kind: Motion) -> &Record {
+/// One kind of motion of a response.
+pub fn channels(response: &Response, kind: Motion) -> &Record {
     match kind {
         Motion::Displacement => response.displacement(),
         Motion::Velocity => response.velocity(),

@@ -246,11 +246,6 @@ impl ChannelArgs {
         Ok(Recorded { held, source })
     }
 
-    /// Reads the columns and holds all of the window.
-    pub fn measure(&self, input: &RecordArgs) -> Result<Measurement, CliError> {
-        Ok(self.record(input, Hold::Whole)?.held)
-    }
-
     /// The columns used, forces first.
     fn used(&self) -> Vec<&String> {
         self.roles().into_iter().map(|(column, ..)| column).collect()

@@ -48,8 +48,8 @@ use crate::outcome::Outcome;
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
 /// it, the checks and a plot in the time domain look at the first 262144 samples. Held whole are
-/// windows for spectral --derivatives, for --interpolation by a spline or band-limited, and for
-/// --validate, and one long period.
+/// windows for spectral --derivatives, and for --interpolation by a spline or band-limited, one long
+/// period, and what --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
@@ -184,12 +184,13 @@ impl Identification {
         };
         let records: Vec<Measurement> = records.into_iter().map(Recorded::into_held).collect();
         let mut report = report(&records, &fitted)?;
-        let validated = self.validation.measure(&self.input, &self.channels, fitted.course)?;
-        if let Some(other) = &validated {
-            let system = fitted.estimate.system()?;
-            report.validation = Some(Validation::of(other, &system, fitted.course)?);
+        let validated = self.validation.record(&self.input, &self.channels, fitted.course, hold)?;
+        if let Some(recorded) = &validated {
+            let (other, system) = (&recorded.held, fitted.estimate.system()?);
+            report.validation = Some(Validation::of(recorded, &system, fitted.course)?);
             report.remarks.extend(other.converted.clone().filter(|_| other.file != report.file));
         }
+        let validated = validated.map(Recorded::into_held);
         Ok(Identified { records, validated, fitted, report })
     }
 
