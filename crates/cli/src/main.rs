@@ -1,8 +1,8 @@
 //! The `mechid` program: the only argument parsing, and the only printing, of the workspace.
 //!
 //! A subcommand is one file of [`commands`]. It computes an [`outcome::Outcome`] and neither prints
-//! nor writes: that happens here, once everything has succeeded, so that a failure leaves nothing
-//! half written. Every failure ends with one message on the error stream and exit code 2.
+//! nor gives a file its name: that happens here, once everything has succeeded, so that a failure
+//! leaves nothing half written. Every failure ends with one message on the error stream and exit code 2.
 #![allow(clippy::print_stderr, reason = "the program talks to its user")]
 
 mod commands;

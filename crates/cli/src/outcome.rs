@@ -2,7 +2,7 @@
 
 use std::io::{self, Write as _};
 
-use mechid::io::{OutputFile, write_all};
+use mechid::io::{BegunFile, OutputFile, write_all};
 use mechid::plot::Figure;
 use serde::Serialize;
 
@@ -21,23 +21,31 @@ pub struct Outcome {
     json: String,
     /// Files to write.
     files: Vec<OutputFile>,
+    /// Files too long to be held, complete but for their names.
+    begun: Vec<BegunFile>,
 }
 
 impl Outcome {
     /// An outcome told as `text` to a person and as the fields of `report` to a program.
     pub fn new(text: String, report: &impl Serialize) -> Result<Self, CliError> {
         let json = serde_json::to_string_pretty(report)? + "\n";
-        Ok(Self { text, json, files: Vec::new() })
+        Ok(Self { text, json, files: Vec::new(), begun: Vec::new() })
     }
 
     /// An outcome that is a text and nothing else.
     pub fn of_text(text: String) -> Self {
-        Self { text, json: String::new(), files: Vec::new() }
+        Self { text, json: String::new(), files: Vec::new(), begun: Vec::new() }
     }
 
     /// The same outcome with one more file to write.
     pub fn with_file(mut self, path: &std::path::Path, content: impl Into<Vec<u8>>) -> Self {
         self.files.push(OutputFile { path: path.to_owned(), content: content.into() });
+        self
+    }
+
+    /// The same outcome with one more file, which only needs its name.
+    pub fn with_begun(mut self, file: BegunFile) -> Self {
+        self.begun.push(file);
         self
     }
 
@@ -56,8 +64,8 @@ impl Outcome {
     }
 
     /// Writes the files, all or none, and prints the report.
-    pub fn deliver(&self, report: &ReportArgs) -> Result<(), CliError> {
-        write_all(&self.files)?;
+    pub fn deliver(self, report: &ReportArgs) -> Result<(), CliError> {
+        write_all(self.begun, &self.files)?;
         let text = match report {
             ReportArgs { json: true, .. } => &self.json,
             ReportArgs { quiet: true, .. } => return Ok(()),

@@ -1,8 +1,14 @@
 //! Records as comma-separated text.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use mechid_signal::Sampling;
+
+use crate::{BegunFile, IoError};
+
+/// Characters of text that are gathered before they are written.
+const GATHERED: usize = 1 << 16;
 
 /// A table with a `time` column in seconds and the named columns, as [`Table`](crate::Table) reads
 /// it back bit for bit: every number has as many digits as it takes to tell it from its neighbours.
@@ -10,21 +16,108 @@ use mechid_signal::Sampling;
 /// # Panics
 /// If a column is not as long as the sampling.
 pub fn csv_text(sampling: Sampling, columns: &[(String, &[f64])]) -> String {
-    let mut text = String::from("time");
+    let mut text = header(columns.iter().map(|(name, _)| name.as_str()));
     for (name, column) in columns {
         assert_eq!(column.len(), sampling.len(), "column {name} is as long as the time axis");
+    }
+    for (k, time) in sampling.times().enumerate() {
+        push_row(&mut text, time, columns.iter().map(|(_, column)| column[k]));
+    }
+    text
+}
+
+/// The text that [`csv_text`] gives, written some rows at a time into a file that is not complete
+/// yet.
+///
+/// ```
+/// use mechid_io::{CsvFile, write_all};
+/// use mechid_signal::Sampling;
+///
+/// let path = std::env::temp_dir().join("mechid-csv-file.csv");
+/// let mut file = CsvFile::begin(&path, Sampling::new(0.5, 3)?, &["force"])?;
+/// file.append(&[&[1.0, 2.0]])?;
+/// file.append(&[&[3.0]])?;
+/// write_all(vec![file.finish()?], &[])?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "time,force\n0.0,1.0\n0.5,2.0\n1.0,3.0\n");
+/// # std::fs::remove_file(path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug)]
+pub struct CsvFile {
+    file: BegunFile,
+    sampling: Sampling,
+    /// Rows there are.
+    rows: usize,
+    /// What is not written yet.
+    text: String,
+}
+
+impl CsvFile {
+    /// Begins the file that is to stand at `path`: a `time` column, in seconds, and the named ones.
+    ///
+    /// # Errors
+    /// As [`BegunFile::begin`].
+    pub fn begin(
+        path: impl AsRef<Path>,
+        sampling: Sampling,
+        names: &[impl AsRef<str>],
+    ) -> Result<Self, IoError> {
+        let text = header(names.iter().map(AsRef::as_ref));
+        Ok(Self { file: BegunFile::begin(path)?, sampling, rows: 0, text })
+    }
+
+    /// Adds rows: so many samples of each column.
+    ///
+    /// # Errors
+    /// [`IoError::Write`].
+    ///
+    /// # Panics
+    /// If the columns are not equally long.
+    pub fn append(&mut self, columns: &[&[f64]]) -> Result<(), IoError> {
+        let rows = columns.first().map_or(0, |column| column.len());
+        assert!(columns.iter().all(|column| column.len() == rows), "columns are equally long");
+        for k in 0..rows {
+            let time = self.sampling.time(self.rows);
+            push_row(&mut self.text, time, columns.iter().map(|column| column[k]));
+            self.rows += 1;
+            if self.text.len() >= GATHERED {
+                self.file.append(&self.text)?;
+                self.text.clear();
+            }
+        }
+        Ok(())
+    }
+
+    /// The complete file, which takes its name in [`write_all`](crate::write_all).
+    ///
+    /// # Errors
+    /// [`IoError::Write`].
+    ///
+    /// # Panics
+    /// If it has not as many rows as the sampling.
+    pub fn finish(mut self) -> Result<BegunFile, IoError> {
+        assert_eq!(self.rows, self.sampling.len(), "there is a row for every instant");
+        self.file.append(&self.text)?;
+        Ok(self.file)
+    }
+}
+
+fn header<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let mut text = String::from("time");
+    for name in names {
         text.push(',');
         text.push_str(&quoted(name));
     }
     text.push('\n');
-    for (k, time) in sampling.times().enumerate() {
-        let _ = write!(text, "{time:?}");
-        for (_, column) in columns {
-            let _ = write!(text, ",{:?}", column[k]);
-        }
-        text.push('\n');
-    }
     text
+}
+
+fn push_row(text: &mut String, time: f64, values: impl Iterator<Item = f64>) {
+    let _ = write!(text, "{time:?}");
+    for value in values {
+        let _ = write!(text, ",{value:?}");
+    }
+    text.push('\n');
 }
 
 fn quoted(name: &str) -> String {

@@ -28,13 +28,13 @@ mod table;
 mod uff;
 
 pub use covariance::{ParameterCovariance, read_covariance};
-pub use csv_text::csv_text;
+pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
 pub use experiment::{
     Experiment, FirstDisplacements, FirstSteps, InitialMotion, Level, LoadBeyond, MiddleLoad,
     Noise, PerDof, ResponseKind, SchemeChoice,
 };
 pub use line_spec::LineSpec;
-pub use output::{OutputFile, write_all};
+pub use output::{BegunFile, OutputFile, write_all};
 pub use system::{SystemMatrices, read_system};
 pub use table::{Inventory, Place, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -1,7 +1,7 @@
 //! Files that appear complete or not at all.
 
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::IoError;
@@ -15,42 +15,84 @@ pub struct OutputFile {
     pub content: Vec<u8>,
 }
 
+/// A file that is written piece by piece beside its destination, and takes its name in
+/// [`write_all`]; dropped before that, it is removed again.
+///
+/// ```
+/// use mechid_io::{BegunFile, write_all};
+///
+/// let path = std::env::temp_dir().join("mechid-begun-file.txt");
+/// let mut file = BegunFile::begin(&path)?;
+/// file.append("one\n")?;
+/// file.append("two\n")?;
+/// assert!(!path.exists());
+/// write_all(vec![file], &[])?;
+/// assert_eq!(std::fs::read_to_string(&path).unwrap(), "one\ntwo\n");
+/// # std::fs::remove_file(path).unwrap();
+/// # Ok::<(), mechid_io::IoError>(())
+/// ```
+#[derive(Debug)]
+pub struct BegunFile {
+    path: PathBuf,
+    // Fields are dropped in this order: closed, then removed.
+    stream: BufWriter<File>,
+    stage: Stage,
+}
+
+/// Where what is written stands until it is complete.
+#[derive(Debug)]
+enum Stage {
+    /// Under another name beside the destination.
+    Beside { temporary: Temporary, destination: PathBuf },
+    /// Without a name: the destination is no regular file and is written into.
+    Nameless { destination: PathBuf },
+}
+
+/// A file that is removed when it is no longer used; where it has been renamed, there is none.
+#[derive(Debug)]
+struct Temporary(PathBuf);
+
 /// Writes all files, or none: each is written beside its destination first, and they take their
-/// names only once all are complete.
+/// names only once all are complete, those that were begun before first.
 ///
 /// A destination that is no regular file (a pipe, `/dev/null`) is written into.
 ///
 /// # Errors
 /// [`IoError::Write`] naming the file; whatever stood at the destinations still stands there.
-pub fn write_all(files: &[OutputFile]) -> Result<(), IoError> {
-    let mut staged: Vec<Staged> = Vec::new();
+pub fn write_all(begun: Vec<BegunFile>, files: &[OutputFile]) -> Result<(), IoError> {
+    let mut all = begun;
     for file in files {
-        staged.push(Staged::write(file).map_err(|e| failed(&file.path, e))?);
+        let mut staged = BegunFile::begin(&file.path)?;
+        staged.append(&file.content)?;
+        all.push(staged);
     }
-    for (file, staged) in files.iter().zip(staged) {
-        staged.commit(&file.content).map_err(|e| failed(&file.path, e))?;
+    for file in &mut all {
+        file.complete()?;
     }
-    Ok(())
+    all.into_iter().try_for_each(BegunFile::commit)
 }
 
-fn failed(path: &Path, source: io::Error) -> IoError {
-    IoError::Write { file: path.display().to_string(), source }
-}
+impl BegunFile {
+    /// Begins a file that is to stand at `path`.
+    ///
+    /// # Errors
+    /// [`IoError::Write`], also if another file is being written for the same path.
+    pub fn begin(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        let path = path.as_ref().to_owned();
+        match Self::open(&path) {
+            Ok((file, stage)) => Ok(Self { path, stream: BufWriter::new(file), stage }),
+            Err(source) => Err(failed(&path, source)),
+        }
+    }
 
-/// A complete file that does not bear its name yet; removed again unless committed.
-struct Staged {
-    /// `None` for a destination that is written into.
-    temporary: Option<PathBuf>,
-    destination: PathBuf,
-}
-
-impl Staged {
-    fn write(file: &OutputFile) -> io::Result<Self> {
+    fn open(path: &Path) -> io::Result<(File, Stage)> {
         // Through a symbolic link, so that the link stays one.
-        let destination = fs::canonicalize(&file.path).unwrap_or_else(|_| file.path.clone());
+        let destination = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         match fs::metadata(&destination) {
             Ok(found) if found.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-            Ok(found) if !found.is_file() => return Ok(Self { temporary: None, destination }),
+            Ok(found) if !found.is_file() => {
+                return Ok((tempfile::tempfile()?, Stage::Nameless { destination }));
+            }
             _ => {}
         }
         let name = destination.file_name().ok_or(io::ErrorKind::InvalidInput)?;
@@ -58,27 +100,50 @@ impl Staged {
         temporary_name.push(name);
         temporary_name.push(format!(".{}.tmp", std::process::id()));
         let temporary = destination.with_file_name(temporary_name);
-        let mut stream = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
-        let staged = Self { temporary: Some(temporary), destination };
-        stream.write_all(&file.content)?;
-        stream.sync_all()?;
-        Ok(staged)
+        let file = OpenOptions::new().write(true).create_new(true).open(&temporary)?;
+        Ok((file, Stage::Beside { temporary: Temporary(temporary), destination }))
     }
 
-    fn commit(mut self, content: &[u8]) -> io::Result<()> {
-        match self.temporary.take() {
-            None => File::options().write(true).open(&self.destination)?.write_all(content),
-            Some(temporary) => fs::rename(&temporary, &self.destination).inspect_err(|_| {
-                let _ = fs::remove_file(&temporary);
-            }),
-        }
+    /// Writes more of it.
+    ///
+    /// # Errors
+    /// [`IoError::Write`].
+    pub fn append(&mut self, content: impl AsRef<[u8]>) -> Result<(), IoError> {
+        self.stream.write_all(content.as_ref()).map_err(|source| failed(&self.path, source))
+    }
+
+    /// Sees to it that all of it is on the disk.
+    fn complete(&mut self) -> Result<(), IoError> {
+        let written = self.stream.flush().and_then(|()| self.stream.get_ref().sync_all());
+        written.map_err(|source| failed(&self.path, source))
+    }
+
+    fn commit(self) -> Result<(), IoError> {
+        let Self { path, stream, stage } = self;
+        let done = match stage {
+            Stage::Beside { temporary, destination } => {
+                drop(stream);
+                fs::rename(&temporary.0, destination)
+            }
+            Stage::Nameless { destination } => copied(stream.get_ref(), &destination),
+        };
+        done.map_err(|source| failed(&path, source))
     }
 }
 
-impl Drop for Staged {
+/// Writes what a file holds into another one, which is there.
+fn copied(mut from: &File, destination: &Path) -> io::Result<()> {
+    io::Seek::rewind(&mut from)?;
+    let mut into = File::options().write(true).open(destination)?;
+    io::copy(&mut from, &mut into).map(|_| ())
+}
+
+fn failed(path: &Path, source: io::Error) -> IoError {
+    IoError::Write { file: path.display().to_string(), source }
+}
+
+impl Drop for Temporary {
     fn drop(&mut self) {
-        if let Some(temporary) = &self.temporary {
-            let _ = fs::remove_file(temporary);
-        }
+        let _ = fs::remove_file(&self.0);
     }
 }

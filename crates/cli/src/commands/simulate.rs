@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mechid::Simulation;
-use mechid::io::{Experiment, ResponseKind, SystemMatrices, csv_text};
+use mechid::io::{CsvFile, Experiment, ResponseKind, SystemMatrices};
 use mechid::signal::Record;
 use serde::Serialize;
 
@@ -106,8 +106,8 @@ impl SimulateArgs {
         let experiment = Experiment::read(&self.experiment)?;
         let simulation = mechid::simulate(&experiment)?;
         let groups = groups(&simulation);
-        let mut columns: Vec<(String, &[f64])> = Vec::new();
-        let mut channels = Vec::new();
+        let mut columns: Vec<&[f64]> = Vec::new();
+        let mut channels: Vec<Channel> = Vec::new();
         for (name, unit, truth, measured) in groups {
             for dof in 0..measured.channels() {
                 let column = match measured.channels() {
@@ -117,17 +117,19 @@ impl SimulateArgs {
                 let noise = measured.column(dof) - truth.column(dof);
                 let per_sample = (measured.len() as f64).sqrt();
                 channels.push(Channel {
-                    column: column.clone(),
+                    column,
                     unit,
                     rms: measured.column(dof).norm() / per_sample,
                     noise_rms: noise.norm() / per_sample,
                 });
-                columns.push((column, measured.channel(dof)));
+                columns.push(measured.channel(dof));
             }
         }
-        let text = csv_text(simulation.force.sampling(), &columns);
+        let names: Vec<&str> = channels.iter().map(|c| c.column.as_str()).collect();
+        let mut file = CsvFile::begin(&self.output, simulation.force.sampling(), &names)?;
+        file.append(&columns)?;
         let report = self.describe(&experiment, &simulation, channels)?;
-        Ok(Outcome::new(report.text(), &report)?.with_file(&self.output, text))
+        Ok(Outcome::new(report.text(), &report)?.with_begun(file.finish()?))
     }
 
     fn describe(

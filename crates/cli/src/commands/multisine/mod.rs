@@ -3,10 +3,10 @@
 mod design;
 mod report;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use mechid::io::{LineSpec, csv_text};
+use mechid::io::{BegunFile, CsvFile, LineSpec};
 use mechid::plot::{Axis, Curve, Figure, Panel};
 use mechid::signal::resample::refine;
 use mechid::signal::{Interpolation, Sampling};
@@ -124,7 +124,7 @@ enum Separation {
     Hadamard,
 }
 
-/// Numbers in the largest record that is written: 800 MB in memory.
+/// Numbers in the largest record that is written: about 2 GB of text.
 const LARGEST: usize = 100_000_000;
 
 impl MultisineArgs {
@@ -144,21 +144,21 @@ impl MultisineArgs {
         let report = Report::of(sampling, &channels)?;
         let mut outcome = Outcome::new(report.text(), &report)?;
         if let Some(path) = &self.output {
-            outcome = outcome.with_file(path, self.table(&channels)?);
+            outcome = outcome.with_begun(self.record(path, &channels)?);
         }
         outcome.with_plot(&self.plot, || figure(&channels))
     }
 
-    /// The record as text.
-    fn table(&self, channels: &[Channel]) -> Result<String, CliError> {
-        let repeated = channels
-            .iter()
-            .map(|c| Ok((c.name.clone(), c.period.repeated(self.periods)?)))
-            .collect::<Result<Vec<_>, CliError>>()?;
-        let columns: Vec<(String, &[f64])> =
-            repeated.iter().map(|(name, record)| (name.clone(), record.channel(0))).collect();
-        let sampling = channels[0].period.sampling();
-        Ok(csv_text(sampling.with_len(self.samples * self.periods)?, &columns))
+    /// The record, period after period.
+    fn record(&self, path: &Path, channels: &[Channel]) -> Result<BegunFile, CliError> {
+        let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+        let period: Vec<&[f64]> = channels.iter().map(|c| c.period.channel(0)).collect();
+        let sampling = channels[0].period.sampling().with_len(self.samples * self.periods)?;
+        let mut file = CsvFile::begin(path, sampling, &names)?;
+        for _ in 0..self.periods {
+            file.append(&period)?;
+        }
+        Ok(file.finish()?)
     }
 }
 
