@@ -4,7 +4,6 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use mechid::io::{RecordFile, Table, TimeAxis};
-use mechid::signal::Record;
 
 use crate::error::CliError;
 
@@ -100,11 +99,6 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 }
 
 impl RecordArgs {
-    /// The file as a table.
-    pub fn table(&self) -> Result<Table, CliError> {
-        Ok(Table::read_below(&self.record, self.skip_lines)?)
-    }
-
     /// The file, of which so many rows are held.
     pub fn file(&self, held: usize) -> Result<RecordFile, CliError> {
         Ok(RecordFile::open(&self.record, self.skip_lines, held)?)
@@ -126,17 +120,6 @@ impl RecordArgs {
             file: table.file().into(),
             available: table.available(),
         })
-    }
-
-    /// The columns `wanted` as the channels of a record: whole, then detrended, then windowed to
-    /// `periods` periods.
-    pub fn window(&self, table: &Table, wanted: &[impl AsRef<str>]) -> Result<Record, CliError> {
-        let mut record = table.record(&self.needed_time_axis(table)?, wanted)?;
-        if self.detrend == Some(Detrend::Mean) {
-            record = record.without_mean();
-        }
-        let (start, len) = self.span(table.file(), record.len())?;
-        record.window(start, len).map_err(|_| self.outside(table.file(), len, record.len()))
     }
 
     /// First sample, counted from 0, and number of samples of the window into a record of so many

@@ -1,7 +1,6 @@
 //! Columns in units other than those of the SI.
 
 use mechid::io::{Quantity, Table};
-use mechid::signal::Record;
 use nalgebra::DMatrix;
 
 use crate::error::CliError;
@@ -53,12 +52,5 @@ impl ToSi {
         for (mut column, factor) in data.column_iter_mut().zip(&self.factors) {
             column *= *factor;
         }
-    }
-
-    /// The record in SI units.
-    pub fn record(&self, record: Record) -> Result<Record, CliError> {
-        let mut data = record.data().clone();
-        self.convert(&mut data);
-        Ok(Record::new(record.sampling(), data)?)
     }
 }

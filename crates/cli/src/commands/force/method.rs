@@ -2,14 +2,14 @@
 
 use clap::ValueEnum;
 use mechid::force::{
-    Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Noise, OPEN_UNKNOWNS,
-    Quantity, Rule, Start, Tuning, continuous, discretised, frequency_domain, inner_lines, kalman,
-    regularised, with_uncertain_system,
+    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement, Noise,
+    OPEN_UNKNOWNS, Quantity, Rule, Start, Tuning, continuous, discretised, frequency_domain,
+    inner_lines, kalman, regularised, with_uncertain_system,
 };
 use mechid::model::SecondOrderSystem;
 
 use super::machine::Machine;
-use super::motion::Motion;
+use super::motion::{complete, response};
 use crate::error::CliError;
 use crate::text_table::significant;
 
@@ -61,6 +61,11 @@ pub struct Request {
 /// A force and how it was found.
 pub struct Found {
     pub force: IdentifiedForce,
+    pub how: How,
+}
+
+/// How a force was found.
+pub struct How {
     pub method: &'static str,
     pub why: String,
     /// Whether the standard error counts the noise of the record.
@@ -72,16 +77,20 @@ pub struct Found {
 /// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
 const SHORT: usize = OPEN_UNKNOWNS / 2;
 
-/// The method for this record and the reason for it.
-pub fn choose(request: &Request, motion: &Motion, dofs: usize) -> (Method, String) {
+/// The method for a record of these channels and so many samples, and the reason for it.
+pub fn choose(
+    request: &Request,
+    channels: &[Channel],
+    samples: usize,
+    dofs: usize,
+) -> (Method, String) {
     if request.method != Method::Auto {
         return (request.method, "it was asked for".into());
     }
-    let samples = motion.measured.sampling().len();
     let unknowns = samples * request.forced.len();
     let (method, why) = if request.periodic && request.lines.is_some() {
         (Method::FrequencyDomain, "whole periods, and the lines with force are given".into())
-    } else if motion.response(dofs, true).is_some() && request.forced.len() == dofs {
+    } else if complete(channels, dofs, true) && request.forced.len() == dofs {
         (
             Method::Continuous,
             "displacement, velocity and acceleration of every degree of freedom are there".into(),
@@ -97,10 +106,14 @@ pub fn choose(request: &Request, motion: &Motion, dofs: usize) -> (Method, Strin
 }
 
 /// Finds the force, with the uncertainty of the machine if that is known.
-pub fn find(request: &Request, machine: &Machine, motion: &Motion) -> Result<Found, CliError> {
-    let (method, why) = choose(request, motion, machine.system.dof());
+pub fn find(request: &Request, machine: &Machine, motion: &Measurement) -> Result<Found, CliError> {
+    let samples = motion.sampling().len();
+    let (method, why) = choose(request, motion.channels(), samples, machine.system.dof());
     match method {
-        Method::Continuous | Method::Discretised => equation(request, machine, motion, method, why),
+        Method::Continuous | Method::Discretised => {
+            let force = equation(request, machine, motion, method)?;
+            Ok(Found { force, how: How::of_equation(method, why) })
+        }
         Method::FrequencyDomain => lines(request, machine, motion, why),
         Method::Kalman => smoothed(request, machine, motion, why),
         Method::Auto | Method::Shrinkage => {
@@ -126,70 +139,75 @@ fn noise(request: &Request, unknown: Noise) -> Noise {
     if request.noise.is_empty() { unknown } else { Noise::PerChannel(request.noise.clone()) }
 }
 
-fn equation(
+/// The force by the equation of motion, sample by sample or from each to the next.
+pub fn equation(
     request: &Request,
     machine: &Machine,
-    motion: &Motion,
+    motion: &Measurement,
     method: Method,
-    why: String,
-) -> Result<Found, CliError> {
+) -> Result<IdentifiedForce, CliError> {
     let with_acceleration = method == Method::Continuous;
-    let response = motion
-        .response(machine.system.dof(), with_acceleration)
+    let response = response(motion, machine.system.dof(), with_acceleration)
         .ok_or(CliError::ForceMotions { with_acceleration })?;
+    if with_acceleration {
+        return with_machine(machine, &|system| continuous(system, &response));
+    }
     let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
-    let (name, force) = if with_acceleration {
-        let find = |system: &SecondOrderSystem| continuous(system, &response);
-        ("equation of motion, sample by sample", with_machine(machine, &find)?)
-    } else {
-        let find = |system: &SecondOrderSystem| {
-            discretised(system, &response, Discretisation::ExactLinear, ends)
+    let linear = Discretisation::ExactLinear;
+    with_machine(machine, &|system| discretised(system, &response, linear, ends))
+}
+
+impl How {
+    /// How [`equation`] finds it.
+    pub fn of_equation(method: Method, why: String) -> Self {
+        let method = if method == Method::Continuous {
+            "equation of motion, sample by sample"
+        } else {
+            "equation of motion from sample to sample, the force linear between them"
         };
-        let name = "equation of motion from sample to sample, the force linear between them";
-        (name, with_machine(machine, &find)?)
-    };
-    Ok(Found { force, method: name, why, counts_noise: false, chosen: Vec::new() })
+        Self { method, why, counts_noise: false, chosen: Vec::new() }
+    }
 }
 
 fn lines(
     request: &Request,
     machine: &Machine,
-    motion: &Motion,
+    motion: &Measurement,
     why: String,
 ) -> Result<Found, CliError> {
     if !request.periodic {
         return Err(CliError::ForceNeedsPeriods);
     }
-    let measured = &motion.measured;
-    let all = inner_lines(measured);
+    let all = inner_lines(motion);
     let lines = request.lines.clone().unwrap_or_else(|| all.clone());
     // Where nothing was driven the record shows its own noise.
     let enough = all.len() >= lines.len() + mechid::force::MIN_OUTSIDE_LINES;
     let noise = noise(request, if enough { Noise::OutsideLines } else { Noise::Unknown });
     let find = |system: &SecondOrderSystem| {
-        frequency_domain(system, measured, &request.forced, &lines, &noise)
+        frequency_domain(system, motion, &request.forced, &lines, &noise)
     };
     let force = with_machine(machine, &find)?;
     let chosen = vec![("lines used".into(), lines.len() as f64, "")];
     let counts_noise = noise != Noise::Unknown;
-    Ok(Found { force, method: "dynamic stiffness, line by line", why, counts_noise, chosen })
+    let how = How { method: "dynamic stiffness, line by line", why, counts_noise, chosen };
+    Ok(Found { force, how })
 }
 
 fn filtered(
     request: &Request,
     machine: &Machine,
-    motion: &Motion,
+    motion: &Measurement,
     filter: Filter,
     why: String,
 ) -> Result<Found, CliError> {
-    let (measured, forced) = (&motion.measured, &request.forced);
+    let forced = &request.forced;
     let extent = match (&request.lines, request.periodic) {
         (Some(lines), true) => Extent::PeriodLines(lines.clone()),
         (None, true) => Extent::Period,
         (_, false) => Extent::Open(request.start),
     };
     let noise = noise(request, Noise::Unknown);
-    let found = regularised(&machine.system, measured, forced, &extent, filter, &noise)?;
+    let found = regularised(&machine.system, motion, forced, &extent, filter, &noise)?;
     // The machine is moved with the parameter that was chosen, not with another choice.
     let fixed = match (filter, found.parameter) {
         (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
@@ -197,7 +215,7 @@ fn filtered(
         _ => filter,
     };
     let find = |system: &SecondOrderSystem| {
-        regularised(system, measured, forced, &extent, fixed, &noise).map(|found| found.force)
+        regularised(system, motion, forced, &extent, fixed, &noise).map(|found| found.force)
     };
     let force = match machine.covariance {
         Some(_) => with_machine(machine, &find)?,
@@ -214,15 +232,15 @@ fn filtered(
         Filter::TruncatedSvd(_) => "truncated singular value decomposition",
         _ => "mean of the force given the measurement (shrinkage)",
     };
-    Ok(Found { force, method, why, counts_noise: true, chosen })
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen } })
 }
 
 /// The noise of every channel measured, in its own unit.
 fn noise_levels<'a>(
-    motion: &'a Motion,
+    motion: &'a Measurement,
     noise: &'a [f64],
 ) -> impl Iterator<Item = (String, f64, &'static str)> + 'a {
-    let levels = (1..).zip(motion.measured.channels().iter().zip(noise));
+    let levels = (1..).zip(motion.channels().iter().zip(noise));
     levels.map(|(number, (channel, level))| {
         let unit = match channel.quantity {
             Quantity::Displacement => "m",
@@ -236,21 +254,21 @@ fn noise_levels<'a>(
 fn smoothed(
     request: &Request,
     machine: &Machine,
-    motion: &Motion,
+    motion: &Measurement,
     why: String,
 ) -> Result<Found, CliError> {
     if request.periodic {
         return Err(CliError::KalmanIsOpen);
     }
-    let (measured, forced) = (&motion.measured, &request.forced);
+    let forced = &request.forced;
     let tuning = match request.noise.as_slice() {
         [] => Tuning::Likelihood,
         level => Tuning::NoiseKnown(level.to_vec()),
     };
-    let found = kalman(&machine.system, measured, forced, request.start, &tuning)?;
+    let found = kalman(&machine.system, motion, forced, request.start, &tuning)?;
     let fixed = Tuning::Given { noise: found.noise.clone(), walk: found.walk.clone() };
     let find = |system: &SecondOrderSystem| {
-        kalman(system, measured, forced, request.start, &fixed).map(|found| found.force)
+        kalman(system, motion, forced, request.start, &fixed).map(|found| found.force)
     };
     let force = match machine.covariance {
         Some(_) => with_machine(machine, &find)?,
@@ -262,7 +280,7 @@ fn smoothed(
     }
     chosen.extend(noise_levels(motion, &found.noise));
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
-    Ok(Found { force, method, why, counts_noise: true, chosen })
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen } })
 }
 
 /// A chosen parameter as a person reads it.

@@ -4,17 +4,22 @@ pub(super) mod machine;
 pub(super) mod method;
 pub(super) mod motion;
 mod report;
+mod stretches;
+mod strongest;
+mod taken;
 
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::force::{Rule, Start};
-use mechid::io::{LineSpec, csv_text};
+use mechid::force::{IdentifiedForce, Rule, Start};
+use mechid::io::LineSpec;
+use mechid::signal::Sampling;
 
 use self::machine::Machine;
-use self::method::{Choice, Found, Method, Request};
-use self::motion::{Motion, MotionArgs};
-use self::report::{Chosen, Force, Report};
+use self::method::{Choice, Found, How, Method, Request};
+use self::motion::{MotionArgs, Recorded};
+use self::report::{Chosen, Report};
+use self::taken::Taken;
 use crate::error::CliError;
 use crate::options::{PlotArgs, RecordArgs, ReportArgs, at_least_one};
 use crate::outcome::Outcome;
@@ -24,6 +29,10 @@ use crate::outcome::Outcome;
 /// The window is one or more whole periods if --period or --lines is given (they are averaged), an
 /// open record otherwise. Where the machine comes from `mechid identify --json`, its uncertainty
 /// counts in the standard error of the force.
+///
+/// A long text is read a stretch at a time. The methods continuous and discretised hold no open
+/// record either; any other method, --spectrum and --plot hold all of it, of the columns used alone.
+/// Of whole periods only their mean is held.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement --json > machine.json
@@ -78,25 +87,50 @@ impl ForceArgs {
         let machine = Machine::read(&self.system)?;
         let dofs = machine.system.dof();
         let periodic = self.input.period.is_some() || self.lines.is_some();
-        let motion = self.motion.read(&self.input, dofs, periodic)?;
-        let request = self.request(&motion, dofs, periodic)?;
-        let found = method::find(&request, &machine, &motion)?;
-        let report = self.describe(&machine, &motion, &request, &found);
+        let recorded = self.motion.open(&self.input, dofs, periodic)?;
+        let request = self.request(recorded.sampling, dofs, periodic)?;
+        let mut taken = Taken::new(recorded.sampling, dofs, periodic, self.output.clone())?;
+        let (how, force) = self.find(&request, &machine, &recorded, &mut taken)?;
+        let report = self.describe(&machine, &recorded, &request, &how, &taken);
         let mut outcome = Outcome::new(report.text(), &report)?;
-        let force = &found.force;
-        if let Some(path) = &self.output {
-            let text = csv_text(force.record().sampling(), &report::columns(force));
-            outcome = outcome.with_file(path, text);
+        if let Some(file) = taken.finish()? {
+            outcome = outcome.with_begun(file);
         }
+        let Some(force) = &force else { return Ok(outcome) };
         if let Some(path) = &self.spectrum {
-            outcome =
-                outcome.with_file(path, report::spectrum_text(force, request.lines.as_deref()));
+            let file = report::spectrum_file(path, force, request.lines.as_deref())?;
+            outcome = outcome.with_begun(file);
         }
-        outcome.with_plot(&self.plot, || Ok(report::figure(found.method, force, &request.forced)))
+        outcome.with_plot(&self.plot, || Ok(report::figure(how.method, force, &request.forced)))
     }
 
-    fn request(&self, motion: &Motion, dofs: usize, periodic: bool) -> Result<Request, CliError> {
-        let lines = self.lines.as_ref().map(|spec| spec.lines(motion.measured.sampling()));
+    /// The force, a stretch at a time where that will do; only otherwise it is handed over.
+    fn find(
+        &self,
+        request: &Request,
+        machine: &Machine,
+        recorded: &Recorded,
+        taken: &mut Taken,
+    ) -> Result<(How, Option<IdentifiedForce>), CliError> {
+        let (dofs, samples) = (machine.system.dof(), recorded.sampling.len());
+        let (method, why) = method::choose(request, &recorded.channels, samples, dofs);
+        let all_at_once = self.spectrum.is_some() || self.plot.plot.is_some();
+        if !all_at_once && stretches::are_enough_for(method, request) {
+            stretches::find(request, machine, recorded, method, taken)?;
+            return Ok((How::of_equation(method, why), None));
+        }
+        let Found { force, how } = method::find(request, machine, &recorded.hold()?)?;
+        taken.push_all(&force)?;
+        Ok((how, Some(force)))
+    }
+
+    fn request(
+        &self,
+        sampling: Sampling,
+        dofs: usize,
+        periodic: bool,
+    ) -> Result<Request, CliError> {
+        let lines = self.lines.as_ref().map(|spec| spec.lines(sampling));
         let rule = match (self.parameter, self.rule) {
             (Some(lambda), _) => Rule::Given(lambda),
             (None, Choice::Likelihood) => Rule::Likelihood,
@@ -120,19 +154,14 @@ impl ForceArgs {
     fn describe(
         &self,
         machine: &Machine,
-        motion: &Motion,
+        recorded: &Recorded,
         request: &Request,
-        found: &Found,
+        how: &How,
+        taken: &Taken,
     ) -> Report {
-        let dofs = machine.system.dof();
-        // The equations of motion give a force everywhere, asked for or not.
-        let everywhere = found.force.record().data().column_iter().map(|c| c.amax() > 0.0);
-        let sought: Vec<bool> = everywhere
-            .enumerate()
-            .map(|(dof, found)| found || request.forced.contains(&dof))
-            .collect();
-        let mut remarks: Vec<String> = motion.converted.iter().cloned().collect();
-        if machine.covariance.is_some() && !found.counts_noise {
+        let mut remarks: Vec<String> = recorded.converted().into_iter().cloned().collect();
+        remarks.extend(taken.remark());
+        if machine.covariance.is_some() && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
                  record: this method does not know it"
@@ -145,20 +174,20 @@ impl ForceArgs {
             );
         }
         Report {
-            file: motion.file.clone(),
+            file: recorded.file().to_owned(),
             machine: self.system.display().to_string(),
-            method: found.method,
-            why: found.why.clone(),
-            samples: found.force.record().len(),
-            periods: request.periodic.then_some(motion.periods),
-            sample_rate_hz: motion.measured.sampling().rate_hz(),
+            method: how.method,
+            why: how.why.clone(),
+            samples: recorded.sampling.len(),
+            periods: request.periodic.then_some(recorded.periods),
+            sample_rate_hz: recorded.sampling.rate_hz(),
             machine_uncertainty: machine.covariance.is_some(),
-            chosen: found
+            chosen: how
                 .chosen
                 .iter()
                 .map(|(name, value, unit)| Chosen { name: name.clone(), value: *value, unit })
                 .collect(),
-            forces: (0..dofs).map(|dof| Force::of(&found.force, dof, sought[dof])).collect(),
+            forces: taken.forces(&request.forced),
             remarks,
         }
     }

@@ -1,15 +1,18 @@
 //! The columns of a record as the motion of a machine.
 
+use std::ops::Range;
+
 use clap::Args;
 use mechid::force::{Channel, Measurement, Quantity};
-use mechid::io;
+use mechid::io::{self, RecordFile};
 use mechid::model::Response;
-use mechid::signal::Record;
+use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
+use crate::commands::identify::measurement::{HELD, STRETCH};
 use crate::error::CliError;
-use crate::options::RecordArgs;
-use crate::units::ToSi;
+use crate::options::{Detrend, RecordArgs};
+use crate::units::{Role, ToSi};
 
 /// Which columns hold what; one entry per degree of freedom, in the machine's order.
 #[derive(Debug, Args)]
@@ -28,55 +31,75 @@ pub struct MotionArgs {
 /// What stands for a degree of freedom without a sensor.
 const NOT_MEASURED: &str = "0";
 
-/// The window of a record, its channels described.
-pub struct Motion {
-    /// How messages call the file.
-    pub file: String,
-    pub measured: Measurement,
+/// Which column is what, as the machine's channels.
+type Columns<'a> = (Vec<Role<'a>>, Vec<Channel>);
+
+/// The motion in a record, of which no more is held than is asked for.
+pub struct Recorded {
+    file: RecordFile,
+    columns: Vec<String>,
+    /// What each column is.
+    pub channels: Vec<Channel>,
+    /// Of each column, taken away from it.
+    offsets: Vec<f64>,
+    units: ToSi,
+    /// Samples, counted from 0.
+    window: Range<usize>,
+    /// Time axis of the window, or of its mean period.
+    pub sampling: Sampling,
     /// Periods in the window; 1 for an open record.
     pub periods: usize,
-    /// Which columns were in other than SI units.
-    pub converted: Option<String>,
 }
 
 impl MotionArgs {
-    /// Reads the columns and cuts the window out; a periodic window is averaged over its periods.
-    pub fn read(
+    /// Reads the columns once and finds the window; a periodic window is averaged over its periods.
+    pub fn open(
         &self,
         input: &RecordArgs,
         dofs: usize,
         periodic: bool,
-    ) -> Result<Motion, CliError> {
+    ) -> Result<Recorded, CliError> {
+        let (roles, channels) = self.columns(dofs)?;
+        let file = input.file(HELD)?;
+        let units = ToSi::of(file.head(), &roles)?;
+        let columns: Vec<String> = roles.iter().map(|(column, ..)| (*column).clone()).collect();
+        let survey = file.survey(&input.needed_time_axis(file.head())?, &columns)?;
+        let offsets = match input.detrend {
+            Some(Detrend::Mean) => survey.means,
+            _ => vec![0.0; columns.len()],
+        };
+        let (start, len) = input.span(file.head().file(), survey.sampling.len())?;
+        let period = if periodic { input.period.unwrap_or(len) } else { len };
+        Ok(Recorded {
+            file,
+            columns,
+            channels,
+            offsets,
+            units,
+            window: start..start + len,
+            sampling: survey.sampling.with_len(period)?,
+            periods: len / period,
+        })
+    }
+
+    /// The columns that are named.
+    fn columns(&self, dofs: usize) -> Result<Columns<'_>, CliError> {
         let groups = [
             ("--displacement", Quantity::Displacement, &self.displacement),
             ("--velocity", Quantity::Velocity, &self.velocity),
             ("--acceleration", Quantity::Acceleration, &self.acceleration),
         ];
-        let (mut wanted, mut roles, mut channels) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut roles, mut channels) = (Vec::new(), Vec::new());
         for (option, quantity, columns) in groups {
             if !columns.is_empty() && columns.len() != dofs {
                 return Err(CliError::MotionCount { option, got: columns.len(), dofs });
             }
             for (dof, column) in columns.iter().enumerate().filter(|(_, c)| *c != NOT_MEASURED) {
-                wanted.push(column);
                 roles.push((column, held(quantity), option));
                 channels.push(Channel { dof, quantity });
             }
         }
-        if channels.is_empty() {
-            return Err(CliError::NoMotion);
-        }
-        let table = input.table()?;
-        let units = ToSi::of(&table, &roles)?;
-        let mut record = units.record(input.window(&table, &wanted)?)?;
-        let mut periods = 1;
-        if periodic {
-            let period = input.period.unwrap_or(record.len());
-            periods = record.len() / period;
-            record = record.period_mean(period)?;
-        }
-        let measured = Measurement::new(record, channels)?;
-        Ok(Motion { file: table.file().into(), measured, periods, converted: units.remark })
+        if channels.is_empty() { Err(CliError::NoMotion) } else { Ok((roles, channels)) }
     }
 }
 
@@ -89,27 +112,97 @@ fn held(quantity: Quantity) -> io::Quantity {
     }
 }
 
-impl Motion {
-    /// Displacement, velocity and acceleration of every degree of freedom, if all were measured;
-    /// without accelerations these are zero.
-    pub fn response(&self, dofs: usize, with_acceleration: bool) -> Option<Response> {
-        let record = self.measured.record();
-        let column = |quantity: Quantity, dof: usize| {
-            self.measured.channels().iter().position(|c| *c == Channel { dof, quantity })
-        };
-        let all = |quantity: Quantity| -> Option<Record> {
-            let columns: Vec<usize> =
-                (0..dofs).map(|dof| column(quantity, dof)).collect::<Option<_>>()?;
-            let data =
-                DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
-            Record::new(record.sampling(), data).ok()
-        };
-        let (x, v) = (all(Quantity::Displacement)?, all(Quantity::Velocity)?);
-        let a = if with_acceleration {
-            all(Quantity::Acceleration)?
-        } else {
-            Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
-        };
-        Response::new(x, v, a).ok()
+impl Recorded {
+    /// How messages call the file.
+    pub fn file(&self) -> &str {
+        self.file.head().file()
     }
+
+    /// Which columns were in other than SI units.
+    pub fn converted(&self) -> Option<&String> {
+        self.units.remark.as_ref()
+    }
+
+    /// All of the window, or its mean period.
+    pub fn hold(&self) -> Result<Measurement, CliError> {
+        let period = self.sampling.len();
+        let mut mean = DMatrix::zeros(period, self.channels.len());
+        let mut at = 0;
+        self.blocks(STRETCH, STRETCH, &mut |block| {
+            let mut from = 0;
+            while from < block.nrows() {
+                let rows = (period - at).min(block.nrows() - from);
+                let mut part = mean.rows_mut(at, rows);
+                part += block.rows(from, rows);
+                (from, at) = (from + rows, (at + rows) % period);
+            }
+            Ok(())
+        })?;
+        mean /= self.periods as f64;
+        self.measurement(mean)
+    }
+
+    /// Goes through the window in stretches of so many samples, each beginning `advance` samples
+    /// after the one before; the last may be shorter.
+    pub fn stretches(
+        &self,
+        samples: usize,
+        advance: usize,
+        take: &mut dyn FnMut(&Measurement) -> Result<(), CliError>,
+    ) -> Result<(), CliError> {
+        self.blocks(samples, advance, &mut |block| take(&self.measurement(block)?))
+    }
+
+    /// The same, as samples × channels in SI units.
+    fn blocks(
+        &self,
+        samples: usize,
+        advance: usize,
+        take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), CliError>,
+    ) -> Result<(), CliError> {
+        self.file.blocks(&self.columns, self.window.clone(), samples, advance, &mut |mut block| {
+            for (mut column, offset) in block.column_iter_mut().zip(&self.offsets) {
+                column.add_scalar_mut(-offset);
+            }
+            self.units.convert(&mut block);
+            take(block)
+        })
+    }
+
+    fn measurement(&self, block: DMatrix<f64>) -> Result<Measurement, CliError> {
+        let record = Record::new(self.sampling.with_len(block.nrows())?, block)?;
+        Ok(Measurement::new(record, self.channels.clone())?)
+    }
+}
+
+/// The channels with this quantity of every degree of freedom, if all were measured.
+fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<usize>> {
+    let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
+    (0..dofs).map(find).collect()
+}
+
+/// Whether displacement and velocity of every degree of freedom were measured, and, if asked for,
+/// acceleration.
+pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
+    let mut needed = vec![Quantity::Displacement, Quantity::Velocity];
+    needed.extend(with_acceleration.then_some(Quantity::Acceleration));
+    needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
+}
+
+/// Displacement, velocity and acceleration of every degree of freedom, if all were measured;
+/// without accelerations these are zero.
+pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
+    let record = measured.record();
+    let all = |quantity: Quantity| -> Option<Record> {
+        let columns = of_all(measured.channels(), quantity, dofs)?;
+        let data = DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
+        Record::new(record.sampling(), data).ok()
+    };
+    let (x, v) = (all(Quantity::Displacement)?, all(Quantity::Velocity)?);
+    let a = if with_acceleration {
+        all(Quantity::Acceleration)?
+    } else {
+        Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
+    };
+    Response::new(x, v, a).ok()
 }

@@ -1,8 +1,10 @@
 //! The force that was found, for people, for programs and as files.
 
 use std::fmt::Write as _;
+use std::path::Path;
 
 use mechid::force::IdentifiedForce;
+use mechid::io::{BegunFile, IoError};
 use mechid::plot::{Axis, Color, Curve, Figure, Panel};
 use serde::Serialize;
 
@@ -48,28 +50,6 @@ pub struct Force {
     pub strongest_hz: f64,
     /// Amplitude of the strongest line, in N.
     pub strongest_amplitude: f64,
-}
-
-impl Force {
-    pub fn of(force: &IdentifiedForce, dof: usize, sought: bool) -> Self {
-        let (record, spectrum) = (force.record(), force.spectrum());
-        let size = (record.len() as f64).sqrt();
-        let strongest = (0..spectrum.len())
-            .max_by(|a, b| {
-                let [a, b] = [a, b].map(|n| spectrum.line(*n, dof).norm());
-                a.total_cmp(&b)
-            })
-            .unwrap_or(0);
-        Self {
-            dof: dof + 1,
-            sought,
-            rms: record.column(dof).norm() / size,
-            peak: record.column(dof).amax(),
-            standard_error: force.standard_error().map(|error| error.column(dof).norm() / size),
-            strongest_hz: spectrum.frequency_hz(strongest),
-            strongest_amplitude: spectrum.line(strongest, dof).norm(),
-        }
-    }
 }
 
 impl Report {
@@ -132,27 +112,39 @@ pub fn columns(force: &IdentifiedForce) -> Vec<(String, &[f64])> {
     columns
 }
 
-/// The spectrum as text: frequency in Hz, then amplitude in N and phase in degrees of each force; of
-/// the lines asked for, or of all.
-pub fn spectrum_text(force: &IdentifiedForce, lines: Option<&[usize]>) -> String {
+/// Lines of a spectrum whose text is gathered before it is written.
+const GATHERED: usize = 1024;
+
+/// The file of the spectrum: frequency in Hz, then amplitude in N and phase in degrees of each
+/// force; of the lines asked for, or of all.
+pub fn spectrum_file(
+    path: &Path,
+    force: &IdentifiedForce,
+    lines: Option<&[usize]>,
+) -> Result<BegunFile, IoError> {
     let spectrum = force.spectrum();
     let all: Vec<usize> = (0..spectrum.len()).collect();
     let dofs = spectrum.channels();
+    let mut file = BegunFile::begin(path)?;
     let mut text = String::from("frequency_hz");
     for dof in 0..dofs {
         let [amplitude, phase] = ["amplitude", "phase_deg"].map(|base| name(base, dof, dofs));
         let _ = write!(text, ",{amplitude},{phase}");
     }
     text.push('\n');
-    for &n in lines.unwrap_or(&all) {
-        let _ = write!(text, "{:?}", spectrum.frequency_hz(n));
-        for dof in 0..dofs {
-            let line = spectrum.line(n, dof);
-            let _ = write!(text, ",{:?},{:?}", line.norm(), line.arg().to_degrees());
+    for gathered in lines.unwrap_or(&all).chunks(GATHERED) {
+        for &n in gathered {
+            let _ = write!(text, "{:?}", spectrum.frequency_hz(n));
+            for dof in 0..dofs {
+                let line = spectrum.line(n, dof);
+                let _ = write!(text, ",{:?},{:?}", line.norm(), line.arg().to_degrees());
+            }
+            text.push('\n');
         }
-        text.push('\n');
+        file.append(&text)?;
+        text.clear();
     }
-    text
+    Ok(file)
 }
 
 /// Every sought force against time, with twice its standard error, above its spectrum.

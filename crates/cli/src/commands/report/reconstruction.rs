@@ -8,7 +8,6 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::commands::force::machine::Machine;
 use crate::commands::force::method::{Method, Request, find};
-use crate::commands::force::motion::Motion;
 use crate::commands::identify::Identified;
 use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
@@ -52,7 +51,7 @@ impl Reconstruction {
             None => force.clone(),
         };
         let errors = channel_errors(result.force.record(), &measured)?;
-        let (method, found) = (result.method, result.force);
+        let (method, found) = (result.how.method, result.force);
         Ok(Self { method, found, measured, forced, errors })
     }
 }
@@ -70,7 +69,7 @@ fn machine(found: &Identified) -> Result<Machine, CliError> {
 }
 
 /// Every motion that was measured.
-fn motion(source: &Measurement, periodic: bool) -> Result<Motion, CliError> {
+fn motion(source: &Measurement, periodic: bool) -> Result<force::Measurement, CliError> {
     let groups = [
         (&source.displacement, Quantity::Displacement),
         (&source.velocity, Quantity::Velocity),
@@ -88,8 +87,7 @@ fn motion(source: &Measurement, periodic: bool) -> Result<Motion, CliError> {
     if periodic {
         record = record.period_mean(source.period)?;
     }
-    let measured = force::Measurement::new(record, channels)?;
-    Ok(Motion { file: source.file.clone(), measured, periods: source.periods, converted: None })
+    Ok(force::Measurement::new(record, channels)?)
 }
 
 /// What a period has on these lines.
