@@ -66,7 +66,7 @@ impl CsvFile {
         Ok(Self { file: BegunFile::begin(path)?, sampling, rows: 0, text })
     }
 
-    /// Adds rows: so many samples of each column.
+    /// Adds rows: so many samples of each column, in its own unit.
     ///
     /// # Errors
     /// [`IoError::Write`].
