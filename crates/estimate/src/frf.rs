@@ -219,6 +219,23 @@ impl Frf {
         all.ok_or(EstimateError::NoExcitedLine)
     }
 
+    /// The same responses at some of the frequencies only, by their places, counted from 0.
+    ///
+    /// # Panics
+    /// If there is no such frequency.
+    pub fn at(&self, places: &[usize]) -> Self {
+        Self {
+            omega: places.iter().map(|at| self.omega[*at]).collect(),
+            lines: places.iter().map(|at| self.lines[*at]).collect(),
+            line_correlation: self.line_correlation.clone(),
+            measured: self.measured,
+            response: places.iter().map(|at| self.response[*at].clone()).collect(),
+            coherence: self.coherence.select_rows(places),
+            variance: places.iter().map(|at| self.variance[*at].clone()).collect(),
+            averages: self.averages,
+        }
+    }
+
     /// Angular frequencies, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega

@@ -122,7 +122,7 @@ fn draw_curve(
         draw_stems(panel, layout, &points, style.color, sheet);
     }
     if curve.has_markers() && (curve.kind != Kind::Stems || radius > LEAST_RADIUS) {
-        for point in trace::thin_markers(points.clone()) {
+        for point in trace::thin_markers(points.clone(), layout.size.0, radius) {
             marker(sheet, style.marker, point, radius, style.color);
         }
     }
@@ -152,7 +152,7 @@ fn draw_stems(
 const BAND_OPACITY: f64 = 0.22;
 
 /// Smallest marker; stems that crowd more are drawn without.
-const LEAST_RADIUS: f64 = 1.4;
+pub(crate) const LEAST_RADIUS: f64 = 1.4;
 
 /// Markers shrink before they run into one another.
 fn marker_radius(width: f64, count: usize) -> f64 {

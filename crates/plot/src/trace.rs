@@ -5,6 +5,7 @@ use std::collections::HashSet;
 use crate::axis::{Mapping, Scale};
 use crate::canvas::Point;
 use crate::curve::{Curve, Kind};
+use crate::draw::LEAST_RADIUS;
 
 /// The two mappings of a panel.
 #[derive(Debug, Clone, Copy)]
@@ -33,8 +34,7 @@ pub(crate) fn stem_base(maps: Mappings, scale: Scale, range: (f64, f64)) -> f64 
 /// The drawn line is the same to within a pixel, and a record of a million samples stays a small file.
 /// Lines that run back in x, and lines with few points, are left alone.
 pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
-    let few = points.len() as f64 <= 4.0 * width;
-    if few || points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
+    if are_few(&points, width) || points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
         return points;
     }
     let mut kept = Vec::new();
@@ -59,11 +59,19 @@ pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     kept
 }
 
-/// Leaves one of the points that fall on the same half pixel, the first: the others would not be seen.
-pub(crate) fn thin_markers(points: Vec<Point>) -> Vec<Point> {
-    let half_pixel = |value: f64| (2.0 * value).floor() as i64;
+/// Whether these are no more points than a line keeps in a panel of this width, in px.
+fn are_few(points: &[Point], width: f64) -> bool {
+    points.len() as f64 <= 4.0 * width
+}
+
+/// Leaves one of the points that fall on the same cell, the first: the others would not be seen. A
+/// cell is half a pixel wide and high, and where many points make a cloud as large as a marker of
+/// this radius, in px.
+pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<Point> {
+    let cell = if are_few(&points, width) { 0.5 } else { 2.0 * radius };
+    let place = |value: f64| (value / cell).floor() as i64;
     let mut taken = HashSet::with_capacity(points.len());
-    points.into_iter().filter(|(x, y)| taken.insert((half_pixel(*x), half_pixel(*y)))).collect()
+    points.into_iter().filter(|(x, y)| taken.insert((place(*x), place(*y)))).collect()
 }
 
 /// Leaves of the stems that follow one another on the same half pixel of width the longest.
@@ -88,7 +96,10 @@ pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) ->
     };
     let lower = map(maps, &curve.x, &curve.y);
     match curve.kind {
-        Kind::Points => thin_markers(lower).into_iter().map(|point| (point, point)).collect(),
+        Kind::Points => thin_markers(lower, width, LEAST_RADIUS)
+            .into_iter()
+            .map(|point| (point, point))
+            .collect(),
         Kind::Line | Kind::MarkedLine => chain(lower),
         Kind::Stems => {
             thin_stems(&lower, base).into_iter().map(|(x, y)| ((x, base), (x, y))).collect()
@@ -151,7 +162,21 @@ mod tests {
         let kept = thin_stems(&points, 1.0);
         assert_eq!(kept.len(), 20, "ten pixels have twenty halves");
         assert!(kept.iter().all(|(_, y)| *y == -3.0));
-        assert_eq!(thin_markers(points).len(), 20 * 7);
+        assert_eq!(thin_markers(points, 500.0, 1.4).len(), 20 * 7);
+    }
+
+    #[test]
+    fn a_cloud_of_markers_stays_small_and_covers_the_same() {
+        // Every tenth of a pixel of a square, and one marker far from it.
+        let square = (0..250_000).map(|i| (f64::from(i % 500) * 0.1, f64::from(i / 500) * 0.1));
+        let points: Vec<Point> = square.chain([(400.0, 100.0)]).collect();
+        let kept = thin_markers(points.clone(), 500.0, 1.25);
+        assert_eq!(kept.len(), 20 * 20 + 1);
+        assert_eq!(kept.last(), points.last());
+        for (x, y) in points.iter().step_by(97) {
+            let nearest = kept.iter().map(|(a, b)| (a - x).abs().max((b - y).abs()));
+            assert!(nearest.fold(f64::MAX, f64::min) < 2.5, "({x}, {y}) is bare");
+        }
     }
 
     #[test]

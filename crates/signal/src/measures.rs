@@ -80,7 +80,8 @@ pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, Sign
     if range == 0.0 {
         return Err(SignalError::Silent { channel });
     }
-    let centred: Vec<f64> = column.iter().map(|x| x - column.mean()).collect();
+    let mean = column.mean();
+    let centred: Vec<f64> = column.iter().map(|x| x - mean).collect();
     Ok(0.5 * range / (std::f64::consts::SQRT_2 * rms(&centred)))
 }
 

@@ -10,6 +10,7 @@ mod force;
 mod frf;
 mod identify;
 mod info;
+mod levels;
 mod modal;
 mod multisine;
 mod report;

@@ -338,3 +338,26 @@ fn what_is_wrong_near_the_end_of_a_long_text_is_told_with_its_line() {
     let message = refused(folder.path(), "info bad.csv --columns sine");
     assert!(message.contains(what), "{message}");
 }
+
+#[test]
+fn the_page_of_a_long_text_is_that_of_the_record_in_memory() {
+    let folder = records();
+    let page = |file: &str, arguments: &str| {
+        let call = format!("report {file} --force f --displacement x {arguments}");
+        mechid(folder.path(), &format!("{call} --output page.html --quiet"));
+        let page = fs::read_to_string(folder.path().join("page.html")).unwrap();
+        page.replace(file, "rec")
+    };
+    for (arguments, held) in [
+        ("--period 1000 --detrend mean --reconstruct-force", 262_000),
+        ("--domain time --velocity v --acceleration a", 262_144),
+        ("--from-frf h1 --segment 1024", 262_144),
+        ("--domain time --velocity v --extent period", 262_144),
+    ] {
+        let text = page("rec.csv", arguments);
+        assert!(text == page("rec.mat", arguments), "{arguments}");
+        assert!(text.contains("<td>1 to 270000</td>"), "{arguments}");
+        let some = format!(", samples 1 to {held}");
+        assert!(text.contains(&some), "{arguments}: no \"{some}\"");
+    }
+}

@@ -2,6 +2,7 @@
 #![allow(clippy::print_stderr, reason = "a skipped test says so")]
 
 mod browser;
+mod long;
 mod receptance;
 
 use std::f64::consts::TAU;

@@ -391,3 +391,18 @@ fn segments_may_come_a_few_at_a_time() {
     let average = FrfAverage::new(lines, [2, 2], Motion::Displacement, Segments::hann(128));
     assert!(matches!(average, Err(EstimateError::Size { expected: 128, got: 1152, .. })));
 }
+
+#[test]
+fn some_responses_are_those_estimated_on_their_lines_alone() {
+    let (force, motion, lines) = steady(&bearing(), 5);
+    let motion = noise::add_white(&motion, NoiseLevel::FractionOfRms(0.1), 4).unwrap();
+    let on = |lines: Vec<usize>| {
+        let segments = Segments::Periods(128);
+        Frf::estimate(&force, &motion, Motion::Displacement, segments, lines, FrfEstimator::H1)
+            .unwrap()
+    };
+    let places = [2, 3, lines.len() - 1];
+    let some = on(lines.clone()).at(&places);
+    assert_eq!(some, on(places.map(|at| lines[at]).to_vec()));
+    assert_eq!(some.data(&[0, 1]).unwrap().len(), 2 * places.len());
+}

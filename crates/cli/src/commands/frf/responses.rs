@@ -123,17 +123,7 @@ impl Responses {
             Segments::Windowed { len, .. } => choose(&force.window(0, len)?, len)?,
         };
         let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
-        let (motion, kind) = held.motion();
-        let channels = [driven.len(), motion.channels()];
-        let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;
-        let (hop, at_once) = (segments.hop(), (STRETCH / segments.hop()).max(1));
-        let (samples, advance) = ((at_once - 1) * hop + len, at_once * hop);
-        recorded.stretches(samples, advance, &mut |stretch| {
-            let acting: Vec<&[f64]> =
-                driven.iter().map(|dof| stretch.force.channel(*dof)).collect();
-            let acting = Record::from_channels(stretch.force.sampling(), &acting)?;
-            Ok(average.push(&acting, stretch.motion().0)?)
-        })?;
+        let average = average(recorded, &lines, segments)?;
         let frf = average.frf(match estimator {
             Estimator::H1 => FrfEstimator::H1,
             Estimator::H2 => FrfEstimator::H2,
@@ -141,4 +131,25 @@ impl Responses {
         })?;
         Ok(Self { frf, lines, driven, segments })
     }
+}
+
+/// From the forces that act to the first kind of motion measured, on some lines of a segment, over all
+/// of the window.
+pub fn average(
+    recorded: &Recorded,
+    lines: &Lines,
+    segments: Segments,
+) -> Result<FrfAverage, CliError> {
+    let driven = &recorded.held.driven;
+    let (motion, kind) = recorded.held.motion();
+    let channels = [driven.len(), motion.channels()];
+    let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;
+    let (hop, at_once) = (segments.hop(), (STRETCH / segments.hop()).max(1));
+    let (samples, advance) = ((at_once - 1) * hop + segments.samples(), at_once * hop);
+    recorded.stretches(samples, advance, &mut |stretch| {
+        let acting: Vec<&[f64]> = driven.iter().map(|dof| stretch.force.channel(*dof)).collect();
+        let acting = Record::from_channels(stretch.force.sampling(), &acting)?;
+        Ok(average.push(&acting, stretch.motion().0)?)
+    })?;
+    Ok(average)
 }

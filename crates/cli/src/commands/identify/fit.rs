@@ -170,7 +170,7 @@ pub fn frequency_domain(
 }
 
 /// All periods of a record, a stretch at a time.
-fn periods(recorded: &Recorded, lines: &Lines) -> Result<RepeatedPeriods, CliError> {
+pub fn periods(recorded: &Recorded, lines: &Lines) -> Result<RepeatedPeriods, CliError> {
     let Measurement { force, period, periods, .. } = &recorded.held;
     let kind = recorded.held.motion().1;
     let mut all = RepeatedPeriods::expecting(lines, force.channels(), kind, *periods);

@@ -123,7 +123,7 @@ pub struct Identification {
 #[derive(Debug)]
 pub struct Identified {
     /// The records fitted, at least one.
-    pub records: Vec<Measurement>,
+    pub records: Vec<Recorded>,
     /// The record predicted, if one was given.
     pub validated: Option<Measurement>,
     pub fitted: Fitted,
@@ -182,7 +182,6 @@ impl Identification {
                 fit::frequency_domain(&records, &unknowns, choose, method)?
             }
         };
-        let records: Vec<Measurement> = records.into_iter().map(Recorded::into_held).collect();
         let mut report = report(&records, &fitted)?;
         let validated = self.validation.record(&self.input, &self.channels, fitted.course, hold)?;
         if let Some(recorded) = &validated {
@@ -233,7 +232,7 @@ impl Identified {
             return self.receptance(title);
         }
         let system = self.fitted.estimate.system()?;
-        let compared = self.fitted.course.predict(&system, &self.records[0])?;
+        let compared = self.fitted.course.predict(&system, &self.records[0].held)?;
         Ok(motion_picture::motion(title, &compared[0]))
     }
 
@@ -247,17 +246,18 @@ impl Identified {
     }
 }
 
-fn report(records: &[Measurement], fitted: &Fitted) -> Result<Report, CliError> {
+fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
+    let records: Vec<&Measurement> = records.iter().map(|r| &r.held).collect();
     let estimate = &fitted.estimate;
     let system = estimate.system()?;
     let unexplained_motion = fitted.unexplained_motion(&system)?;
     let files: Vec<&str> = records.iter().map(|r| r.file.as_str()).collect();
-    let row = |r: &Measurement| RecordRow { file: r.file.clone(), window: Window::of(r) };
+    let row = |r: &&Measurement| RecordRow { file: r.file.clone(), window: Window::of(r) };
     let mut report = Report {
         file: records[0].file.clone(),
         domain: fitted.domain,
         estimator: fitted.estimator,
-        window: Window::of(&records[0]),
+        window: Window::of(records[0]),
         repeats: fitted.course == Course::Steady,
         lines: fitted.frequency.as_ref().map(|(lines, _)| Lines::of(lines)),
         confidence: CONFIDENCE,

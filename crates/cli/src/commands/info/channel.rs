@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use mechid::signal::{Record, Repetition, Sampling, SignalError, Spectrum, repetition};
 use serde::Serialize;
 
-use super::levels::Levels;
+use crate::commands::levels::Levels;
 
 /// Spectral lines told of a channel.
 const STRONGEST: usize = 3;

@@ -1,7 +1,6 @@
 //! `mechid info`: what is in a record.
 
 mod channel;
-mod levels;
 mod report;
 
 use std::ops::Range;

@@ -1,9 +1,9 @@
 //! What is in the channels that were used.
 
-use mechid::signal::{Record, measures};
+use mechid::signal::measures;
 
+use super::whole::{Gathered, Whole};
 use crate::commands::identify::measurement::{ChannelArgs, Measurement};
-use crate::error::CliError;
 
 /// One column of the record, over the window.
 pub struct Channel {
@@ -27,50 +27,44 @@ pub struct Channel {
 const ROUNDING: f64 = 1e-12;
 
 /// The columns in the order force, displacement, velocity, acceleration.
-pub fn channels(measured: &Measurement, names: &ChannelArgs) -> Result<Vec<Channel>, CliError> {
-    let groups = [
-        ("force", "N", Some(&measured.force), &names.force),
-        ("displacement", "m", measured.displacement.as_ref(), &names.displacement),
-        ("velocity", "m/s", measured.velocity.as_ref(), &names.velocity),
-        ("acceleration", "m/s²", measured.acceleration.as_ref(), &names.acceleration),
+pub fn channels(held: &Measurement, whole: &Whole, names: &ChannelArgs) -> Vec<Channel> {
+    let period = whole.period(held);
+    let force = ("force", "N", &period.force, &whole.force, &names.force);
+    let motions = [
+        ("displacement", "m", &period.displacement, &names.displacement),
+        ("velocity", "m/s", &period.velocity, &names.velocity),
+        ("acceleration", "m/s²", &period.acceleration, &names.acceleration),
     ];
+    let measured = motions.into_iter().filter_map(|(quantity, unit, record, columns)| {
+        record.as_ref().map(|record| (quantity, unit, record, columns))
+    });
+    let motions = measured
+        .zip(&whole.motions)
+        .map(|((quantity, unit, record, columns), all)| (quantity, unit, record, all, columns));
     let mut found = Vec::new();
-    for (quantity, unit, record, columns) in groups {
-        let Some(record) = record else { continue };
-        let scatter = scatter(record, measured.period, measured.periods)?;
+    for (quantity, unit, period, all, columns) in std::iter::once(force).chain(motions) {
+        let varying = period.without_mean();
         for (at, column) in columns.iter().enumerate() {
-            let values = record.channel(at);
-            let (mean, peak) = (record.column(at).mean(), measures::peak(values));
+            let levels = &all.levels[at];
+            let (mean, rms, peak) = (levels.mean(), levels.rms(), levels.peak);
             found.push(Channel {
                 column: column.clone(),
                 quantity,
                 dof: (columns.len() > 1).then_some(at + 1),
                 unit,
                 mean: if mean.abs() > ROUNDING * peak { mean } else { 0.0 },
-                rms: measures::rms(values),
+                rms,
                 peak,
-                crest_factor: measures::crest_factor(record, at).ok(),
-                scatter: scatter[at],
+                crest_factor: (peak > 0.0).then(|| peak / rms),
+                scatter: scatter(all, at, measures::rms(varying.channel(at))),
             });
         }
     }
-    Ok(found)
+    found
 }
 
-/// How much of each channel does not repeat.
-fn scatter(record: &Record, period: usize, periods: usize) -> Result<Vec<Option<f64>>, CliError> {
-    if periods < 2 {
-        return Ok(vec![None; record.channels()]);
-    }
-    let mean = record.period_mean(period)?;
-    let repeated = mean.repeated(periods)?;
-    let varying = mean.without_mean();
-    let of = |at: usize| {
-        let apart: Vec<f64> =
-            record.channel(at).iter().zip(repeated.channel(at)).map(|(x, m)| x - m).collect();
-        let level = measures::rms(varying.channel(at));
-        let share = measures::rms(&apart) / level;
-        (level > 0.0).then_some(if share > ROUNDING { share } else { 0.0 })
-    };
-    Ok((0..record.channels()).map(of).collect())
+/// How much of a channel, whose mean period varies by `level`, does not repeat.
+fn scatter(all: &Gathered, channel: usize, level: f64) -> Option<f64> {
+    let share = all.scatter(channel)? / level;
+    (level > 0.0).then_some(if share > ROUNDING { share } else { 0.0 })
 }

@@ -3,7 +3,6 @@
 use mechid::signal::measures::{self, Band};
 use mechid::signal::{Record, Spectrum};
 
-use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
 
 /// A line this far below the strongest, in dB, is no longer driven: a multisine stands far above
@@ -25,18 +24,9 @@ pub struct Excitation {
     pub order: usize,
 }
 
-/// One period of the force, averaged; or the window.
-pub fn force(measured: &Measurement, periodic: bool) -> Result<Record, CliError> {
-    Ok(match periodic {
-        true => measured.force.period_mean(measured.period)?,
-        false => measured.force.clone(),
-    })
-}
-
-/// Of every force that is not zero throughout.
-pub fn excitations(measured: &Measurement, periodic: bool) -> Result<Vec<Excitation>, CliError> {
-    let force = force(measured, periodic)?;
-    let spectrum = Spectrum::of(&force);
+/// Of every force that is not zero throughout, in one period.
+pub fn excitations(force: &Record) -> Result<Vec<Excitation>, CliError> {
+    let spectrum = Spectrum::of(force);
     let floor = 10f64.powf(-DROP_DB / 20.0);
     let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);
     acting
@@ -47,8 +37,8 @@ pub fn excitations(measured: &Measurement, periodic: bool) -> Result<Vec<Excitat
             let lines: Vec<usize> = (1..spectrum.len()).filter(driven).collect();
             Ok(Excitation {
                 dof: c + 1,
-                crest_factor: measures::crest_factor(&force, c)?,
-                peak_factor: measures::relative_peak_factor(&force, c).ok(),
+                crest_factor: measures::crest_factor(force, c)?,
+                peak_factor: measures::relative_peak_factor(force, c).ok(),
                 lines: lines.len(),
                 band: measures::effective_band(&spectrum, c, DROP_DB).ok(),
                 flatness: measures::spectral_flatness(&spectrum, c, lines).ok(),

@@ -4,10 +4,11 @@ use mechid::estimate::frequency_domain::Motion;
 use mechid::plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid::signal::{Record, Spectrum};
 
+use super::Part;
 use super::receptance::Receptance;
 use super::reconstruction::Reconstruction;
-use super::residual::Correlations;
-use super::{Part, excitation};
+use super::residual::{Correlations, Residual};
+use super::whole::Gathered;
 use crate::commands::identify::Identified;
 use crate::commands::identify::course::Compared;
 use crate::commands::identify::measurement::Measurement;
@@ -56,19 +57,25 @@ fn times(record: &Record) -> Vec<f64> {
     record.sampling().times().collect()
 }
 
-/// Time history of the window above the amplitudes of its mean period, of each channel.
-fn history(name: (&str, &str), window: &Record, period: &Record, channels: &[usize]) -> Figure {
+/// Time history of the window above the amplitudes of its mean period, of each channel; `held` are
+/// the samples to draw where these are all.
+fn history(
+    name: (&str, &str),
+    (held, whole): (&Record, &Gathered),
+    period: &Record,
+    channels: &[usize],
+) -> Figure {
     let spectrum = Spectrum::of(period);
     let hz: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
     let mut figure = Figure::new("");
     for &c in channels {
-        let label = numbered(name.0, c, window.channels());
-        let curve = Curve::line("", &times(window), window.channel(c)).width(1.0);
+        let label = numbered(name.0, c, held.channels());
+        let (t, values) = whole.history(held, c);
         let time =
             Panel::new(Axis::linear("Time in the window", "s"), Axis::linear(&label, name.1));
-        figure = figure.panel(time.curve(curve));
+        figure = figure.panel(time.curve(Curve::line("", &t, &values).width(1.0)));
         let amplitude: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.line(n, c).norm()).collect();
-        let axis = Axis::linear(numbered("Amplitude", c, window.channels()), name.1);
+        let axis = Axis::linear(numbered("Amplitude", c, held.channels()), name.1);
         let stems = Curve::stems("", &hz, &amplitude).color(Color::VERMILION);
         figure = figure.panel(Panel::new(Axis::linear("Frequency", "Hz"), axis).curve(stems));
     }
@@ -85,29 +92,30 @@ fn overlay(t: &[f64], measured: &[f64], name: &str, own: &[f64]) -> [Curve; 2] {
 
 /// Time histories and spectra of force and motion.
 pub fn data(part: &Part<'_>) -> Result<Vec<Drawn>, CliError> {
-    let source = part.measured;
-    let (motion, kind) = source.motion();
-    let mean = part.lines.is_some();
-    let force = excitation::force(source, mean)?;
-    let period = if mean { motion.period_mean(source.period)? } else { motion.clone() };
-    let of = match (mean, source.periods) {
-        (false, _) => "the window taken as one period",
-        (true, 1) => "the period",
-        (true, _) => "the mean period",
+    let (held, period) = (part.held(), part.period());
+    let (motion, kind) = held.motion();
+    let of = match (&part.lines, held.periods) {
+        (Some(_), 1) => "the period".into(),
+        (Some(_), _) => "the mean period".into(),
+        (None, _) => match held.held_to() {
+            None => "the window taken as one period".into(),
+            Some(last) => {
+                format!("samples {} to {last} taken as one period", held.first_sample)
+            }
+        },
     };
-    let acting: Vec<usize> =
-        (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
     let all: Vec<usize> = (0..motion.channels()).collect();
-    let name = symbol(kind);
+    let of_force = (&held.force, &part.whole.force);
+    let of_motion = (motion, &part.whole.motions[0]);
     Ok(vec![
         drawn(
             part.id("force"),
-            history(("Force", "N"), &source.force, &force, &acting),
+            history(("Force", "N"), of_force, &period.force, &held.driven),
             format!("Measured force: time history of the window, and line amplitudes of {of}."),
         )?,
         drawn(
             part.id("motion"),
-            history(name, motion, &period, &all),
+            history(symbol(kind), of_motion, period.motion().0, &all),
             format!("Measured {kind}: time history of the window, and line amplitudes of {of}."),
         )?,
     ])
@@ -128,12 +136,13 @@ pub fn receptance(found: &Identified, measured: &Receptance) -> Result<Drawn, Cl
 
 /// Measured and modelled motion with what is left, over one period or the whole open record.
 pub fn fit(part: &Part<'_>, compared: &Compared) -> Result<Drawn, CliError> {
-    let extent = extent(part.measured);
+    let held = part.held();
+    let extent = extent(held);
     let caption = format!(
         "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
         compared.kind
     );
-    over_time(part.id("fit"), compared, part.measured.period, caption)
+    over_time(part.id("fit"), compared, shown(held), caption)
 }
 
 /// The same of a record that was not fitted.
@@ -143,11 +152,21 @@ pub fn validation(source: &Measurement, compared: &Compared) -> Result<Drawn, Cl
         "{}: measured {} and the one predicted {extent}; below, their difference.",
         source.file, compared.kind
     );
-    over_time("validation".into(), compared, source.period, caption)
+    over_time("validation".into(), compared, shown(source), caption)
 }
 
-fn extent(source: &Measurement) -> &'static str {
-    if source.periods == 1 { "over the window" } else { "over the first period" }
+/// Samples of a motion in time that are drawn.
+fn shown(source: &Measurement) -> usize {
+    source.period.min(source.force.len())
+}
+
+fn extent(source: &Measurement) -> String {
+    let (first, shown) = (source.first_sample, shown(source));
+    match source.periods {
+        _ if shown < source.period => format!("over samples {first} to {}", first + shown - 1),
+        1 => "over the window".into(),
+        _ => "over the first period".into(),
+    }
 }
 
 /// The first samples of a motion, measured and modelled, above their difference.
@@ -177,14 +196,11 @@ fn over_time(
 }
 
 /// Amplitudes of motion and residual, on the lines used or all.
-pub fn residual_spectrum(part: &Part<'_>, compared: &Compared) -> Result<Drawn, CliError> {
-    let mean = |record: &Record| match part.lines {
-        Some(_) => record.period_mean(part.measured.period),
-        None => Ok(record.clone()),
-    };
-    let (motion, model) = (mean(&compared.measured)?, mean(&compared.predicted)?);
-    let left = Record::new(motion.sampling(), motion.data() - model.data())?;
-    let (motion, left) = (Spectrum::of(&motion), Spectrum::of(&left));
+pub fn residual_spectrum(part: &Part<'_>, residual: &Residual) -> Result<Drawn, CliError> {
+    let compared = residual.mean.as_ref().unwrap_or(&residual.compared[0]);
+    let motion = &compared.measured;
+    let left = Record::new(motion.sampling(), motion.data() - compared.predicted.data())?;
+    let (motion, left) = (Spectrum::of(motion), Spectrum::of(&left));
     let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
     let (_, unit) = symbol(compared.kind);
@@ -209,8 +225,11 @@ pub fn residual_spectrum(part: &Part<'_>, compared: &Compared) -> Result<Drawn, 
         part.id("residual-spectrum"),
         figure,
         format!(
-            "Spectra of the measured {} and of the residual: noise lies flat, what the model misses has the shape of a resonance or of the force.",
-            compared.kind
+            "{}: noise lies flat, what the model misses has the shape of a resonance or of the force.",
+            part.of_period(&format!(
+                "Spectra of the measured {} and of the residual",
+                compared.kind
+            ))
         ),
     )
 }
@@ -241,7 +260,8 @@ pub fn correlations(part: &Part<'_>, found: &[Correlations]) -> Result<Drawn, Cl
         Some(span) => format!(" Noise on the motion correlates it over {span} lags by itself."),
     };
     let caption = format!(
-        "Autocorrelation of what the fit leaves, and its correlation with the force; 95 % of the stems of white noise stay between the dashed lines.{spanned}"
+        "{}; 95 % of the stems of white noise stay between the dashed lines.{spanned}",
+        part.of_held("Autocorrelation of what the fit leaves, and its correlation with the force")
     );
     drawn(part.id("correlations"), figure, caption)
 }
@@ -273,6 +293,6 @@ pub fn force(part: &Part<'_>, reconstruction: &Reconstruction) -> Result<Drawn, 
     drawn(
         part.id("reconstructed-force"),
         figure,
-        "Force found from the motion with the identified machine, and the measured one; below, their difference.".into(),
+        part.of_period("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
     )
 }

@@ -11,6 +11,7 @@ mod repeat;
 mod residual;
 mod sections;
 mod tables;
+mod whole;
 
 use std::path::PathBuf;
 
@@ -22,8 +23,9 @@ use self::excitation::Excitation;
 use self::receptance::Receptance;
 use self::reconstruction::Reconstruction;
 use self::residual::Residual;
+use self::whole::Whole;
 use crate::commands::identify::course::{Compared, Course};
-use crate::commands::identify::measurement::{Hold, Measurement};
+use crate::commands::identify::measurement::{Measurement, Recorded};
 use crate::commands::identify::report::Report;
 use crate::commands::identify::{Identification, Identified};
 use crate::error::CliError;
@@ -33,7 +35,11 @@ use crate::outcome::Outcome;
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
 ///
 /// Takes the options of `mechid identify`. The file needs nothing else: it can be sent, printed and
-/// kept, and ends with the command that writes it again. The records are held whole, to be drawn.
+/// kept, and ends with the command that writes it again.
+///
+/// A long text is gone through a stretch at a time and held as by `mechid identify`: levels, time
+/// histories and mean periods are those of all samples; the residual in time and, of an open record,
+/// its spectrum and the force found are those of the first 262144 samples, and the page says so.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid report record.csv --force force --displacement displacement --output report.html
@@ -80,7 +86,8 @@ struct Contents<'a> {
 
 /// What the page shows of one record.
 struct Part<'a> {
-    measured: &'a Measurement,
+    recorded: &'a Recorded,
+    whole: Whole,
     /// The name of the record, where there are several.
     name: Option<&'a str>,
     /// What makes the names of this record's figures its own.
@@ -105,7 +112,7 @@ struct Printed<'a> {
 impl PageArgs {
     /// Reads, identifies, draws and writes.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let found = self.identification.identify(Hold::Whole)?;
+        let found = self.identification.identify(self.identification.hold())?;
         let contents = self.contents(&found)?;
         let page = page::html(&contents)?;
         let html = self.output.display().to_string();
@@ -117,7 +124,8 @@ impl PageArgs {
     fn contents<'a>(&self, found: &'a Identified) -> Result<Contents<'a>, CliError> {
         let name = PathBuf::from(&found.report.file);
         let name = name.file_name().unwrap_or_default().to_string_lossy();
-        let parts = 0..found.records.len();
+        let parts = (0..found.records.len()).map(|at| self.part(found, at));
+        let parts: Vec<Part<'_>> = parts.collect::<Result<_, _>>()?;
         let validation = match &found.validated {
             Some(other) => found.fitted.course.predict(&found.fitted.estimate.system()?, other)?,
             None => Vec::new(),
@@ -125,42 +133,77 @@ impl PageArgs {
         Ok(Contents {
             title: self.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
             found,
-            parts: parts.map(|at| self.part(found, at)).collect::<Result<_, _>>()?,
-            receptance: Receptance::of(found).map_err(|reason| reason.to_string()),
+            receptance: Receptance::of(found, &parts).map_err(|reason| reason.to_string()),
+            parts,
             validation,
             command: repeat::command(std::env::args_os().skip(1)),
         })
     }
 
     fn part<'a>(&self, found: &'a Identified, at: usize) -> Result<Part<'a>, CliError> {
-        let measured = &found.records[at];
+        let recorded = &found.records[at];
+        let held = &recorded.held;
         let lines = match found.fitted.frequency {
             // Lines of segments are not those of the record.
             Some(_) if found.fitted.course == Course::Steady => {
-                Some(self.identification.choose(&measured.force, measured.period)?)
+                Some(self.identification.choose(&held.force, held.period)?)
             }
             _ => None,
         };
+        let whole = Whole::of(recorded)?;
+        let mean = whole.mean.as_ref().filter(|_| lines.is_some());
+        let period = mean.unwrap_or(held);
         let reconstruction = match self.reconstruct_force {
-            true => Some(Reconstruction::of(found, measured, lines.clone())?),
+            true => Some(Reconstruction::of(found, period, lines.clone())?),
             false => None,
         };
         Ok(Part {
-            measured,
-            name: (found.records.len() > 1).then_some(measured.file.as_str()),
+            recorded,
+            name: (found.records.len() > 1).then_some(held.file.as_str()),
             suffix: if at == 0 { String::new() } else { format!("-{}", at + 1) },
-            channels: channels::channels(measured, &self.identification.channels)?,
-            excitations: excitation::excitations(measured, lines.is_some())?,
-            residual: Residual::of(found, at).map_err(|reason| reason.to_string()),
+            channels: channels::channels(held, &whole, &self.identification.channels),
+            excitations: excitation::excitations(&period.force)?,
+            residual: Residual::of(found, at, mean).map_err(|reason| reason.to_string()),
             reconstruction,
             lines,
+            whole,
         })
     }
 }
 
 impl Part<'_> {
+    /// What of the record is held.
+    fn held(&self) -> &Measurement {
+        &self.recorded.held
+    }
+
+    /// What spectra are of: the mean period where lines of periods were fitted, otherwise what is
+    /// held.
+    fn period(&self) -> &Measurement {
+        match self.lines {
+            Some(_) => self.whole.period(self.held()),
+            None => self.held(),
+        }
+    }
+
     /// The name of a figure of this record.
     fn id(&self, figure: &str) -> String {
         format!("{figure}{}", self.suffix)
+    }
+
+    /// A caption of what is told of the samples held, with their numbers where these are not all.
+    fn of_held(&self, caption: &str) -> String {
+        match self.held().held_to() {
+            Some(last) => format!("{caption}, samples {} to {last}", self.held().first_sample),
+            None => caption.into(),
+        }
+    }
+
+    /// The same of what is told of [`Part::period`].
+    fn of_period(&self, caption: &str) -> String {
+        match self.lines {
+            Some(_) => caption.into(),
+            None => self.of_held(caption),
+        }
     }
 }

@@ -109,7 +109,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
 }
 
 fn files(contents: &Contents<'_>) -> String {
-    let names: Vec<&str> = contents.found.records.iter().map(|r| r.file.as_str()).collect();
+    let names: Vec<&str> = contents.found.records.iter().map(|r| r.held.file.as_str()).collect();
     names.join(", ")
 }
 

@@ -1,17 +1,21 @@
 //! The receptance that records show, whatever was fitted.
 
-use mechid::estimate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods};
+use mechid::estimate::frequency_domain::{FrequencyData, Lines};
 use mechid::estimate::time_domain::Extent;
-use mechid::estimate::{Frf, FrfEstimator, Segments, Window};
-use mechid::signal::{Record, lines};
+use mechid::estimate::{FrfEstimator, Segments, Window};
+use mechid::signal::lines;
 
+use super::Part;
+use crate::commands::frf::responses::average;
 use crate::commands::identify::Identified;
 use crate::commands::identify::course::Course;
 use crate::commands::identify::excited::choose_lines;
-use crate::commands::identify::measurement::Measurement;
+use crate::commands::identify::fit::periods;
+use crate::commands::identify::measurement::{HELD, Measurement, Recorded};
 use crate::error::CliError;
 
-/// Part of an open record that a segment takes; half overlapped, this makes fifteen segments.
+/// Part of an open record that a segment takes; half overlapped, this makes fifteen segments. Of a
+/// record too long to be held there are more of them, not longer ones.
 const SEGMENTS: usize = 8;
 
 /// A line is shown if the force explains at least this part of the power of every motion.
@@ -29,7 +33,7 @@ impl Receptance {
     ///
     /// # Errors
     /// If the records show none.
-    pub fn of(found: &Identified) -> Result<Self, CliError> {
+    pub fn of(found: &Identified, parts: &[Part<'_>]) -> Result<Self, CliError> {
         if let Some((_, data)) = &found.fitted.frequency {
             let origin = match found.fitted.course {
                 Course::Steady => "measured on the lines used",
@@ -37,15 +41,20 @@ impl Receptance {
             };
             return Ok(Self { data: data.clone(), origin: origin.into() });
         }
-        let first = &found.records[0];
+        let first = parts[0].held();
+        // The beginning of a period is none.
+        let held = first.periods > 1 || first.held_to().is_none();
         let period = match found.fitted.course {
-            Course::Steady | Course::Sampled { extent: Extent::WholePeriod, .. } => true,
+            Course::Steady | Course::Sampled { extent: Extent::WholePeriod, .. } => held,
             Course::Sampled { .. } => first.periods > 1,
         };
-        let each = |measured| if period { of_periods(measured) } else { of_segments(measured) };
-        let mut data = each(first)?;
-        for measured in &found.records[1..] {
-            data = data.and(&each(measured)?)?;
+        let each = |part: &Part<'_>| match period {
+            true => of_periods(part),
+            false => of_segments(part.recorded),
+        };
+        let mut data = each(&parts[0])?;
+        for part in &parts[1..] {
+            data = data.and(&each(part)?)?;
         }
         let origin = match period {
             true => "measured on the lines of whole periods that carry force".into(),
@@ -63,36 +72,34 @@ impl Receptance {
     }
 }
 
-fn of_periods(measured: &Measurement) -> Result<FrequencyData, CliError> {
-    let force = &measured.force;
-    let chosen = choose_lines(force, measured.period, None, None)?;
-    let lines = Lines::new(force.sampling().with_len(measured.period)?, chosen)?;
-    let (motion, kind) = measured.motion();
-    Ok(RepeatedPeriods::new(&lines, force, motion, kind)?.mean()?)
+fn of_periods(part: &Part<'_>) -> Result<FrequencyData, CliError> {
+    let held = part.held();
+    // Several periods tell their noise; of one that is longer than what is held there is the mean.
+    let force = match held.force.len() < held.period {
+        true => &part.whole.period(held).force,
+        false => &held.force,
+    };
+    let chosen = choose_lines(force, held.period, None, None)?;
+    let lines = Lines::new(force.sampling().with_len(held.period)?, chosen)?;
+    Ok(periods(part.recorded, &lines)?.mean()?)
 }
 
 fn segment(measured: &Measurement) -> usize {
-    (measured.force.len() / SEGMENTS).max(1)
+    ((measured.period * measured.periods).min(HELD) / SEGMENTS).max(1)
 }
 
-fn of_segments(measured: &Measurement) -> Result<FrequencyData, CliError> {
-    let force = &measured.force;
-    let len = segment(measured);
+fn of_segments(recorded: &Recorded) -> Result<FrequencyData, CliError> {
+    let held = &recorded.held;
+    let len = segment(held);
     let segments = Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann };
-    let acts = |dof: &usize| force.channel(*dof).iter().any(|f| *f != 0.0);
-    let driven: Vec<usize> = (0..force.channels()).filter(acts).collect();
-    let acting: Vec<&[f64]> = driven.iter().map(|dof| force.channel(*dof)).collect();
-    let acting = Record::from_channels(force.sampling(), &acting)?;
-    let (motion, kind) = measured.motion();
-    let estimate =
-        |lines: Vec<usize>| Frf::estimate(&acting, motion, kind, segments, lines, FrfEstimator::H1);
-    let all = lines::full(force.sampling().with_len(len)?);
-    let coherence = estimate(all.clone())?.coherence().clone();
-    let explained = |row: usize| coherence.row(row).iter().all(|part| *part >= EXPLAINED);
-    let clear: Vec<usize> =
-        all.into_iter().enumerate().filter(|(row, _)| explained(*row)).map(|(_, n)| n).collect();
+    let sampling = held.force.sampling().with_len(len)?;
+    let all = Lines::new(sampling, lines::full(sampling))?;
+    let responses = average(recorded, &all, segments)?.frf(FrfEstimator::H1)?;
+    let explained =
+        |row: &usize| responses.coherence().row(*row).iter().all(|part| *part >= EXPLAINED);
+    let clear: Vec<usize> = (0..all.as_slice().len()).filter(explained).collect();
     if clear.is_empty() {
         return Err(CliError::NothingToDraw);
     }
-    Ok(estimate(clear)?.data(&driven)?)
+    Ok(responses.at(&clear).data(&held.driven)?)
 }

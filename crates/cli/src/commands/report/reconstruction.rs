@@ -26,14 +26,14 @@ pub struct Reconstruction {
 }
 
 impl Reconstruction {
-    /// Line by line on lines of the periods where there are some, otherwise with the method that suits
-    /// an open record.
+    /// Line by line on lines of the mean `period` where there are some, otherwise with
+    /// the method that suits an open record.
     pub fn of(
         found: &Identified,
-        source: &Measurement,
+        period: &Measurement,
         lines: Option<Vec<usize>>,
     ) -> Result<Self, CliError> {
-        let force = &source.force;
+        let force = &period.force;
         let forced: Vec<usize> =
             (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
         let request = Request {
@@ -45,9 +45,9 @@ impl Reconstruction {
             rule: Rule::Likelihood,
             noise: Vec::new(),
         };
-        let result = find(&request, &machine(found)?, &motion(source, lines.is_some())?)?;
+        let result = find(&request, &machine(found)?, &motion(period)?)?;
         let measured = match &lines {
-            Some(lines) => on_lines(&force.period_mean(source.period)?, lines),
+            Some(lines) => on_lines(force, lines),
             None => force.clone(),
         };
         let errors = channel_errors(result.force.record(), &measured)?;
@@ -69,7 +69,7 @@ fn machine(found: &Identified) -> Result<Machine, CliError> {
 }
 
 /// Every motion that was measured.
-fn motion(source: &Measurement, periodic: bool) -> Result<force::Measurement, CliError> {
+fn motion(source: &Measurement) -> Result<force::Measurement, CliError> {
     let groups = [
         (&source.displacement, Quantity::Displacement),
         (&source.velocity, Quantity::Velocity),
@@ -83,10 +83,7 @@ fn motion(source: &Measurement, periodic: bool) -> Result<force::Measurement, Cl
             channels.push(Channel { dof, quantity });
         }
     }
-    let mut record = Record::new(source.force.sampling(), DMatrix::from_columns(&columns))?;
-    if periodic {
-        record = record.period_mean(source.period)?;
-    }
+    let record = Record::new(source.force.sampling(), DMatrix::from_columns(&columns))?;
     Ok(force::Measurement::new(record, channels)?)
 }
 

@@ -7,6 +7,7 @@ use crate::commands::identify::Identified;
 use crate::commands::identify::checks::{LAGS, SAMPLES_PER_LAG};
 use crate::commands::identify::course::Compared;
 use crate::commands::identify::fit;
+use crate::commands::identify::measurement::Measurement;
 use crate::error::CliError;
 
 /// What is below this share of the motion is rounding.
@@ -18,6 +19,8 @@ pub struct Residual {
     pub compared: Vec<Compared>,
     /// Of each channel that the fit leaves; none where it leaves no row of samples.
     pub correlations: Vec<Correlations>,
+    /// The first kind of motion in the mean period, where there are several.
+    pub mean: Option<Compared>,
 }
 
 /// Correlations of one channel of a residual.
@@ -30,18 +33,21 @@ pub struct Correlations {
 }
 
 impl Residual {
-    /// Of the record at this place.
+    /// Of the record at this place, as far as it is held, and of its mean period.
     ///
     /// # Errors
     /// If the machine has no such motion.
-    pub fn of(found: &Identified, at: usize) -> Result<Self, CliError> {
+    pub fn of(found: &Identified, at: usize, mean: Option<&Measurement>) -> Result<Self, CliError> {
         let system = found.fitted.estimate.system()?;
-        let compared = found.fitted.course.predict(&system, &found.records[at])?;
+        let course = found.fitted.course;
+        let compared = course.predict(&system, &found.records[at].held)?;
+        let mean = mean.map(|mean| course.predict(&system, mean)).transpose()?;
+        let mean = mean.map(|mut motions| motions.swap_remove(0));
         let correlations = match found.fitted.residuals.get(at) {
             Some(left) => correlations(left)?,
             None => Vec::new(),
         };
-        Ok(Self { compared, correlations })
+        Ok(Self { compared, correlations, mean })
     }
 }
 

@@ -51,7 +51,8 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, CliError> {
                 (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts(contents, part) }.html())
                 (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
             }
-            @if let Some(converted) = &part.measured.converted { p.note { (converted) "." } }
+            @if let Some(converted) = &part.held().converted { p.note { (converted) "." } }
+            @if let Some(note) = part_held(part) { p.note { (note) } }
             div.figures { @for drawn in &drawn { (figure(drawn)) } }
         })
     })?;
@@ -61,13 +62,23 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, CliError> {
     })
 }
 
+/// What the page says of all samples and what of a part, where the record is long.
+fn part_held(part: &Part<'_>) -> Option<String> {
+    let (first, last) = (part.held().first_sample, part.held().held_to()?);
+    Some(format!(
+        "The record is long: levels, time histories and what is averaged over periods or segments are those of all \
+         samples used. What is told of single samples (the residual in time, its correlations, checks of it) \
+         is that of samples {first} to {last}; captions say where else."
+    ))
+}
+
 fn facts(contents: &Contents<'_>, part: &Part<'_>) -> Vec<Vec<String>> {
-    let (measured, samples) = (part.measured, part.measured.force.len());
-    let rate = measured.force.sampling().rate_hz();
-    let first = measured.first_sample;
+    let measured = part.held();
+    let (first, last) = (measured.first_sample, measured.last_sample());
+    let (samples, rate) = (last + 1 - first, measured.force.sampling().rate_hz());
     let mut facts = vec![
         pair("File", &measured.file),
-        pair("Samples used", format!("{first} to {}", first + samples - 1)),
+        pair("Samples used", format!("{first} to {last}")),
         pair("Sample rate", format!("{} Hz", compact(rate, 8))),
         pair("Duration", format!("{} s", compact(samples as f64 / rate, 6))),
     ];
@@ -111,8 +122,8 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, CliError> {
     ];
     let records = of_each(contents, |part| {
         let rows = part.excitations.iter().map(excitation_row).collect();
-        Ok(Table { caption: "Quality of the excitation", header: &header, numbers_from: 1, rows }
-            .html())
+        let caption = part.of_period("Quality of the excitation");
+        Ok(Table { caption: &caption, header: &header, numbers_from: 1, rows }.html())
     })?;
     Ok(html! {
         (records)
@@ -238,7 +249,7 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, CliError> {
 }
 
 fn residual_of(part: &Part<'_>, residual: &Residual) -> Result<Markup, CliError> {
-    let mut drawn = vec![figures::residual_spectrum(part, &residual.compared[0])?];
+    let mut drawn = vec![figures::residual_spectrum(part, residual)?];
     if !residual.correlations.is_empty() {
         drawn.push(figures::correlations(part, &residual.correlations)?);
     }
@@ -259,7 +270,7 @@ fn residual_of(part: &Part<'_>, residual: &Residual) -> Result<Markup, CliError>
         }
     }
     Ok(html! {
-        (Table { caption: "What is left of the motion", header: &header, numbers_from: 2, rows }.html())
+        (Table { caption: &part.of_held("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
         div.figures { @for drawn in &drawn { (figure(drawn)) } }
     })
 }
@@ -336,7 +347,7 @@ fn reconstruction_of(part: &Part<'_>, found: &Reconstruction) -> Result<Markup, 
     let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
     Ok(html! {
         p { "Found from the measured motion with the identified machine: " (found.method) (lines) "." }
-        (Table { caption: "Force found and force measured", header: &header, numbers_from: 1, rows }.html())
+        (Table { caption: &part.of_period("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
     })
 }
