@@ -1,11 +1,13 @@
-//! Lines for the reader's shell that are not commands of `mechid`: what is cheap is run, the rest
-//! is held to the workspace, and a line that nothing here knows must not be in a page.
+//! Lines for the reader's shell that are not commands of `mechid`: each is held to the workspace,
+//! and what it starts is run. A line that nothing here knows must not be in a page.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::Value;
+
+use super::runs::Run;
 
 /// Words with which a command in running text begins.
 pub const BEGINNINGS: [&str; 5] = ["cargo ", "git ", "mdbook ", "rustup ", "MECHID_"];
@@ -22,11 +24,11 @@ impl Workspace {
         Self { root: root.to_owned(), metadata: serde_json::from_str(&told).unwrap() }
     }
 
-    /// Holds one line to what is there.
+    /// What runs one line.
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn hold(&self, line: &str) -> Result<(), String> {
+    pub fn meaning(&self, line: &str) -> Result<Run, String> {
         let typed = line.split(" # ").next().unwrap_or_default().trim();
         let mut words = shlex::split(typed).ok_or("no shell reads it")?;
         let settings = words.iter().take_while(|word| word.contains('=')).count();
@@ -34,49 +36,48 @@ impl Workspace {
         let words: Vec<&str> = words.iter().map(String::as_str).filter(|w| *w != "…").collect();
         match words[..] {
             ["cargo", task, ref rest @ ..] => match self.alias(task) {
-                Some(meant) => self.hold(&format!("cargo {meant} {}", rest.join(" "))),
-                None => self.hold_cargo(typed, task, rest, &settings),
+                Some(meant) => self.meaning(&format!("cargo {meant} {}", rest.join(" "))),
+                None => self.meaning_of_cargo(typed, task, rest, &settings),
             },
-            ["mdbook", "build", folder] => self.build_book(folder),
-            _ => Err("nothing holds this command".into()),
+            ["mdbook", "build", folder] if self.root.join(folder).join("book.toml").is_file() => {
+                Ok(Run::Book(folder.into()))
+            }
+            ["mdbook", "build", folder] => Err(format!("no book.toml in {folder}")),
+            _ => Err("nothing runs this command".into()),
         }
     }
 
-    fn hold_cargo(
+    fn meaning_of_cargo(
         &self,
         typed: &str,
         task: &str,
         rest: &[&str],
         settings: &[String],
-    ) -> Result<(), String> {
-        let own = rest.split(|word| *word == "--").next().unwrap_or_default();
+    ) -> Result<Run, String> {
+        let mut parts = rest.split(|word| *word == "--");
+        let own = parts.next().unwrap_or_default();
+        let arguments = parts.flatten().map(|word| (*word).to_owned()).collect();
         known_options(task, own)?;
         let package = match value(own, &["-p", "--package"]) {
             Some(name) => Some(self.package(name).ok_or(format!("no package {name}"))?),
             None => None,
         };
-        let target = |option: &str, kind: &str| match (value(own, &[option]), package) {
-            (None, _) => Ok(None),
-            (Some(name), Some(package)) => {
-                target(package, kind, name).map(Some).ok_or(format!("no {kind} {name}"))
-            }
-            (Some(_), None) => Err(format!("{option} without --package")),
-        };
-        let chosen = [("--example", "example"), ("--test", "test"), ("--bench", "bench")];
-        let chosen: Vec<Value> = chosen
-            .iter()
-            .filter_map(|(option, kind)| target(option, kind).transpose())
-            .collect::<Result<_, _>>()?;
-        let has = |kind: &str| package.is_some_and(|p| !targets(p, kind).is_empty());
-        match task {
-            "run" if !chosen.is_empty() || has("bin") => Ok(()),
-            "test" if !chosen.is_empty() => test_knows(&chosen[0], own, settings),
-            "bench" if has("bench") => Ok(()),
-            "install" => self.installs(value(own, &["--path"]).unwrap_or_default()),
-            "tree" if own.is_empty() => Ok(()),
+        let chosen = ["example", "test", "bench"].into_iter().find_map(|kind| {
+            let name = value(own, &[format!("--{kind}").as_str()])?;
+            let there = package.and_then(|package| target(package, kind, name));
+            Some(there.map(|there| (kind, there)).ok_or(format!("no {kind} {name}")))
+        });
+        let bins = package.map(|package| targets(package, "bin")).unwrap_or_default();
+        match (task, chosen.transpose()?) {
+            ("run", Some((kind, example))) => Ok(Run::program(kind, &example, arguments)),
+            ("run", None) if bins.len() == 1 => Ok(Run::program("bin", bins[0], arguments)),
+            ("test", Some((_, test))) => test_knows(&test, own, settings).map(|()| Run::Always),
+            ("bench", None) => is_benched(package),
+            ("install", _) => self.installs(value(own, &["--path"]).unwrap_or_default()),
+            ("tree", _) if own.is_empty() => Ok(Run::Always),
             // Whatever needs the whole workspace, the check of every change runs.
             _ if own.contains(&"--workspace") => self.is_run_always(typed),
-            _ => Err("nothing holds this command of cargo".into()),
+            _ => Err("nothing runs this command of cargo".into()),
         }
     }
 
@@ -92,43 +93,26 @@ impl Workspace {
     }
 
     /// The folder's package brings the program of this book.
-    fn installs(&self, folder: &str) -> Result<(), String> {
+    fn installs(&self, folder: &str) -> Result<Run, String> {
         let manifest = self.root.join(folder).join("Cargo.toml");
         let packages = self.metadata["packages"].as_array().unwrap();
         let there =
             packages.iter().find(|p| Path::new(p["manifest_path"].as_str().unwrap()) == manifest);
         match there.and_then(|package| target(package, "bin", "mechid")) {
-            Some(_) => Ok(()),
+            Some(_) => Ok(Run::Install(folder.into())),
             None => Err(format!("no program mechid in \"{folder}\"")),
         }
     }
 
-    fn is_run_always(&self, line: &str) -> Result<(), String> {
+    fn is_run_always(&self, line: &str) -> Result<Run, String> {
         let checks = std::fs::read_to_string(self.root.join(".ci/run")).unwrap();
         let line = line.trim_end_matches(" --open");
         match checks
             .lines()
             .any(|check| check.trim_end_matches(" --locked") == line.trim_end_matches(" --locked"))
         {
-            true => Ok(()),
+            true => Ok(Run::Always),
             false => Err(format!("`.ci/run` has no such line: {line}")),
-        }
-    }
-
-    /// Where mdBook is installed, it must make the page that a reader opens first.
-    fn build_book(&self, folder: &str) -> Result<(), String> {
-        let book = self.root.join(folder);
-        if !book.join("book.toml").is_file() {
-            return Err(format!("no book.toml in {folder}"));
-        }
-        let made = tempfile::tempdir().unwrap();
-        let run =
-            Command::new("mdbook").arg("build").arg(&book).arg("-d").arg(made.path()).output();
-        match run {
-            Ok(output) if !made.path().join("index.html").is_file() => {
-                Err(String::from_utf8_lossy(&output.stderr).into_owned())
-            }
-            _ => Ok(()),
         }
     }
 }
@@ -170,6 +154,16 @@ fn target(package: &Value, kind: &str, name: &str) -> Option<Value> {
     targets(package, kind).into_iter().find(|target| target["name"] == name).cloned()
 }
 
+/// `cargo test` runs each measurement of these benches once.
+fn is_benched(package: Option<&Value>) -> Result<Run, String> {
+    let benches = package.map(|package| targets(package, "bench")).unwrap_or_default();
+    match benches.iter().find(|bench| bench["test"] != true) {
+        Some(bench) => Err(format!("no test runs the bench {}", bench["name"])),
+        None if benches.is_empty() => Err("nothing runs a bench that is not there".into()),
+        None => Ok(Run::Always),
+    }
+}
+
 /// Whether the sources of a test have the tests that a line picks, and the setting it makes.
 fn test_knows(test: &Value, words: &[&str], settings: &[String]) -> Result<(), String> {
     let main = Path::new(test["src_path"].as_str().unwrap());
@@ -200,35 +194,54 @@ fn below(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
+fn lines_are_known_by_what_they_run() {
+    let workspace = Workspace::of(&crate::root());
+    let program = |kind: &'static str, name: &str, arguments: &[&str]| Run::Program {
+        kind,
+        name: name.into(),
+        arguments: arguments.iter().map(|word| (*word).to_owned()).collect(),
+    };
+    for (line, run) in [
+        (
+            "cargo run --package mechid-cli -- identify a.csv",
+            program("bin", "mechid", &["identify", "a.csv"]),
+        ),
+        (
+            "cargo run --package mechid --example 01_identify_a_record",
+            program("example", "01_identify_a_record", &[]),
+        ),
+        ("cargo bench -p mechid-integrate", Run::Always),
+        ("MECHID_BLESS=1 cargo test -p mechid-cli --test book fits # and so on", Run::Always),
+        ("cargo install --path crates/cli", Run::Install("crates/cli".into())),
+        ("cargo xtask reproduce-thesis", program("bin", "xtask", &["reproduce-thesis"])),
+        ("mdbook build docs/book", Run::Book("docs/book".into())),
+        ("cargo doc --workspace --no-deps --open", Run::Always),
+    ] {
+        assert_eq!(workspace.meaning(line), Ok(run), "{line}");
+    }
+}
+
+#[test]
 fn what_is_not_there_is_found() {
     let workspace = Workspace::of(&crate::root());
-    for line in [
-        "cargo run --package mechid-cli -- identify",
-        "cargo run --package mechid --example 01_identify_a_record",
-        "cargo bench -p mechid-integrate",
-        "MECHID_BLESS=1 cargo test -p mechid-cli --test book fits # and so on",
-        "cargo install --path crates/cli",
-        "cargo xtask reproduce-thesis",
-    ] {
-        workspace.hold(line).unwrap_or_else(|why| panic!("{line}: {why}"));
-    }
     for (line, why) in [
-        ("curl -O record.csv", "nothing holds"),
+        ("curl -O record.csv", "nothing runs"),
         ("cargo run --pakage mechid-cli --", "no option --pakage"),
         ("cargo run --package mechid-cly --", "no package mechid-cly"),
         ("cargo run --package mechid --example 99_not_there", "no example 99_not_there"),
-        ("cargo run --package mechid-signal", "nothing holds"),
+        ("cargo run --example 01_identify_a_record", "no example 01"),
+        ("cargo run --package mechid-signal", "nothing runs"),
         ("cargo test -p mechid-cli --test boook", "no test boook"),
         ("cargo test -p mechid-cli --test book no_such_test", "no test no_such_test"),
         ("MECHID_BLUNDER=1 cargo test -p mechid-cli --test book", "does not know MECHID_B"),
-        ("cargo bench -p mechid-cli", "nothing holds"),
+        ("cargo bench -p mechid-cli", "nothing runs"),
         ("cargo install --path crates/mechid", "no program mechid"),
         ("cargo test --workspace --no-run", "no such line"),
         ("cargo frobnicate", "no command frobnicate"),
         ("mdbook build docs", "no book.toml"),
         ("echo 'open", "no shell"),
     ] {
-        let found = workspace.hold(line).expect_err(line);
+        let found = workspace.meaning(line).expect_err(line);
         assert!(found.contains(why), "{line}: {found}");
     }
 }

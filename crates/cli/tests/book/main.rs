@@ -9,6 +9,7 @@ mod commands;
 mod markdown;
 mod numbers;
 mod pictures;
+mod runs;
 mod session;
 
 use std::collections::BTreeSet;
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use assert_cmd::Command;
 use commands::Workspace;
 use markdown::Page;
+use runs::Programs;
 use session::{Session, Step, fits};
 
 fn root() -> PathBuf {
@@ -243,12 +245,10 @@ fn the_tutorial_says_what_its_blocks_show() {
     assert!(looked_at > 30, "{looked_at} numbers");
 }
 
-/// Every line for a shell, in blocks and in running text, is one that a test holds. Folders are made
-/// and entered where the pages are followed.
-#[test]
-fn no_command_is_untested() {
-    let workspace = Workspace::of(&root());
-    let mut wrong = Vec::new();
+/// Every line for a shell, in blocks and in running text, with the page that has it. Folders are
+/// made and entered where the pages are followed.
+fn shell_lines(wrong: &mut Vec<String>) -> Vec<(PathBuf, String)> {
+    let mut all = Vec::new();
     for document in documents() {
         let text = read(&document);
         let page = Page::parse(&text);
@@ -270,11 +270,28 @@ fn no_command_is_untested() {
                 wrong.extend(typed.map(|line| format!("{place}: a command as text: {line}")));
             }
         }
-        for line in lines.iter().filter(|line| !Session::walks(line)) {
-            let told = workspace.hold(line).err();
-            wrong.extend(told.map(|why| format!("{}: {line}: {why}", document.display())));
+        lines.retain(|line| !Session::walks(line));
+        all.extend(lines.into_iter().map(|line| (document.clone(), line)));
+    }
+    all
+}
+
+#[test]
+fn every_command_is_run() {
+    let workspace = Workspace::of(&root());
+    let (mut wrong, mut runs) = (Vec::new(), BTreeSet::new());
+    for (document, line) in shell_lines(&mut wrong) {
+        match workspace.meaning(&line) {
+            Ok(run) => drop(runs.insert(run)),
+            Err(why) => wrong.push(format!("{}: {line}: {why}", document.display())),
         }
     }
+    let programs = Programs::of(&root(), &runs);
+    for run in &runs {
+        let failed = run.go(&root(), &programs).err();
+        wrong.extend(failed.map(|why| format!("{run:?}: {why}")));
+    }
+    assert!(runs.len() > 6, "{runs:?}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 

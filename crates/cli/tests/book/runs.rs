@@ -1,0 +1,140 @@
+//! What lines for the reader's shell start, run.
+//!
+//! Built without the reader's `--release` where that would compile everything once more.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use mdbook_driver::MDBook;
+use serde_json::Value;
+
+/// How a line is run.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Run {
+    /// By the check of every change, of which these tests are a part.
+    Always,
+    /// A program or an example of the workspace with what the line says to it.
+    Program { kind: &'static str, name: String, arguments: Vec<String> },
+    /// `cargo install` of this folder.
+    Install(String),
+    /// mdBook, on this folder.
+    Book(String),
+}
+
+/// The programs and examples that lines start, by their kinds and names.
+pub struct Programs(BTreeMap<(String, String), PathBuf>);
+
+impl Run {
+    pub fn program(kind: &'static str, target: &Value, arguments: Vec<String>) -> Self {
+        Run::Program { kind, name: target["name"].as_str().unwrap().into(), arguments }
+    }
+
+    /// Runs it, as from the root of the repository, and sees that something came of it.
+    ///
+    /// # Errors
+    /// What went wrong.
+    pub fn go(&self, root: &Path, programs: &Programs) -> Result<(), String> {
+        let made = tempfile::tempdir().unwrap();
+        match self {
+            Run::Always => Ok(()),
+            // The beginning of commands that the pages show and other tests follow.
+            Run::Program { name, arguments, .. } if name == "mechid" && arguments.is_empty() => {
+                Ok(())
+            }
+            Run::Program { kind, name, arguments } => {
+                let mut program = Command::new(programs.path(kind, name)?);
+                program.current_dir(root).args(arguments);
+                if name == "xtask" && !arguments.iter().any(|word| word == "--check") {
+                    // Others read the files in the repository meanwhile.
+                    program.arg("--out").arg(made.path());
+                }
+                said(&mut program).map(drop)
+            }
+            Run::Install(folder) => install(root, folder, made.path()),
+            Run::Book(folder) => build_book(&root.join(folder), made.path()),
+        }
+    }
+}
+
+impl Programs {
+    /// Builds what these runs start, as `cargo test --workspace` has already done.
+    pub fn of(root: &Path, runs: &BTreeSet<Run>) -> Self {
+        let mut build = Command::new(env!("CARGO"));
+        build.current_dir(root).args(["build", "--workspace", "--locked", "--offline"]);
+        build.args(["--message-format", "json"]);
+        for run in runs {
+            if let Run::Program { kind, name, .. } = run {
+                build.arg(format!("--{kind}")).arg(name);
+            }
+        }
+        // The features of their dependencies are those of the tests then.
+        build.arg("--examples");
+        let told = said(&mut build).unwrap();
+        let made = told.lines().filter_map(|line| {
+            let message: Value = serde_json::from_str(line).ok()?;
+            let (path, target) = (message["executable"].as_str()?, &message["target"]);
+            let (kind, name) = (target["kind"][0].as_str()?, target["name"].as_str()?);
+            Some(((kind.to_owned(), name.to_owned()), PathBuf::from(path)))
+        });
+        Self(made.collect())
+    }
+
+    fn path(&self, kind: &str, name: &str) -> Result<&Path, String> {
+        let path = self.0.get(&(kind.to_owned(), name.to_owned()));
+        path.map(PathBuf::as_path).ok_or(format!("no {kind} {name} was built"))
+    }
+}
+
+/// What a command prints, which must be something, and its exit code 0.
+fn said(command: &mut Command) -> Result<String, String> {
+    let Output { status, stdout, stderr } =
+        command.output().map_err(|error| format!("{command:?}: {error}"))?;
+    if !status.success() || stdout.is_empty() {
+        return Err(format!("{command:?}: {status}: {}", String::from_utf8_lossy(&stderr)));
+    }
+    String::from_utf8(stdout).map_err(|error| error.to_string())
+}
+
+/// Installs the program into a folder, compiled fast rather than to be fast, and holds what it says
+/// against the program tested here.
+fn install(root: &Path, folder: &str, to: &Path) -> Result<(), String> {
+    let built = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install");
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.current_dir(root).args(["install", "--path", folder]);
+    cargo.args(["--debug", "--locked", "--offline"]);
+    cargo.arg("--root").arg(to).arg("--target-dir").arg(built);
+    cargo.envs([("CARGO_PROFILE_DEV_OPT_LEVEL", "0"), ("CARGO_PROFILE_DEV_DEBUG", "none")]);
+    cargo.env("CARGO_INCREMENTAL", "0");
+    let Output { status, stderr, .. } = cargo.output().map_err(|error| error.to_string())?;
+    if !status.success() {
+        return Err(String::from_utf8_lossy(&stderr).into_owned());
+    }
+    let say = |program: &Path| {
+        said(Command::new(program).current_dir(root).args(["info", "examples/machine.csv"]))
+    };
+    let (installed, tested) =
+        (say(&to.join("bin/mechid"))?, say(Path::new(env!("CARGO_BIN_EXE_mechid")))?);
+    match installed == tested {
+        true => Ok(()),
+        false => Err(format!("installed it says\n{installed}and tested\n{tested}")),
+    }
+}
+
+/// Makes the pages that a reader opens in a browser.
+fn build_book(folder: &Path, to: &Path) -> Result<(), String> {
+    let mut book = MDBook::load(folder).map_err(|error| format!("{error:#}"))?;
+    book.config.build.build_dir = to.to_owned();
+    book.build().map_err(|error| format!("{error:#}"))?;
+    let chapters = book.iter().filter_map(|item| match item {
+        mdbook_driver::book::BookItem::Chapter(chapter) => chapter.path.clone(),
+        _ => None,
+    });
+    let pages: Vec<PathBuf> =
+        chapters.map(|chapter| to.join(chapter.with_extension("html"))).collect();
+    match pages.iter().chain([&to.join("index.html")]).find(|page| !page.is_file()) {
+        Some(page) => Err(format!("mdBook made no {}", page.display())),
+        None if pages.len() < 10 => Err(format!("a book of {} pages", pages.len())),
+        None => Ok(()),
+    }
+}
