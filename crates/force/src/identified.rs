@@ -1,22 +1,30 @@
 //! The force that was found.
 
+use std::sync::OnceLock;
+
 use mechid_signal::{Record, Spectrum};
 
 /// A reconstructed force: one channel per degree of freedom of the machine, in N.
 ///
 /// Channels of degrees of freedom that the method was told are not forced are zero.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct IdentifiedForce {
     record: Record,
-    spectrum: Spectrum,
+    /// Found when it is asked for: of the many forces behind a standard error nobody asks.
+    spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
+}
+
+impl PartialEq for IdentifiedForce {
+    fn eq(&self, other: &Self) -> bool {
+        self.record == other.record && self.standard_error == other.standard_error
+    }
 }
 
 impl IdentifiedForce {
     /// A force whose uncertainty is not known.
     pub(crate) fn of(record: Record) -> Self {
-        let spectrum = Spectrum::of(&record);
-        Self { record, spectrum, standard_error: None }
+        Self { record, spectrum: OnceLock::new(), standard_error: None }
     }
 
     /// The same force with its standard error, on the same time axis.
@@ -32,7 +40,7 @@ impl IdentifiedForce {
 
     /// The lines of F̂, lines × degrees of freedom, in N; the record taken as one whole period.
     pub fn spectrum(&self) -> &Spectrum {
-        &self.spectrum
+        self.spectrum.get_or_init(|| Spectrum::of(&self.record))
     }
 
     /// One standard deviation of F̂(t), in N: samples × degrees of freedom; `None` where the
