@@ -239,6 +239,12 @@ fn wrong_excitations_say_what_is_wrong() {
         let e = parse(&description(SDOF, excitation, "")).and_then(|e| e.force()).unwrap_err();
         assert!(e.to_string().contains(part), "\"{part}\" is missing in: {e}");
     }
+    let alone = description(SDOF, FORCE, "").replace(['[', ']'], "");
+    let e = parse(&alone).unwrap_err().to_string();
+    assert!(
+        e.contains("expected a list, of a single force too: \"excitation\": [{ … }] at"),
+        "{e}"
+    );
     let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
     let experiment = parse(&description(SDOF, random, "")).unwrap();
     let e = experiment.mid_step_force().unwrap_err().to_string();

@@ -1,9 +1,12 @@
 //! The forces of an experiment, each on one degree of freedom.
 
+use std::fmt;
+
 use mechid_signal::excitation::{HalfSine, Harmonic, Impulse, Prbs, Random, Sweep, SweepLaw};
 use mechid_signal::{Multisine, Phases, Record, Sampling, SignalError};
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, Deserializer, Error as _};
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{DeserializeOwned, Deserializer, Error as _, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
 use crate::{IoError, LineSpec};
@@ -25,6 +28,24 @@ enum Kind {
     Random(RandomForce),
     Impulse(ImpulseForce),
     HalfSine(HalfSineForce),
+}
+
+/// The excitations of a description. One alone, without brackets, is refused by the name of the
+/// field: serde would only say that a sequence is missing.
+pub(super) fn list<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Excitation>, D::Error> {
+    struct List;
+    impl<'de> Visitor<'de> for List {
+        type Value = Vec<Excitation>;
+
+        fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
+            to.write_str("a list, of a single force too: \"excitation\": [{ … }]")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, forces: A) -> Result<Self::Value, A::Error> {
+            Vec::deserialize(SeqAccessDeserializer::new(forces))
+        }
+    }
+    from.deserialize_seq(List)
 }
 
 /// Names of the kinds, as they are written.

@@ -42,6 +42,7 @@ pub struct Experiment {
     file: String,
     system: SystemDescription,
     sampling: SamplingDescription,
+    #[serde(deserialize_with = "excitation::list")]
     excitation: Vec<Excitation>,
     /// How the response is computed.
     #[serde(default)]
