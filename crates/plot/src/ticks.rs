@@ -25,13 +25,11 @@ fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     // A step that would crowd the axis is not a step the caller can have meant.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
-        .unwrap_or_else(|| nice_step((high - low) / wanted));
+        .unwrap_or_else(|| telling_step(low, high, nice_step((high - low) / wanted)));
     let exponent = common_exponent(low.abs().max(high.abs()));
     let unit = 10f64.powi(exponent);
     let decimals = decimals(step / unit);
-    let first = (low / step - 1e-9).ceil();
-    let last = (high / step + 1e-9).floor();
-    let count = (last - first).max(-1.0) as usize + 1;
+    let (first, count) = multiples(low, high, step);
     let major = (0..count.min(200))
         .map(|index| {
             let value = (first + index as f64) * step;
@@ -40,6 +38,20 @@ fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
         .collect();
     let factor = (exponent != 0).then(|| format!("×{}", power(exponent)));
     Ticks { major, minor: Vec::new(), factor }
+}
+
+/// The first multiple of `step` on `low..=high`, and how many there are.
+fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
+    let first = (low / step - 1e-9).ceil();
+    let last = (high / step + 1e-9).floor();
+    (first, (last - first).max(-1.0) as usize + 1)
+}
+
+/// `step`, or one of the next finer ones if it leaves less than two ticks: a single one does not say
+/// how long the axis is.
+fn telling_step(low: f64, high: f64, step: f64) -> f64 {
+    let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
+    finer.take(3).find(|step| multiples(low, high, *step).1 >= 2).unwrap_or(step)
 }
 
 /// The least of 1, 2, 5 × 10ⁿ that is not below `rough`.
@@ -166,6 +178,8 @@ mod tests {
             labels(&linear(1.9, 4.1, 11.0, None)),
             ["2.0", "2.2", "2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6", "3.8", "4.0"]
         );
+        // ±50 lie outside, and 0 alone would not tell how long the axis is.
+        assert_eq!(labels(&linear(-44.7, 44.7, 2.0, None)), ["−40", "−20", "0", "20", "40"]);
         let small = linear(-2.1e-4, 2.1e-4, 4.0, None);
         assert_eq!(labels(&small), ["−200", "0", "200"]);
         assert_eq!(small.factor.as_deref(), Some("×10^{−6}"));
