@@ -20,6 +20,9 @@
 //! assert!(low < 8.0 && 8.0 < high && high - low < 1.0);
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
+//!
+//! Matrices are those of `nalgebra`, which a program that uses this crate depends on, too; the spectra
+//! and records are those of `mechid-signal`.
 
 pub mod checks;
 pub mod derivatives;

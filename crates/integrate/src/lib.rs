@@ -29,6 +29,9 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! `mechid-model` has the systems and `mechid-signal` the forces: a program that uses this crate depends
+//! on them, too.
+//!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
 //! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
 //! fail nor allocate. [`integrate()`] and [`integrate_periodic`] run it over a sampled force,

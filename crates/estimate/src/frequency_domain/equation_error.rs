@@ -51,15 +51,46 @@ pub fn equation_error(
 /// # Errors
 /// [`EstimateError::NoExcitedLine`] if no row carries force.
 pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateError> {
+    weighted_rows(data, |_| 1.0)
+}
+
+/// [`equation_error`] with every row divided by what the stated noise puts into its equation, by
+/// the measured receptance: of frequency responses the weight is the coherence over what it lacks
+/// of 1, so that lines which only noise has reached do not decide.
+///
+/// Nothing if no noise is stated, or none at some row, or if it leaves a parameter open.
+pub(super) fn weighted_equation_error(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+) -> Option<Estimate> {
+    let noise = data.noise()?;
+    let n = data.dof();
+    let weight = |row: usize| {
+        let spread = noise.covariance(row).diagonal().map(|variance| variance.re);
+        let (motion, force) =
+            (data.displacement().row(row).norm_squared(), data.force().row(row).norm_squared());
+        if motion == 0.0 || force == 0.0 {
+            return 0.0;
+        }
+        (force * (spread.rows(0, n).sum() / motion) + spread.rows(n, n).sum()).sqrt().recip()
+    };
+    let found = weighted_rows(data, weight).ok()?.solve(unknowns).ok()?;
+    found.check_determined().ok().map(|()| found)
+}
+
+fn weighted_rows(
+    data: &FrequencyData,
+    weight: impl Fn(usize) -> f64,
+) -> Result<EquationOfMotion, EstimateError> {
     if data.force().iter().all(|f| *f == Complex::default()) {
         return Err(EstimateError::NoExcitedLine);
     }
     let s = |row: usize| Complex::new(0.0, data.omega()[row]);
     let x = data.displacement();
-    let velocity = real_rows(x, |row, x| s(row) * x);
-    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x);
-    let displacement = real_rows(x, |_, x| x);
-    let force = real_rows(data.force(), |_, f| f);
+    let velocity = real_rows(x, |row, x| s(row) * x * weight(row));
+    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight(row));
+    let displacement = real_rows(x, |row, x| x * weight(row));
+    let force = real_rows(data.force(), |row, f| f * weight(row));
     let mut rows = EquationOfMotion::new(data.dof());
     rows.push_rows(
         acceleration.as_view(),

@@ -2,6 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::equation_error::weighted_equation_error;
 use super::levenberg_marquardt::{Minimum, SumOfSquares, minimise};
 use super::misfit::{Misfit, Noise, output_weights};
 use super::{FrequencyData, NoiseSpectrum, equation_error};
@@ -34,7 +35,8 @@ const MAX_ROUNDS: usize = 10;
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
 ///
 /// Minimises the weighted distance between measured displacement and G(ω) F, by Gauss–Newton
-/// steps from the [`equation_error`] estimate. Unbiased and of least scatter to first order
+/// steps from the [`equation_error`] estimate, or from the same with its rows weighted by the noise
+/// stated where that is nearer. Unbiased and of least scatter to first order
 /// in the noise. The weights come from [`FrequencyData::noise`]:
 ///
 /// - noise on displacement alone (force exact): the output-error estimator;
@@ -59,8 +61,7 @@ pub fn output_error(
 ) -> Result<OutputErrorFit, EstimateError> {
     let start = equation_error(data, unknowns)?;
     start.check_determined()?;
-    let theta =
-        DVector::from_iterator(start.parameters().len(), start.parameters().map(|p| p.value));
+    let theta = values(&start);
     match data.noise() {
         Some(noise) => with_known_noise(data, unknowns, noise, theta),
         None => with_white_noise(data, unknowns, theta),
@@ -77,6 +78,8 @@ fn with_known_noise(
     let weights =
         if noise.has_force() { Noise::Both(noise) } else { Noise::Output(output_weights(noise)?) };
     let mut misfit = Misfit::new(data, unknowns, weights);
+    let weighted = weighted_equation_error(data, unknowns).map(|found| values(&found));
+    let theta = nearest(&mut misfit, theta, weighted);
     let fit = search(&mut misfit, theta)?;
     let spare = spare(data, &fit.theta);
     // A sampled covariance makes the weights too large by ν/(ν − n) on average.
@@ -135,6 +138,29 @@ fn with_white_noise(
         levels = found.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
     }
     Err(EstimateError::NotConverged { steps })
+}
+
+fn values(estimate: &Estimate) -> DVector<f64> {
+    let parameters = estimate.parameters();
+    DVector::from_iterator(parameters.len(), parameters.map(|p| p.value))
+}
+
+/// The start that misses the data least: far from the minimum a search may run off to a machine
+/// so heavy or stiff that it does not move.
+fn nearest(
+    misfit: &mut Misfit<'_>,
+    theta: DVector<f64>,
+    other: Option<DVector<f64>>,
+) -> DVector<f64> {
+    let mut residual = DVector::zeros(misfit.residuals());
+    let mut cost = |theta: &DVector<f64>| match misfit.residual(theta, &mut residual) {
+        true => residual.norm_squared(),
+        false => f64::INFINITY,
+    };
+    match other {
+        Some(other) if cost(&other) < cost(&theta) => other,
+        _ => theta,
+    }
 }
 
 /// The minimum, at which `misfit` is left evaluated.

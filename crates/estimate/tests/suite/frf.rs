@@ -406,3 +406,36 @@ fn some_responses_are_those_estimated_on_their_lines_alone() {
     assert_eq!(some, on(places.map(|at| lines[at]).to_vec()));
     assert_eq!(some.data(&[0, 1]).unwrap().len(), 2 * places.len());
 }
+
+/// Accelerances of which the upper half is nothing but noise, as above the band of a random
+/// excitation: by the coherence they weigh next to nothing, in the start of the search as in its end.
+#[test]
+fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
+    let system = oscillator();
+    let natural = system.modes().unwrap().last().unwrap().natural_frequency();
+    let omega: Vec<f64> = (1..=200).map(|n| f64::from(n) * natural / 25.0).collect();
+    let averages = 60.0;
+    let mut coherence = DMatrix::zeros(omega.len(), 1);
+    let response = omega.iter().enumerate().map(|(at, &w)| {
+        let exact = -w * w * system.receptance(w).unwrap()[(0, 0)];
+        let level = if at < 100 { 1e-3 } else { 300.0 } / system.mass()[(0, 0)];
+        let error = Complex::from_polar(level, (at * at) as f64);
+        let measured = exact + error;
+        coherence[(at, 0)] = 1.0 / (1.0 + level * level * (averages - 1.0) / measured.norm_sqr());
+        DMatrix::from_element(1, 1, measured)
+    });
+    let response = response.collect();
+    let frf = Frf::new(omega.clone(), response, coherence, averages, Motion::Acceleration).unwrap();
+    let fit = output_error(&frf.data(&[0]).unwrap(), &Unknowns::unknown_mass(1).unwrap()).unwrap();
+    let truth = [system.mass()[(0, 0)], system.damping()[(0, 0)], system.stiffness()[(0, 0)]];
+    for (found, truth) in fit.estimate.parameters().zip(truth) {
+        let error = (found.value - truth).abs();
+        assert!(
+            error < 4.0 * found.standard_error,
+            "{} = {}, truth {truth}",
+            found.parameter,
+            found.value
+        );
+        assert!(error < 0.01 * truth, "{} = {}, truth {truth}", found.parameter, found.value);
+    }
+}
