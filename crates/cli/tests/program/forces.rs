@@ -217,3 +217,23 @@ fn nothing_is_left_of_a_file_begun_when_the_end_of_the_record_is_bad() {
         assert_eq!(left, ["machine.json", "rec.csv"]);
     }
 }
+
+/// Line 3 of a period of 64 samples is line 12 of four of them: whoever forgets --period is told
+/// that the motion is elsewhere.
+#[test]
+fn lines_of_another_period_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let wave = |k: u32| 1e-3 * (std::f64::consts::TAU * 3.0 * f64::from(k) / 64.0).sin();
+    let rows: String = (0..256).map(|k| format!("{}\n", wave(k))).collect();
+    fs::write(folder.path().join("x.csv"), format!("x\n{rows}")).unwrap();
+    let machine = r#"{"system": {"mass": 25, "damping": 190, "stiffness": 142e3}}"#;
+    fs::write(folder.path().join("machine.json"), machine).unwrap();
+    let notes = |window: &str| {
+        let call = "force x.csv --sample-rate 64 --system machine.json --displacement x --lines 3";
+        let told = mechid(folder.path(), &format!("{call} {window}"));
+        told.lines().filter(|line| line.contains("the lines given hold")).count()
+    };
+    assert_eq!(notes(""), 1);
+    assert_eq!(notes("--method shrinkage"), 1);
+    assert_eq!(notes("--period 64"), 0);
+}

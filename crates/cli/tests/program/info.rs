@@ -149,3 +149,22 @@ fn a_mean_of_zero_is_told_as_zero() {
     assert_eq!(report["channels"][0]["mean"], 0.0);
     close(&report["channels"][1]["mean"], 1e-9, 1e-11);
 }
+
+/// One period alone does not repeat; where --period says that it is one, its lines are exact, and
+/// neighbours do not mix as they do under a window.
+#[test]
+fn a_period_that_is_given_has_exact_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let force = |k: u32, line: u32, phase: f64| (TAU * f64::from(k * line) / 64.0 + phase).cos();
+    let rows: String = (0..64)
+        .map(|k| format!("{}\n", force(k, 3, 0.0) + 5.0 * force(k, 4, 2.0) + force(k, 5, 1.0)))
+        .collect();
+    fs::write(folder.path().join("one.csv"), format!("f\n{rows}")).unwrap();
+    for window in ["--period 64", "--start 1 --period 64 --periods 1"] {
+        let report = info(&folder, &format!("one.csv --sample-rate 64 {window}"));
+        let peaks = report["channels"][0]["spectrum_peaks"].as_array().unwrap();
+        assert_eq!(peaks.len(), 1, "{peaks:?}");
+        close(&peaks[0]["frequency_hz"], 4.0, 1e-12);
+        close(&peaks[0]["amplitude"], 5.0, 1e-12);
+    }
+}

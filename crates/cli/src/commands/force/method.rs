@@ -1,5 +1,7 @@
 //! The methods, which of them suits a record, and what it finds.
 
+use std::f64::consts::TAU;
+
 use clap::ValueEnum;
 use mechid::force::{
     Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement, Noise,
@@ -7,6 +9,7 @@ use mechid::force::{
     inner_lines, kalman, regularised, with_uncertain_system,
 };
 use mechid::model::SecondOrderSystem;
+use mechid::signal::Spectrum;
 
 use super::machine::Machine;
 use super::motion::{complete, response};
@@ -72,6 +75,8 @@ pub struct How {
     pub counts_noise: bool,
     /// Parameters that were chosen, with their units.
     pub chosen: Vec<(String, f64, &'static str)>,
+    /// What to beware of.
+    pub remark: Option<String>,
 }
 
 /// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
@@ -165,7 +170,7 @@ impl How {
         } else {
             "equation of motion from sample to sample, the force linear between them"
         };
-        Self { method, why, counts_noise: false, chosen: Vec::new() }
+        Self { method, why, counts_noise: false, chosen: Vec::new(), remark: None }
     }
 }
 
@@ -189,8 +194,8 @@ fn lines(
     let force = with_machine(machine, &find)?;
     let chosen = vec![("lines used".into(), lines.len() as f64, "")];
     let counts_noise = noise != Noise::Unknown;
-    let how = How { method: "dynamic stiffness, line by line", why, counts_noise, chosen };
-    Ok(Found { force, how })
+    let (method, remark) = ("dynamic stiffness, line by line", elsewhere(motion, request));
+    Ok(Found { force, how: How { method, why, counts_noise, chosen, remark } })
 }
 
 fn filtered(
@@ -232,7 +237,35 @@ fn filtered(
         Filter::TruncatedSvd(_) => "truncated singular value decomposition",
         _ => "mean of the force given the measurement (shrinkage)",
     };
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen } })
+    let remark = elsewhere(motion, request);
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, remark } })
+}
+
+/// Less of a motion than this on the lines of the force says that it has another cause.
+const FEW: f64 = 0.5;
+
+/// Tells of the channel of which the lines given hold least, if that is little: they may have been
+/// counted in another period than that of the window.
+fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
+    let lines = request.lines.as_deref().filter(|_| request.periodic)?;
+    let spectrum = Spectrum::of(motion.record());
+    let power = |lines: &mut dyn Iterator<Item = usize>, channel: usize| -> f64 {
+        lines.map(|n| spectrum.line(n, channel).norm_sqr()).sum()
+    };
+    let shares = (0..motion.channels().len()).map(|channel| {
+        let all = power(&mut (1..spectrum.len()), channel);
+        let held = power(&mut lines.iter().copied(), channel);
+        (channel, if all > 0.0 { held / all } else { 1.0 })
+    });
+    let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
+    let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
+    Some(format!(
+        "the lines given hold {} % of the power of channel {} about its mean, and a force on others \
+         is not sought: they are counted in the period of {samples} samples, {} Hz apart",
+        significant(100.0 * share, 3),
+        channel + 1,
+        significant(step, 5)
+    ))
 }
 
 /// The noise of every channel measured, in its own unit.
@@ -280,7 +313,7 @@ fn smoothed(
     }
     chosen.extend(noise_levels(motion, &found.noise));
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen } })
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, remark: None } })
 }
 
 /// A chosen parameter as a person reads it.

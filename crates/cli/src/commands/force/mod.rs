@@ -161,6 +161,7 @@ impl ForceArgs {
     ) -> Report {
         let mut remarks: Vec<String> = recorded.converted().into_iter().cloned().collect();
         remarks.extend(taken.remark());
+        remarks.extend(how.remark.clone());
         if machine.covariance.is_some() && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \

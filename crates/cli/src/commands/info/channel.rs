@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid::signal::{Record, Repetition, Sampling, SignalError, Spectrum, repetition};
+use mechid::signal::{Record, Sampling, SignalError, Spectrum, repetition};
 use serde::Serialize;
 
 use crate::commands::levels::Levels;
@@ -75,17 +75,19 @@ impl Gathered {
 }
 
 impl Channel {
-    /// Measures a channel whose step, in s, may be unknown.
+    /// Measures a channel whose step, in s, may be unknown, and of which a period may be `given`.
     pub fn of(
         column: usize,
         name: String,
         about: String,
         gathered: Gathered,
         dt: Option<f64>,
+        given: Option<usize>,
     ) -> Result<Self, SignalError> {
         let Gathered { levels, held, mean_of_held } = gathered;
         let repeats = repetition(&held);
-        let spectrum_peaks = spectrum_peaks(held, mean_of_held, repeats, dt)?;
+        let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
+        let spectrum_peaks = spectrum_peaks(held, mean_of_held, period, dt)?;
         let Levels { peak, minimum, maximum, .. } = levels;
         Ok(Self {
             column,
@@ -107,21 +109,24 @@ impl Channel {
     }
 }
 
+/// Amplitudes closer than this, relative to the largest, are one.
+const EQUAL: f64 = 1e-9;
+
 /// The strongest local maxima of the spectrum about the mean: of whole periods where the channel
-/// repeats, otherwise of all samples weighted by a Hann window.
+/// repeats or somebody says so, otherwise of all samples weighted by a Hann window.
 fn spectrum_peaks(
     mut values: Vec<f64>,
     mean: f64,
-    repeats: Option<Repetition>,
+    period: Option<usize>,
     dt: Option<f64>,
 ) -> Result<Vec<SpectrumPeak>, SignalError> {
-    if let Some(Repetition { period, .. }) = repeats {
+    if let Some(period) = period {
         values.truncate(values.len() / period * period);
     }
     let len = values.len();
     for (k, value) in values.iter_mut().enumerate() {
         // The window's mean is 1, so that a sine keeps its amplitude.
-        let weight = match repeats {
+        let weight = match period {
             Some(_) => 1.0,
             None => 1.0 - (TAU * k as f64 / len as f64).cos(),
         };
@@ -130,11 +135,14 @@ fn spectrum_peaks(
     let spectrum = Spectrum::of(&Record::from_channel(Sampling::new(1.0, len)?, values)?);
     let amplitude: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
     let at = |n: usize| amplitude.get(n).copied().unwrap_or(0.0);
-    let mut peaks: Vec<usize> =
-        (1..amplitude.len()).filter(|n| at(*n) > at(n - 1) && at(*n) >= at(n + 1)).collect();
-    peaks.sort_by(|a, b| at(*b).total_cmp(&at(*a)));
-    let strongest = peaks.first().map_or(0.0, |n| at(*n));
-    let told = peaks.into_iter().take(STRONGEST).take_while(|n| at(*n) > FAINTEST * strongest);
+    let strongest = amplitude.iter().skip(1).copied().fold(0.0, f64::max);
+    // Lines of the same amplitude but for rounding stand in order.
+    let level = |n: usize| (at(n) / strongest / EQUAL).round();
+    let mut peaks: Vec<usize> = (1..amplitude.len())
+        .filter(|n| level(*n) >= level(n - 1).max(level(n + 1)) && at(*n) > FAINTEST * strongest)
+        .collect();
+    peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
+    let told = peaks.into_iter().take(STRONGEST);
     Ok(told
         .map(|n| {
             let cycles_per_sample = n as f64 / len as f64;

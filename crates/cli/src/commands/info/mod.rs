@@ -20,9 +20,9 @@ use crate::outcome::Outcome;
 ///
 /// For every channel: mean, RMS and peak value in its own unit, the crest factor, the strongest
 /// lines of its spectrum with their amplitudes, and the period, in samples, if it repeats. The
-/// spectrum is that of whole periods or, where nothing repeats, of the window weighted by a Hann
-/// window. Of a text of more than 262144 rows, only the levels are those of all samples of the
-/// window: lines and period are those of its first 262144 samples.
+/// spectrum is that of whole periods where the channel repeats or --period says so, otherwise of the
+/// window weighted by a Hann window. Of a text of more than 262144 rows, only the levels are those
+/// of all samples of the window: lines and period are those of its first 262144 samples.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid info record.csv
@@ -63,7 +63,7 @@ impl InfoArgs {
             Some((start, len)) if !shown.is_empty() => {
                 let hold = if file.is_whole() { len } else { len.min(HELD) };
                 remarks.extend(looked_at(table.file(), start, len, hold));
-                channels(&file, &shown, start..start + len, hold, dt)?
+                channels(&file, &shown, start..start + len, hold, (dt, self.input.period))?
             }
             _ => Vec::new(),
         };
@@ -171,13 +171,14 @@ fn looked_at(file: &str, start: usize, len: usize, hold: usize) -> Option<String
     })
 }
 
-/// Measures the window of some columns; of its samples so many are looked at together.
+/// Measures the window of some columns, with the step and the period if they are known; of its
+/// samples so many are looked at together.
 fn channels(
     file: &RecordFile,
     shown: &[Shown],
     window: Range<usize>,
     hold: usize,
-    dt: Option<f64>,
+    (dt, period): (Option<f64>, Option<usize>),
 ) -> Result<Vec<Channel>, CliError> {
     // A text is read once for all columns; of what is held, one copy at a time is enough.
     let at_once = if file.is_whole() { 1 } else { shown.len() };
@@ -196,7 +197,7 @@ fn channels(
         })?;
         for (column, gathered) in columns.into_iter().zip(gathered) {
             let (name, about) = (table.names()[column].clone(), table.about(column).into());
-            channels.push(Channel::of(column + 1, name, about, gathered, dt)?);
+            channels.push(Channel::of(column + 1, name, about, gathered, dt, period)?);
         }
     }
     Ok(channels)
