@@ -232,6 +232,8 @@ pub enum CliError {
         "nothing to plot: several forces act on every line, so the record shows no single receptance"
     )]
     NothingToDraw,
+    #[error("{file}: nothing to plot: the machine has no natural frequency other than zero")]
+    NothingResonates { file: String },
     /// A fit sample by sample has no receptances.
     #[error("there are no spectra to draw: the fit was done sample by sample")]
     NoSpectra,

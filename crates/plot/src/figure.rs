@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::bitmap;
 use crate::canvas::Canvas;
+use crate::curve::Reference;
 use crate::draw;
 use crate::error::PlotError;
 use crate::layout::Layout;
@@ -68,6 +69,18 @@ impl Figure {
     #[must_use]
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = Some((width, height));
+        self
+    }
+
+    /// Marks these abscissae, in the unit of their axis, by vertical reference lines through every
+    /// panel, which the legend of the first names once.
+    #[must_use]
+    pub fn mark_x(mut self, label: &str, values: &[f64]) -> Self {
+        for (at, panel) in self.panels.iter_mut().enumerate() {
+            let named = |k: usize| if (at, k) == (0, 0) { label } else { "" };
+            let lines = values.iter().enumerate();
+            panel.references.extend(lines.map(|(k, x)| Reference::vertical(named(k), *x)));
+        }
         self
     }
 

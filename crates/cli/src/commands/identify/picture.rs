@@ -120,6 +120,10 @@ impl Trace {
         trace
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.magnitude.is_empty()
+    }
+
     pub fn as_response(&self) -> FrequencyResponse<'_> {
         FrequencyResponse {
             name: &self.name,

@@ -1,5 +1,7 @@
 //! `mechid simulate`: the record an experiment would give.
 
+mod picture;
+
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,7 +11,7 @@ use mechid::signal::Record;
 use serde::Serialize;
 
 use crate::error::CliError;
-use crate::options::ReportArgs;
+use crate::options::{PlotArgs, ReportArgs};
 use crate::outcome::Outcome;
 use crate::text_table::{compact, significant, text_table};
 
@@ -47,10 +49,13 @@ use crate::text_table::{compact, significant, text_table};
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed
+///
+/// The picture shows over time what the record holds, noise and all, of up to four degrees of freedom.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
     after_help = "Examples:\n  mechid simulate examples/machine.json --output record.csv\n  \
+                  mechid simulate examples/machine.json --output record.csv --plot run.svg\n  \
                   mechid identify record.csv --force force --displacement displacement"
 )]
 pub struct SimulateArgs {
@@ -61,6 +66,8 @@ pub struct SimulateArgs {
     /// with several degrees of freedom force_1, force_2, …
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
+    #[command(flatten)]
+    plot: PlotArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -106,30 +113,18 @@ impl SimulateArgs {
         let experiment = Experiment::read(&self.experiment)?;
         let simulation = mechid::simulate(&experiment)?;
         let groups = groups(&simulation);
-        let mut columns: Vec<&[f64]> = Vec::new();
-        let mut channels: Vec<Channel> = Vec::new();
-        for (name, unit, truth, measured) in groups {
-            for dof in 0..measured.channels() {
-                let column = match measured.channels() {
-                    1 => name.to_string(),
-                    _ => format!("{name}_{}", dof + 1),
-                };
-                let noise = measured.column(dof) - truth.column(dof);
-                let per_sample = (measured.len() as f64).sqrt();
-                channels.push(Channel {
-                    column,
-                    unit,
-                    rms: measured.column(dof).norm() / per_sample,
-                    noise_rms: noise.norm() / per_sample,
-                });
-                columns.push(measured.channel(dof));
-            }
-        }
+        let channels: Vec<Channel> = groups.iter().flat_map(Channel::of).collect();
+        let columns: Vec<&[f64]> = groups
+            .iter()
+            .flat_map(|g| (0..g.measured.channels()).map(|dof| g.measured.channel(dof)))
+            .collect();
         let names: Vec<&str> = channels.iter().map(|c| c.column.as_str()).collect();
         let mut file = CsvFile::begin(&self.output, simulation.force.sampling(), &names)?;
         file.append(&columns)?;
         let report = self.describe(&experiment, &simulation, channels)?;
-        Ok(Outcome::new(report.text(), &report)?.with_begun(file.finish()?))
+        Outcome::new(report.text(), &report)?
+            .with_begun(file.finish()?)
+            .with_plot(&self.plot, || Ok(picture::figure(&report.record, &groups)))
     }
 
     fn describe(
@@ -164,8 +159,15 @@ impl SimulateArgs {
     }
 }
 
-/// Name, unit, truth and measurement of each quantity.
-fn groups(s: &Simulation) -> [(&'static str, &'static str, &Record, &Record); 4] {
+/// One quantity of all degrees of freedom, before and after noise.
+struct Group<'a> {
+    name: &'static str,
+    unit: &'static str,
+    truth: &'a Record,
+    measured: &'a Record,
+}
+
+fn groups(s: &Simulation) -> [Group<'_>; 4] {
     let (truth, measured) = (&s.response, &s.measured_response);
     [
         ("force", "N", &s.force, &s.measured_force),
@@ -173,6 +175,29 @@ fn groups(s: &Simulation) -> [(&'static str, &'static str, &Record, &Record); 4]
         ("velocity", "m/s", truth.velocity(), measured.velocity()),
         ("acceleration", "m/s²", truth.acceleration(), measured.acceleration()),
     ]
+    .map(|(name, unit, truth, measured)| Group { name, unit, truth, measured })
+}
+
+impl Channel {
+    /// One for each degree of freedom.
+    fn of(group: &Group<'_>) -> Vec<Self> {
+        let Group { name, unit, truth, measured } = *group;
+        let channel = |dof: usize| {
+            let column = match measured.channels() {
+                1 => name.to_string(),
+                _ => format!("{name}_{}", dof + 1),
+            };
+            let noise = measured.column(dof) - truth.column(dof);
+            let per_sample = (measured.len() as f64).sqrt();
+            Self {
+                column,
+                unit,
+                rms: measured.column(dof).norm() / per_sample,
+                noise_rms: noise.norm() / per_sample,
+            }
+        };
+        (0..measured.channels()).map(channel).collect()
+    }
 }
 
 impl Report {

@@ -1,5 +1,7 @@
 //! `mechid modal`: frequencies, damping ratios and shapes of a machine.
 
+mod picture;
+
 use std::path::PathBuf;
 
 use clap::Args;
@@ -11,7 +13,7 @@ use serde::Serialize;
 
 use super::identify::report::{CONFIDENCE, Uncertain};
 use crate::error::CliError;
-use crate::options::ReportArgs;
+use crate::options::{PlotArgs, ReportArgs};
 use crate::outcome::Outcome;
 use crate::text_table::{compact, significant, text_table};
 
@@ -19,15 +21,21 @@ use crate::text_table::{compact, significant, text_table};
 ///
 /// The file is the description of a machine, or what `mechid identify --json` printed: then every
 /// frequency, ratio and shape comes with the standard error that the uncertainty of mass, damping and
-/// stiffness gives it. Shapes are scaled so that their largest entry is 1.
+/// stiffness gives it. Shapes are scaled so that their largest entry is 1. The picture shows the
+/// receptance of the machine around its natural frequencies: of one or two degrees of freedom for
+/// every pair of motion and force, of more where motion and force share their place, up to six of
+/// them.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
-  mechid modal found.json")]
+  mechid modal found.json
+  mechid modal examples/machine.json --plot modes.svg")]
 pub struct ModalArgs {
     /// JSON with a `system`: mass, damping and stiffness in kg, N·s/m and N/m
     #[arg(value_name = "SYSTEM.json")]
     system: PathBuf,
+    #[command(flatten)]
+    plot: PlotArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -83,7 +91,13 @@ impl ModalArgs {
             modes: rows.collect::<Result<_, _>>()?,
             system: SystemMatrices::from(&system),
         };
-        Outcome::new(report.text(), &report)
+        Outcome::new(report.text(), &report)?.with_plot(&self.plot, || {
+            let of = |found: &IdentifiedMode| {
+                (found.natural_frequency_hz.value, found.damping_ratio.value)
+            };
+            let resonances: Vec<_> = modes.iter().map(of).collect();
+            picture::figure(&report.file, &system, &resonances)
+        })
     }
 }
 
