@@ -232,6 +232,10 @@ pub enum CliError {
         "nothing to plot: several forces act on every line, so the record shows no single receptance"
     )]
     NothingToDraw,
+    /// A record without numbers but those of time.
+    #[error("{file}: nothing to plot: no column other than time holds numbers")]
+    NoColumnToDraw { file: String },
+    /// A mass without a spring.
     #[error("{file}: nothing to plot: the machine has no natural frequency other than zero")]
     NothingResonates { file: String },
     /// A fit sample by sample has no receptances.

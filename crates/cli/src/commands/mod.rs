@@ -6,6 +6,7 @@
 //! [`CliError`].
 
 mod completions;
+mod extremes;
 mod force;
 mod frf;
 mod identify;

@@ -6,6 +6,7 @@ mod identification;
 mod info;
 mod lines;
 mod modal;
+mod pictures;
 mod records;
 mod reference;
 mod stretches;

@@ -339,6 +339,36 @@ fn what_is_wrong_near_the_end_of_a_long_text_is_told_with_its_line() {
     assert!(message.contains(what), "{message}");
 }
 
+/// Over time all of a window is drawn, held or not.
+#[test]
+fn a_long_text_is_drawn_whole() {
+    let folder = records();
+    let lines = |file: &str| -> Vec<String> {
+        mechid(folder.path(), &format!("info {file} --columns f,x --plot all.svg --quiet"));
+        let svg = fs::read_to_string(folder.path().join("all.svg")).unwrap();
+        let only = "rec.csv; spectra of samples 1 to 262144";
+        assert_eq!(svg.contains(only), file == "rec.csv");
+        let document = roxmltree::Document::parse(&svg).unwrap();
+        let curves = document.descendants().filter(|n| n.attribute("class") == Some("curve"));
+        let path = |n: roxmltree::Node<'_, '_>| {
+            n.descendants().find_map(|n| n.attribute("d")).unwrap().into()
+        };
+        curves.step_by(2).map(path).collect()
+    };
+    let (text, held) = (lines("rec.csv"), lines("rec.mat"));
+    assert_eq!(text.len(), 2);
+    assert!(text == held);
+    // The noise of the last periods, which are not held, stands out.
+    let heights: Vec<f64> =
+        text[0].split([' ', 'L']).skip(1).step_by(2).map(|y| y.parse().unwrap()).collect();
+    let spread = |heights: &[f64]| {
+        heights.iter().fold(0.0, |most: f64, y| most.max(*y))
+            - heights.iter().fold(f64::MAX, |least, y| least.min(*y))
+    };
+    let end = heights.len() * 97 / 100;
+    assert!(spread(&heights[end..]) > 1.3 * spread(&heights[..end]));
+}
+
 #[test]
 fn the_page_of_a_long_text_is_that_of_the_record_in_memory() {
     let folder = records();

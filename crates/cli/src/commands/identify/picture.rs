@@ -76,9 +76,16 @@ fn fine_grid(omega: &[f64]) -> Vec<f64> {
     (0..=FINE).map(|k| low + (high - low) * k as f64 / FINE as f64).collect()
 }
 
-/// The angle on the branch next to another one, both in degrees.
+/// The angle on the branch next to another one, both in degrees. Of two that are as near, as there
+/// are where a machine without damping turns over, the smaller one, or −180° of ±180°.
 fn next_to(other: f64, angle: f64) -> f64 {
-    angle - 360.0 * ((angle - other) / 360.0).round()
+    const ALIKE: f64 = 1e-6;
+    let near = angle - 360.0 * ((angle - other) / 360.0).round();
+    let beyond = near - (near - other).signum() * 360.0;
+    let smaller = beyond.abs() < near.abs() - ALIKE;
+    let negative = beyond.abs() < near.abs() + ALIKE && beyond < near;
+    let as_near = (near - other).abs() > 180.0 - ALIKE;
+    if as_near && (smaller || negative) { beyond } else { near }
 }
 
 impl Trace {

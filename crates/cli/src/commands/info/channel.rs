@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use mechid::signal::{Record, Sampling, SignalError, Spectrum, repetition};
 use serde::Serialize;
 
+use crate::commands::extremes::Extremes;
 use crate::commands::levels::Levels;
 
 /// Spectral lines told of a channel.
@@ -60,12 +61,30 @@ pub struct Gathered {
     /// The first samples, which are looked at together.
     held: Vec<f64>,
     mean_of_held: f64,
+    /// What a picture shows over time; nothing if none is drawn.
+    extremes: Option<Extremes>,
+}
+
+/// A channel with what a picture shows of it.
+pub struct Measured {
+    pub channel: Channel,
+    pub lines: Lines,
+    /// Nothing if it is not drawn.
+    pub extremes: Option<Extremes>,
 }
 
 impl Gathered {
+    /// Nothing yet of a channel that may be drawn, over a window of so many samples.
+    pub fn of(window: usize, drawn: bool) -> Self {
+        Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
+    }
+
     /// The next samples; whole blocks are held until there are `hold` of them.
     pub fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
+        if let Some(extremes) = &mut self.extremes {
+            extremes.push(values);
+        }
         if self.held.len() < hold {
             self.held.extend_from_slice(values);
             self.mean_of_held = self.levels.mean();
@@ -74,7 +93,7 @@ impl Gathered {
     }
 }
 
-impl Channel {
+impl Measured {
     /// Measures a channel whose step, in s, may be unknown, and of which a period may be `given`.
     pub fn of(
         column: usize,
@@ -84,12 +103,12 @@ impl Channel {
         dt: Option<f64>,
         given: Option<usize>,
     ) -> Result<Self, SignalError> {
-        let Gathered { levels, held, mean_of_held } = gathered;
+        let Gathered { levels, held, mean_of_held, extremes } = gathered;
         let repeats = repetition(&held);
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
-        let spectrum_peaks = spectrum_peaks(held, mean_of_held, period, dt)?;
+        let lines = Lines::of(held, mean_of_held, period)?;
         let Levels { peak, minimum, maximum, .. } = levels;
-        Ok(Self {
+        let channel = Channel {
             column,
             name,
             about,
@@ -99,58 +118,83 @@ impl Channel {
             crest_factor: (peak > 0.0).then(|| peak / levels.rms()),
             minimum,
             maximum,
-            spectrum_peaks,
+            spectrum_peaks: lines.strongest(dt),
             period: repeats.map(|r| Period {
                 samples: r.period,
                 seconds: dt.map(|dt| r.period as f64 * dt),
                 mismatch: r.mismatch,
             }),
-        })
+        };
+        Ok(Self { channel, lines, extremes })
     }
 }
 
 /// Amplitudes closer than this, relative to the largest, are one.
 const EQUAL: f64 = 1e-9;
 
-/// The strongest local maxima of the spectrum about the mean: of whole periods where the channel
-/// repeats or somebody says so, otherwise of all samples weighted by a Hann window.
-fn spectrum_peaks(
-    mut values: Vec<f64>,
-    mean: f64,
+/// The spectrum about the mean: of whole periods where the channel repeats or somebody says so,
+/// otherwise of all samples weighted by a Hann window.
+pub struct Lines {
+    /// From zero on.
+    amplitude: Vec<f64>,
+    /// That were transformed.
+    samples: usize,
     period: Option<usize>,
-    dt: Option<f64>,
-) -> Result<Vec<SpectrumPeak>, SignalError> {
-    if let Some(period) = period {
-        values.truncate(values.len() / period * period);
+}
+
+impl Lines {
+    fn of(mut values: Vec<f64>, mean: f64, period: Option<usize>) -> Result<Self, SignalError> {
+        if let Some(period) = period {
+            values.truncate(values.len() / period * period);
+        }
+        let samples = values.len();
+        for (k, value) in values.iter_mut().enumerate() {
+            // The window's mean is 1, so that a sine keeps its amplitude.
+            let weight = match period {
+                Some(_) => 1.0,
+                None => 1.0 - (TAU * k as f64 / samples as f64).cos(),
+            };
+            *value = weight * (*value - mean);
+        }
+        let record = Record::from_channel(Sampling::new(1.0, samples)?, values)?;
+        let spectrum = Spectrum::of(&record);
+        let amplitude = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
+        Ok(Self { amplitude, samples, period })
     }
-    let len = values.len();
-    for (k, value) in values.iter_mut().enumerate() {
-        // The window's mean is 1, so that a sine keeps its amplitude.
-        let weight = match period {
-            Some(_) => 1.0,
-            None => 1.0 - (TAU * k as f64 / len as f64).cos(),
-        };
-        *value = weight * (*value - mean);
-    }
-    let spectrum = Spectrum::of(&Record::from_channel(Sampling::new(1.0, len)?, values)?);
-    let amplitude: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
-    let at = |n: usize| amplitude.get(n).copied().unwrap_or(0.0);
-    let strongest = amplitude.iter().skip(1).copied().fold(0.0, f64::max);
-    // Lines of the same amplitude but for rounding stand in order.
-    let level = |n: usize| (at(n) / strongest / EQUAL).round();
-    let mut peaks: Vec<usize> = (1..amplitude.len())
-        .filter(|n| level(*n) >= level(n - 1).max(level(n + 1)) && at(*n) > FAINTEST * strongest)
-        .collect();
-    peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
-    let told = peaks.into_iter().take(STRONGEST);
-    Ok(told
-        .map(|n| {
-            let cycles_per_sample = n as f64 / len as f64;
-            SpectrumPeak {
-                cycles_per_sample,
-                frequency_hz: dt.map(|dt| cycles_per_sample / dt),
-                amplitude: at(n),
-            }
+
+    /// The highest of those that no neighbour surpasses, the strongest first.
+    fn strongest(&self, dt: Option<f64>) -> Vec<SpectrumPeak> {
+        let at = |n: usize| self.amplitude.get(n).copied().unwrap_or(0.0);
+        let strongest = self.amplitude.iter().skip(1).copied().fold(0.0, f64::max);
+        // Lines of the same amplitude but for rounding stand in order.
+        let level = |n: usize| (at(n) / strongest / EQUAL).round();
+        let is_peak = |n: &usize| level(*n) >= level(n - 1).max(level(n + 1));
+        let mut peaks: Vec<usize> = (1..self.amplitude.len())
+            .filter(|n| is_peak(n) && at(*n) > FAINTEST * strongest)
+            .collect();
+        peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
+        let told = peaks.into_iter().take(STRONGEST);
+        told.map(|n| SpectrumPeak {
+            cycles_per_sample: self.cycles_per_sample(n),
+            frequency_hz: dt.map(|dt| self.cycles_per_sample(n) / dt),
+            amplitude: at(n),
         })
-        .collect())
+        .collect()
+    }
+
+    fn cycles_per_sample(&self, n: usize) -> f64 {
+        n as f64 / self.samples as f64
+    }
+
+    /// Samples of the period whose mean [`points`](Self::points) are of.
+    pub fn period(&self) -> Option<usize> {
+        self.period
+    }
+
+    /// Cycles per sample and amplitudes, without the mean: of the mean period where there is one.
+    pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
+        let every = self.period.map_or(1, |period| self.samples / period);
+        let lines = self.amplitude.iter().copied().enumerate().step_by(every).skip(1);
+        lines.map(|(n, amplitude)| (self.cycles_per_sample(n), amplitude))
+    }
 }

@@ -1,19 +1,19 @@
 //! `mechid info`: what is in a record.
 
 mod channel;
+mod measured;
+mod picture;
 mod report;
-
-use std::ops::Range;
 
 use clap::Args;
 use mechid::io::{Inventory, IoError, RecordFile, Table, TimeAxis};
 use mechid::signal;
 
-use self::channel::{Channel, Gathered};
-use self::report::{Report, Sampling, Scalar, Window};
+use self::measured::{Shown, Span, measured};
+use self::report::Report;
 use super::identify::measurement::HELD;
 use crate::error::CliError;
-use crate::options::{Detrend, RecordArgs, ReportArgs};
+use crate::options::{Detrend, PlotArgs, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
 
 /// Show what is in a record: format, columns, sampling, levels, strongest lines, period
@@ -23,9 +23,13 @@ use crate::outcome::Outcome;
 /// spectrum is that of whole periods where the channel repeats or --period says so, otherwise of the
 /// window weighted by a Hann window. Of a text of more than 262144 rows, only the levels are those
 /// of all samples of the window: lines and period are those of its first 262144 samples.
+///
+/// The picture shows columns over time, all of the window, beside their spectra, of the mean period
+/// where there is one: the first eight, and the column of time only if --columns asks for it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid info record.csv
+  mechid info examples/machine.csv --plot record.svg
   mechid info rig.csv --sample-rate 610.35 --columns V1,V2 --start 10585 --period 1024
   mechid info rig.mat --columns force,acceleration[2] --json")]
 pub struct InfoArgs {
@@ -34,6 +38,8 @@ pub struct InfoArgs {
     /// Columns to show, by name or number [default: every column that holds numbers only]
     #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
     columns: Vec<String>,
+    #[command(flatten)]
+    plot: PlotArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -52,38 +58,44 @@ impl InfoArgs {
         let mut inventory = file.inventory(&asked, instants)?;
         let samples = inventory.samples;
         let sampling = inventory.sampling.take();
-        let (shown, len, mut left_out) = self.shown(table, &asked, inventory)?;
+        let (mut shown, len, mut left_out) = self.shown(table, &asked, inventory)?;
         let dt = self.step(&file, time, sampling, &mut left_out)?;
         let window = match len {
             0 => None,
-            len => Some(self.input.span(table.file(), len)?),
+            len => Some(Span::of(self.input.span(table.file(), len)?, &file)),
         };
-        let mut remarks = table.remarks().to_vec();
-        let channels = match window {
-            Some((start, len)) if !shown.is_empty() => {
-                let hold = if file.is_whole() { len } else { len.min(HELD) };
-                remarks.extend(looked_at(table.file(), start, len, hold));
-                channels(&file, &shown, start..start + len, hold, (dt, self.input.period))?
-            }
-            _ => Vec::new(),
-        };
-        let report = Report {
-            file: table.file().into(),
-            format: table.format(),
-            columns: table.width(),
-            samples,
-            window: window.map(|(start, len)| Window::of(start, len)),
-            sampling: dt.zip(window).map(|(dt, (_, len))| Sampling::of(dt, len)),
-            channels,
-            scalars: table
-                .scalars()
-                .iter()
-                .map(|(name, value)| Scalar { name: name.clone(), value: *value })
-                .collect(),
-            remarks,
-            left_out,
-        };
-        Outcome::new(report.text(), &report)
+        let mut report = Report::begin(table, samples, window, dt, left_out);
+        let mut drawn = Vec::new();
+        if let (Some(window), false) = (window, shown.is_empty()) {
+            report.remarks.extend(window.looked_at(table.file()));
+            report.remarks.extend(self.choose_drawn(table, &mut shown, instants));
+            (report.channels, drawn) = measured(&file, &shown, window, (dt, self.input.period))?;
+        }
+        let title = || picture::title(table.file(), window);
+        Outcome::new(report.text(), &report)?
+            .with_plot(&self.plot, || picture::figure(table.file(), &title(), &drawn, dt))
+    }
+
+    /// Says which columns are drawn, and returns what is to be told of the others.
+    fn choose_drawn(
+        &self,
+        table: &Table,
+        shown: &mut [Shown],
+        instants: Option<usize>,
+    ) -> Option<String> {
+        let path = self.plot.plot.as_ref()?;
+        let asked = !self.columns.is_empty();
+        let mut wanted = shown.iter_mut().filter(|s| asked || Some(s.column) != instants);
+        wanted.by_ref().take(picture::COLUMNS).for_each(|s| s.drawn = true);
+        let others: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
+        (!others.is_empty()).then(|| {
+            format!(
+                "{} shows {} columns; not drawn, unless --columns chooses them: {}",
+                path.display(),
+                picture::COLUMNS,
+                others.join(", ")
+            )
+        })
     }
 
     /// Indices of the columns asked for, or of all that are more than a trailing delimiter.
@@ -111,7 +123,7 @@ impl InfoArgs {
             match tally {
                 Ok(tally) if !self.columns.is_empty() || tally.samples == inventory.samples => {
                     len = tally.samples;
-                    shown.push(Shown { column, offset: offset(tally.mean) });
+                    shown.push(Shown { column, offset: offset(tally.mean), drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
                     "column {} has {} samples, most have {}",
@@ -151,54 +163,4 @@ impl InfoArgs {
             }
         }
     }
-}
-
-/// A column to show, and what is taken away from it.
-#[derive(Debug, Clone, Copy)]
-struct Shown {
-    column: usize,
-    offset: f64,
-}
-
-/// Which samples period and lines come from, if these are not all.
-fn looked_at(file: &str, start: usize, len: usize, hold: usize) -> Option<String> {
-    let (first, last, end) = (start + 1, start + hold, start + len);
-    (hold < len).then(|| {
-        format!(
-            "period, mismatch and strongest lines looked at samples {first} to {last} of {file} \
-             only; the levels count all samples up to {end}"
-        )
-    })
-}
-
-/// Measures the window of some columns, with the step and the period if they are known; of its
-/// samples so many are looked at together.
-fn channels(
-    file: &RecordFile,
-    shown: &[Shown],
-    window: Range<usize>,
-    hold: usize,
-    (dt, period): (Option<f64>, Option<usize>),
-) -> Result<Vec<Channel>, CliError> {
-    // A text is read once for all columns; of what is held, one copy at a time is enough.
-    let at_once = if file.is_whole() { 1 } else { shown.len() };
-    let table = file.head();
-    let mut channels = Vec::new();
-    for together in shown.chunks(at_once) {
-        let columns: Vec<usize> = together.iter().map(|s| s.column).collect();
-        let mut gathered: Vec<Gathered> = columns.iter().map(|_| Gathered::default()).collect();
-        file.blocks_at(&columns, window.clone(), HELD, HELD, &mut |block| {
-            let values = block.as_slice().chunks(block.nrows());
-            for ((gathered, shown), values) in gathered.iter_mut().zip(together).zip(values) {
-                let values: Vec<f64> = values.iter().map(|v| v - shown.offset).collect();
-                gathered.push(&values, hold)?;
-            }
-            Ok::<_, CliError>(())
-        })?;
-        for (column, gathered) in columns.into_iter().zip(gathered) {
-            let (name, about) = (table.names()[column].clone(), table.about(column).into());
-            channels.push(Channel::of(column + 1, name, about, gathered, dt, period)?);
-        }
-    }
-    Ok(channels)
 }

@@ -1,8 +1,10 @@
 //! How `mechid info` tells what it found.
 
+use mechid::io::Table;
 use serde::Serialize;
 
 use super::channel::{Channel, Period, SpectrumPeak};
+use super::measured::Span;
 use crate::text_table::{compact, significant, text_table};
 
 /// What is in a record.
@@ -47,18 +49,43 @@ pub struct Scalar {
 }
 
 impl Window {
-    pub fn of(start: usize, len: usize) -> Self {
+    fn of(start: usize, len: usize) -> Self {
         Self { first_sample: start + 1, last_sample: start + len }
     }
 }
 
 impl Sampling {
-    pub fn of(dt: f64, len: usize) -> Self {
+    fn of(dt: f64, len: usize) -> Self {
         Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt }
     }
 }
 
 impl Report {
+    /// All but the channels.
+    pub fn begin(
+        table: &Table,
+        samples: usize,
+        window: Option<Span>,
+        dt: Option<f64>,
+        left_out: Vec<String>,
+    ) -> Self {
+        let scalars = table.scalars().iter();
+        Self {
+            file: table.file().into(),
+            format: table.format(),
+            columns: table.width(),
+            samples,
+            window: window.map(|window| Window::of(window.start, window.len)),
+            sampling: dt.zip(window).map(|(dt, window)| Sampling::of(dt, window.len)),
+            channels: Vec::new(),
+            scalars: scalars
+                .map(|(name, value)| Scalar { name: name.clone(), value: *value })
+                .collect(),
+            remarks: table.remarks().to_vec(),
+            left_out,
+        }
+    }
+
     pub fn text(&self) -> String {
         let mut text = format!(
             "{}: {}, {} columns, {} samples",
@@ -97,8 +124,7 @@ impl Report {
         let header = ["column", "mean", "RMS", "peak", "crest factor", "minimum", "maximum"];
         let mut rows = vec![header.map(String::from).to_vec()];
         for c in &self.channels {
-            let about = if c.about.is_empty() { String::new() } else { format!(" ({})", c.about) };
-            let mut row = vec![format!("{} {}{about}", c.column, c.name)];
+            let mut row = vec![c.title()];
             row.extend([c.mean, c.rms, c.peak].map(|v| significant(v, 5)));
             row.push(c.crest_factor.map_or("–".into(), |v| significant(v, 4)));
             row.extend([c.minimum, c.maximum].map(|v| significant(v, 5)));
@@ -133,6 +159,15 @@ impl Report {
             rows.push(vec![format!("{} {}", c.column, c.name), period, mismatch, peaks.join(", ")]);
         }
         format!("{}\n", text_table(&rows)).replace("\n\n\n", "\n\n")
+    }
+}
+
+impl Channel {
+    /// Number and name of the column, and what the file says of it.
+    pub fn title(&self) -> String {
+        let about =
+            if self.about.is_empty() { String::new() } else { format!(" ({})", self.about) };
+        format!("{} {}{about}", self.column, self.name)
     }
 }
 

@@ -8,6 +8,7 @@ use mechid::plot::{Axis, Figure};
 
 use crate::commands::identify::picture::Trace;
 use crate::error::CliError;
+use crate::text_table::compact;
 
 /// Up to so many degrees of freedom every pair of motion and force is drawn, of more the driving
 /// points.
@@ -104,7 +105,7 @@ fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
 }
 
 fn label(natural: &[f64]) -> String {
-    let told: Vec<String> = natural.iter().map(|hz| crate::text_table::compact(*hz, 5)).collect();
+    let told: Vec<String> = natural.iter().map(|hz| compact(*hz, 5)).collect();
     match told.len() {
         1 => format!("natural frequency, {} Hz", told[0]),
         len if len <= TOLD => format!("natural frequencies, {} Hz", told.join(", ")),

@@ -3,13 +3,10 @@
 use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
+use crate::commands::extremes::Extremes;
 use crate::commands::identify::measurement::{Measurement, Recorded, STRETCH};
 use crate::commands::levels::Levels;
 use crate::error::CliError;
-
-/// Stretches of a long window of which a picture shows the extremes: several for each column of its
-/// pixels.
-const CELLS: usize = 4096;
 
 /// All samples of a window.
 pub struct Whole {
@@ -85,9 +82,9 @@ fn mean(
 impl Gathered {
     fn new(held: &Measurement, record: &Record) -> Self {
         let channels = record.channels();
-        let cell = (held.period * held.periods).div_ceil(CELLS);
+        let window = held.period * held.periods;
         let extremes = match held.held_to() {
-            Some(_) => vec![Extremes::new(cell); channels],
+            Some(_) => vec![Extremes::of(window); channels],
             None => Vec::new(),
         };
         let periods = (held.periods > 1).then(|| Periods::new(held.period, record));
@@ -179,41 +176,5 @@ impl Periods {
     fn scatter(&self, channel: usize) -> f64 {
         let mean_square = self.squares.column(channel).sum() / self.samples as f64;
         self.scales[channel] * mean_square.max(0.0).sqrt()
-    }
-}
-
-/// The least and the largest sample of every cell of so many.
-#[derive(Debug, Clone)]
-struct Extremes {
-    cell: usize,
-    samples: usize,
-    /// Of every cell the samples, counted from 0, with their values.
-    found: Vec<[(usize, f64); 2]>,
-}
-
-impl Extremes {
-    fn new(cell: usize) -> Self {
-        Self { cell, samples: 0, found: Vec::new() }
-    }
-
-    fn push(&mut self, values: &[f64]) {
-        for point in (self.samples..).zip(values.iter().copied()) {
-            match self.found.get_mut(point.0 / self.cell) {
-                None => self.found.push([point; 2]),
-                Some([least, _]) if point.1 < least.1 => *least = point,
-                Some([_, largest]) if point.1 > largest.1 => *largest = point,
-                Some(_) => {}
-            }
-        }
-        self.samples += values.len();
-    }
-
-    /// In the order of time.
-    fn points(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.found.iter().flat_map(|cell| {
-            let mut cell = *cell;
-            cell.sort_by_key(|(sample, _)| *sample);
-            cell
-        })
     }
 }

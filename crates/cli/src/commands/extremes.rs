@@ -1,0 +1,44 @@
+//! What a picture shows of a long window: no more than it has pixels for.
+
+/// Stretches of a long window of which a picture shows the extremes: several for each column of its
+/// pixels.
+const CELLS: usize = 4096;
+
+/// The least and the largest sample of every cell of so many.
+#[derive(Debug, Clone)]
+pub struct Extremes {
+    cell: usize,
+    samples: usize,
+    /// Of every cell the samples, counted from 0, with their values.
+    found: Vec<[(usize, f64); 2]>,
+}
+
+impl Extremes {
+    /// None yet of a window of so many samples.
+    pub fn of(window: usize) -> Self {
+        Self { cell: window.div_ceil(CELLS).max(1), samples: 0, found: Vec::new() }
+    }
+
+    /// The next samples.
+    pub fn push(&mut self, values: &[f64]) {
+        for point in (self.samples..).zip(values.iter().copied()) {
+            match self.found.get_mut(point.0 / self.cell) {
+                None => self.found.push([point; 2]),
+                Some([least, _]) if point.1 < least.1 => *least = point,
+                Some([_, largest]) if point.1 > largest.1 => *largest = point,
+                Some(_) => {}
+            }
+        }
+        self.samples += values.len();
+    }
+
+    /// In the order of time.
+    pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.found.iter().flat_map(|cell| {
+            let mut cell = *cell;
+            cell.sort_by_key(|(sample, _)| *sample);
+            let points = if cell[0].0 == cell[1].0 { 1 } else { 2 };
+            cell.into_iter().take(points)
+        })
+    }
+}
