@@ -1,7 +1,7 @@
 //! The discretised equation of motion, solved for the force of each step.
 
 use mechid_model::{Response, SecondOrderSystem};
-use mechid_signal::Record;
+use mechid_signal::{Record, Sampling};
 use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::continuous::check_dof;
@@ -66,61 +66,80 @@ pub fn discretised(
     if sampling.len() < needed {
         return Err(ForceError::TooShort { samples: sampling.len(), needed });
     }
+    let solution = solution(system, sampling, discretisation)?;
+    let input = solution.input(response, ends);
     let dt = sampling.dt();
+    let force = (system.mass() * input).transpose() / (dt * dt);
+    let sampling = sampling.with_len(force.nrows())?;
+    Ok(IdentifiedForce::of(Record::new(sampling, force)?))
+}
+
+/// What tells the input of a step, q in step units, from its change z(k+1) − Φ z(k).
+pub(crate) struct Solution {
+    /// Φ, 2n×2n.
+    pub state: DMatrix<f64>,
+    /// Of order n where the input is held over a step, of order 2n where it is linear.
+    input: LU<f64, Dyn, Dyn>,
+}
+
+pub(crate) fn solution(
+    system: &SecondOrderSystem,
+    sampling: Sampling,
+    discretisation: Discretisation,
+) -> Result<Solution, ForceError> {
+    let (n, dt) = (system.dof(), sampling.dt());
     let transition = match discretisation {
         Discretisation::Euler => Transition::taylor(system, dt, 1),
         Discretisation::Taylor(order @ 1..=8) => Transition::taylor(system, dt, order),
         Discretisation::Taylor(order) => return Err(ForceError::TaylorOrder { order }),
         Discretisation::ExactHeld | Discretisation::ExactLinear => Transition::exact(system, dt),
     };
+    let Transition { state, held, ramp } = transition;
     let input = if discretisation == Discretisation::ExactLinear {
-        linear_input(&transition, response, ends)?
+        // (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
+        let mut both = DMatrix::zeros(2 * n, 2 * n);
+        both.columns_mut(0, n).copy_from(&(held - &ramp));
+        both.columns_mut(n, n).copy_from(&ramp);
+        both
     } else {
-        held_input(&transition, response, ends)?
+        // Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
+        held.rows(n, n).into_owned()
     };
-    let force = (system.mass() * input).transpose() / (dt * dt);
-    let sampling = sampling.with_len(force.nrows())?;
-    Ok(IdentifiedForce::of(Record::new(sampling, force)?))
+    Ok(Solution { state, input: invertible(input, dt)? })
 }
 
 /// Below this a sample of 16 digits leaves fewer than four for the force.
 const NO_TRACE: f64 = 1e-12;
 
-/// q of each step, n × steps: Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
-fn held_input(
-    transition: &Transition,
-    response: &Response,
-    ends: Ends,
-) -> Result<DMatrix<f64>, ForceError> {
-    let n = response.dof();
-    let input = invertible(transition.held.rows(n, n).into_owned(), response)?;
-    let mut change = changes(&transition.state, response, ends).rows(n, n).into_owned();
-    input.solve_mut(&mut change);
-    Ok(change)
-}
-
-/// q at each sample, n × samples, from (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
-fn linear_input(
-    transition: &Transition,
-    response: &Response,
-    ends: Ends,
-) -> Result<DMatrix<f64>, ForceError> {
-    let (n, len) = (response.dof(), response.sampling().len());
-    let mut both = DMatrix::zeros(2 * n, 2 * n);
-    both.columns_mut(0, n).copy_from(&(&transition.held - &transition.ramp));
-    both.columns_mut(n, n).copy_from(&transition.ramp);
-    let mut steps = changes(&transition.state, response, ends);
-    invertible(both, response)?.solve_mut(&mut steps);
-    let mut input = DMatrix::zeros(n, len);
-    for (k, step) in steps.column_iter().enumerate() {
-        let (start, end) = (step.rows(0, n), step.rows(n, n));
-        let (first, last) = (ends == Ends::Open && k == 0, ends == Ends::Open && k + 2 == len);
-        let mut at = input.column_mut(k);
-        at.axpy(if first { 1.0 } else { 0.5 }, &start, 1.0);
-        let mut at = input.column_mut((k + 1) % len);
-        at.axpy(if last { 1.0 } else { 0.5 }, &end, 1.0);
+impl Solution {
+    /// Of changes, 2n × any number: the input at the start of each step, n × the same; where it is
+    /// linear, that at its end too.
+    pub fn of(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
+        let n = self.state.nrows() / 2;
+        if self.input.lu_internal().nrows() == n {
+            let mut velocity = change.rows(n, n).into_owned();
+            self.input.solve_mut(&mut velocity);
+            return (velocity, None);
+        }
+        self.input.solve_mut(&mut change);
+        (change.rows(0, n).into_owned(), Some(change.rows(n, n).into_owned()))
     }
-    Ok(input)
+
+    /// q, n × samples; of a held input n × steps.
+    fn input(&self, response: &Response, ends: Ends) -> DMatrix<f64> {
+        let len = response.sampling().len();
+        let (start, end) = self.of(changes(&self.state, response, ends));
+        let Some(end) = end else { return start };
+        let mut input = DMatrix::zeros(response.dof(), len);
+        for (k, (start, end)) in start.column_iter().zip(end.column_iter()).enumerate() {
+            let (first, last) = (ends == Ends::Open && k == 0, ends == Ends::Open && k + 2 == len);
+            let mut at = input.column_mut(k);
+            at.axpy(if first { 1.0 } else { 0.5 }, &start, 1.0);
+            let mut at = input.column_mut((k + 1) % len);
+            at.axpy(if last { 1.0 } else { 0.5 }, &end, 1.0);
+        }
+        input
+    }
 }
 
 /// z(k+1) − Φ z(k) in step units, 2n × steps.
@@ -135,12 +154,11 @@ fn changes(state: &DMatrix<f64>, response: &Response, ends: Ends) -> DMatrix<f64
 }
 
 /// The factorised input matrix, unless some force leaves no trace in its rows.
-fn invertible(input: DMatrix<f64>, response: &Response) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
+fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
     let singular_values = input.singular_values();
     // In step units the input matrix of a short step is about I: a single force is judged too.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < NO_TRACE {
-        let dt = response.sampling().dt();
         return Err(ForceError::StepTooLong { dt, reciprocal_condition });
     }
     Ok(input.lu())

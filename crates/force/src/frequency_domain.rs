@@ -6,6 +6,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::measurement::first_repeated;
 use crate::transfer::Transfer;
+use crate::unexplained::Rest;
 use crate::{ForceError, IdentifiedForce, Measurement};
 
 /// What is known of the noise in the measured channels, taken as white.
@@ -71,13 +72,19 @@ pub fn frequency_domain(
                 * inverse.row(f).iter().zip(&scale).map(|(g, s)| g.norm_sqr() * s * s).sum::<f64>();
         }
     }
-    let record = Spectrum::from_lines(sampling, force).to_record();
+    let force = Spectrum::from_lines(sampling, force);
+    let level = level.as_deref();
+    let rest = measured
+        .exceeds(forced)
+        .then(|| Rest::of_lines(system, measured, forced, &force, lines, level));
     let standard_error = level.map(|_| {
         let constant =
             DMatrix::from_fn(sampling.len(), system.dof(), |_, dof| variance[dof].sqrt());
         Record::new(sampling, constant)
     });
-    Ok(IdentifiedForce::of(record).with_standard_error(standard_error.transpose()?))
+    Ok(IdentifiedForce::of(force.to_record())
+        .with_standard_error(standard_error.transpose()?)
+        .with_rest(rest.transpose()?))
 }
 
 /// Every line of the record that holds a whole complex amplitude: 1 up to, not at, Nyquist.

@@ -9,6 +9,7 @@ use crate::nelder_mead::minimise;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
+use crate::unexplained::Rest;
 use crate::{ForceError, IdentifiedForce, Measurement, Noise, Quantity, Start};
 
 /// How strong noise and force are taken to be.
@@ -108,7 +109,13 @@ pub fn kalman(
             std::iter::once(0.0).chain(walk.iter().map(|w| (w / unit).ln())).collect()
         }
     };
-    model.solve(system, measured, forced, &scale, &parameters)
+    let found = model.solve(system, measured, forced, &scale, &parameters)?;
+    let stated = (*tuning != Tuning::Likelihood).then_some(&found.noise[..]);
+    let rest = measured.exceeds(forced).then(|| {
+        let motion = [&found.displacement, &found.velocity, found.force.record()];
+        Rest::of_motion(system, measured, motion, stated)
+    });
+    Ok(KalmanForce { force: found.force.with_rest(rest), ..found })
 }
 
 /// The stated noise levels, if they can be any.

@@ -112,6 +112,11 @@ impl Measurement {
         self.record.sampling()
     }
 
+    /// Whether there are more channels than so many forces need: they can contradict one another.
+    pub(crate) fn exceeds(&self, forced: &[usize]) -> bool {
+        self.channels.len() > forced.len()
+    }
+
     /// An error unless the forces at `forced` can be sought from these channels.
     pub(crate) fn check(&self, dofs: usize, forced: &[usize]) -> Result<(), ForceError> {
         let named = self.channels.iter().map(|c| c.dof).chain(forced.iter().copied());

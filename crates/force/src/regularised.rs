@@ -1,7 +1,7 @@
 //! Force from few or noisy channels: the weakly transmitted part of it is damped.
 
 use mechid_model::SecondOrderSystem;
-use mechid_signal::Record;
+use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
 
 use crate::components::Components;
@@ -10,6 +10,7 @@ use crate::frequency_domain::sizes;
 use crate::open_operator::OpenOperator;
 use crate::period_operator::PeriodOperator;
 use crate::rule::{choose, factor};
+use crate::unexplained::Rest;
 use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise};
 
 /// What the measured record is.
@@ -76,22 +77,30 @@ pub fn regularised(
 ) -> Result<RegularisedForce, ForceError> {
     measured.check(system.dof(), forced)?;
     filter.check()?;
-    match extent {
-        Extent::Period | Extent::PeriodLines(_) => {
-            let lines = match extent {
-                Extent::PeriodLines(lines) => lines.clone(),
-                _ => (0..measured.sampling().len().div_ceil(2)).collect(),
-            };
-            let scale = scale(measured, &lines, noise)?;
-            let operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
-            solve(&operator, system, measured, forced, filter, &scale)
-        }
+    let lines = match extent {
+        Extent::Period => (0..measured.sampling().len().div_ceil(2)).collect(),
+        Extent::PeriodLines(lines) => lines.clone(),
+        Extent::Open(_) => Vec::new(),
+    };
+    let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
+    let scale = level.clone().unwrap_or_else(|| sizes(measured.record()));
+    let level = level.as_deref();
+    let found = if let Extent::Open(start) = extent {
+        let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
+        solve(&operator, system, measured, forced, filter, &scale)?
+    } else {
+        let operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
+        solve(&operator, system, measured, forced, filter, &scale)?
+    };
+    let force = found.force;
+    let rest = measured.exceeds(forced).then(|| match extent {
         Extent::Open(start) => {
-            let scale = scale(measured, &[], noise)?;
-            let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
-            solve(&operator, system, measured, forced, filter, &scale)
+            let start = (*start, &scale[..]);
+            Ok(Rest::of_open(system, measured, forced, force.record(), start, level))
         }
-    }
+        _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
+    });
+    Ok(RegularisedForce { force: force.with_rest(rest.transpose()?), ..found })
 }
 
 /// The problem in its singular vectors.
@@ -101,11 +110,6 @@ pub(crate) trait Operator {
     fn force(&self, factors: &[f64]) -> DMatrix<f64>;
     /// Samples × forces: variance, given that of each component per real unknown.
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
-}
-
-fn scale(measured: &Measurement, lines: &[usize], noise: &Noise) -> Result<Vec<f64>, ForceError> {
-    let spectrum = mechid_signal::Spectrum::of(measured.record());
-    Ok(noise.resolve(measured, &spectrum, lines)?.unwrap_or_else(|| sizes(measured.record())))
 }
 
 fn solve(

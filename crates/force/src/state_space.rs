@@ -1,7 +1,7 @@
 //! The machine between unknown forces and measured channels, sample by sample.
 
 use mechid_model::SecondOrderSystem;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 use crate::transition::Transition;
 use crate::{Measurement, Quantity};
@@ -45,6 +45,24 @@ impl Machine {
             }
         }
         Self { transition, out, through, input }
+    }
+
+    /// Channels × samples from rest, of a force given as forces × samples.
+    pub fn response(&self, force: &DMatrix<f64>) -> DMatrix<f64> {
+        let samples = force.ncols();
+        let held = &self.transition.held * &self.input;
+        let ramp = &self.transition.ramp * &self.input;
+        let mut motion = &self.through * force;
+        let mut state = DVector::zeros(self.transition.state.ncols());
+        for k in 0..samples {
+            let mut at = motion.column_mut(k);
+            at += &self.out * &state;
+            if k + 1 < samples {
+                let (now, next) = (force.column(k), force.column(k + 1));
+                state = &self.transition.state * state + &held * now + &ramp * (next - now);
+            }
+        }
+        motion
     }
 
     /// Rows channel after channel, columns force after force, of unit forces at each sample.

@@ -62,6 +62,20 @@ impl SystemCovariance {
         &self.covariance
     }
 
+    /// gᵀ Σ g at every place of a matrix of this shape, g the derivatives there, one matrix per
+    /// entry.
+    fn variance(
+        &self,
+        (rows, columns): (usize, usize),
+        derivatives: &[DMatrix<f64>],
+    ) -> DMatrix<f64> {
+        DMatrix::from_fn(rows, columns, |k, i| {
+            let g =
+                DVector::from_iterator(derivatives.len(), derivatives.iter().map(|d| d[(k, i)]));
+            g.dot(&(&self.covariance * &g)).max(0.0)
+        })
+    }
+
     /// The system with one entry moved.
     fn moved(
         &self,
@@ -82,7 +96,8 @@ impl SystemCovariance {
 
 /// The force that `find` gives for `system`, the uncertainty of the system added to its standard
 /// error: variance + gᵀ Σ g at every sample, g the derivatives of the force with respect to the
-/// uncertain entries (delta method).
+/// uncertain entries (delta method). Likewise what it may leave of the measured channels
+/// ([`Unexplained::machine`](crate::Unexplained)).
 ///
 /// The derivatives are central differences over a tenth of a standard error: exact for
 /// [`continuous`](crate::continuous()), in which the force is linear in the entries. Where `find`
@@ -125,7 +140,7 @@ pub fn with_uncertain_system(
 ) -> Result<IdentifiedForce, ForceError> {
     let force = find(system)?;
     let dofs = system.dof();
-    let mut derivatives = Vec::with_capacity(known.entries.len());
+    let (mut forces, mut rests) = (Vec::new(), Vec::new());
     for (i, &entry) in known.entries.iter().enumerate() {
         let Entry { matrix, row, column } = entry;
         if row >= dofs || column >= dofs {
@@ -133,18 +148,25 @@ pub fn with_uncertain_system(
         }
         let step = STEP * known.covariance[(i, i)].sqrt();
         if step == 0.0 {
-            derivatives.push(DMatrix::zeros(force.record().len(), dofs));
+            forces.push(DMatrix::zeros(force.record().len(), dofs));
+            rests.extend(force.rest().map(|rest| rest.left() * 0.0));
             continue;
         }
         let above = find(&known.moved(system, entry, step)?)?;
         let below = find(&known.moved(system, entry, -step)?)?;
-        derivatives.push((above.record().data() - below.record().data()) / (2.0 * step));
+        forces.push((above.record().data() - below.record().data()) / (2.0 * step));
+        if let (Some(above), Some(below)) = (above.rest(), below.rest()) {
+            rests.push((above.left() - below.left()) / (2.0 * step));
+        }
     }
-    let error = DMatrix::from_fn(force.record().len(), dofs, |k, i| {
-        let g = DVector::from_iterator(derivatives.len(), derivatives.iter().map(|d| d[(k, i)]));
-        let noise = force.standard_error().map_or(0.0, |error| error.data()[(k, i)]);
-        (noise * noise + g.dot(&(&known.covariance * &g)).max(0.0)).sqrt()
+    let mut variance = known.variance(force.record().data().shape(), &forces);
+    if let Some(error) = force.standard_error() {
+        variance.zip_apply(error.data(), |sum, noise| *sum += noise * noise);
+    }
+    let error = Record::new(force.record().sampling(), variance.map(f64::sqrt))?;
+    let rest = force.rest().cloned().map(|rest| {
+        let variance = known.variance(rest.left().shape(), &rests);
+        rest.with_machine(&variance)
     });
-    let error = Record::new(force.record().sampling(), error)?;
-    Ok(force.with_standard_error(Some(error)))
+    Ok(force.with_standard_error(Some(error)).with_rest(rest))
 }

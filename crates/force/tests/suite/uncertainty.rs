@@ -44,24 +44,30 @@ fn known() -> SystemCovariance {
     SystemCovariance::new(entries, &root * root.transpose()).unwrap()
 }
 
-/// Standard deviation of the force over machines drawn from the covariance.
-fn scatter(find: impl Fn(&SecondOrderSystem) -> Record, draws: usize) -> DMatrix<f64> {
-    let known = known();
+/// Machines drawn from the covariance.
+fn drawn(known: SystemCovariance, draws: usize) -> impl Iterator<Item = SecondOrderSystem> {
+    let entries = known.entries().len();
     let root = known.covariance().clone().cholesky().unwrap().l();
     let sampling = Sampling::new(1.0, draws).unwrap();
-    let normal = noise::white(sampling, 4, 1.0, 77).unwrap();
-    let exact = find(&bearing());
-    let mut sum = DMatrix::zeros(exact.len(), 2);
-    for d in 0..draws {
-        let shift = &root * DVector::from_iterator(4, normal.data().row(d).iter().copied());
+    let normal = noise::white(sampling, entries, 1.0, 77).unwrap();
+    (0..draws).map(move |d| {
+        let shift = &root * DVector::from_iterator(entries, normal.data().row(d).iter().copied());
         let mut matrices = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
             .map(|which| bearing().matrix(which).clone());
         for (entry, by) in known.entries().iter().zip(shift.iter()) {
             matrices[entry.matrix as usize][(entry.row, entry.column)] += by;
         }
         let [m, c, k] = matrices;
-        let found = find(&SecondOrderSystem::new(m, c, k).unwrap());
-        sum += (found.data() - exact.data()).map(|e| e * e);
+        SecondOrderSystem::new(m, c, k).unwrap()
+    })
+}
+
+/// Standard deviation of the force over machines drawn from the covariance.
+fn scatter(find: impl Fn(&SecondOrderSystem) -> Record, draws: usize) -> DMatrix<f64> {
+    let exact = find(&bearing());
+    let mut sum = DMatrix::zeros(exact.len(), 2);
+    for machine in drawn(known(), draws) {
+        sum += (find(&machine).data() - exact.data()).map(|e| e * e);
     }
     sum.map(|s| (s / draws as f64).sqrt())
 }
@@ -95,6 +101,40 @@ fn the_stated_error_is_the_scatter_over_machines() {
     let found = with_uncertain_system(&bearing(), &known(), held).unwrap();
     let seen = scatter(|s| held(s).unwrap().record().clone(), draws);
     assert_close(found.standard_error().unwrap(), &seen, 0.04, "discretised");
+}
+
+/// One force of two channels: what machines drawn from the covariance leave of an exact record.
+#[test]
+fn the_rest_that_the_machine_explains_is_that_of_machines_drawn() {
+    let measured = Measurement::of_all(Quantity::Displacement, response().displacement().clone());
+    let noise = Noise::PerChannel(vec![1e-3, 2e-3]);
+    // The motions that a force on the second direction makes are in proportion by the first row.
+    let entries = vec![entry(Matrix::Damping, 0, 0), entry(Matrix::Stiffness, 0, 1)];
+    let root = dmatrix![0.2, 0.0; 0.3, 0.4];
+    let uncertain = SystemCovariance::new(entries, &root * root.transpose()).unwrap();
+    let rests = |s: &SecondOrderSystem| -> Vec<f64> {
+        let found = frequency_domain(s, &measured, &[1], &LINES, &noise).unwrap();
+        found.unexplained().unwrap().iter().map(|channel| channel.rest).collect()
+    };
+    let found = with_uncertain_system(&bearing(), &uncertain, |s| {
+        frequency_domain(s, &measured, &[1], &LINES, &noise)
+    });
+    let found = found.unwrap();
+    let draws = 2000;
+    let mut sums = [0.0; 2];
+    for machine in drawn(uncertain, draws) {
+        for (sum, rest) in sums.iter_mut().zip(rests(&machine)) {
+            *sum += rest * rest;
+        }
+    }
+    for (channel, sum) in found.unexplained().unwrap().iter().zip(sums) {
+        let seen = (sum / draws as f64).sqrt();
+
+        assert!(channel.rest < 1e-9 * seen);
+        let ratio = channel.machine.unwrap() / seen;
+        // As above: what 2,000 draws know, and the second order.
+        assert!((ratio - 1.0).abs() < 0.04, "{ratio:.3}");
+    }
 }
 
 #[test]
