@@ -13,17 +13,31 @@ pub struct Repetition {
     pub mismatch: f64,
 }
 
-/// Signals that differ more from period to period do not count as periodic.
-const WORST: f64 = 0.1;
+/// Signals that differ more from period to period do not count as periodic: noise of a tenth, whose
+/// mismatch scatters, does no harm.
+const WORST: f64 = 0.125;
 
 /// Lags of the same quality differ by this factor at most in the square of the mismatch.
 const ALIKE: f64 = 2.0;
+
+/// A slow signal resembles itself up to the first lag at which the square of the mismatch is this
+/// many times that of [`WORST`]: more than any two lags of the same quality differ.
+const APART: f64 = 2.0 * ALIKE;
 
 /// Squared mismatch that rounding in the Fourier transforms leaves of one that is zero.
 const ROUNDING: f64 = 1e-12;
 
 /// The shortest whole number of samples after which a signal, in any unit, repeats, if it does so
-/// at least once in full and better than to a tenth of its RMS value.
+/// at least once in full and better than to an eighth of its RMS value.
+///
+/// What is said holds of the whole record: samples two, three and more periods apart, as long as
+/// every sample has such a partner, are alike, too, to √2 eighths of the RMS value. And it is no
+/// decay: a free vibration also resembles itself after each of its cycles, only weaker, and a
+/// modulated one stronger or weaker in turn. There d, the difference of samples one period apart, is
+/// a part of their sum s; noise leaves a difference that has nothing to do with the sum. So in every
+/// period d is fitted by the terms κs (the same shape, larger or smaller) and τs′ (the same a
+/// fraction of a sample later, for a period need not be a whole number of samples); if κs
+/// makes more than half of what τs′ leaves of d, nothing repeats.
 ///
 /// A signal that changes slowly also resembles itself a few samples later; lags up to the first at
 /// which it does not are left out. A period that is no whole number of samples is not found, but a
@@ -50,17 +64,76 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
     }
     let differences = squared_mismatches(&centred);
     // Behind the lags at which a slow signal resembles itself.
-    let apart = (1..differences.len()).find(|lag| differences[*lag] > WORST * WORST)?;
+    let apart = (1..differences.len()).find(|lag| differences[*lag] > APART * WORST * WORST)?;
     let best = differences[apart..].iter().copied().fold(f64::INFINITY, f64::min);
     if best > WORST * WORST {
         return None;
     }
-    let alike = |lag: &usize| differences[*lag] <= ALIKE * best.max(0.0) + ROUNDING;
-    let first = (apart..differences.len()).find(alike)?;
-    // Around the period a slow signal resembles itself, too.
-    let around = (first..differences.len()).take_while(alike);
-    let period = around.min_by(|a, b| differences[*a].total_cmp(&differences[*b]))?;
-    Some(Repetition { period, mismatch: mismatch(&centred, period) })
+    let alike = |lag: usize| differences[lag] <= ALIKE * best.max(0.0) + ROUNDING;
+    let throughout = |period: &usize| {
+        let mut multiples = (*period..differences.len()).step_by(*period);
+        multiples.all(|lag| differences[lag] <= ALIKE * WORST * WORST)
+    };
+    let period = valleys(&differences, apart, alike).find(throughout)?;
+    let found = Repetition { period, mismatch: mismatch(&centred, period) };
+    (!grows_or_decays(&centred, period)).then_some(found)
+}
+
+/// Of every run of lags that are `alike`, from `first` on, the one with the least difference: around
+/// the period a slow signal resembles itself, too.
+fn valleys(
+    differences: &[f64],
+    first: usize,
+    alike: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = usize> {
+    let mut at = first;
+    std::iter::from_fn(move || {
+        let begin = (at..differences.len()).find(|lag| alike(*lag))?;
+        let end = (begin..differences.len()).find(|lag| !alike(*lag));
+        at = end.unwrap_or(differences.len());
+        (begin..at).min_by(|a, b| differences[*a].total_cmp(&differences[*b]))
+    })
+}
+
+/// Pairs of samples that say how much of a difference is growth: of fewer, two terms would explain
+/// any difference.
+const PAIRS: usize = 20;
+
+/// A growth that makes less than this part of the difference is none: what is left of it beside the
+/// shift may be rounding alone.
+const LEAST_GROWTH: f64 = 0.01;
+
+/// Whether more than half of the difference of samples one period apart is the same shape larger or
+/// smaller, in each period by an amount of its own.
+fn grows_or_decays(x: &[f64], period: usize) -> bool {
+    let (early, late) = (&x[..x.len() - period], &x[period..]);
+    let sum: Vec<f64> = early.iter().zip(late).map(|(a, b)| b + a).collect();
+    let difference: Vec<f64> = early.iter().zip(late).map(|(a, b)| b - a).collect();
+    let after = |k: usize| sum.get(k + 1).unwrap_or(&sum[k]);
+    let slope: Vec<f64> = (0..sum.len()).map(|k| after(k) - sum[k.saturating_sub(1)]).collect();
+    let stretch = PAIRS.div_ceil(period) * period;
+    let (mut shift, mut growth) = (0.0, 0.0);
+    for ((d, s), t) in
+        difference.chunks(stretch).zip(sum.chunks(stretch)).zip(slope.chunks(stretch))
+    {
+        if d.len() < PAIRS.min(difference.len()) {
+            continue;
+        }
+        let tt = product(t, t);
+        let [of_sum, of_difference] =
+            [s, d].map(|values| if tt > 0.0 { product(values, t) / tt } else { 0.0 });
+        shift += of_difference * of_difference * tt;
+        // Both without what the shift explains.
+        let ss = product(s, s) - of_sum * of_sum * tt;
+        let ds = product(d, s) - of_difference * of_sum * tt;
+        growth += if ss > ROUNDING * product(s, s) { ds * ds / ss } else { 0.0 };
+    }
+    let whole = product(&difference, &difference);
+    growth > 0.5 * (whole - shift) && growth > LEAST_GROWTH * whole
+}
+
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// The square of the mismatch for the lags 0 … ⌊N/2⌋, by way of the autocorrelation: to rounding.
@@ -126,6 +199,79 @@ mod tests {
             let expected = part / (1.0 + part * part).sqrt();
             assert!((found.mismatch / expected - 1.0).abs() < 0.07, "{}", found.mismatch);
         }
+    }
+
+    /// Of slow periods, too, whose samples resemble their neighbours as well as those of the next one.
+    #[test]
+    fn noise_of_a_tenth_hides_no_period() {
+        for (period, periods) in [(64, 3), (100, 12), (257, 7), (1024, 8)] {
+            let clean = multisine(period, periods);
+            for seed in 0..20 {
+                let noisy = add_white(&clean, NoiseLevel::FractionOfRms(0.1), seed).unwrap();
+                let found = repetition(noisy.channel(0)).map(|found| found.period);
+                assert_eq!(found, Some(period), "{periods} periods, seed {seed}");
+            }
+        }
+    }
+
+    fn free(damping: f64, hz: f64, seconds: f64) -> impl Iterator<Item = f64> {
+        let omega = std::f64::consts::TAU * hz;
+        (0..(1000.0 * seconds) as usize).map(move |k| {
+            let t = k as f64 / 1000.0;
+            (-damping * omega * t).exp() * ((1.0 - damping * damping).sqrt() * omega * t).sin()
+        })
+    }
+
+    #[test]
+    fn a_free_vibration_that_decays_does_not_repeat() {
+        for damping in [0.001, 0.002, 0.005, 0.01, 0.02, 0.05] {
+            for hz in [5.0, 17.0, 40.0, 83.7, 250.3] {
+                for seconds in [0.5, 1.0, 2.0, 5.0] {
+                    let ring: Vec<f64> = free(damping, hz, seconds).collect();
+                    assert_eq!(repetition(&ring), None, "{damping}, {hz} Hz, {seconds} s");
+                    // Nor does it backwards, growing.
+                    let grown: Vec<f64> = ring.into_iter().rev().collect();
+                    assert_eq!(repetition(&grown), None, "{damping}, {hz} Hz, {seconds} s");
+                    let second = free(1.5 * damping, 2.6 * hz, seconds);
+                    let two: Vec<f64> =
+                        free(damping, hz, seconds).zip(second).map(|(a, b)| a + 0.4 * b).collect();
+                    assert_eq!(repetition(&two), None, "{damping}, {hz} Hz, {seconds} s");
+                }
+            }
+        }
+    }
+
+    /// Three eighths and one and a half of a modulation: the amplitude is another in every cycle.
+    #[test]
+    fn a_modulated_vibration_does_not_repeat_within_its_modulation() {
+        for depth in [0.1, 0.3, 0.9] {
+            for (hz, modulation_hz) in [(20.0, 0.375), (17.3, 0.375), (20.0, 1.5), (33.0, 1.5)] {
+                let wave = |k: usize| {
+                    let turn = std::f64::consts::TAU * k as f64 / 1000.0;
+                    (1.0 + depth * (modulation_hz * turn).cos()) * (hz * turn).sin()
+                };
+                let record: Vec<f64> = (0..1000).map(wave).collect();
+                assert_eq!(repetition(&record), None, "{depth}, {hz} Hz, {modulation_hz} Hz");
+                // Over some modulations it does, after each of them.
+                let long: Vec<f64> = (0..16_000).map(wave).collect();
+                let found = repetition(&long).unwrap();
+                let cycles = found.period as f64 * modulation_hz / 1000.0;
+                assert!((cycles - cycles.round()).abs() < 0.02 && cycles > 0.9, "{cycles}");
+            }
+        }
+    }
+
+    /// A period of 76.1 samples: after 76 the next one is alike, the fortieth is not; after ten times
+    /// 76.1 all are.
+    #[test]
+    fn a_period_that_only_neighbours_share_is_none() {
+        let turn = |k: usize| std::f64::consts::TAU * k as f64 / 76.1;
+        let sampling = Sampling::new(1.0, 8000).unwrap();
+        let sine = Record::from_channel(sampling, (0..8000).map(|k| turn(k).sin()).collect());
+        let noisy = add_white(&sine.unwrap(), NoiseLevel::FractionOfRms(0.01), 1).unwrap();
+        let found = repetition(noisy.channel(0)).unwrap();
+        let turns = found.period as f64 / 76.1;
+        assert!((turns - turns.round()).abs() < 0.01, "{}", found.period);
     }
 
     #[test]

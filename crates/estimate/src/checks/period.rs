@@ -23,10 +23,12 @@ const CLEARLY: f64 = 4.0;
 /// What is wrong with a claimed period (in samples) by the force (N), the samples of which are one or
 /// several such periods; nothing if nothing speaks against it.
 ///
-/// Two things are looked at: whether the force returns to itself better after one or two samples more
-/// or less, and whether it repeats after another number of samples altogether, of which the claimed
-/// one is no multiple. The latter shows in a single claimed period, too, if it holds four thirds of
-/// the true one or more. The verdict is bad, and its value the period found, in samples.
+/// Three things are looked at: whether the force returns to itself better after one or two samples
+/// more or less; whether it returns after the claimed period but in one place, where samples are
+/// missing or too many; and whether it repeats after another number of samples altogether, of which
+/// the claimed one is no multiple. The last shows in a single claimed period, too, if it holds four
+/// thirds of the true one or more; what is said is then said of the samples compared. The verdict is
+/// bad, and its value the period found, in samples.
 pub fn claimed_period(force: &Record, period: usize) -> Option<Check> {
     let channels: Vec<Vec<f64>> = (0..force.channels()).filter_map(|c| unit(force, c)).collect();
     if channels.is_empty() || period == 0 || period > force.len() {
@@ -42,18 +44,42 @@ pub fn claimed_period(force: &Record, period: usize) -> Option<Check> {
                 percent(better),
             ),
         ),
-        None => {
-            let (found, mismatch) = another(&channels, period)?;
-            let text = format!(
-                "the force repeats every {found} samples, to {} of its RMS value, and {period} \
-                 samples are no whole number of that: the lines used are not those of the force",
-                percent(mismatch),
-            );
-            (found, text)
-        }
+        None => match interruption(&channels, period) {
+            Some((at, mismatch)) => (
+                period,
+                format!(
+                    "the force repeats every {period} samples, to {} of its RMS value, but not across \
+                     sample {} of the window, as if samples were missing there or too many: keep to \
+                     one side of it",
+                    percent(mismatch),
+                    at + 1
+                ),
+            ),
+            None => {
+                let (found, mismatch) = another(&channels, period)?;
+                (found, other_period(found, mismatch, period, force.len()))
+            }
+        },
     };
     let (subject, verdict) = (Subject::Periodicity, Verdict::Bad);
     Some(Check { subject, verdict, value: found as f64, text })
+}
+
+/// What is said of another period than the claimed one: of all samples, if each was compared with one
+/// a period away, otherwise of those that were.
+fn other_period(found: usize, mismatch: f64, period: usize, len: usize) -> String {
+    let mismatch = percent(mismatch);
+    let repeats = match len.checked_sub(found) {
+        Some(compared) if compared < found => format!(
+            "the first {compared} of {len} samples of the force come again {found} samples later, to \
+             {mismatch} of its RMS value"
+        ),
+        _ => format!("the force repeats every {found} samples, to {mismatch} of its RMS value"),
+    };
+    format!(
+        "{repeats}, and {period} samples are no whole number of that: the lines used are not those of \
+         the force"
+    )
 }
 
 fn percent(share: f64) -> String {
@@ -93,6 +119,44 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<(usize, [f64; 2])> 
     let share = |squares: &[f64]| (0.5 * sum(squares) / squares.len() as f64).sqrt();
     let clear = share(&claimed) > ROUNDING.sqrt() && sum(&gain) > CLEARLY * scatter;
     clear.then(|| (found, [share(&claimed), share(&best)]))
+}
+
+/// Beyond the stretch in which they differ, samples one period apart differ less than in it by this
+/// factor at least, in the square.
+const INTERRUPTED: f64 = 10.0;
+
+/// The first sample, counted from 0, that does not follow from the one a claimed period before, if
+/// that holds of one stretch of a period at most and of no other; and by how much the others differ,
+/// as a share of √2 times the RMS value.
+fn interruption(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
+    let pairs = channels[0].len().checked_sub(period)?;
+    // On both sides together there must be a period at least that meets the next one.
+    if pairs < 2 * period {
+        return None;
+    }
+    let square = |k: usize| -> f64 {
+        channels.iter().map(|x| (x[k + period] - x[k]).powi(2)).sum::<f64>()
+            / (2 * channels.len()) as f64
+    };
+    let squares: Vec<f64> = (0..pairs).map(square).collect();
+    let mut sums = vec![0.0];
+    sums.extend(squares.iter().scan(0.0, |sum, square| {
+        *sum += square;
+        Some(*sum)
+    }));
+    let within = |first: usize| (sums[first + period] - sums[first]) / period as f64;
+    let stretches = 0..=pairs - period;
+    let worst = stretches.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
+    // Summed anew, for what is left of a large sum is rounding.
+    let others: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
+    let others = others / (pairs - period) as f64;
+    if within(worst) <= WORST * WORST || others > (WORST * WORST).min(within(worst) / INTERRUPTED) {
+        return None;
+    }
+    // A single sample may be like the one a period before by chance, or unlike it by noise.
+    let off = others.max(within(worst) / INTERRUPTED);
+    let first = (worst..worst + period).find(|k| squares[*k] > off)?;
+    Some((first + period, others.sqrt()))
 }
 
 /// The shortest number of samples after which all channels repeat, if the claimed period is no

@@ -279,6 +279,32 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     let force = wide().unwrap().sample(sampling).unwrap().repeated(2).unwrap();
     let found = claimed_period(&force.window(0, 1536).unwrap(), 1536).unwrap();
     assert_eq!(found.value, 1024.0, "{found}");
+    // A third of the samples had no partner, and nothing is said of them.
+    assert!(found.text.starts_with("the first 512 of 1536 samples"), "{found}");
+}
+
+/// Rows missing from a record, and rows of a second run behind it: the samples on the two sides of a
+/// gap return after other lags, too, which says nothing of the record.
+#[test]
+fn a_gap_in_the_record_is_no_other_period() {
+    let sampling = Sampling::new(0.01, 256).unwrap();
+    let force = Multisine::flat(1..=60, 2.0, Phases::Random { seed: 3 }).unwrap();
+    let force = force.sample(sampling).unwrap().repeated(8).unwrap();
+    for (gap, missing) in [(1000, 3), (1000, 100), (700, 1), (400, 255), (1300, 17)] {
+        for share in [1e-9, 0.01, 0.05] {
+            let force = noise::add_white(&force, NoiseLevel::FractionOfRms(share), 5).unwrap();
+            let samples = force.channel(0);
+            let broken = [&samples[..gap], &samples[gap + missing..]].concat();
+            let sampling = sampling.with_len(7 * 256).unwrap();
+            let broken = Record::from_channel(sampling, broken[..7 * 256].to_vec()).unwrap();
+            let found = claimed_period(&broken, 256).unwrap();
+            assert_eq!((found.verdict, found.value), (Verdict::Bad, 256.0), "{found}");
+            let (_, told) = found.text.split_once("but not across sample ").expect(&found.text);
+            let told: usize = told.split(' ').next().unwrap().parse().unwrap();
+            // A sample or two there may be by chance what was expected.
+            assert!((gap + 1..gap + 8).contains(&told), "{gap} {missing}: {told}");
+        }
+    }
 }
 
 /// What never repeats, what hardly varies, and what is still most of the time.
