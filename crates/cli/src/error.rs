@@ -1,6 +1,6 @@
 //! What can go wrong between the command line and the result.
 
-use mechid::signal::{told, told_to};
+use mechid::signal::{counted, ordinal, told, told_to};
 
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
@@ -45,8 +45,8 @@ pub enum CliError {
     NoMotion,
     /// The columns do not pair up with the degrees of freedom.
     #[error(
-        "{option} names {got} columns and --force {forces}: every degree of freedom needs one of each \
-         (--force 0 where no force acts)"
+        "{option} names {} and --force {forces}: every degree of freedom needs one of each \
+         (--force 0 where no force acts)", counted(*got, "column")
     )]
     ColumnCount {
         /// The option with the wrong number of columns.
@@ -88,8 +88,8 @@ pub enum CliError {
     },
     /// Not one motion column per degree of freedom of the machine.
     #[error(
-        "{option} names {got} columns, the machine has {dofs} degrees of freedom: name one for \
-         each, 0 where it was not measured"
+        "{option} names {}, the machine has {}: name one for \
+         each, 0 where it was not measured", counted(*got, "column"), counted(*dofs, "degree of freedom")
     )]
     MotionCount {
         /// The option with the wrong number of columns.
@@ -136,7 +136,8 @@ pub enum CliError {
     },
     /// Not one mass per degree of freedom.
     #[error(
-        "--mass gives {got} values, the record has {dof} degrees of freedom: give one mass for each, or all {dof}×{dof} entries row by row"
+        "--mass gives {}, the record has {}: give one mass for each, or \
+         all entries of the {dof}×{dof} matrix row by row", counted(*got, "value"), counted(*dof, "degree of freedom")
     )]
     MassCount {
         /// Values given.
@@ -145,7 +146,7 @@ pub enum CliError {
         dof: usize,
     },
     /// There is no line at all.
-    #[error("no excited line: over a period of {period} samples the force does not vary")]
+    #[error("no excited line: over a period of {} the force does not vary", counted(*period, "sample"))]
     StillForce {
         /// Samples in the period.
         period: usize,
@@ -278,7 +279,7 @@ pub enum CliError {
         value: f64,
     },
     /// The period is lost.
-    #[error("a period of {period} samples is no whole number of every {factor}-th sample")]
+    #[error("a period of {} is no whole number of every {} sample", counted(*period, "sample"), ordinal(*factor))]
     DecimatedPeriod {
         /// Samples in a period.
         period: usize,
@@ -322,6 +323,18 @@ pub enum CliError {
     /// A model cannot be used.
     #[error(transparent)]
     Model(#[from] mechid::model::ModelError),
+    /// Two things on one stream.
+    #[error(
+        "standard output takes one thing, not {}{}",
+        counted(*files, "file"),
+        if *json { " and the report: name files, or leave --json out" } else { ": name the others" }
+    )]
+    SharedOutput {
+        /// Files that are to go there.
+        files: usize,
+        /// Whether the report as JSON goes there, too.
+        json: bool,
+    },
     /// The report cannot be printed.
     #[error("cannot print the report: {0}")]
     Print(#[from] std::io::Error),

@@ -39,7 +39,7 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
 #[derive(Debug, Clone, Args)]
 pub struct RecordArgs {
     /// The record: text with one row per sample, MATLAB .mat (up to -v7), or universal file (dataset
-    /// 58); also in gzip
+    /// 58); also in gzip; - is standard input
     ///
     /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
     /// found too; lines starting with # are left out. MATLAB: a vector is a column, of a matrix

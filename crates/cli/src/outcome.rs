@@ -1,8 +1,8 @@
 //! What a subcommand found, and how it reaches the user.
 
-use std::io::{self, Write as _};
+use std::io;
 
-use mechid::io::{BegunFile, OutputFile, write_all};
+use mechid::io::{BegunFile, OutputFile, is_standard_output, write_all};
 use mechid::plot::Figure;
 use serde::Serialize;
 
@@ -63,19 +63,32 @@ impl Outcome {
         Ok(self.with_file(path, content))
     }
 
-    /// Writes the files, all or none, and prints the report.
+    /// Writes the files, all or none, and prints the report: on the error stream where a file goes
+    /// to standard output, for whoever reads on there expects the file and nothing else.
     pub fn deliver(self, report: &ReportArgs) -> Result<(), CliError> {
+        let taken = self.begun.iter().filter(|file| file.is_for_standard_output()).count()
+            + self.files.iter().filter(|file| is_standard_output(&file.path)).count();
+        if taken + usize::from(report.json) > 1 && taken > 0 {
+            return Err(CliError::SharedOutput { files: taken, json: report.json });
+        }
         write_all(self.begun, &self.files)?;
         let text = match report {
             ReportArgs { json: true, .. } => &self.json,
             ReportArgs { quiet: true, .. } => return Ok(()),
             _ => &self.text,
         };
-        let mut out = io::stdout().lock();
-        match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        let printed = match taken {
+            0 => print(io::stdout().lock(), text),
+            _ => print(io::stderr().lock(), text),
+        };
+        match printed {
             // The reader has seen enough (`mechid … | head`).
             Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
             other => Ok(other?),
         }
     }
+}
+
+fn print(mut out: impl io::Write, text: &str) -> io::Result<()> {
+    out.write_all(text.as_bytes()).and_then(|()| out.flush())
 }

@@ -1,6 +1,7 @@
 //! What can go wrong in an identification.
 
 use mechid_model::Matrix;
+use mechid_signal::counted;
 
 /// An identification that cannot be done; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -27,7 +28,7 @@ pub enum EstimateError {
         value: f64,
     },
     /// There is no such entry.
-    #[error("{matrix} has no entry ({row}, {column}): the problem has {dof} degrees of freedom")]
+    #[error("{matrix} has no entry ({row}, {column}): the problem has {}", counted(*dof, "degree of freedom"))]
     NoSuchEntry {
         /// Which matrix.
         matrix: Matrix,
@@ -54,7 +55,10 @@ pub enum EstimateError {
     },
     /// Fewer equations than unknowns.
     #[error(
-        "{rows} equations do not determine {unknowns} unknowns: use a longer record or fewer unknowns"
+        "{} {} not determine {}: use a longer record or fewer unknowns",
+        counted(*rows, "equation"),
+        if *rows == 1 { "does" } else { "do" },
+        counted(*unknowns, "unknown")
     )]
     TooFewRows {
         /// Equations (rows) given.
@@ -116,7 +120,7 @@ pub enum EstimateError {
         parameter: String,
     },
     /// Segments that do not move on, or leave samples out.
-    #[error("segments of {len} samples cannot start {hop} samples apart: from 1 to {len}")]
+    #[error("segments of {} cannot start {} apart: from 1 to {len}", counted(*len, "sample"), counted(*hop, "sample"))]
     Hop {
         /// Samples of a segment.
         len: usize,
@@ -133,8 +137,8 @@ pub enum EstimateError {
     },
     /// A sliding polynomial cannot be fitted, or has no such derivative.
     #[error(
-        "a polynomial of order {order} through {samples} samples: the window must have more samples \
-         than the order, and the order must be at least that of the derivative"
+        "a polynomial of order {order} through {}: the window must have more samples \
+         than the order, and the order must be at least that of the derivative", counted(*samples, "sample")
     )]
     Window {
         /// Samples of the window.
@@ -143,7 +147,7 @@ pub enum EstimateError {
         order: usize,
     },
     /// A record is too short for what is asked of it.
-    #[error("the record has {samples} samples where at least {needed} are needed")]
+    #[error("the record has {} where at least {needed} are needed", counted(*samples, "sample"))]
     TooShort {
         /// Samples of the record.
         samples: usize,

@@ -1,7 +1,7 @@
 //! What can keep a force from being reconstructed.
 
 use mechid_model::{Matrix, ModelError};
-use mechid_signal::{SignalError, told_to};
+use mechid_signal::{SignalError, counted, told_to};
 
 /// A force that cannot be reconstructed; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -9,8 +9,8 @@ use mechid_signal::{SignalError, told_to};
 pub enum ForceError {
     /// System and response differ in size.
     #[error(
-        "the system has {system} degrees of freedom, the response has {response} channels: \
-         give one channel per degree of freedom, or name the measured ones in a `Measurement`"
+        "the system has {}, the response has {}: \
+         give one channel per degree of freedom, or name the measured ones in a `Measurement`", counted(*system, "degree of freedom"), counted(*response, "channel")
     )]
     Dof {
         /// Degrees of freedom of the system.
@@ -19,7 +19,7 @@ pub enum ForceError {
         response: usize,
     },
     /// The response is shorter than the method needs.
-    #[error("{samples} samples are too few: this method needs {needed}; give a longer response")]
+    #[error("a response of {} is too short: this method needs {needed}", counted(*samples, "sample"))]
     TooShort {
         /// Samples given.
         samples: usize,
@@ -27,7 +27,7 @@ pub enum ForceError {
         needed: usize,
     },
     /// A record and its list of channels differ in size.
-    #[error("the record has {record} channels, {described} are described")]
+    #[error("the record has {}, {described} are described", counted(*record, "channel"))]
     ChannelCount {
         /// Channels of the record.
         record: usize,
@@ -55,8 +55,8 @@ pub enum ForceError {
     NoForcedDof,
     /// More unknown forces than measured channels.
     #[error(
-        "{forces} unknown forces cannot be told apart with {measurements} measured channels: \
-         measure more degrees of freedom, or name fewer forced ones"
+        "{forces} unknown forces cannot be told apart with {}: \
+         measure more degrees of freedom, or name fewer forced ones", counted(*measurements, "measured channel")
     )]
     MoreForcesThanMeasurements {
         /// Unknown forces.
@@ -162,7 +162,7 @@ pub enum ForceError {
         dof: usize,
     },
     /// Not one random walk per force.
-    #[error("{walks} random-walk intensities were given for {forces} forces")]
+    #[error("as many random-walk intensities as forces are needed: {forces}, got {walks}")]
     WalkCount {
         /// Intensities given.
         walks: usize,
@@ -190,7 +190,7 @@ pub enum ForceError {
     #[error("the force compared with is zero on every channel")]
     NoForce,
     /// A covariance that is not one row and column per entry.
-    #[error("the covariance is {rows}×{columns}, {entries} entries are uncertain")]
+    #[error("the covariance is {rows}×{columns}, for {}", counted(*entries, "uncertain entry"))]
     CovarianceShape {
         /// Its rows.
         rows: usize,
@@ -226,8 +226,7 @@ pub enum ForceError {
     },
     /// An entry outside the matrices.
     #[error(
-        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) of a system of {dofs} \
-         degrees of freedom"
+        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) of a system of {}", counted(*dofs, "degree of freedom")
     )]
     NoSuchEntry {
         /// Which matrix.

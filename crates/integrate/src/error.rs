@@ -1,6 +1,6 @@
 //! What can be wrong with an integration.
 
-use mechid_signal::{told, told_to};
+use mechid_signal::{counted, told, told_to};
 
 /// An integration that cannot be set up or carried out; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -30,7 +30,7 @@ pub enum IntegrateError {
         value: f64,
     },
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
-    #[error("{what} has {got} components, the system has {dof} degrees of freedom")]
+    #[error("{what} has {}, the system has {}", counted(*got, "component"), counted(*dof, "degree of freedom"))]
     Components {
         /// What was given.
         what: &'static str,
@@ -41,7 +41,7 @@ pub enum IntegrateError {
     },
     /// The forces in the middle of the steps do not lie on the time axis of the force.
     #[error(
-        "the mid-step forces have {got} samples at {got_dt} s, the force {expected} at {dt} s",
+        "the mid-step forces have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
         got_dt = told(*got_dt), dt = told(*dt)
     )]
     MidStepSampling {

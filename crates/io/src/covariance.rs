@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use mechid_signal::told;
+use mechid_signal::{counted, told};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::IoError;
+use crate::{IoError, standard};
 
 /// The `covariance` of the report that `mechid identify --json` prints, which
 /// [`read_covariance`] reads back.
@@ -38,7 +38,7 @@ impl ParameterCovariance {
     }
 }
 
-/// The covariance in a JSON report, if it has one.
+/// The covariance in a JSON report (`-`: on standard input), if it has one.
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is null, as JSON writes
@@ -55,8 +55,9 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
         matrix: Vec<Vec<Option<f64>>>,
         degrees_of_freedom: usize,
     }
-    let file = path.as_ref().display().to_string();
-    let text = match std::fs::read_to_string(path) {
+    let path = path.as_ref();
+    let file = standard::input_name(path);
+    let text = match standard::read_text(path) {
         Ok(text) => text,
         Err(source) => return Err(IoError::Read { file, source }),
     };
@@ -68,7 +69,10 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     let n = covariance.parameters.len();
     let wrong = |what: String| IoError::Description { file: file.clone(), what };
     if covariance.matrix.len() != n || covariance.matrix.iter().any(|row| row.len() != n) {
-        return Err(wrong(format!("the covariance of {n} parameters must be a {n}×{n} matrix")));
+        return Err(wrong(format!(
+            "the covariance of {} must be a {n}×{n} matrix",
+            counted(n, "parameter")
+        )));
     }
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
     let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);

@@ -1,7 +1,7 @@
 //! What can be wrong with a file.
 
 use mechid_model::ModelError;
-use mechid_signal::{SignalError, told};
+use mechid_signal::{SignalError, counted, told};
 
 use crate::Place;
 
@@ -71,8 +71,9 @@ pub enum IoError {
     },
     /// Text stands above the table.
     #[error(
-        "{file}: the table seems to begin on line {line}, with {fields} fields; if so, leave out what \
+        "{file}: the table seems to begin on line {line}, with {}; if so, leave out what \
          stands above it with --skip-lines {}",
+        counted(*fields, "field"),
         line - 1
     )]
     AboveTable {
@@ -98,7 +99,7 @@ pub enum IoError {
         found: &'static str,
     },
     /// A line has more or fewer fields than the first one.
-    #[error("{file}, line {line}: {got} fields where the first line has {expected}")]
+    #[error("{file}, line {line}: {} where the first line has {expected}", counted(*got, "field"))]
     Ragged {
         /// The file.
         file: String,
@@ -337,7 +338,7 @@ pub enum IoError {
     /// A spectral line does not exist in a period.
     #[error(
         "lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
-         frequency of a period of {len} samples"
+         frequency of a period of {}", counted(*len, "sample")
     )]
     LineOutside {
         /// What was written.

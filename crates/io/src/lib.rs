@@ -23,6 +23,7 @@ mod experiment;
 mod line_spec;
 mod mat;
 mod output;
+mod standard;
 mod system;
 mod table;
 mod uff;
@@ -36,5 +37,6 @@ pub use experiment::{
 };
 pub use line_spec::LineSpec;
 pub use output::{BegunFile, OutputFile, write_all};
+pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{SystemMatrices, read_system};
 pub use table::{Inventory, Place, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::IoError;
+use crate::standard::{is_standard_output, output_name};
 
 /// A file to be written: where, and what.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -46,6 +47,8 @@ enum Stage {
     Beside { temporary: Temporary, destination: PathBuf },
     /// Without a name: the destination is no regular file and is written into.
     Nameless { destination: PathBuf },
+    /// Without a name: it goes to standard output.
+    StandardOutput,
 }
 
 /// A file that is removed when it is no longer used; where it has been renamed, there is none.
@@ -55,7 +58,9 @@ struct Temporary(PathBuf);
 /// Writes all files, or none: each is written beside its destination first, and they take their
 /// names only once all are complete, those that were begun before first.
 ///
-/// A destination that is no regular file (a pipe, `/dev/null`) is written into.
+/// A destination that is no regular file (a pipe, `/dev/null`) is written into; so is standard
+/// output, called `-` or by a name of the system such as `/dev/stdout`, whatever it is redirected to.
+/// There it is no error if the reader has seen enough and closed the pipe.
 ///
 /// # Errors
 /// [`IoError::Write`] naming the file; whatever stood at the destinations still stands there.
@@ -85,7 +90,15 @@ impl BegunFile {
         }
     }
 
+    /// Whether it goes to standard output.
+    pub fn is_for_standard_output(&self) -> bool {
+        matches!(self.stage, Stage::StandardOutput)
+    }
+
     fn open(path: &Path) -> io::Result<(File, Stage)> {
+        if is_standard_output(path) {
+            return Ok((tempfile::tempfile()?, Stage::StandardOutput));
+        }
         // Through a symbolic link, so that the link stays one.
         let destination = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
         match fs::metadata(&destination) {
@@ -125,21 +138,28 @@ impl BegunFile {
                 drop(stream);
                 fs::rename(&temporary.0, destination)
             }
-            Stage::Nameless { destination } => copied(stream.get_ref(), &destination),
+            Stage::Nameless { destination } => {
+                let into = File::options().write(true).open(destination);
+                into.and_then(|into| copied(stream.get_ref(), into))
+            }
+            Stage::StandardOutput => match copied(stream.get_ref(), io::stdout().lock()) {
+                Err(closed) if closed.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                other => other,
+            },
         };
         done.map_err(|source| failed(&path, source))
     }
 }
 
-/// Writes what a file holds into another one, which is there.
-fn copied(mut from: &File, destination: &Path) -> io::Result<()> {
+/// Writes what a file holds into something else.
+fn copied(mut from: &File, mut into: impl io::Write) -> io::Result<()> {
     io::Seek::rewind(&mut from)?;
-    let mut into = File::options().write(true).open(destination)?;
-    io::copy(&mut from, &mut into).map(|_| ())
+    io::copy(&mut from, &mut into)?;
+    into.flush()
 }
 
 fn failed(path: &Path, source: io::Error) -> IoError {
-    IoError::Write { file: path.display().to_string(), source }
+    IoError::Write { file: output_name(path), source }
 }
 
 impl Drop for Temporary {

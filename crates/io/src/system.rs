@@ -4,11 +4,12 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_model::SecondOrderSystem;
+use mechid_signal::counted;
 use nalgebra::DMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
-use crate::IoError;
+use crate::{IoError, standard};
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
 /// [`read_system`] reads back.
@@ -33,7 +34,7 @@ impl From<&SecondOrderSystem> for SystemMatrices {
     }
 }
 
-/// The system in a JSON file: the `system` of an [`Experiment`](crate::Experiment), or of the report
+/// The system in a JSON file (`-`: on standard input): the `system` of an [`Experiment`](crate::Experiment), or of the report
 /// that `mechid identify --json` prints.
 ///
 /// # Errors
@@ -43,8 +44,9 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
     struct Described {
         system: SystemDescription,
     }
-    let file = path.as_ref().display().to_string();
-    let text = match std::fs::read_to_string(path) {
+    let path = path.as_ref();
+    let file = standard::input_name(path);
+    let text = match standard::read_text(path) {
         Ok(text) => text,
         Err(source) => return Err(IoError::Read { file, source }),
     };
@@ -144,9 +146,9 @@ impl<'de> Deserialize<'de> for Entries {
                 while let Some(row) = seq.next_element::<Vec<f64>>()? {
                     if let Some(first) = rows.first().filter(|first| first.len() != row.len()) {
                         return Err(de::Error::custom(format_args!(
-                            "row {} of a matrix has {} entries, the first has {}",
+                            "row {} of a matrix has {}, the first has {}",
                             rows.len() + 1,
-                            row.len(),
+                            counted(row.len(), "entry"),
                             first.len()
                         )));
                     }

@@ -1,6 +1,6 @@
 //! What can be wrong with a model.
 
-use mechid_signal::told;
+use mechid_signal::{counted, told};
 
 use crate::Matrix;
 
@@ -45,7 +45,7 @@ pub enum ModelError {
     #[error("a system needs at least one degree of freedom")]
     NoDof,
     /// Displacement, velocity and acceleration do not belong together.
-    #[error("displacement has {expected} channels, {quantity} has {got}")]
+    #[error("displacement has {}, {quantity} has {got}", counted(*expected, "channel"))]
     Channels {
         /// `"velocity"` or `"acceleration"`.
         quantity: &'static str,
@@ -65,7 +65,7 @@ pub enum ModelError {
         value: f64,
     },
     /// Displacement and velocity of a state, or a state and a system, do not fit.
-    #[error("the state has {got} entries for {dof} degrees of freedom")]
+    #[error("the state has {} for {}", counted(*got, "entry"), counted(*dof, "degree of freedom"))]
     StateLength {
         /// Entries found.
         got: usize,
@@ -86,7 +86,7 @@ pub enum ModelError {
         value: f64,
     },
     /// A force record does not have one channel per degree of freedom.
-    #[error("the force has {got} channels for {dof} degrees of freedom")]
+    #[error("the force has {} for {}", counted(*got, "channel"), counted(*dof, "degree of freedom"))]
     ForceChannels {
         /// Channels found.
         got: usize,
@@ -112,7 +112,7 @@ pub enum ModelError {
         largest: f64,
     },
     /// The eigenvalue or singular value iteration did not converge.
-    #[error("the modes of a system with {dof} degrees of freedom did not converge")]
+    #[error("the modes of a system with {} did not converge", counted(*dof, "degree of freedom"))]
     ModesNotConverged {
         /// Degrees of freedom.
         dof: usize,

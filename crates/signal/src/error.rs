@@ -1,6 +1,6 @@
 //! What can be wrong with a signal.
 
-use crate::{Sampling, told};
+use crate::{Sampling, counted, told};
 
 /// A signal that cannot be made or used; every variant carries the offending numbers.
 ///
@@ -18,7 +18,7 @@ pub enum SignalError {
     #[error("a record needs at least one sample")]
     Empty,
     /// The data do not have as many samples as the sampling says.
-    #[error("channel {} has {got} samples where the sampling has {expected}", channel + 1)]
+    #[error("channel {} has {} where the sampling has {expected}", channel + 1, counted(*got, "sample"))]
     Length {
         /// Channel, counted from 0.
         channel: usize,
@@ -53,7 +53,7 @@ pub enum SignalError {
     },
     /// Two records that must share a time axis do not.
     #[error(
-        "time axes differ: {left_len} samples at {left_dt} s against {right_len} at {right_dt} s",
+        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", counted(*left_len, "sample"),
         left_dt = told(*left_dt), right_dt = told(*right_dt)
     )]
     SamplingMismatch {
@@ -86,7 +86,7 @@ pub enum SignalError {
         line: usize,
     },
     /// A list that must have one entry per line has another length.
-    #[error("{lines} lines but {got} {what}")]
+    #[error("{} but {got} {what}", counted(*lines, "line"))]
     PerLine {
         /// What the list holds.
         what: &'static str,

@@ -66,4 +66,4 @@ pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
-pub use told::{told, told_to};
+pub use told::{counted, ordinal, told, told_to};

@@ -27,6 +27,44 @@ pub fn told_to(value: f64, decimals: usize) -> impl fmt::Display {
     ToldTo(value, decimals)
 }
 
+/// So many things: the number and, of anything but one, their plural.
+///
+/// ```
+/// use mechid_signal::counted;
+///
+/// assert_eq!(counted(1, "sample"), "1 sample");
+/// assert_eq!(counted(0, "entry"), "0 entries");
+/// assert_eq!(counted(2, "degree of freedom"), "2 degrees of freedom");
+/// ```
+pub fn counted(count: usize, thing: &str) -> String {
+    if count == 1 {
+        return format!("1 {thing}");
+    }
+    let (first, rest) = thing.find(" of ").map_or((thing, ""), |at| thing.split_at(at));
+    match first.strip_suffix('y') {
+        Some(stem) => format!("{count} {stem}ies{rest}"),
+        None => format!("{count} {first}s{rest}"),
+    }
+}
+
+/// The place in a row, counted from 1: `1st`, `2nd`, `3rd`, `4th`.
+///
+/// ```
+/// use mechid_signal::ordinal;
+///
+/// assert_eq!(ordinal(3), "3rd");
+/// ```
+pub fn ordinal(place: usize) -> String {
+    let ending = match (place % 10, place % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    };
+    format!("{place}{ending}")
+}
+
 struct Told(f64);
 
 struct ToldTo(f64, usize);
@@ -57,7 +95,27 @@ impl fmt::Display for Told {
 
 #[cfg(test)]
 mod tests {
-    use super::{told, told_to};
+    use super::{counted, ordinal, told, told_to};
+
+    #[test]
+    fn places_end_as_they_are_spoken() {
+        let places = [1, 2, 3, 4, 10, 11, 12, 13, 21, 22, 23, 24, 101, 111, 112, 113, 1002, 1013];
+        assert_eq!(
+            places.map(ordinal).join(" "),
+            "1st 2nd 3rd 4th 10th 11th 12th 13th 21st 22nd 23rd 24th 101st 111th 112th 113th \
+             1002nd 1013th"
+        );
+    }
+
+    #[test]
+    fn one_thing_is_no_plural() {
+        let told = |count| {
+            ["line", "frequency", "degree of freedom"].map(|thing| counted(count, thing)).join(", ")
+        };
+        assert_eq!(told(1), "1 line, 1 frequency, 1 degree of freedom");
+        assert_eq!(told(0), "0 lines, 0 frequencies, 0 degrees of freedom");
+        assert_eq!(told(21), "21 lines, 21 frequencies, 21 degrees of freedom");
+    }
 
     #[test]
     fn short_numbers_in_full_and_long_ones_with_an_exponent() {

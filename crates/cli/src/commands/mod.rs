@@ -34,6 +34,8 @@ use crate::outcome::Outcome;
     after_help = "Numbers are in SI units. Columns are chosen by name or by number, counted from 1. Records are \
                   text\n(CSV and its relatives), MATLAB files up to -v7, universal files (dataset 58), \
                   or any of them in gzip.\n\n\
+                  A file called - is standard input where it is read, standard output where it is written; the\n\
+                  report for people then goes to the error stream.\n\n\
                   Exit codes:\n  0  success\n  2  every failure, wrong options included: one message on \
                   the error stream, no file written"
 )]

@@ -9,6 +9,7 @@ mod modal;
 mod pictures;
 mod records;
 mod reference;
+mod streams;
 mod stretches;
 mod sweep;
 mod talk;

@@ -67,6 +67,38 @@ fn quiet_success_says_nothing_and_quiet_failure_says_what_is_wrong() {
     assert!(message.starts_with("error: a.csv has no column \"x\""), "{message}");
 }
 
+/// One is no plural, and numbers in a row end as they are spoken.
+#[test]
+fn one_thing_is_told_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    write("one.csv", "x\n1\n".into());
+    let told = mechid(folder.path(), "info one.csv");
+    assert!(
+        told.starts_with("one.csv: text, fields between blanks, 1 column, 1 sample;"),
+        "{told}"
+    );
+    let rows = (0..32).map(|k| {
+        let turn = PI * f64::from(k) / 8.0;
+        format!("{},{},{}\n", f64::from(k) / 16.0, turn.cos(), turn.sin())
+    });
+    write("a.csv", "t,f,x\n".to_owned() + &rows.collect::<String>());
+    let record = "a.csv --force f --displacement x --period 16";
+    let told = mechid(folder.path(), &format!("identify {record} --mass 1"));
+    assert!(told.contains("; 1 line, 1 (1 Hz)\n"), "{told}");
+    let told = mechid(folder.path(), &format!("frf {record}"));
+    assert!(told.contains("worth 2 averages; 1 line, 1 Hz\n"), "{told}");
+    for (factor, ordinal) in [(3, "3rd"), (6, "6th"), (11, "11th"), (21, "21st")] {
+        let told = refused(
+            folder.path(),
+            &format!("sweep {record} --velocity 3 --estimator least-squares --decimate {factor}"),
+        );
+        assert!(told.contains(&format!("no whole number of every {ordinal} sample")), "{told}");
+    }
+    let told = refused(folder.path(), "identify a.csv --force f,0 --displacement x,0 --mass 1");
+    assert!(told.contains("--mass gives 1 value, the record has 2 degrees of freedom"), "{told}");
+}
+
 /// A random walk where a motion should be: warnings and notes, a line each and no gaps.
 #[test]
 fn warnings_stand_together() {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{Record, Spectrum, counted};
 
 use super::{Check, Subject, Verdict, claimed_period};
 use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions, equation_of_motion};
@@ -139,8 +139,10 @@ pub(super) fn conditioning(condition: f64, lost: usize) -> Check {
     };
     let (verdict, text) = if lost > 0 {
         let text = format!(
-            "{lost} combinations of displacements, velocities and forces do not vary in the data: \
-             some parameters will stay undetermined"
+            "{} of displacements, velocities and forces {} not vary in the data: some parameters \
+             will stay undetermined",
+            counted(lost, "combination"),
+            if lost == 1 { "does" } else { "do" }
         );
         (Verdict::Bad, text)
     } else if condition > DOUBTFUL_CONDITION {

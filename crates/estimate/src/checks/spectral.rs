@@ -1,6 +1,6 @@
 //! Whether a record will do for a fit of its spectra.
 
-use mechid_signal::Record;
+use mechid_signal::{Record, counted};
 
 use super::before::{
     LINE_FLOOR, conditioning, fastest_mode, grade, periodicity, unknowns_of_an_equation,
@@ -93,9 +93,10 @@ fn excitation(data: &FrequencyData, unknowns: &Unknowns) -> Check {
     let count = (0..data.len()).filter(driven).count();
     let needed = unknowns_of_an_equation(unknowns);
     let text = format!(
-        "{count} of the lines used carry force, which makes {} equations for {needed} unknowns in \
-         each equation of motion",
-        2 * count
+        "{count} of the lines used {}, which makes {} equations for {} in each equation of motion",
+        if count == 1 { "carries force" } else { "carry force" },
+        2 * count,
+        counted(needed, "unknown")
     );
     let (verdict, text) = match 2 * count {
         few if few < needed => (Verdict::Bad, text + ": excite more lines"),

@@ -8,7 +8,7 @@ mod scheme;
 use std::path::Path;
 
 use mechid_model::{InitialState, SecondOrderSystem};
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Record, Sampling, counted};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 
@@ -16,8 +16,8 @@ use self::excitation::Excitation;
 pub use self::noise::{Level, Noise};
 pub use self::response::{InitialMotion, PerDof, ResponseKind};
 pub use self::scheme::{FirstDisplacements, FirstSteps, LoadBeyond, MiddleLoad, SchemeChoice};
-use crate::IoError;
 use crate::system::SystemDescription;
+use crate::{IoError, standard};
 
 /// What to simulate. Every field of the file is one of those below; an unknown one is an error.
 ///
@@ -76,13 +76,14 @@ struct SamplingDescription {
 }
 
 impl Experiment {
-    /// The experiment described in a file.
+    /// The experiment described in a file, or on standard input as `-`.
     ///
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        let file = path.as_ref().display().to_string();
-        match std::fs::read_to_string(path) {
+        let path = path.as_ref();
+        let file = standard::input_name(path);
+        match standard::read_text(path) {
             Ok(text) => Self::parse(file, &text),
             Err(source) => Err(IoError::Read { file, source }),
         }
@@ -167,8 +168,10 @@ impl Experiment {
     /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].
     pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
         let dof = self.system()?.dof();
-        let wrong =
-            |got| format!("{what} has {got} entries, the system has {dof} degrees of freedom");
+        let wrong = |got| {
+            let (got, dof) = (counted(got, "entry"), counted(dof, "degree of freedom"));
+            format!("{what} has {got}, the system has {dof}")
+        };
         given.values(dof).map_err(|got| self.wrong(wrong(got)))
     }
 

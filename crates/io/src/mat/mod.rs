@@ -10,6 +10,7 @@
 mod array;
 mod element;
 
+use mechid_signal::counted;
 use std::io::Read as _;
 
 use flate2::read::ZlibDecoder;
@@ -110,7 +111,8 @@ fn add(contents: &mut Contents, Array { name, value }: Array) {
                 return;
             }
             format!(
-                "a matrix of {rows} rows and {columns} columns (transpose it: a channel is a column)"
+                "a matrix of {} and {columns} columns (transpose it: a channel is a column)",
+                counted(rows, "row")
             )
         }
         Value::Other(what) => what.into(),

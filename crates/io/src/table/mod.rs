@@ -75,7 +75,7 @@ pub(crate) struct Contents {
 }
 
 impl Table {
-    /// The table in a file.
+    /// The table in a file, or on standard input as `-`.
     ///
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Table::parse`].

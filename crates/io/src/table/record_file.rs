@@ -13,7 +13,7 @@ use super::source::{Kind, Source};
 use super::text::TextReader;
 use super::time_axis::{self, Steps};
 use super::{Table, TimeAxis};
-use crate::IoError;
+use crate::{IoError, standard};
 
 /// Rows taken from a text at a time.
 const CHUNK: usize = 4096;
@@ -75,14 +75,16 @@ struct Chunk<'a> {
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file below some lines of text; of a text at most `held` rows are held.
+    /// Opens a file, or standard input as `-`, below some lines of text; of a text at most `held`
+    /// rows are held.
     ///
     /// # Errors
     /// As [`Table::read_below`].
     pub fn open(path: impl AsRef<Path>, skip: u64, held: usize) -> Result<Self, IoError> {
         let path = path.as_ref().to_owned();
         let source = Source::open(&path)?;
-        let again = fs::metadata(&path).is_ok_and(|m| m.is_file()) && source.kind() == Kind::Text;
+        let file = !standard::is_input(&path) && fs::metadata(&path).is_ok_and(|m| m.is_file());
+        let again = file && source.kind() == Kind::Text;
         let limit = if again { held } else { usize::MAX };
         let (head, whole) = Table::first_rows(source, skip, limit)?;
         Ok(Self { path, skip, head, whole })

@@ -1,13 +1,12 @@
 //! The bytes of a file, out of their gzip if they are in one, text as UTF-8, and what format they are.
 
-use std::fs::File;
 use std::io::{self, BufRead, BufReader, Cursor, Read as _};
 use std::path::Path;
 
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
-use crate::IoError;
+use crate::{IoError, standard};
 
 /// Bytes asked of the operating system at a time.
 const CHUNK: usize = 1 << 16;
@@ -44,10 +43,10 @@ pub(crate) enum Kind {
 }
 
 impl<'a> Source<'a> {
-    /// Opens a file.
+    /// Opens a file, or standard input as `-`.
     pub fn open(path: &Path) -> Result<Source<'static>, IoError> {
-        let file = path.display().to_string();
-        match File::open(path) {
+        let file = standard::input_name(path);
+        match standard::open(path) {
             Ok(stream) => Source::new(file, BufReader::with_capacity(CHUNK, stream)),
             Err(source) => Err(IoError::Read { file, source }),
         }

@@ -1,5 +1,7 @@
 //! The values of a function, printed or binary.
 
+use mechid_signal::counted;
+
 use super::header::Header;
 use super::lines::{Fault, Line, Lines, is_mark, number};
 
@@ -14,7 +16,11 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
     while values.len() < expected {
         let line = lines.required("the file is cut short within the values of a dataset 58")?;
         if is_mark(line.text) {
-            let what = format!("a function of {expected} numbers ends after {}", values.len());
+            let what = format!(
+                "a function of {} ends after {}",
+                counted(expected, "number"),
+                values.len()
+            );
             return Err(line.fault(what));
         }
         row(header, &line, &mut values)?;
@@ -22,7 +28,7 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
     if values.len() > expected {
         return Err(Fault {
             at: lines.at().saturating_sub(1),
-            what: format!("a function of {expected} numbers has more"),
+            what: format!("a function of {} has more", counted(expected, "number")),
         });
     }
     Ok(values)

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mechid::estimate::Parameter;
 use mechid::force::{Entry, SystemCovariance};
-use mechid::io::{read_covariance, read_system};
+use mechid::io::{input_name, read_covariance, read_system};
 use mechid::model::SecondOrderSystem;
 
 use crate::commands::modal::parameters;
@@ -23,7 +23,7 @@ impl Machine {
         let system = read_system(path)?;
         let covariance = match read_covariance(path)? {
             Some(found) => {
-                let named = parameters(&path.display().to_string(), &system, &found)?;
+                let named = parameters(&input_name(path), &system, &found)?;
                 let entry =
                     |p: &Parameter| Entry { matrix: p.matrix(), row: p.row(), column: p.column() };
                 let entries = named.iter().map(entry).collect();

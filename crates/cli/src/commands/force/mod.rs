@@ -176,7 +176,7 @@ impl ForceArgs {
         }
         Report {
             file: recorded.file().to_owned(),
-            machine: self.system.display().to_string(),
+            machine: mechid::io::input_name(&self.system),
             method: how.method,
             why: how.why.clone(),
             samples: recorded.sampling.len(),

@@ -6,6 +6,7 @@ use std::path::Path;
 use mechid::force::IdentifiedForce;
 use mechid::io::{BegunFile, IoError};
 use mechid::plot::{Axis, Color, Curve, Figure, Panel};
+use mechid::signal::counted;
 use serde::Serialize;
 
 use super::method::told;
@@ -61,7 +62,8 @@ impl Report {
             Some(1) => "one period".into(),
             Some(n) => format!("mean of {n} periods"),
         };
-        let mut text = format!("{}: {} samples at {rate} Hz, {extent}\n", self.file, self.samples);
+        let mut text =
+            format!("{}: {} at {rate} Hz, {extent}\n", self.file, counted(self.samples, "sample"));
         let _ = writeln!(text, "machine: {}", self.machine);
         let _ = writeln!(text, "method: {}\n  because: {}", self.method, self.why);
         for Chosen { name, value, unit } in &self.chosen {

@@ -45,7 +45,8 @@ pub struct FrfArgs {
     band_hz: Option<Band>,
     #[command(flatten)]
     segments: SegmentArgs,
-    /// Write the responses into this file, as a table with one row per frequency
+    /// Write the responses into this file (-: to standard output), as a table with one row per
+    /// frequency
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 
 use mechid::estimate::frequency_domain::Motion;
 use mechid::estimate::{Segments, Window};
+use mechid::signal::counted;
 use serde::Serialize;
 
 use super::responses::{Estimator, Responses};
@@ -104,23 +105,26 @@ impl Report {
     pub fn text(&self) -> String {
         let s = &self.segments;
         let cut = match s.window {
-            None => format!("periods of {} samples", s.samples),
+            None => format!("periods of {}", counted(s.samples, "sample")),
             Some(window) => {
-                format!("segments of {} samples every {} under a {window} window", s.samples, s.hop)
+                let samples = counted(s.samples, "sample");
+                format!("segments of {samples} every {} under a {window} window", s.hop)
             }
         };
         let [low, high] = [self.frequency_hz.first(), self.frequency_hz.last()]
             .map(|hz| compact(hz.copied().unwrap_or(0.0), 5));
+        let lines = match self.frequency_hz.len() {
+            1 => format!("1 line, {low} Hz"),
+            n => format!("{n} lines, {low} to {high} Hz"),
+        };
         let mut text = format!(
-            "{}: samples {} to {}, {} Hz\n{} from {cut}, worth {} averages; {} lines, {low} to {high} \
-             Hz\n\n",
+            "{}: samples {} to {}, {} Hz\n{} from {cut}, worth {} averages; {lines}\n\n",
             self.file,
             self.first_sample,
             self.last_sample,
             compact(self.sample_rate_hz, 8),
             self.estimator,
             compact(s.averages, 4),
-            self.frequency_hz.len(),
         );
         let mut rows = vec![
             ["response", "largest magnitude", "at", "least coherence", "median"]

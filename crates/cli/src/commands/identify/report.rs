@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mechid::estimate::{self, IdentifiedMode, frequency_domain};
 use mechid::io::{ParameterCovariance, SystemMatrices};
+use mechid::signal::counted;
 use serde::Serialize;
 
 use super::checks::CheckRow;
@@ -163,8 +164,7 @@ impl Report {
             let rate = compact(window.sample_rate_hz, 8);
             let periods = match (self.repeats, window.periods) {
                 (false, _) => String::new(),
-                (_, 1) => format!(", 1 period of {}", window.period_samples),
-                (_, n) => format!(", {n} periods of {}", window.period_samples),
+                (_, n) => format!(", {} of {}", counted(n, "period"), window.period_samples),
             };
             let (first, last) = (window.first_sample, window.last_sample);
             text += &format!("{file}: samples {first} to {last}{periods}, {rate} Hz\n");
@@ -172,7 +172,10 @@ impl Report {
         text += self.estimator;
         if let Some(l) = &self.lines {
             let [low, high] = [l.first_hz, l.last_hz].map(|hz| compact(hz, 5));
-            text += &format!("; {} lines, {} to {} ({low} to {high} Hz)", l.count, l.first, l.last);
+            text += &match l.count {
+                1 => format!("; 1 line, {} ({low} Hz)", l.first),
+                n => format!("; {n} lines, {} to {} ({low} to {high} Hz)", l.first, l.last),
+            };
         }
         text + "\n"
     }

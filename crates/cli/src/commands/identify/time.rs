@@ -6,7 +6,7 @@ use mechid::estimate::checks::{
 };
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
-use mechid::signal::{Interpolation, Record};
+use mechid::signal::{Interpolation, Record, counted};
 
 use super::course::Course;
 use super::derivatives::{Derivatives, Prepared};
@@ -309,7 +309,8 @@ impl TimeArgs {
         if let Some((factor, way)) = self.refinement() {
             let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
             remarks.push(format!(
-                "{factor} steps in every interval; the standard errors count measured samples only{}",
+                "{} in every interval; the standard errors count measured samples only{}",
+                counted(factor, "step"),
                 if open { ", and the interpolation takes the window as open" } else { "" }
             ));
         }

@@ -7,7 +7,7 @@ mod report;
 
 use clap::Args;
 use mechid::io::{Inventory, IoError, RecordFile, Table, TimeAxis};
-use mechid::signal;
+use mechid::signal::{self, counted};
 
 use self::measured::{Shown, Span, measured};
 use self::report::Report;
@@ -126,9 +126,9 @@ impl InfoArgs {
                     shown.push(Shown { column, offset: offset(tally.mean), drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
-                    "column {} has {} samples, most have {}",
+                    "column {} has {}, most have {}",
                     table.label(column),
-                    tally.samples,
+                    counted(tally.samples, "sample"),
                     inventory.samples
                 )),
                 Err(reason) if !self.columns.is_empty() => return Err(reason.into()),

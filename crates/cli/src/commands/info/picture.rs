@@ -1,6 +1,7 @@
 //! Columns over time beside their spectra.
 
 use mechid::plot::{Axis, Color, Curve, Figure, Panel};
+use mechid::signal::counted;
 
 use super::measured::{Drawn, Span};
 use crate::error::CliError;
@@ -81,7 +82,9 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     }
     let (hz, amplitude): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
     let (title, curve) = match period {
-        Some(period) => (format!("period of {period} samples"), Curve::stems("", &hz, &amplitude)),
+        Some(period) => {
+            (format!("period of {}", counted(period, "sample")), Curve::stems("", &hz, &amplitude))
+        }
         None => ("Hann window, no period".into(), Curve::line("", &hz, &amplitude).width(1.0)),
     };
     panel(Axis::log10("Amplitude", unit(column)).range(low, high), title, curve)

@@ -1,6 +1,7 @@
 //! How `mechid info` tells what it found.
 
 use mechid::io::Table;
+use mechid::signal::counted;
 use serde::Serialize;
 
 use super::channel::{Channel, Period, SpectrumPeak};
@@ -88,8 +89,11 @@ impl Report {
 
     pub fn text(&self) -> String {
         let mut text = format!(
-            "{}: {}, {} columns, {} samples",
-            self.file, self.format, self.columns, self.samples
+            "{}: {}, {}, {}",
+            self.file,
+            self.format,
+            counted(self.columns, "column"),
+            counted(self.samples, "sample")
         );
         if let Some(Window { first_sample, last_sample }) = &self.window {
             text += &format!("; shown: samples {first_sample} to {last_sample}");

@@ -29,9 +29,10 @@ use crate::text_table::{compact, significant, text_table};
 #[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
   mechid modal found.json
+  mechid identify rotor.csv --force fx,fy --displacement x,y --json | mechid modal -
   mechid modal examples/machine.json --plot modes.svg")]
 pub struct ModalArgs {
-    /// JSON with a `system`: mass, damping and stiffness in kg, N·s/m and N/m
+    /// JSON with a `system`: mass, damping and stiffness in kg, N·s/m and N/m (-: on standard input)
     #[arg(value_name = "SYSTEM.json")]
     system: PathBuf,
     #[command(flatten)]
@@ -72,7 +73,7 @@ impl ModalArgs {
     /// Reads the machine and finds its modes.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let system = read_system(&self.system)?;
-        let file = self.system.display().to_string();
+        let file = mechid::io::input_name(&self.system);
         let covariance = read_covariance(&self.system)?;
         let modes = match &covariance {
             Some(covariance) => {

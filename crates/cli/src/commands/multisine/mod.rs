@@ -86,8 +86,8 @@ pub struct MultisineArgs {
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Output")]
     periods: usize,
-    /// Where the record goes: columns time, in s, and force, in N; with several inputs force_1,
-    /// force_2, …
+    /// Where the record goes (-: to standard output): columns time, in s, and force, in N; with
+    /// several inputs force_1, force_2, …
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: Option<PathBuf>,
     #[command(flatten)]

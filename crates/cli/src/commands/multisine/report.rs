@@ -1,6 +1,6 @@
 //! The measures of an excitation, for people and for programs.
 
-use mechid::signal::{Sampling, SignalError, Spectrum, measures};
+use mechid::signal::{Sampling, SignalError, Spectrum, counted, measures};
 use serde::Serialize;
 
 use super::design::Channel;
@@ -58,9 +58,10 @@ impl Report {
 
     pub fn text(&self) -> String {
         let Self { samples, channels, .. } = self;
+        let samples = counted(*samples, "sample");
         let digits = |v: f64| significant(v, 6);
         let text = format!(
-            "{samples} samples at {} Hz, a period of {} s, lines every {} Hz\n\n",
+            "{samples} at {} Hz, a period of {} s, lines every {} Hz\n\n",
             digits(self.rate_hz),
             digits(self.period_s),
             digits(self.line_spacing_hz)

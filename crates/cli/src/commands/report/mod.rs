@@ -16,6 +16,7 @@ mod whole;
 use std::path::PathBuf;
 
 use clap::Args;
+use mechid::io::{is_standard_output, output_name};
 use serde::Serialize;
 
 use self::channels::Channel;
@@ -54,7 +55,7 @@ pub struct PageArgs {
     /// measured one
     #[arg(long)]
     reconstruct_force: bool,
-    /// Where the report goes
+    /// Where the report goes (-: to standard output)
     #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
     output: PathBuf,
     /// Heading of the report [default: the name of the record]
@@ -68,6 +69,7 @@ fn html_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("html" | "htm") => Ok(path),
+        _ if is_standard_output(&path) => Ok(path),
         _ => Err("the file name must end in .html".into()),
     }
 }
@@ -115,7 +117,7 @@ impl PageArgs {
         let found = self.identification.identify(self.identification.hold())?;
         let contents = self.contents(&found)?;
         let page = page::html(&contents)?;
-        let html = self.output.display().to_string();
+        let html = output_name(&self.output);
         let text = format!("{}\nreport: {html}\n", found.report.text());
         let printed = Printed { report: &found.report, html };
         Ok(Outcome::new(text, &printed)?.with_file(&self.output, page))

@@ -1,6 +1,7 @@
 //! The sections of the report.
 
 use maud::{Markup, html};
+use mechid::signal::counted;
 
 use super::channels::Channel;
 use super::excitation::DROP_DB;
@@ -85,8 +86,10 @@ fn facts(contents: &Contents<'_>, part: &Part<'_>) -> Vec<Vec<String>> {
     if let Some((lines, _)) = &contents.found.fitted.frequency {
         let len = lines.sampling().len();
         facts.push(match part.lines {
-            Some(_) => pair("Periods", format!("{} of {len} samples", measured.periods)),
-            None => pair("Segments", format!("of {len} samples")),
+            Some(_) => {
+                pair("Periods", format!("{} of {}", measured.periods, counted(len, "sample")))
+            }
+            None => pair("Segments", format!("of {}", counted(len, "sample"))),
         });
         let spacing = lines.sampling().line_spacing_hz();
         facts.push(pair("Line spacing", format!("{} Hz", compact(spacing, 6))));

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::Simulation;
 use mechid::io::{CsvFile, Experiment, ResponseKind, SystemMatrices};
-use mechid::signal::Record;
+use mechid::signal::{Record, counted};
 use serde::Serialize;
 
 use crate::error::CliError;
@@ -59,11 +59,11 @@ use crate::text_table::{compact, significant, text_table};
                   mechid identify record.csv --force force --displacement displacement"
 )]
 pub struct SimulateArgs {
-    /// The description of the experiment
+    /// The description of the experiment (-: on standard input)
     #[arg(value_name = "SYSTEM.json")]
     experiment: PathBuf,
-    /// Where the record goes: columns time, force, displacement, velocity, acceleration in SI units;
-    /// with several degrees of freedom force_1, force_2, …
+    /// Where the record goes (-: to standard output): columns time, force, displacement, velocity,
+    /// acceleration in SI units; with several degrees of freedom force_1, force_2, …
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
     #[command(flatten)]
@@ -135,7 +135,7 @@ impl SimulateArgs {
     ) -> Result<Report, CliError> {
         let modes = simulation.system.modes()?;
         Ok(Report {
-            record: self.output.display().to_string(),
+            record: mechid::io::output_name(&self.output),
             scheme: simulation.scheme.clone(),
             conventions: simulation
                 .conventions
@@ -208,12 +208,11 @@ impl Report {
             ResponseKind::From(_) => "from a given motion",
         };
         let mut text = format!(
-            "{}: {} samples at {} Hz, {} {}, {kind}\nscheme: {}\n",
+            "{}: {} at {} Hz, {}, {kind}\nscheme: {}\n",
             self.record,
-            self.samples,
+            counted(self.samples, "sample"),
             compact(self.sample_rate_hz, 8),
-            self.periods,
-            if self.periods == 1 { "period" } else { "periods" },
+            counted(self.periods, "period"),
             self.scheme,
         );
         for Convention { what, choice } in &self.conventions {

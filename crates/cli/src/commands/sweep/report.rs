@@ -6,6 +6,7 @@ use mechid::estimate::{Estimate, SweepPoint};
 use mechid::model::SecondOrderSystem;
 use mechid::plot::charts::{self, Quantity, Series};
 use mechid::plot::{Axis, Figure};
+use mechid::signal::counted;
 use serde::Serialize;
 
 use super::gathered::Estimator;
@@ -145,8 +146,10 @@ impl Report {
     /// As a person reads it: all settings, or the best with its intervals.
     pub fn text(&self, only_best: bool) -> String {
         let mut text = format!(
-            "{}: {}, {} samples in a period",
-            self.file, self.estimator, self.samples_per_period
+            "{}: {}, {} in a period",
+            self.file,
+            self.estimator,
+            counted(self.samples_per_period, "sample")
         );
         if let Some(hz) = self.natural_frequency_hz {
             text += &format!(", natural frequency {} Hz", significant(hz, 6));

@@ -1,0 +1,154 @@
+//! Standard input and output in place of files, through the pipes of a real shell.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use super::{mechid, refused};
+
+const EXAMPLES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples");
+
+/// Runs a line for a shell, in which `mechid` is the program, in a folder with the examples.
+fn shell(folder: &Path, line: &str) -> Output {
+    for file in ["machine.csv", "machine.json"] {
+        fs::copy(Path::new(EXAMPLES).join(file), folder.join(file)).unwrap();
+    }
+    let program = Path::new(env!("CARGO_BIN_EXE_mechid")).parent().unwrap();
+    let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
+    let line = format!("set -o pipefail; {line}");
+    let mut bash = Command::new("bash");
+    bash.current_dir(folder).env("PATH", path).args(["-c", &line]).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> &str {
+    std::str::from_utf8(bytes).unwrap()
+}
+
+const FORCE: &str = "mechid force machine.csv --system machine.json --displacement displacement \
+                     --period 256";
+
+/// The file and nothing else on the one stream, the report as ever on the other.
+#[test]
+fn an_output_to_standard_output_is_alone_there() {
+    let folder = tempfile::tempdir().unwrap();
+    for line in [
+        FORCE,
+        "mechid simulate machine.json",
+        "mechid multisine --samples 64 --rate 64 --amplitude 1",
+        "mechid frf machine.csv --force force --displacement displacement --period 256",
+        "mechid report machine.csv --force force --displacement displacement --period 256",
+    ] {
+        let file = if line.starts_with("mechid report") { "named.html" } else { "named.csv" };
+        let named = shell(folder.path(), &format!("{line} --output {file}"));
+        assert!(named.status.success(), "{line}: {}", text(&named.stderr));
+        let expected = fs::read_to_string(folder.path().join(file)).unwrap();
+        for name in ["-", "/dev/stdout"] {
+            let piped = shell(folder.path(), &format!("{line} --output {name} | cat"));
+            assert!(piped.status.success(), "{line}");
+            // A page tells the command that made it.
+            assert_eq!(
+                text(&piped.stdout)
+                    .replace(&format!("--output {name}"), &format!("--output {file}")),
+                expected,
+                "{line}"
+            );
+            let report = text(&piped.stderr).replace("standard output", file);
+            assert_eq!(report, text(&named.stdout), "{line}");
+        }
+    }
+}
+
+/// More than a pipe holds, of which the reader takes three lines.
+#[test]
+fn a_reader_may_have_seen_enough() {
+    let folder = tempfile::tempdir().unwrap();
+    let line =
+        "mechid multisine --samples 64 --rate 64 --amplitude 1 --periods 2000 -o - | head -3";
+    let piped = shell(folder.path(), line);
+    assert!(piped.status.success(), "{}", text(&piped.stderr));
+    let lines: Vec<&str> = text(&piped.stdout).lines().collect();
+    assert_eq!((lines[0], lines.len()), ("time,force", 3));
+    assert!(lines[1].starts_with("0.0,") && lines[2].starts_with("0.015625,"), "{lines:?}");
+}
+
+/// Standard output may be a file, of which what stands in it already is kept.
+#[test]
+fn a_redirected_output_is_written_where_the_shell_says() {
+    let folder = tempfile::tempdir().unwrap();
+    let line = "mechid multisine --samples 8 --rate 8 --amplitude 1 -q -o";
+    shell(folder.path(), &format!("{line} named.csv; echo above > all.csv"));
+    let named = fs::read_to_string(folder.path().join("named.csv")).unwrap();
+    shell(folder.path(), &format!("{line} /dev/stdout >> all.csv"));
+    let all = fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    assert_eq!(all, format!("above\n{named}"));
+}
+
+#[test]
+fn standard_output_takes_one_thing() {
+    let folder = tempfile::tempdir().unwrap();
+    let design = "multisine --samples 64 --rate 64 --amplitude 1 --output";
+    for name in ["-", "/dev/stdout"] {
+        let message = refused(folder.path(), &format!("{design} {name} --json"));
+        assert_eq!(
+            message,
+            "error: standard output takes one thing, not 1 file and the report: name files, or leave \
+             --json out\n"
+        );
+    }
+    let both = shell(folder.path(), &format!("{FORCE} --output - --spectrum /dev/stdout"));
+    assert_eq!((both.status.code(), text(&both.stdout)), (Some(2), ""));
+    assert!(text(&both.stderr).contains("not 2 files: name the others"), "{}", text(&both.stderr));
+}
+
+#[test]
+fn a_record_may_come_from_standard_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let roles = "--force force --displacement displacement --period 256";
+    for line in [
+        "info RECORD".into(),
+        format!("identify RECORD {roles}"),
+        format!("frf RECORD {roles}"),
+        format!("sweep RECORD {roles} --decimate 1,2 --estimator least-squares"),
+        "force RECORD --system machine.json --displacement displacement --period 256".into(),
+    ] {
+        let named =
+            shell(folder.path(), &format!("mechid {}", line.replace("RECORD", "machine.csv")));
+        let piped = line.replace("RECORD", "-");
+        let packed = shell(folder.path(), &format!("gzip -c machine.csv | mechid {piped}"));
+        let piped = shell(folder.path(), &format!("cat machine.csv | mechid {piped}"));
+        assert!(piped.status.success(), "{line}: {}", text(&piped.stderr));
+        let told = |output: &Output| text(&output.stdout).replace("standard input", "machine.csv");
+        assert_eq!(told(&piped), text(&named.stdout), "{line}");
+        assert_eq!(told(&packed).replace(", in gzip", ""), text(&named.stdout), "{line}");
+    }
+    let ragged = shell(folder.path(), "printf 't,x\\n0,1\\n1\\n' | mechid info -");
+    assert_eq!(
+        text(&ragged.stderr),
+        "error: standard input, line 3: 1 field where the first line has 2\n"
+    );
+    // A file of that name, too.
+    fs::write(folder.path().join("-"), "t,x\n0,1\n1,2\n").unwrap();
+    assert!(mechid(folder.path(), "info ./-").starts_with("./-: "));
+}
+
+/// A machine goes from one call to the next, with the covariance of its parameters.
+#[test]
+fn a_description_may_come_from_standard_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let identify = "mechid identify machine.csv --force force --displacement displacement \
+                    --period 256 --json";
+    shell(folder.path(), &format!("{identify} > found.json"));
+    for line in [
+        "mechid modal FILE",
+        "mechid force machine.csv --system FILE --displacement 3 --period 256",
+    ] {
+        let named = shell(folder.path(), &line.replace("FILE", "found.json"));
+        let piped = shell(folder.path(), &format!("{identify} | {}", line.replace("FILE", "-")));
+        assert!(piped.status.success(), "{line}: {}", text(&piped.stderr));
+        let told = text(&piped.stdout).replace("standard input", "found.json");
+        assert_eq!(told, text(&named.stdout), "{line}");
+    }
+    let simulated =
+        shell(folder.path(), "mechid simulate - -q -o - < machine.json | cmp - machine.csv");
+    assert!(simulated.status.success(), "{}", text(&simulated.stderr));
+}
