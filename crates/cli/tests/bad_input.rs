@@ -186,7 +186,11 @@ fn a_mass_no_body_has() {
     identify(&good(), "--mass -3", &["a mass must be positive and finite, got -3 kg"]);
     identify(&good(), "--mass 0", &["got 0 kg"]);
     identify(&good(), "--mass NaN", &["got NaN kg"]);
-    identify(&good(), "--mass 1,2,3", &["--mass gives 3 values, the record has 1 degrees"]);
+    identify(
+        &good(),
+        "--mass 1,2,3",
+        &["--mass gives 3 values, the record has 1 degree of freedom"],
+    );
     identify(&good(), "--mass heavy", &["\"heavy\" is not a number"]);
 }
 
@@ -223,7 +227,7 @@ fn columns_that_do_not_pair_up() {
     refused(
         &good(),
         "identify a.csv --force 2,0 --displacement 3",
-        &["names 1 columns and --force 2"],
+        &["names 1 column and --force 2"],
     );
     identify(&good(), "--domain time", &["in the time domain"]);
     refused(&good(), "identify a.csv --displacement x", &["--force"]);

@@ -96,7 +96,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(r#"{ "mass": [[1, 2], [3]], "damping": 1, "stiffness": 2 }"#, FORCE, ""),
-            "row 2 of a matrix has 1 entries, the first has 2",
+            "row 2 of a matrix has 1 entry, the first has 2",
         ),
         (
             description(r#"{ "mass": 0, "damping": 1, "stiffness": 2 }"#, FORCE, ""),

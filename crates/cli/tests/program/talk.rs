@@ -80,9 +80,9 @@ fn one_thing_is_told_as_one() {
     );
     let rows = (0..32).map(|k| {
         let turn = PI * f64::from(k) / 8.0;
-        format!("{},{},{}\n", f64::from(k) / 16.0, turn.cos(), turn.sin())
+        format!("{},{},{},1\n", f64::from(k) / 16.0, turn.cos(), turn.sin())
     });
-    write("a.csv", "t,f,x\n".to_owned() + &rows.collect::<String>());
+    write("a.csv", "t,f,x,v\n".to_owned() + &rows.collect::<String>());
     let record = "a.csv --force f --displacement x --period 16";
     let told = mechid(folder.path(), &format!("identify {record} --mass 1"));
     assert!(told.contains("; 1 line, 1 (1 Hz)\n"), "{told}");
@@ -91,11 +91,11 @@ fn one_thing_is_told_as_one() {
     for (factor, ordinal) in [(3, "3rd"), (6, "6th"), (11, "11th"), (21, "21st")] {
         let told = refused(
             folder.path(),
-            &format!("sweep {record} --velocity 3 --estimator least-squares --decimate {factor}"),
+            &format!("sweep {record} --velocity v --estimator least-squares --decimate {factor}"),
         );
         assert!(told.contains(&format!("no whole number of every {ordinal} sample")), "{told}");
     }
-    let told = refused(folder.path(), "identify a.csv --force f,0 --displacement x,0 --mass 1");
+    let told = refused(folder.path(), "identify a.csv --force f,0 --displacement x,v --mass 1");
     assert!(told.contains("--mass gives 1 value, the record has 2 degrees of freedom"), "{told}");
 }
 

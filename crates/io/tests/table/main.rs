@@ -209,7 +209,7 @@ fn what_stands_above_the_table_is_left_out_when_told() {
         }
     }
     // Comments are no such thing, nor is a row that is wrong further down.
-    assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: 1 fields"));
+    assert!(refused("# rig\nt,f\n0,1\n1,2\n3\n").contains("line 5: 1 field where"));
     let path = folder.path().join("a.csv");
     std::fs::write(&path, "t,f\n0,1\n").unwrap();
     assert!(matches!(Table::read_below(&path, 9), Err(IoError::Empty { .. })));
