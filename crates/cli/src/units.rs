@@ -47,6 +47,11 @@ impl ToSi {
         Ok(Self { factors, remark })
     }
 
+    /// What a column is multiplied by; 1 where there is no such column.
+    pub fn factor(&self, column: usize) -> f64 {
+        self.factors.get(column).copied().unwrap_or(1.0)
+    }
+
     /// Converts samples × columns.
     pub fn convert(&self, data: &mut DMatrix<f64>) {
         for (mut column, factor) in data.column_iter_mut().zip(&self.factors) {

@@ -133,6 +133,15 @@ pub enum ForceError {
         /// Fewest that will do.
         needed: usize,
     },
+    /// A channel that shows no noise where it was to be measured.
+    #[error(
+        "channel {channel} (counted from 1) is zero outside the chosen lines, or not finite, where \
+         its noise is to be measured: the sensor may be dead; leave it out, or state the noise level"
+    )]
+    NoNoise {
+        /// The channel, counted from 1.
+        channel: usize,
+    },
     /// A number that must be positive and finite is not.
     #[error("{what} must be positive and finite, got {value}")]
     NotPositive {

@@ -42,7 +42,7 @@ pub const MIN_OUTSIDE_LINES: usize = 8;
 /// [`ForceError::NotTransmitted`] at a line that does not show the forces in the channels, as
 /// DC does not in velocities; [`ForceError::MoreForcesThanMeasurements`],
 /// [`ForceError::NoForcedDof`], [`ForceError::NoSuchDof`], [`ForceError::Resonance`],
-/// [`ForceError::TooFewOutsideLines`], [`ForceError::NotPositive`].
+/// [`ForceError::TooFewOutsideLines`], [`ForceError::NoNoise`], [`ForceError::NotPositive`].
 ///
 /// # Source
 /// Dissertation section 6.2 suggests it; eq. (4.6.9) is its real form for one degree of freedom.
@@ -144,11 +144,7 @@ fn outside_level(
         .map(|c| {
             let power: f64 = outside.iter().map(|n| spectrum.line(*n, c).norm_sqr()).sum();
             let value = (per_line * power).sqrt();
-            if value > 0.0 {
-                Ok(value)
-            } else {
-                Err(ForceError::NotPositive { what: "noise level outside the lines", value })
-            }
+            if value > 0.0 { Ok(value) } else { Err(ForceError::NoNoise { channel: c + 1 }) }
         })
         .collect()
 }

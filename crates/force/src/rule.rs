@@ -126,11 +126,15 @@ fn grid(largest: f64) -> Vec<f64> {
         .collect()
 }
 
-/// One threshold per distinct singular value that is more than rounding.
+/// One threshold per distinct singular value that is more than rounding, halfway (in its logarithm)
+/// to the next: the least change of the machine would cut off a value that is its own threshold.
 fn thresholds(components: &Components) -> Vec<f64> {
-    let mut thresholds = components.singular[..components.transmitted()].to_vec();
-    thresholds.dedup();
-    thresholds
+    let transmitted = components.transmitted();
+    let mut values = components.singular[..transmitted].to_vec();
+    values.dedup();
+    let below = components.singular.get(transmitted).copied().unwrap_or(0.0);
+    let next = values[1..].iter().copied().chain([below]);
+    values.iter().zip(next).map(|(s, next)| (s * next.max(1e-3 * s)).sqrt()).collect()
 }
 
 /// Least residual²/left², where enough is left to judge by.

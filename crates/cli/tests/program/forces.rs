@@ -5,7 +5,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use mechid::force::{
-    Discretisation, Ends, Entry, SystemCovariance, discretised, with_uncertain_system,
+    Discretisation, Ends, Entry, MotionNoise, SystemCovariance, discretised,
+    discretised_with_noise, with_uncertain_system,
 };
 use mechid::io::{Table, TimeAxis, csv_text};
 use mechid::model::{Matrix, Response, SecondOrderSystem};
@@ -29,6 +30,11 @@ const RATE_HZ: f64 = 1024.0;
 /// m, c and k, and their standard errors.
 const MACHINE: [f64; 3] = [25.0, 190.0, 142e3];
 const ERRORS: [f64; 3] = [0.1, 2.0, 300.0];
+
+const ALL: &str = "--displacement x --velocity v --acceleration a";
+
+/// The standard error that counts the machine alone.
+const OF_MACHINE: &str = "standard_error_of_machine";
 
 /// Where the second part of the force begins.
 const BURST: usize = 250_000;
@@ -65,13 +71,14 @@ fn motion(folder: &Path) -> [Vec<f64>; 3] {
     [x, v, a]
 }
 
-/// Runs `force` on both files, which must say and write the same; the report and what it wrote.
-fn both(folder: &Path, arguments: &str) -> (Value, Record) {
+/// Runs `force` on both files, which must say and write the same; the report and what it wrote, the
+/// standard error under this name.
+fn both(folder: &Path, arguments: &str, error: &str) -> (Value, Record) {
     let run = |file: &str| -> (Value, Record) {
         let call = format!("force {file} --system machine.json {arguments} --output f.csv --json");
         let told = mechid(folder, &call).replace(file, "rec");
         let written = Table::read(folder.join("f.csv")).unwrap();
-        let columns = ["force", "standard_error"];
+        let columns = ["force", error];
         let written = written.record(&TimeAxis::Column("time"), &columns).unwrap();
         (serde_json::from_str(&told).unwrap(), written)
     };
@@ -97,7 +104,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     let folder = tempfile::tempdir().unwrap();
     let [x, v, a] = motion(folder.path());
-    let (report, written) = both(folder.path(), "--displacement x --velocity v --acceleration a");
+    let (report, written) = both(folder.path(), ALL, OF_MACHINE);
     assert_eq!(written.len(), SAMPLES);
     close(&written, 0, &force, 1e-11);
     let [m, c, k] = ERRORS;
@@ -125,8 +132,8 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     assert_eq!(report["remarks"][0], remark);
 
     // What is transformed at once is held, and the same.
-    let all = "--displacement x --velocity v --acceleration a --spectrum lines.csv";
-    let (held, rows) = both(folder.path(), all);
+    let all = format!("{ALL} --spectrum lines.csv");
+    let (held, rows) = both(folder.path(), &all, OF_MACHINE);
     for column in 0..2 {
         close(&rows, column, &|k| written.channel(column)[k], 1e-12);
     }
@@ -136,12 +143,51 @@ fn sample_by_sample_a_long_text_gives_the_force_in_closed_form() {
     assert_eq!(report["remarks"], held["remarks"]);
 }
 
+/// The error that noise and machine lead to together, each sample by itself.
+#[test]
+fn sample_by_sample_the_noise_stated_is_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [x, v, a] = motion(folder.path());
+    let noise = [1e-6, 2e-5, 5e-3];
+    let [m, c, k] = MACHINE;
+    let of_noise = (m * noise[2]).hypot(c * noise[1]).hypot(k * noise[0]);
+    let [em, ec, ek] = ERRORS;
+    let error = |at: usize| (em * a[at]).hypot(ec * v[at]).hypot(ek * x[at]).hypot(of_noise);
+    let stated = format!("{ALL} --noise 1e-6,2e-5,5e-3");
+    let (report, written) = both(folder.path(), &stated, "standard_error");
+    close(&written, 1, &error, 1e-11);
+    assert_eq!(report["noise_uncertainty"], true);
+    let (report, _) = both(folder.path(), ALL, OF_MACHINE);
+    assert_eq!(report["noise_uncertainty"], false);
+    // 270 periods are averaged, of noise and motion alike.
+    let periods = SAMPLES / PERIOD;
+    let (_, written) =
+        both(folder.path(), &format!("{stated} --period {PERIOD}"), "standard_error");
+    let mean = |of: &[f64], at: usize| {
+        (0..periods).map(|p| of[p * PERIOD + at]).sum::<f64>() / periods as f64
+    };
+    let error = |at: usize| {
+        let machine = (em * mean(&a, at)).hypot(ec * mean(&v, at)).hypot(ek * mean(&x, at));
+        machine.hypot(of_noise / (periods as f64).sqrt())
+    };
+    close(&written, 1, &error, 1e-11);
+    // One level for three columns, or an impossible one, was once passed over.
+    for (levels, words) in [("1e-6", "1 are described"), ("1e-6,-1,1", "must be positive")] {
+        let call = format!("force rec.csv --system machine.json {ALL} --noise {levels}");
+        let message = refused(folder.path(), &call);
+        assert!(message.contains(words), "{message}");
+    }
+}
+
 #[test]
 fn from_sample_to_sample_stretches_join_without_a_seam() {
     let folder = tempfile::tempdir().unwrap();
     let [x, v, _] = motion(folder.path());
-    let (_, written) = both(folder.path(), "--displacement x --velocity v --method discretised");
-    let sampling = written.sampling();
+    let method = "--displacement x --velocity v --method discretised";
+    let (_, machine_alone) = both(folder.path(), method, OF_MACHINE);
+    let noisy = format!("{method} --noise 1e-6,2e-5");
+    let (_, with_noise) = both(folder.path(), &noisy, "standard_error");
+    let sampling = machine_alone.sampling();
     let channel = |values: Vec<f64>| Record::from_channel(sampling, values).unwrap();
     let response = Response::new(channel(x), channel(v), channel(vec![0.0; SAMPLES])).unwrap();
     let [m, c, k] = MACHINE;
@@ -151,16 +197,22 @@ fn from_sample_to_sample_stretches_join_without_a_seam() {
     let [vm, vc, vk] = ERRORS.map(|error| error * error);
     let covariance = dmatrix![vm, 0.0, 0.0; 0.0, vc, 0.0; 0.0, 0.0, vk];
     let covariance = SystemCovariance::new(entries, covariance).unwrap();
-    let at_once = with_uncertain_system(&system, &covariance, |system| {
-        discretised(system, &response, Discretisation::ExactLinear, Ends::Open)
+    let (linear, ends) = (Discretisation::ExactLinear, Ends::Open);
+    let noise = MotionNoise::new(vec![1e-6], vec![2e-5], vec![]).unwrap();
+    let alone = with_uncertain_system(&system, &covariance, |system| {
+        discretised(system, &response, linear, ends)
     });
-    let at_once = at_once.unwrap();
-    let columns = [at_once.record(), at_once.standard_error().unwrap()];
-    for (column, truth) in columns.into_iter().enumerate() {
-        let truth = truth.channel(0);
-        let size = rms(truth.iter().copied());
-        assert!(size > 1e-3);
-        close(&written, column, &|k| truth[k], 1e-11 * size);
+    let noisy = with_uncertain_system(&system, &covariance, |system| {
+        discretised_with_noise(system, &response, linear, ends, &noise)
+    });
+    for (written, at_once) in [(machine_alone, alone.unwrap()), (with_noise, noisy.unwrap())] {
+        let columns = [at_once.record(), at_once.standard_error().unwrap()];
+        for (column, truth) in columns.into_iter().enumerate() {
+            let truth = truth.channel(0);
+            let size = rms(truth.iter().copied());
+            assert!(size > 1e-3);
+            close(&written, column, &|k| truth[k], 1e-11 * size);
+        }
     }
 }
 
@@ -170,7 +222,7 @@ fn periods_and_windows_of_a_long_text_are_those_of_all_of_it() {
     let [x, ..] = motion(folder.path());
     let lines = "--displacement x --lines 1:40";
     let whole = format!("{lines} --period {PERIOD} --start 101");
-    let (report, found) = both(folder.path(), &whole);
+    let (report, found) = both(folder.path(), &whole, "standard_error");
     let periods = (SAMPLES - 100) / PERIOD;
     assert_eq!((&report["periods"], report["samples"].as_u64()), (&periods.into(), Some(1000)));
     let mean = |k: usize| (0..periods).map(|p| x[100 + p * PERIOD + k]).sum::<f64>();
@@ -189,7 +241,8 @@ fn periods_and_windows_of_a_long_text_are_those_of_all_of_it() {
         close(&found, column, &|k| truth[k], 1e-11 * size);
     }
     // An open record of which all is needed at once.
-    let (report, _) = both(folder.path(), "--displacement x --start 270001 --method tikhonov");
+    let (report, _) =
+        both(folder.path(), "--displacement x --start 270001 --method tikhonov", "standard_error");
     assert_eq!(report["samples"], 123);
 }
 

@@ -13,6 +13,7 @@ mod streams;
 mod stretches;
 mod sweep;
 mod talk;
+mod unexplained;
 mod units;
 
 use std::path::Path;

@@ -4,9 +4,10 @@ use std::f64::consts::TAU;
 
 use clap::ValueEnum;
 use mechid::force::{
-    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement, Noise,
-    OPEN_UNKNOWNS, Quantity, Rule, Start, Tuning, continuous, discretised, frequency_domain,
-    inner_lines, kalman, regularised, with_uncertain_system,
+    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement,
+    MotionNoise, Noise, OPEN_UNKNOWNS, Quantity, Rule, Start, Tuning, Unexplained, continuous,
+    continuous_with_noise, discretised, discretised_with_noise, frequency_domain, inner_lines,
+    kalman, regularised, with_uncertain_system,
 };
 use mechid::model::SecondOrderSystem;
 use mechid::signal::Spectrum;
@@ -57,8 +58,11 @@ pub struct Request {
     pub periodic: bool,
     pub start: Start,
     pub rule: Rule,
-    /// Standard deviation of each measured channel; empty if not known.
+    /// Standard deviation of the noise in each measured channel, in its SI unit, as far as the mean
+    /// of the periods has it; empty if not known.
     pub noise: Vec<f64>,
+    /// Periods in that mean.
+    pub averaged: usize,
 }
 
 /// A force and how it was found.
@@ -75,8 +79,10 @@ pub struct How {
     pub counts_noise: bool,
     /// Parameters that were chosen, with their units.
     pub chosen: Vec<(String, f64, &'static str)>,
+    /// What the force leaves of each measured channel; nothing where nothing is left over.
+    pub unexplained: Option<Vec<Unexplained>>,
     /// What to beware of.
-    pub remark: Option<String>,
+    pub remarks: Vec<String>,
 }
 
 /// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
@@ -117,7 +123,7 @@ pub fn find(request: &Request, machine: &Machine, motion: &Measurement) -> Resul
     match method {
         Method::Continuous | Method::Discretised => {
             let force = equation(request, machine, motion, method)?;
-            Ok(Found { force, how: How::of_equation(method, why) })
+            Ok(Found { force, how: How::of_equation(method, why, request) })
         }
         Method::FrequencyDomain => lines(request, machine, motion, why),
         Method::Kalman => smoothed(request, machine, motion, why),
@@ -154,23 +160,55 @@ pub fn equation(
     let with_acceleration = method == Method::Continuous;
     let response = response(motion, machine.system.dof(), with_acceleration)
         .ok_or(CliError::ForceMotions { with_acceleration })?;
-    if with_acceleration {
-        return with_machine(machine, &|system| continuous(system, &response));
-    }
     let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
     let linear = Discretisation::ExactLinear;
-    with_machine(machine, &|system| discretised(system, &response, linear, ends))
+    let noise = motion_noise(request, motion, machine.system.dof())?;
+    with_machine(machine, &|system| match (with_acceleration, &noise) {
+        (true, None) => continuous(system, &response),
+        (true, Some(noise)) => continuous_with_noise(system, &response, noise),
+        (false, None) => discretised(system, &response, linear, ends),
+        (false, Some(noise)) => discretised_with_noise(system, &response, linear, ends, noise),
+    })
+}
+
+/// The noise of each channel as that of a complete motion, if it is stated.
+fn motion_noise(
+    request: &Request,
+    motion: &Measurement,
+    dofs: usize,
+) -> Result<Option<MotionNoise>, CliError> {
+    let (channels, levels) = (motion.channels(), &request.noise);
+    if levels.is_empty() {
+        return Ok(None);
+    }
+    if levels.len() != channels.len() {
+        let (record, described) = (channels.len(), levels.len());
+        return Err(ForceError::ChannelCount { record, described }.into());
+    }
+    let of = |quantity: Quantity| -> Vec<f64> {
+        let find = |dof| channels.iter().position(|c| *c == Channel { dof, quantity });
+        (0..dofs).filter_map(find).map(|at| levels[at]).collect()
+    };
+    let [x, v, a] = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration].map(of);
+    Ok(Some(MotionNoise::new(x, v, a)?))
 }
 
 impl How {
     /// How [`equation`] finds it.
-    pub fn of_equation(method: Method, why: String) -> Self {
+    pub fn of_equation(method: Method, why: String, request: &Request) -> Self {
         let method = if method == Method::Continuous {
             "equation of motion, sample by sample"
         } else {
             "equation of motion from sample to sample, the force linear between them"
         };
-        Self { method, why, counts_noise: false, chosen: Vec::new(), remark: None }
+        Self {
+            method,
+            why,
+            counts_noise: !request.noise.is_empty(),
+            chosen: Vec::new(),
+            unexplained: None,
+            remarks: Vec::new(),
+        }
     }
 }
 
@@ -194,8 +232,10 @@ fn lines(
     let force = with_machine(machine, &find)?;
     let chosen = vec![("lines used".into(), lines.len() as f64, "")];
     let counts_noise = noise != Noise::Unknown;
-    let (method, remark) = ("dynamic stiffness, line by line", elsewhere(motion, request));
-    Ok(Found { force, how: How { method, why, counts_noise, chosen, remark } })
+    let unexplained = force.unexplained().map(<[_]>::to_vec);
+    let method = "dynamic stiffness, line by line";
+    let remarks = elsewhere(motion, request).into_iter().collect();
+    Ok(Found { force, how: How { method, why, counts_noise, chosen, unexplained, remarks } })
 }
 
 fn filtered(
@@ -231,14 +271,15 @@ fn filtered(
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
     }
     chosen.push(("unknowns let through".into(), found.unknowns, ""));
-    chosen.extend(noise_levels(motion, &found.noise));
+    chosen.extend(noise_levels(motion, &found.noise, request.averaged));
+    let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = match filter {
         Filter::Tikhonov(_) => "Tikhonov regularisation",
         Filter::TruncatedSvd(_) => "truncated singular value decomposition",
         _ => "mean of the force given the measurement (shrinkage)",
     };
-    let remark = elsewhere(motion, request);
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, remark } })
+    let remarks = elsewhere(motion, request).into_iter().collect();
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
 }
 
 /// Less of a motion than this on the lines of the force says that it has another cause.
@@ -268,19 +309,20 @@ fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     ))
 }
 
-/// The noise of every channel measured, in its own unit.
+/// The noise of every channel as it was measured, in its own unit, from that of the mean of periods.
 fn noise_levels<'a>(
     motion: &'a Measurement,
     noise: &'a [f64],
+    averaged: usize,
 ) -> impl Iterator<Item = (String, f64, &'static str)> + 'a {
     let levels = (1..).zip(motion.channels().iter().zip(noise));
-    levels.map(|(number, (channel, level))| {
+    levels.map(move |(number, (channel, level))| {
         let unit = match channel.quantity {
             Quantity::Displacement => "m",
             Quantity::Velocity => "m/s",
             Quantity::Acceleration => "m/s²",
         };
-        (format!("noise of channel {number}"), *level, unit)
+        (format!("noise of channel {number}"), level * (averaged as f64).sqrt(), unit)
     })
 }
 
@@ -311,9 +353,15 @@ fn smoothed(
     for (dof, walk) in forced.iter().zip(&found.walk) {
         chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
     }
-    chosen.extend(noise_levels(motion, &found.noise));
+    chosen.extend(noise_levels(motion, &found.noise, 1));
+    let mut unexplained = force.unexplained().map(<[_]>::to_vec);
+    if request.noise.is_empty() {
+        // The level is that of the fit, which takes for noise what it does not explain.
+        unexplained.iter_mut().flatten().for_each(|channel| channel.noise = None);
+    }
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, remark: None } })
+    let remarks = Vec::new();
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
 }
 
 /// A chosen parameter as a person reads it.

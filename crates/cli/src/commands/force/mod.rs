@@ -3,23 +3,27 @@
 pub(super) mod machine;
 pub(super) mod method;
 pub(super) mod motion;
+mod periods;
+mod rates;
 mod report;
 mod stretches;
 mod strongest;
 mod taken;
+mod unexplained;
 
 use std::path::PathBuf;
 
 use clap::Args;
 use mechid::force::{IdentifiedForce, Rule, Start};
 use mechid::io::LineSpec;
-use mechid::signal::Sampling;
 
 use self::machine::Machine;
 use self::method::{Choice, Found, How, Method, Request};
 use self::motion::{MotionArgs, Recorded};
+use self::rates::Rates;
 use self::report::{Chosen, Report};
 use self::taken::Taken;
+use self::unexplained::Measured;
 use crate::error::CliError;
 use crate::options::{PlotArgs, RecordArgs, ReportArgs, at_least_one};
 use crate::outcome::Outcome;
@@ -59,7 +63,8 @@ pub struct ForceArgs {
     /// An open record begins at rest
     #[arg(long)]
     at_rest: bool,
-    /// Standard deviation of the noise in each measured column, in its unit [default: found]
+    /// Standard deviation of the noise in each measured column, in its unit, before periods are
+    /// averaged [default: found]
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
     /// How to choose the regularisation parameter
@@ -88,7 +93,7 @@ impl ForceArgs {
         let dofs = machine.system.dof();
         let periodic = self.input.period.is_some() || self.lines.is_some();
         let recorded = self.motion.open(&self.input, dofs, periodic)?;
-        let request = self.request(recorded.sampling, dofs, periodic)?;
+        let request = self.request(&recorded, dofs, periodic)?;
         let mut taken = Taken::new(recorded.sampling, dofs, periodic, self.output.clone())?;
         let (how, force) = self.find(&request, &machine, &recorded, &mut taken)?;
         let report = self.describe(&machine, &recorded, &request, &how, &taken);
@@ -101,7 +106,7 @@ impl ForceArgs {
             let file = report::spectrum_file(path, force, request.lines.as_deref())?;
             outcome = outcome.with_begun(file);
         }
-        outcome.with_plot(&self.plot, || Ok(report::figure(how.method, force, &request.forced)))
+        outcome.with_plot(&self.plot, || Ok(report::figure(&how, force, &request.forced)))
     }
 
     /// The force, a stretch at a time where that will do; only otherwise it is handed over.
@@ -115,22 +120,33 @@ impl ForceArgs {
         let (dofs, samples) = (machine.system.dof(), recorded.sampling.len());
         let (method, why) = method::choose(request, &recorded.channels, samples, dofs);
         let all_at_once = self.spectrum.is_some() || self.plot.plot.is_some();
-        if !all_at_once && stretches::are_enough_for(method, request) {
-            stretches::find(request, machine, recorded, method, taken)?;
-            return Ok((How::of_equation(method, why), None));
-        }
-        let Found { force, how } = method::find(request, machine, &recorded.hold()?)?;
-        taken.push_all(&force)?;
-        Ok((how, Some(force)))
+        let mut rates = Rates::of(&recorded.channels);
+        let (mut how, force) = if !all_at_once && stretches::are_enough_for(method, request) {
+            stretches::find(request, machine, recorded, method, &mut |stretch, force, kept| {
+                rates.push(stretch);
+                taken.push(force, kept, !request.noise.is_empty())
+            })?;
+            (How::of_equation(method, why, request), None)
+        } else {
+            let held = recorded.hold()?;
+            rates.push(&held.motion);
+            let Found { force, mut how } = method::find(request, machine, &held.motion)?;
+            taken.push_all(&force, how.counts_noise)?;
+            how.remarks.extend(periods::remark(recorded, &held));
+            periods::tell_noise(how.unexplained.as_mut(), recorded, &held);
+            (how, Some(force))
+        };
+        how.remarks.extend(rates.remarks(recorded.columns()));
+        Ok((how, force))
     }
 
     fn request(
         &self,
-        sampling: Sampling,
+        recorded: &Recorded,
         dofs: usize,
         periodic: bool,
     ) -> Result<Request, CliError> {
-        let lines = self.lines.as_ref().map(|spec| spec.lines(sampling));
+        let lines = self.lines.as_ref().map(|spec| spec.lines(recorded.sampling));
         let rule = match (self.parameter, self.rule) {
             (Some(lambda), _) => Rule::Given(lambda),
             (None, Choice::Likelihood) => Rule::Likelihood,
@@ -147,7 +163,8 @@ impl ForceArgs {
             periodic,
             start: if self.at_rest { Start::FromRest } else { Start::InMotion },
             rule,
-            noise: self.noise.clone(),
+            noise: recorded.levels(&self.noise),
+            averaged: recorded.periods,
         })
     }
 
@@ -161,11 +178,15 @@ impl ForceArgs {
     ) -> Report {
         let mut remarks: Vec<String> = recorded.converted().into_iter().cloned().collect();
         remarks.extend(taken.remark());
-        remarks.extend(how.remark.clone());
+        remarks.extend(how.remarks.iter().cloned());
+        let unexplained = how.unexplained.as_deref();
+        let channels = Measured::all(recorded, unexplained);
+        let dofs = machine.system.dof();
+        remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
         if machine.covariance.is_some() && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
-                 record: this method does not know it"
+                 record: state that with --noise"
                     .to_owned(),
             );
         }
@@ -183,11 +204,13 @@ impl ForceArgs {
             periods: request.periodic.then_some(recorded.periods),
             sample_rate_hz: recorded.sampling.rate_hz(),
             machine_uncertainty: machine.covariance.is_some(),
+            noise_uncertainty: how.counts_noise,
             chosen: how
                 .chosen
                 .iter()
                 .map(|(name, value, unit)| Chosen { name: name.clone(), value: *value, unit })
                 .collect(),
+            channels,
             forces: taken.forces(&request.forced),
             remarks,
         }

@@ -9,6 +9,7 @@ use mechid::model::Response;
 use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
+use super::periods::{Scatter, Sums};
 use crate::commands::identify::measurement::{HELD, STRETCH};
 use crate::error::CliError;
 use crate::options::{Detrend, RecordArgs};
@@ -49,6 +50,13 @@ pub struct Recorded {
     pub sampling: Sampling,
     /// Periods in the window; 1 for an open record.
     pub periods: usize,
+}
+
+/// The samples of a window, or of its mean period.
+pub struct Held {
+    pub motion: Measurement,
+    /// How the periods differ from their mean, one per channel; nothing where there is one period.
+    pub scatter: Option<Vec<Scatter>>,
 }
 
 impl MotionArgs {
@@ -118,28 +126,49 @@ impl Recorded {
         self.file.head().file()
     }
 
+    /// What each channel was called.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Levels stated of the columns, in their units, as the held samples have them: in SI units, and
+    /// of the mean of periods.
+    pub fn levels(&self, stated: &[f64]) -> Vec<f64> {
+        let mean = (self.periods as f64).sqrt();
+        let stated = stated.iter().enumerate();
+        stated.map(|(column, level)| level * self.units.factor(column) / mean).collect()
+    }
+
     /// Which columns were in other than SI units.
     pub fn converted(&self) -> Option<&String> {
         self.units.remark.as_ref()
     }
 
     /// All of the window, or its mean period.
-    pub fn hold(&self) -> Result<Measurement, CliError> {
+    pub fn hold(&self) -> Result<Held, CliError> {
         let period = self.sampling.len();
         let mut mean = DMatrix::zeros(period, self.channels.len());
+        let mut scatters = vec![Sums::default(); self.channels.len()];
         let mut at = 0;
         self.blocks(STRETCH, STRETCH, &mut |block| {
             let mut from = 0;
             while from < block.nrows() {
                 let rows = (period - at).min(block.nrows() - from);
-                let mut part = mean.rows_mut(at, rows);
-                part += block.rows(from, rows);
+                let part = block.rows(from, rows);
+                for (sums, column) in scatters.iter_mut().zip(part.column_iter()) {
+                    sums.push(column.iter().copied(), at == 0);
+                }
+                let mut mean = mean.rows_mut(at, rows);
+                mean += part;
                 (from, at) = (from + rows, (at + rows) % period);
             }
             Ok(())
         })?;
         mean /= self.periods as f64;
-        self.measurement(mean)
+        let scatter = scatters.iter().zip(mean.column_iter());
+        let scatter = scatter.map(|(sums, mean)| sums.about(mean.as_slice(), self.periods));
+        let scatter = (self.periods > 1).then(|| scatter.collect());
+        Ok(Held { motion: self.measurement(mean)?, scatter })
     }
 
     /// Goes through the window in stretches of so many samples, each beginning `advance` samples

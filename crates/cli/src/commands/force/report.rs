@@ -9,7 +9,8 @@ use mechid::plot::{Axis, Color, Curve, Figure, Panel};
 use mechid::signal::counted;
 use serde::Serialize;
 
-use super::method::told;
+use super::method::{How, told};
+use super::unexplained::Measured;
 use crate::text_table::{compact, significant, text_table};
 
 /// Everything `mechid force` has to say.
@@ -25,7 +26,10 @@ pub struct Report {
     pub sample_rate_hz: f64,
     /// Whether the standard errors count the machine's own uncertainty.
     pub machine_uncertainty: bool,
+    /// Whether they count the noise of the record.
+    pub noise_uncertainty: bool,
     pub chosen: Vec<Chosen>,
+    pub channels: Vec<Measured>,
     pub forces: Vec<Force>,
     pub remarks: Vec<String>,
 }
@@ -54,6 +58,10 @@ pub struct Force {
 }
 
 impl Report {
+    fn counts_machine_alone(&self) -> bool {
+        self.machine_uncertainty && !self.noise_uncertainty
+    }
+
     /// The report as a person reads it.
     pub fn text(&self) -> String {
         let rate = compact(self.sample_rate_hz, 8);
@@ -69,7 +77,15 @@ impl Report {
         for Chosen { name, value, unit } in &self.chosen {
             let _ = writeln!(text, "  {name}: {}", told(*value, unit));
         }
-        let header = ["force", "RMS (N)", "standard error (N)", "peak (N)", "strongest line"];
+        for channel in self.channels.iter().filter_map(Measured::text) {
+            let _ = writeln!(text, "  {channel}");
+        }
+        let error = if self.counts_machine_alone() {
+            "standard error of machine (N)"
+        } else {
+            "standard error (N)"
+        };
+        let header = ["force", "RMS (N)", error, "peak (N)", "strongest line"];
         let mut rows = vec![header.map(String::from).to_vec()];
         for force in &self.forces {
             let error = match force.standard_error {
@@ -102,14 +118,15 @@ fn name(base: &str, dof: usize, dofs: usize) -> String {
     if dofs == 1 { base.into() } else { format!("{base}_{}", dof + 1) }
 }
 
-/// The record as columns: force and, where known, its standard error.
-pub fn columns(force: &IdentifiedForce) -> Vec<(String, &[f64])> {
+/// The record as columns: force and, where known, its standard error, which without the noise is
+/// that of the machine alone.
+pub fn columns(force: &IdentifiedForce, counts_noise: bool) -> Vec<(String, &[f64])> {
     let dofs = force.record().channels();
     let mut columns: Vec<(String, &[f64])> =
         (0..dofs).map(|dof| (name("force", dof, dofs), force.record().channel(dof))).collect();
     if let Some(error) = force.standard_error() {
-        columns
-            .extend((0..dofs).map(|dof| (name("standard_error", dof, dofs), error.channel(dof))));
+        let base = if counts_noise { "standard_error" } else { "standard_error_of_machine" };
+        columns.extend((0..dofs).map(|dof| (name(base, dof, dofs), error.channel(dof))));
     }
     columns
 }
@@ -150,11 +167,11 @@ pub fn spectrum_file(
 }
 
 /// Every sought force against time, with twice its standard error, above its spectrum.
-pub fn figure(title: &str, force: &IdentifiedForce, sought: &[usize]) -> Figure {
+pub fn figure(how: &How, force: &IdentifiedForce, sought: &[usize]) -> Figure {
     let (record, spectrum) = (force.record(), force.spectrum());
     let times: Vec<f64> = record.sampling().times().collect();
     let frequencies: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
-    let mut figure = Figure::new(title).columns(sought.len());
+    let mut figure = Figure::new(how.method).columns(sought.len());
     for &dof in sought {
         let values = record.channel(dof);
         let label = name("Force", dof, record.channels());
@@ -164,8 +181,12 @@ pub fn figure(title: &str, force: &IdentifiedForce, sought: &[usize]) -> Figure 
             let bound = |side: f64| -> Vec<f64> {
                 values.iter().zip(error).map(|(f, e)| f + side * 2.0 * e).collect()
             };
-            panel =
-                panel.curve(Curve::band("± 2 standard errors", &times, &bound(-1.0), &bound(1.0)));
+            let label = if how.counts_noise {
+                "± 2 standard errors"
+            } else {
+                "± 2 standard errors of the machine"
+            };
+            panel = panel.curve(Curve::band(label, &times, &bound(-1.0), &bound(1.0)));
         }
         figure = figure.panel(panel.curve(Curve::line("", &times, values).width(1.2)));
     }

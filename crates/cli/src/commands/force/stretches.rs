@@ -1,12 +1,13 @@
 //! The force of an open record that is not held.
 
-use mechid::force::ForceError;
+use std::ops::Range;
+
+use mechid::force::{ForceError, IdentifiedForce, Measurement};
 use mechid::signal::SignalError;
 
 use super::machine::Machine;
 use super::method::{Method, Request, equation};
 use super::motion::{Recorded, complete};
-use super::taken::Taken;
 use crate::commands::identify::measurement::STRETCH;
 use crate::error::CliError;
 
@@ -15,13 +16,17 @@ pub fn are_enough_for(method: Method, request: &Request) -> bool {
     !request.periodic && matches!(method, Method::Continuous | Method::Discretised)
 }
 
+/// What is done with a stretch, the force on it, and those of its samples that count.
+pub type Take<'a> =
+    dyn FnMut(&Measurement, &IdentifiedForce, Range<usize>) -> Result<(), CliError> + 'a;
+
 /// Finds the force by such a method, one stretch after the other.
 pub fn find(
     request: &Request,
     machine: &Machine,
     recorded: &Recorded,
     method: Method,
-    taken: &mut Taken,
+    take: &mut Take<'_>,
 ) -> Result<(), CliError> {
     let with_acceleration = method == Method::Continuous;
     if !complete(&recorded.channels, machine.system.dof(), with_acceleration) {
@@ -39,7 +44,7 @@ pub fn find(
         let start = if first == 0 { 0 } else { beside };
         let end = if first + samples == len { samples } else { samples - beside };
         first += advance;
-        taken.push(&force, start..end)
+        take(stretch, &force, start..end)
     })
 }
 

@@ -43,10 +43,14 @@ impl Taken {
         Ok(Self { sampling, levels, strongest, path, rows: None })
     }
 
-    /// All of it.
-    pub fn push_all(&mut self, force: &IdentifiedForce) -> Result<(), CliError> {
+    /// All of it, and whether its standard error counts the noise of the record.
+    pub fn push_all(
+        &mut self,
+        force: &IdentifiedForce,
+        counts_noise: bool,
+    ) -> Result<(), CliError> {
         let all = 0..force.record().len();
-        self.push_samples(force, all.clone())?;
+        self.push_samples(force, all.clone(), counts_noise)?;
         if self.strongest.pieces() == 1 {
             self.strongest.add(force.spectrum());
         } else {
@@ -55,9 +59,14 @@ impl Taken {
         Ok(())
     }
 
-    /// Some samples of what was found of a stretch.
-    pub fn push(&mut self, force: &IdentifiedForce, kept: Range<usize>) -> Result<(), CliError> {
-        self.push_samples(force, kept.clone())?;
+    /// Some samples of what was found of a stretch, likewise.
+    pub fn push(
+        &mut self,
+        force: &IdentifiedForce,
+        kept: Range<usize>,
+        counts_noise: bool,
+    ) -> Result<(), CliError> {
+        self.push_samples(force, kept.clone(), counts_noise)?;
         self.strongest.push(force.record(), kept)
     }
 
@@ -65,6 +74,7 @@ impl Taken {
         &mut self,
         force: &IdentifiedForce,
         kept: Range<usize>,
+        counts_noise: bool,
     ) -> Result<(), CliError> {
         let (record, error) = (force.record(), force.standard_error());
         for (dof, level) in self.levels.iter_mut().enumerate() {
@@ -77,7 +87,7 @@ impl Taken {
                 *level.errors.get_or_insert(0.0) += squares;
             }
         }
-        self.write(&columns(force), kept)
+        self.write(&columns(force, counts_noise), kept)
     }
 
     fn write(&mut self, columns: &[(String, &[f64])], kept: Range<usize>) -> Result<(), CliError> {

@@ -44,6 +44,7 @@ impl Reconstruction {
             start: Start::InMotion,
             rule: Rule::Likelihood,
             noise: Vec::new(),
+            averaged: 1,
         };
         let result = find(&request, &machine(found)?, &motion(period)?)?;
         let measured = match &lines {
