@@ -134,6 +134,26 @@ fn a_table_below_other_lines_and_in_utf16_is_the_same_table() {
     assert_eq!(wide, told);
 }
 
+/// A ramp has many lines, none of which is a vibration; its mean and its ends stay.
+#[test]
+fn the_time_column_has_no_spectrum_unless_asked_for() {
+    let folder = folder();
+    let report = info(&folder, "timed.csv");
+    let time = &report["channels"][0];
+    assert_eq!((&time["name"], &time["spectrum_peaks"]), (&"t".into(), &Value::Array(vec![])));
+    assert!(time["period"].is_null());
+    close(&time["maximum"], 2.99, 1e-12);
+    let text = mechid(folder.path(), "info timed.csv");
+    let rows = |text: &str, column: &str| text.lines().filter(|l| l.starts_with(column)).count();
+    assert_eq!((rows(&text, "1 t"), rows(&text, "2 force")), (1, 2), "{text}");
+    let asked = mechid(folder.path(), "info timed.csv --columns t,force");
+    assert_eq!((rows(&asked, "1 t"), rows(&asked, "2 force")), (2, 2), "{asked}");
+    // Who calls it otherwise gets it like any other column.
+    let text = mechid(folder.path(), "info a.csv");
+    assert_eq!(rows(&text, "1 clock"), 2, "{text}");
+    assert_eq!(rows(&mechid(folder.path(), "info a.csv --time clock"), "1 clock"), 1);
+}
+
 /// The mean of whole periods of a sine is zero, of which summing leaves a rounding; an offset of as
 /// little as 1e-12 of the sine is none.
 #[test]

@@ -104,6 +104,78 @@ fn the_machine_is_the_same_in_any_units() {
     }
 }
 
+/// The example's record with other names and numbers in its column of time.
+fn timed(folder: &Path, name: &str, time: &str, per_second: f64) {
+    let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    let text = fs::read_to_string(machine).unwrap();
+    let rows = text.lines().skip(1).map(|row| {
+        let (t, rest) = row.split_once(',').unwrap();
+        format!("{:?},{rest}\n", per_second * t.parse::<f64>().unwrap())
+    });
+    let header = text.lines().next().unwrap().replace("time,", &format!("{time},"));
+    fs::write(folder.join(name), format!("{header}\n{}", rows.collect::<String>())).unwrap();
+}
+
+/// 128 Hz: 7.8125 ms from sample to sample, 512 of them in 4 s.
+#[test]
+fn milliseconds_that_do_not_say_so_are_asked_about() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    timed(folder, "bare.csv", "t", 1e3);
+    timed(folder, "said.csv", "t_ms", 1e3);
+    timed(folder, "si.csv", "t", 1.0);
+    let machine = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.json");
+    let roles = "--force force --displacement displacement --period 256";
+    let calls = [
+        "info RECORD".to_owned(),
+        format!("identify RECORD {roles}"),
+        format!("frf RECORD {roles}"),
+        format!("sweep RECORD {roles} --decimate 1 --estimator least-squares --velocity velocity"),
+        format!(
+            "force RECORD --system {} --displacement displacement --period 256",
+            machine.display()
+        ),
+        format!("report RECORD {roles} --output page.html"),
+    ];
+    let asked = "bare.csv: the time in column 1 \"t\" says no unit and is taken as seconds: 0.128 Hz, \
+                 4000 s long; if it is in ms, call it t_ms in the file or give --sample-rate 128, if in \
+                 s, t_s";
+    for call in calls {
+        let told = |file: &str| mechid(folder, &call.replace("RECORD", file));
+        assert!(told("bare.csv").contains(asked), "{call}: {}", told("bare.csv"));
+        let rate = told("bare.csv --sample-rate 128");
+        for told in [told("said.csv"), told("si.csv"), rate] {
+            assert!(!told.contains("says no unit"), "{call}: {told}");
+        }
+    }
+    let page = || fs::read_to_string(folder.join("page.html")).unwrap();
+    assert!(!page().contains("says no unit"));
+    mechid(folder, &format!("report bare.csv {roles} --output page.html"));
+    assert!(page().contains("says no unit"));
+}
+
+/// Slow, or rather slow and long; what a name or a row of units says is not doubted.
+#[test]
+fn slow_records_with_a_unit_and_fast_ones_without_are_not_doubted() {
+    let folder = tempfile::tempdir().unwrap();
+    for (header, step, rows, doubted) in [
+        ("t,x", 0.4, 100, false),
+        ("t,x", 0.6, 100, true),
+        ("time,x", 0.1, 9990, false),
+        ("time,x", 0.1, 10_010, true),
+        ("time,x", 0.04, 30_000, false),
+        ("time_s,x", 0.6, 100, false),
+        ("Time [min],x", 0.6, 100, false),
+        ("t,x\ns,mm", 0.6, 100, false),
+    ] {
+        let rows = (0..rows).map(|k| format!("{:?},{}\n", f64::from(k) * step, k % 7));
+        let text = format!("{header}\n{}", rows.collect::<String>());
+        fs::write(folder.path().join("a.csv"), text).unwrap();
+        let told = mechid(folder.path(), "info a.csv");
+        assert_eq!(told.contains("says no unit"), doubted, "{header} {step}: {told}");
+    }
+}
+
 #[test]
 fn a_column_of_another_quantity_is_refused() {
     let folder = records(["F [N]", "x [g]", "v", "a"], [1.0; 4], None);

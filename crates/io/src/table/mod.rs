@@ -201,6 +201,15 @@ impl Table {
         self.names.iter().map(String::as_str).find(|name| time_unit::is_time(name))
     }
 
+    /// Whether a column of instants, by its index counted from 0, says its unit, in its name or in
+    /// the line of units; otherwise it is taken as seconds.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn says_unit_of_time(&self, column: usize) -> bool {
+        time_unit::told(&self.contents.columns[column]).is_some()
+    }
+
     /// Indices, counted from 0, of the columns that have a name or a first value: not those that a
     /// trailing delimiter leaves.
     pub fn filled_columns(&self) -> impl Iterator<Item = usize> + '_ {

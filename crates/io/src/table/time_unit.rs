@@ -20,8 +20,13 @@ const UNITS: [(&str, f64); 8] = [
 /// The unit of a column of instants, in s: that of its name or else of the line of units below it;
 /// seconds where neither says.
 pub(super) fn unit(column: &Column) -> f64 {
+    told(column).unwrap_or(1.0)
+}
+
+/// The same; nothing where neither says.
+pub(super) fn told(column: &Column) -> Option<f64> {
     let (_, named) = split(&column.name);
-    named.or_else(|| known(&column.about)).unwrap_or(1.0)
+    named.or_else(|| known(&column.about))
 }
 
 /// Whether a name says that these are instants: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.

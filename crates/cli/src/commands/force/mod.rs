@@ -176,7 +176,7 @@ impl ForceArgs {
         how: &How,
         taken: &Taken,
     ) -> Report {
-        let mut remarks: Vec<String> = recorded.converted().into_iter().cloned().collect();
+        let mut remarks = recorded.of_units().to_vec();
         remarks.extend(taken.remark());
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();

@@ -71,7 +71,9 @@ impl MotionArgs {
         let file = input.file(HELD)?;
         let units = ToSi::of(file.head(), &roles)?;
         let columns: Vec<String> = roles.iter().map(|(column, ..)| (*column).clone()).collect();
-        let survey = file.survey(&input.needed_time_axis(file.head())?, &columns)?;
+        let time = input.needed_time_axis(file.head())?;
+        let survey = file.survey(&time, &columns)?;
+        let units = units.at_instants(file.head(), &time, survey.sampling);
         let offsets = match input.detrend {
             Some(Detrend::Mean) => survey.means,
             _ => vec![0.0; columns.len()],
@@ -139,9 +141,9 @@ impl Recorded {
         stated.map(|(column, level)| level * self.units.factor(column) / mean).collect()
     }
 
-    /// Which columns were in other than SI units.
-    pub fn converted(&self) -> Option<&String> {
-        self.units.remark.as_ref()
+    /// Which columns were in other than SI units, and whether the time may be.
+    pub fn of_units(&self) -> &[String] {
+        &self.units.remarks
     }
 
     /// All of the window, or its mean period.

@@ -97,7 +97,7 @@ impl Report {
             frequency_hz: frf.omega().iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence: coherence.collect(),
-            remarks: measured.converted.iter().cloned().collect(),
+            remarks: measured.of_units.clone(),
         }
     }
 

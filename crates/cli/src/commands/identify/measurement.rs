@@ -71,8 +71,8 @@ pub struct Measurement {
     pub periods: usize,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub driven: Vec<usize>,
-    /// Which columns were in other than SI units.
-    pub converted: Option<String>,
+    /// Which columns were in other than SI units, and whether the time may be.
+    pub of_units: Vec<String>,
 }
 
 /// A measurement that can be gone through from beginning to end, however long it is.
@@ -206,7 +206,7 @@ impl Source {
             period: force.len(),
             periods: 1,
             driven: Vec::new(),
-            converted: self.units.remark.clone(),
+            of_units: self.units.remarks.clone(),
             force,
         })
     }
@@ -219,7 +219,9 @@ impl ChannelArgs {
         let file = input.file(HELD)?;
         let used = self.used();
         let units = ToSi::of(file.head(), &self.roles())?;
-        let survey = file.survey(&input.needed_time_axis(file.head())?, &used)?;
+        let time = input.needed_time_axis(file.head())?;
+        let survey = file.survey(&time, &used)?;
+        let units = units.at_instants(file.head(), &time, survey.sampling);
         let name = file.head().file().to_owned();
         let (start, len) = input.span(&name, survey.sampling.len())?;
         let period = input.period.unwrap_or(len);

@@ -187,7 +187,8 @@ impl Identification {
         if let Some(recorded) = &validated {
             let (other, system) = (&recorded.held, fitted.estimate.system()?);
             report.validation = Some(Validation::of(recorded, &system, fitted.course)?);
-            report.remarks.extend(other.converted.clone().filter(|_| other.file != report.file));
+            let of_units = other.of_units.iter().filter(|_| other.file != report.file);
+            report.remarks.extend(of_units.cloned());
         }
         let validated = validated.map(Recorded::into_held);
         Ok(Identified { records, validated, fitted, report })
@@ -284,8 +285,8 @@ fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
         Some(format!("checks of single samples looked at samples {first} to {last} of {file} only"))
     });
     let of_method = of_least_squares(fitted, &report.checks);
-    let converted = records.iter().filter_map(|record| record.converted.clone());
-    let remarks = converted.chain(fitted.remarks.iter().cloned()).chain(looked_at);
+    let of_units = records.iter().flat_map(|record| record.of_units.iter().cloned());
+    let remarks = of_units.chain(fitted.remarks.iter().cloned()).chain(looked_at);
     report.remarks = remarks.chain(doubts(&report)).chain(of_method).collect();
     Ok(report)
 }

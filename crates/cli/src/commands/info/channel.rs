@@ -32,6 +32,9 @@ pub struct Channel {
     pub spectrum_peaks: Vec<SpectrumPeak>,
     /// Nothing if it does not repeat.
     pub period: Option<Period>,
+    /// Whether lines and period were looked for.
+    #[serde(skip)]
+    pub spectral: bool,
 }
 
 /// A line of a spectrum that is higher than its neighbours.
@@ -58,7 +61,7 @@ pub struct Period {
 #[derive(Debug, Default)]
 pub struct Gathered {
     levels: Levels,
-    /// The first samples, which are looked at together.
+    /// The first samples, which are looked at together; none where nothing is looked for.
     held: Vec<f64>,
     mean_of_held: f64,
     /// What a picture shows over time; nothing if none is drawn.
@@ -104,7 +107,7 @@ impl Measured {
         given: Option<usize>,
     ) -> Result<Self, SignalError> {
         let Gathered { levels, held, mean_of_held, extremes } = gathered;
-        let repeats = repetition(&held);
+        let (spectral, repeats) = (!held.is_empty(), repetition(&held));
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
         let lines = Lines::of(held, mean_of_held, period)?;
         let Levels { peak, minimum, maximum, .. } = levels;
@@ -124,6 +127,7 @@ impl Measured {
                 seconds: dt.map(|dt| r.period as f64 * dt),
                 mismatch: r.mismatch,
             }),
+            spectral,
         };
         Ok(Self { channel, lines, extremes })
     }
@@ -148,6 +152,9 @@ impl Lines {
             values.truncate(values.len() / period * period);
         }
         let samples = values.len();
+        if samples == 0 {
+            return Ok(Self { amplitude: Vec::new(), samples, period });
+        }
         for (k, value) in values.iter_mut().enumerate() {
             // The window's mean is 1, so that a sine keeps its amplitude.
             let weight = match period {

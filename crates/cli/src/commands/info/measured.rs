@@ -12,6 +12,8 @@ use crate::error::CliError;
 pub struct Shown {
     pub column: usize,
     pub offset: f64,
+    /// With lines and period, which instants do not have.
+    pub spectral: bool,
     /// In the picture, too.
     pub drawn: bool,
 }
@@ -105,7 +107,7 @@ fn gathered(
         let values = block.as_slice().chunks(block.nrows());
         for ((gathered, shown), values) in gathered.iter_mut().zip(together).zip(values) {
             let values: Vec<f64> = values.iter().map(|v| v - shown.offset).collect();
-            gathered.push(&values, window.hold)?;
+            gathered.push(&values, if shown.spectral { window.hold } else { 0 })?;
         }
         Ok::<_, CliError>(())
     })?;

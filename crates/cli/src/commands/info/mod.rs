@@ -15,6 +15,7 @@ use super::identify::measurement::HELD;
 use crate::error::CliError;
 use crate::options::{Detrend, PlotArgs, RecordArgs, ReportArgs};
 use crate::outcome::Outcome;
+use crate::units::doubtful_time;
 
 /// Show what is in a record: format, columns, sampling, levels, strongest lines, period
 ///
@@ -25,7 +26,8 @@ use crate::outcome::Outcome;
 /// of all samples of the window: lines and period are those of its first 262144 samples.
 ///
 /// The picture shows columns over time, all of the window, beside their spectra, of the mean period
-/// where there is one: the first eight, and the column of time only if --columns asks for it.
+/// where there is one: the first eight. The column of time has a spectrum only if --columns asks for
+/// it.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid info record.csv
@@ -58,17 +60,20 @@ impl InfoArgs {
         let mut inventory = file.inventory(&asked, instants)?;
         let samples = inventory.samples;
         let sampling = inventory.sampling.take();
-        let (mut shown, len, mut left_out) = self.shown(table, &asked, inventory)?;
+        let (mut shown, len, mut left_out) = self.shown(table, &asked, instants, inventory)?;
         let dt = self.step(&file, time, sampling, &mut left_out)?;
         let window = match len {
             0 => None,
             len => Some(Span::of(self.input.span(table.file(), len)?, &file)),
         };
         let mut report = Report::begin(table, samples, window, dt, left_out);
+        report.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
+            doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
+        }));
         let mut drawn = Vec::new();
         if let (Some(window), false) = (window, shown.is_empty()) {
             report.remarks.extend(window.looked_at(table.file()));
-            report.remarks.extend(self.choose_drawn(table, &mut shown, instants));
+            report.remarks.extend(self.choose_drawn(table, &mut shown));
             (report.channels, drawn) = measured(&file, &shown, window, (dt, self.input.period))?;
         }
         let title = || picture::title(table.file(), window);
@@ -77,15 +82,9 @@ impl InfoArgs {
     }
 
     /// Says which columns are drawn, and returns what is to be told of the others.
-    fn choose_drawn(
-        &self,
-        table: &Table,
-        shown: &mut [Shown],
-        instants: Option<usize>,
-    ) -> Option<String> {
+    fn choose_drawn(&self, table: &Table, shown: &mut [Shown]) -> Option<String> {
         let path = self.plot.plot.as_ref()?;
-        let asked = !self.columns.is_empty();
-        let mut wanted = shown.iter_mut().filter(|s| asked || Some(s.column) != instants);
+        let mut wanted = shown.iter_mut().filter(|s| s.spectral);
         wanted.by_ref().take(picture::COLUMNS).for_each(|s| s.drawn = true);
         let others: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
         (!others.is_empty()).then(|| {
@@ -112,6 +111,7 @@ impl InfoArgs {
         &self,
         table: &Table,
         asked: &[usize],
+        instants: Option<usize>,
         inventory: Inventory,
     ) -> Result<(Vec<Shown>, usize, Vec<String>), CliError> {
         let offset = |mean: f64| match self.input.detrend {
@@ -123,7 +123,10 @@ impl InfoArgs {
             match tally {
                 Ok(tally) if !self.columns.is_empty() || tally.samples == inventory.samples => {
                     len = tally.samples;
-                    shown.push(Shown { column, offset: offset(tally.mean), drawn: false });
+                    // Instants are no signal.
+                    let spectral = !self.columns.is_empty() || Some(column) != instants;
+                    let offset = offset(tally.mean);
+                    shown.push(Shown { column, offset, spectral, drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
                     "column {} has {}, most have {}",

@@ -138,7 +138,7 @@ impl Report {
     }
 
     fn lines(&self) -> String {
-        if self.channels.is_empty() {
+        if !self.channels.iter().any(|c| c.spectral) {
             return String::new();
         }
         let unit = if self.sampling.is_some() { "Hz" } else { "cycles/sample" };
@@ -152,7 +152,7 @@ impl Report {
             .map(String::from)
             .to_vec(),
         ];
-        for c in &self.channels {
+        for c in self.channels.iter().filter(|c| c.spectral) {
             let (period, mismatch) = match &c.period {
                 Some(Period { samples, mismatch, .. }) => {
                     (samples.to_string(), format!("{} %", significant(100.0 * mismatch, 3)))

@@ -52,7 +52,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, CliError> {
                 (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts(contents, part) }.html())
                 (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
             }
-            @if let Some(converted) = &part.held().converted { p.note { (converted) "." } }
+            @for remark in &part.held().of_units { p.note { (remark) "." } }
             @if let Some(note) = part_held(part) { p.note { (note) } }
             div.figures { @for drawn in &drawn { (figure(drawn)) } }
         })

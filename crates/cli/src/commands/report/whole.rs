@@ -75,7 +75,7 @@ fn mean(
         period: held.period,
         periods: 1,
         driven: held.driven.clone(),
-        converted: held.converted.clone(),
+        of_units: held.of_units.clone(),
     }))
 }
 

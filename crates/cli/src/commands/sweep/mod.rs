@@ -172,7 +172,7 @@ impl SweepArgs {
         let (file, samples) = (measured.file.clone(), measured.period);
         let how = (natural_frequency_hz, &rate_hz as &dyn Fn(f64) -> f64);
         let mut report = self.report(file, samples, &found, reference.as_ref(), how)?;
-        report.remarks.extend(measured.converted.clone());
+        report.remarks.extend(measured.of_units.clone());
         if let (true, Some(last)) = (self.estimator.is_of_spectra(), measured.held_to()) {
             let (first, file) = (measured.first_sample, &measured.file);
             report.remarks.push(format!(
