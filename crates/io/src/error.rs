@@ -195,10 +195,10 @@ pub enum IoError {
     /// The instants of the time column are not equally spaced.
     #[error(
         "{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
-         {} s (resample the record, or give the sample rate instead of the time column if the \
-         times are only rounded)",
+         {} s ({})",
         told(six_digits(*step)),
-        told(six_digits(*usual))
+        told(six_digits(*usual)),
+        remedy(*step, *usual)
     )]
     NonUniformTime {
         /// The file.
@@ -355,4 +355,14 @@ pub enum IoError {
 /// A number without the digits that rounding left behind.
 fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
+}
+
+/// What to do about a time step unlike the usual one, both in s.
+fn remedy(step: f64, usual: f64) -> &'static str {
+    if usual > 0.0 && step < 0.0 {
+        "the time goes back, as where a second record was appended: keep them in files of their own"
+    } else {
+        "resample the record, or give the sample rate instead of the time column if the times are \
+         only rounded"
+    }
 }

@@ -234,6 +234,11 @@ fn uneven_time_is_refused_with_its_worst_step() {
         ),
         "{e}"
     );
+    assert!(e.to_string().contains("resample the record"), "{e}");
+    // A second run behind the first one, whose time starts again.
+    let e = of(&[0.0, 1.0, 2.0, 0.0, 1.0, 2.0]).unwrap_err().to_string();
+    assert!(e.contains("-2 s up to line 5") && e.contains("second record was appended"), "{e}");
+    assert!(!e.contains("resample"), "{e}");
     for times in
         [&[0.0, 1.0, 0.5, 1.5][..], &[0.0, 0.0, 0.0], &[2.0, 1.0, 0.0], &[-1.7e308, 1.7e308]]
     {
