@@ -99,6 +99,17 @@ pub enum CliError {
         /// Degrees of freedom of the machine.
         dofs: usize,
     },
+    /// Not one noise level per measured column.
+    #[error(
+        "--noise gives {}, the motion has {}: give one for each",
+        counted(*levels, "level"), counted(*columns, "column")
+    )]
+    NoiseCount {
+        /// Levels given.
+        levels: usize,
+        /// Columns of the motion.
+        columns: usize,
+    },
     /// An equation of motion needs all its terms.
     #[error(
         "this method needs displacement, velocity{} of every degree of freedom: measure them, or \

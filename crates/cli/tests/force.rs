@@ -156,7 +156,7 @@ fn bad_requests_say_what_to_change() {
     for (arguments, words) in [
         ("", "the motion is missing"),
         ("--displacement displacement,velocity", "the machine has 1 degree of freedom"),
-        ("--displacement displacement --forced 2", "degree of freedom 1 (counted from 0)"),
+        ("--displacement displacement --forced 2", "degree of freedom 2 (counted from 1)"),
         ("--displacement displacement --method continuous", "velocity and acceleration"),
         ("--displacement displacement --method frequency-domain", "--period"),
         ("--displacement displacement --period 256 --method kalman", "open record"),

@@ -35,7 +35,7 @@ pub enum ForceError {
         described: usize,
     },
     /// A degree of freedom that the system does not have.
-    #[error("degree of freedom {dof} (counted from 0) of a system of {dofs}")]
+    #[error("degree of freedom {} (counted from 1) of a system of {dofs}", dof + 1)]
     NoSuchDof {
         /// The one asked for, counted from 0.
         dof: usize,
@@ -95,10 +95,11 @@ pub enum ForceError {
     /// The measured channels do not show a force at this line.
     #[error(
         "at line {line} (ω = {} rad/s) the machine transmits nothing of the force on \
-         degree of freedom {dof} (counted from 0) to the measured channels (reciprocal \
+         degree of freedom {} (counted from 1) to the measured channels (reciprocal \
          condition {reciprocal_condition:.1e}): leave the line out, measure another degree of \
          freedom or quantity, or name fewer forces",
-        told_to(*omega, 6)
+        told_to(*omega, 6),
+        dof + 1
     )]
     NotTransmitted {
         /// The line.
@@ -163,8 +164,9 @@ pub enum ForceError {
     },
     /// The measured channels cannot show a force, at any frequency.
     #[error(
-        "no frequency shows the force on degree of freedom {dof} (counted from 0) apart from the \
-         others in the measured channels: measure elsewhere, or name fewer forces"
+        "no frequency shows the force on degree of freedom {} (counted from 1) apart from the \
+         others in the measured channels: measure elsewhere, or name fewer forces",
+        dof + 1
     )]
     Unseen {
         /// The forced degree of freedom, counted from 0.

@@ -181,10 +181,6 @@ fn motion_noise(
     if levels.is_empty() {
         return Ok(None);
     }
-    if levels.len() != channels.len() {
-        let (record, described) = (channels.len(), levels.len());
-        return Err(ForceError::ChannelCount { record, described }.into());
-    }
     let of = |quantity: Quantity| -> Vec<f64> {
         let find = |dof| channels.iter().position(|c| *c == Channel { dof, quantity });
         (0..dofs).filter_map(find).map(|at| levels[at]).collect()

@@ -146,6 +146,10 @@ impl ForceArgs {
         dofs: usize,
         periodic: bool,
     ) -> Result<Request, CliError> {
+        let (levels, columns) = (self.noise.len(), recorded.columns().len());
+        if levels > 0 && levels != columns {
+            return Err(CliError::NoiseCount { levels, columns });
+        }
         let lines = self.lines.as_ref().map(|spec| spec.lines(recorded.sampling));
         let rule = match (self.parameter, self.rule) {
             (Some(lambda), _) => Rule::Given(lambda),
