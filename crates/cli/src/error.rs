@@ -129,6 +129,14 @@ pub enum CliError {
     /// The reconstruction failed.
     #[error(transparent)]
     Force(#[from] mechid::force::ForceError),
+    /// The fit failed, and something is wrong with its data.
+    #[error("{error}; {reasons}")]
+    Unfit {
+        /// What failed.
+        error: mechid::estimate::EstimateError,
+        /// What was seen before the fit.
+        reasons: String,
+    },
     /// The force does nothing.
     #[error(
         "{file}: the force (column {columns}) is zero throughout the window: nothing drives the machine"

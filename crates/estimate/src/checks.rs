@@ -5,9 +5,14 @@
 mod after;
 mod before;
 mod correlation;
+mod delay;
+mod kinematics;
 mod linearity;
 mod misfit;
 mod period;
+mod power;
+mod range;
+mod regressors;
 mod spectral;
 
 use std::fmt;
@@ -15,9 +20,14 @@ use std::fmt;
 pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
 pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
+pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines};
+pub use kinematics::kinematics;
 pub use linearity::linearity;
 pub use misfit::{after_response_fit, after_spectral_fit};
 pub use period::claimed_period;
+pub use power::power;
+pub use range::{range, still};
+pub use regressors::noise_on_motion;
 pub use spectral::{before_response_fit, before_spectral_fit};
 
 /// How a check came out.
@@ -39,12 +49,22 @@ pub enum Subject {
     Excitation,
     /// Whether the data tell the unknowns apart.
     Conditioning,
+    /// Whether a channel was cut off at the end of its range, or is dead.
+    Range,
+    /// Whether the motions measured are those of one motion.
+    Kinematics,
+    /// Whether the force puts power into the machine.
+    Power,
     /// Whether the record is the period it is said to be.
     Periodicity,
     /// Whether the step suits the fastest mode and the discretisation.
     Step,
     /// Whether motion and force belong together.
     Coherence,
+    /// Whether force and motion are apart in time.
+    Delay,
+    /// Whether noise on the motion biases the fit.
+    NoiseOnMotion,
     /// Whether the residual is as large as the noise.
     Misfit,
     /// Whether the residual goes with a power of the motion.
@@ -83,9 +103,14 @@ impl fmt::Display for Subject {
         f.pad(match self {
             Subject::Excitation => "excitation",
             Subject::Conditioning => "conditioning",
+            Subject::Range => "range",
+            Subject::Kinematics => "kinematics",
+            Subject::Power => "power",
             Subject::Periodicity => "periodicity",
             Subject::Step => "step",
             Subject::Coherence => "coherence",
+            Subject::Delay => "delay",
+            Subject::NoiseOnMotion => "noise on motion",
             Subject::Misfit => "misfit",
             Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",
@@ -97,5 +122,14 @@ impl fmt::Display for Subject {
 impl fmt::Display for Check {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.verdict, self.text)
+    }
+}
+
+/// A number to six digits, as a person writes it.
+fn six_digits(value: f64) -> String {
+    let exponent = value.abs().log10().floor();
+    match exponent {
+        e if (-4.0..6.0).contains(&e) => format!("{value:.0$}", (5.0 - e) as usize),
+        _ => format!("{value:.5e}"),
     }
 }

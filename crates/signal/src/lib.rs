@@ -35,9 +35,11 @@
 //! | impact, noise, sweep, binary sequence | [`excitation`] |
 //! | crest factor, flatness, order of excitation | [`measures`] |
 //! | whether a record repeats, and how well | [`repetition()`] |
+//! | whether a channel was cut off | [`clipping()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 
+mod clipping;
 pub mod crest;
 mod driven;
 mod error;
@@ -55,6 +57,7 @@ mod sampling;
 pub mod spectrum;
 mod told;
 
+pub use clipping::{Clipping, clipping};
 pub use crest::CrestSearch;
 pub use driven::driven_lines;
 pub use error::SignalError;

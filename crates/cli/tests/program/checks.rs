@@ -172,3 +172,99 @@ fn an_unstable_machine_is_not_led_through_a_long_record() {
     assert!(told.starts_with("error: long.csv: the machine found is unstable"), "{told}");
     assert!(told.contains("by a factor of e in 0.100 s"), "{told}");
 }
+
+/// What a wrong channel is told as, whichever way it is fitted.
+#[test]
+fn what_is_wrong_with_a_channel_is_named() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let sampling = Sampling::new(0.01, 256).unwrap();
+    let force = Multisine::flat((4..=60).step_by(2), 2.0, Phases::Random { seed: 4 }).unwrap();
+    let force = force.sample(sampling).unwrap().repeated(8).unwrap();
+    let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    let part = |motion: &Response, first: usize| {
+        let cut = |record: &Record| record.window(first, 1024).unwrap();
+        let [x, v, a] = [motion.displacement(), motion.velocity(), motion.acceleration()];
+        Response::new(cut(x), cut(v), cut(a)).unwrap()
+    };
+    let at = force.window(64, 1024).unwrap();
+    write(folder, "right.csv", &at, &part(&motion, 64), 0.001);
+    write(folder, "late.csv", &at, &part(&motion, 61), 0.001);
+    let level = 0.5 * at.data().amax();
+    let cut = Record::new(at.sampling(), at.data().map(|f| f.clamp(-level, level))).unwrap();
+    write(folder, "cut.csv", &cut, &part(&motion, 64), 0.001);
+    let [x, v, a] = [motion.displacement(), motion.velocity(), motion.acceleration()];
+    let milli = Record::new(force.sampling(), v.data() * 1e3).unwrap();
+    let milli = Response::new(x.clone(), milli, a.clone()).unwrap();
+    write(folder, "milli.csv", &at, &part(&milli, 64), 0.001);
+    let spectra = "--force f --displacement x --period 256";
+    let random = "--force f --displacement x --from-frf h1 --segment 256 --lines 4:2:60";
+    let time = "--force f --displacement x --velocity v --domain time";
+    let all = [spectra, random, time];
+    for (record, subject, ways) in [
+        ("late.csv", "delay", &all[..]),
+        ("cut.csv", "range", &all),
+        ("milli.csv", "kinematics", &all[2..]),
+    ] {
+        for way in ways {
+            let said = verdicts(folder, &format!("identify {record} {way}"), subject);
+            assert_eq!(said, ["bad"], "{record} {way}");
+            assert!(verdicts(folder, &format!("identify right.csv {way}"), subject).is_empty());
+        }
+    }
+    let swapped = "--force x --displacement f";
+    let said = verdicts(folder, &format!("identify right.csv {swapped} --period 256"), "power");
+    assert_eq!(said, ["bad"]);
+    // The reason is told if nothing can be fitted, too.
+    let said = refused(folder, &format!("identify right.csv {swapped} --velocity v --domain time"));
+    assert!(said.contains("displacement 1 changes by "), "{said}");
+}
+
+#[test]
+fn a_dead_channel_is_named_whether_it_can_be_fitted_or_not() {
+    let place = tempfile::tempdir().unwrap();
+    for (name, dead) in [("zero.csv", 0.0), ("offset.csv", 0.25)] {
+        let row = |k: i32| format!("{},{},{dead},{}\n", 0.01 * f64::from(k), k % 7, k % 5);
+        let text = format!("t,f,x,v\n{}", (0..400).map(row).collect::<String>());
+        std::fs::write(place.path().join(name), text).unwrap();
+    }
+    let said = |way: &str| refused(place.path(), &format!("identify {way}"));
+    let zero = said("zero.csv --force f --displacement x");
+    assert!(zero.starts_with("error: the data do not determine m, c, k"), "{zero}");
+    assert!(zero.contains("; displacement 1 is 0 in all of 400 samples"), "{zero}");
+    let time = said("offset.csv --force f --displacement v --velocity x --domain time");
+    assert!(time.contains("; velocity 1 is 0.25 in all of 400 samples"), "{time}");
+    // The spectrum of a constant is rounding, from which something follows.
+    let way = "identify offset.csv --force f --displacement x";
+    assert_eq!(verdicts(place.path(), way, "range"), ["bad"]);
+}
+
+/// Noise on displacement, velocity and acceleration biases the equation of motion.
+#[test]
+fn noise_that_biases_least_squares_in_time_is_told() {
+    let place = tempfile::tempdir().unwrap();
+    let force = Multisine::flat(4..=60, 2.0, Phases::Random { seed: 6 }).unwrap();
+    let force = force.sample(Sampling::new(0.01, 256).unwrap()).unwrap().repeated(8).unwrap();
+    let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    let [x, v, a] = [motion.displacement(), motion.velocity(), motion.acceleration()];
+    for (name, share) in [("clean.csv", 0.0), ("noisy.csv", 0.05)] {
+        let [x, v, a] = [(x, 1), (v, 2), (a, 3)].map(|(record, seed)| match share {
+            0.0 => record.clone(),
+            _ => noisy(record, share, seed),
+        });
+        let columns = [("f", &force), ("x", &x), ("v", &v), ("a", &a)];
+        let columns = columns.map(|(name, record)| (name.to_owned(), record.channel(0)));
+        let text = mechid::io::csv_text(force.sampling(), &columns);
+        std::fs::write(place.path().join(name), text).unwrap();
+        let command = format!(
+            "identify {name} --force f --displacement x --velocity v --acceleration a --domain time"
+        );
+        let said = verdicts(place.path(), &command, "noise on motion");
+        assert_eq!(said.len(), usize::from(share > 0.0), "{said:?}");
+    }
+    // Where the derivatives are the cause the way around them is told.
+    let command = "identify noisy.csv --force f --acceleration a --domain time \
+                   --derivatives spectral";
+    let said = mechid(place.path(), command);
+    assert!(said.contains("fitted on the lines of the force alone"), "{said}");
+}

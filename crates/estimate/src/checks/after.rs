@@ -10,7 +10,7 @@ use super::{Check, Subject, Verdict};
 use crate::EstimateError;
 
 /// A residual smaller than this share of what was fitted is rounding.
-const ROUNDING: f64 = 1e-9;
+pub(super) const ROUNDING: f64 = 1e-9;
 
 /// Noise has a larger statistic in one record of a hundred.
 pub(super) const SIGNIFICANT: f64 = 0.01;

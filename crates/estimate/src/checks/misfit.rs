@@ -120,8 +120,9 @@ impl Expected {
                  a degree of freedom more, a wrong known mass), or force and motion leak",
             ),
         };
+        let times = if value < 1e4 { format!("{value:.3}") } else { format!("{value:.1e}") };
         let text = format!(
-            "the residual has {value:.3} times the power that {of} explains, {}; {meaning}",
+            "the residual has {times} times the power that {of} explains, {}; {meaning}",
             p_told(p_value)
         );
         Check { subject: Subject::Misfit, verdict, value, text }

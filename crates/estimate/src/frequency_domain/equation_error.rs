@@ -51,46 +51,73 @@ pub fn equation_error(
 /// # Errors
 /// [`EstimateError::NoExcitedLine`] if no row carries force.
 pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateError> {
-    weighted_rows(data, |_| 1.0)
+    weighted_rows(data, 0.0, |_| 1.0)
 }
+
+/// Noise of more than this part of a line's power makes it unclear.
+const CLEAR: f64 = 0.1;
 
 /// [`equation_error`] with every row divided by what the stated noise puts into its equation, by
 /// the measured receptance: of frequency responses the weight is the coherence over what it lacks
-/// of 1, so that lines which only noise has reached do not decide.
+/// of 1, so that lines which only noise has reached do not decide. Once of all lines, and once of
+/// those alone that are clear: an unclear line with next to no force shows a machine far too soft.
 ///
 /// Nothing if no noise is stated, or none at some row, or if it leaves a parameter open.
-pub(super) fn weighted_equation_error(
+pub(super) fn weighted_equation_errors<'a>(
+    data: &'a FrequencyData,
+    unknowns: &'a Unknowns,
+) -> impl Iterator<Item = Estimate> + 'a {
+    [f64::INFINITY, CLEAR].into_iter().filter_map(|clear| {
+        let rows = weighted_rows(data, 0.0, noise_weight(data, clear)?);
+        let found = rows.ok()?.solve(unknowns).ok()?;
+        found.check_determined().ok().map(|()| found)
+    })
+}
+
+/// The rows of [`equation_error`] with the force `delay` seconds later; where noise is stated, of
+/// clear lines, weighted by it.
+pub(crate) fn late_rows(
     data: &FrequencyData,
-    unknowns: &Unknowns,
-) -> Option<Estimate> {
+    delay: f64,
+) -> Result<EquationOfMotion, EstimateError> {
+    match noise_weight(data, CLEAR) {
+        Some(weight) => weighted_rows(data, delay, weight),
+        None => weighted_rows(data, delay, |_| 1.0),
+    }
+}
+
+/// Of each row the inverse of what the stated noise puts into it; 0 if that is more than `clear` of
+/// its power.
+fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f64> {
     let noise = data.noise()?;
     let n = data.dof();
-    let weight = |row: usize| {
+    Some(move |row: usize| {
         let spread = noise.covariance(row).diagonal().map(|variance| variance.re);
         let (motion, force) =
             (data.displacement().row(row).norm_squared(), data.force().row(row).norm_squared());
-        if motion == 0.0 || force == 0.0 {
+        let of_motion = spread.rows(0, n).sum();
+        if motion == 0.0 || force == 0.0 || of_motion > clear * motion {
             return 0.0;
         }
-        (force * (spread.rows(0, n).sum() / motion) + spread.rows(n, n).sum()).sqrt().recip()
-    };
-    let found = weighted_rows(data, weight).ok()?.solve(unknowns).ok()?;
-    found.check_determined().ok().map(|()| found)
+        (force * (of_motion / motion) + spread.rows(n, n).sum()).sqrt().recip()
+    })
 }
 
 fn weighted_rows(
     data: &FrequencyData,
+    delay: f64,
     weight: impl Fn(usize) -> f64,
 ) -> Result<EquationOfMotion, EstimateError> {
     if data.force().iter().all(|f| *f == Complex::default()) {
         return Err(EstimateError::NoExcitedLine);
     }
     let s = |row: usize| Complex::new(0.0, data.omega()[row]);
+    let late = |row: usize| Complex::cis(-data.omega()[row] * delay);
     let x = data.displacement();
     let velocity = real_rows(x, |row, x| s(row) * x * weight(row));
     let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight(row));
     let displacement = real_rows(x, |row, x| x * weight(row));
-    let force = real_rows(data.force(), |row, f| f * weight(row));
+    let force = real_rows(data.force(), |row, f| f * late(row) * weight(row));
     let mut rows = EquationOfMotion::new(data.dof());
     rows.push_rows(
         acceleration.as_view(),

@@ -51,6 +51,7 @@ mod output_error;
 mod periods;
 
 pub use data::FrequencyData;
+pub(crate) use equation_error::late_rows;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use lines::Lines;

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::equation_error::weighted_equation_error;
+use super::equation_error::weighted_equation_errors;
 use super::levenberg_marquardt::{Minimum, SumOfSquares, minimise};
 use super::misfit::{Misfit, Noise, output_weights};
 use super::{FrequencyData, NoiseSpectrum, equation_error};
@@ -78,7 +78,7 @@ fn with_known_noise(
     let weights =
         if noise.has_force() { Noise::Both(noise) } else { Noise::Output(output_weights(noise)?) };
     let mut misfit = Misfit::new(data, unknowns, weights);
-    let weighted = weighted_equation_error(data, unknowns).map(|found| values(&found));
+    let weighted = weighted_equation_errors(data, unknowns).map(|found| values(&found));
     let theta = nearest(&mut misfit, theta, weighted);
     let fit = search(&mut misfit, theta)?;
     let spare = spare(data, &fit.theta);
@@ -150,17 +150,21 @@ fn values(estimate: &Estimate) -> DVector<f64> {
 fn nearest(
     misfit: &mut Misfit<'_>,
     theta: DVector<f64>,
-    other: Option<DVector<f64>>,
+    others: impl Iterator<Item = DVector<f64>>,
 ) -> DVector<f64> {
     let mut residual = DVector::zeros(misfit.residuals());
     let mut cost = |theta: &DVector<f64>| match misfit.residual(theta, &mut residual) {
         true => residual.norm_squared(),
         false => f64::INFINITY,
     };
-    match other {
-        Some(other) if cost(&other) < cost(&theta) => other,
-        _ => theta,
+    let mut least = (cost(&theta), theta);
+    for other in others {
+        let own = cost(&other);
+        if own < least.0 {
+            least = (own, other);
+        }
     }
+    least.1
 }
 
 /// The minimum, at which `misfit` is left evaluated.

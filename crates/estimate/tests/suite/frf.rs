@@ -4,6 +4,7 @@ use crate::common::{bearing, displacements, forces, oscillator, relative_error, 
 use mechid_estimate::frequency_domain::{Lines, Motion, equation_error, output_error};
 use mechid_estimate::{EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window};
 use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::excitation::Random;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 
@@ -437,5 +438,37 @@ fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
             found.value
         );
         assert!(error < 0.01 * truth, "{} = {}, truth {truth}", found.parameter, found.value);
+    }
+}
+
+/// Displacements of a random force that leaves off at a third of the band: noise alone, divided by
+/// next to no force, beyond it, on every segment length a machine far too soft.
+#[test]
+fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
+    let system = oscillator();
+    let sampling = Sampling::new(0.02, 1 << 14).unwrap();
+    for seed in 0..5 {
+        let strong = Random::band_limited(20.0, 0.0, 8.0, seed).unwrap().sample(sampling).unwrap();
+        let weak = noise::white(sampling, 1, 1e-4, 100 + seed).unwrap();
+        let force = Record::new(sampling, strong.data() + weak.data()).unwrap();
+        let motion = exact_harmonic_periodic(&system, &force).unwrap();
+        let level = NoiseLevel::FractionOfRms(0.01);
+        let motion = noise::add_white(motion.displacement(), level, seed).unwrap();
+        for len in [128, 256, 512, 1024] {
+            let frf = Frf::estimate(
+                &force,
+                &motion,
+                Motion::Displacement,
+                Segments::hann(len),
+                1..len / 2,
+                FrfEstimator::H1,
+            )
+            .unwrap();
+            let fit = output_error(&frf.data(&[0]).unwrap(), &Unknowns::unknown_mass(1).unwrap());
+            let found = fit.unwrap().estimate;
+            let error = relative_error(&found.mass(), system.mass());
+            // What is left is the leakage of short segments.
+            assert!(error < 0.05, "{seed} {len}: m = {}", found.mass()[(0, 0)]);
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! What was looked at before and after the fit, for people and for programs.
 
-use mechid::estimate::checks::{Check, Verdict, after_fit};
+use mechid::estimate::checks::{Check, Verdict, after_fit, kinematics, power, range, still};
+use mechid::estimate::frequency_domain::Motion;
 use serde::Serialize;
 
 use super::fit::{Fitted, Residual};
+use super::measurement::Measurement;
 use crate::error::CliError;
 
 /// Lags up to which a residual is correlated.
@@ -27,15 +29,16 @@ pub struct CheckRow {
     pub text: String,
 }
 
-/// Everything looked at; `files` are the names of the records.
-pub fn rows(fitted: &Fitted, files: &[&str]) -> Result<Vec<CheckRow>, CliError> {
+/// Everything looked at.
+pub fn rows(fitted: &Fitted, records: &[&Measurement]) -> Result<Vec<CheckRow>, CliError> {
     let mut rows = Vec::new();
     let mut add = |when, at: usize, checks: &[Check]| {
-        let name = (files.len() > 1).then(|| files[at].to_owned());
+        let name = (records.len() > 1).then(|| records[at].file.clone());
         rows.extend(checks.iter().map(|check| CheckRow::new(when, name.clone(), check)));
     };
-    for (at, checks) in fitted.before.iter().enumerate() {
+    for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
         add("before", at, checks);
+        add("before", at, &of_channels(record)?);
     }
     for (at, checks) in fitted.after.iter().enumerate() {
         add("after", at, checks);
@@ -44,6 +47,23 @@ pub fn rows(fitted: &Fitted, files: &[&str]) -> Result<Vec<CheckRow>, CliError> 
         add("after", at, &of_residual(residual)?);
     }
     Ok(rows)
+}
+
+/// What is wrong with the channels themselves, whatever is fitted to them.
+pub fn of_channels(measured: &Measurement) -> Result<Vec<Check>, CliError> {
+    let mut checks = range("force", &measured.force);
+    for (kind, motion) in measured.motions() {
+        checks.extend(range(&kind.to_string(), motion));
+        checks.extend(still(&kind.to_string(), motion));
+    }
+    checks.extend(kinematics(&measured.motions())?);
+    // A velocity tells the power without its neighbours in time.
+    let (motion, kind) = match &measured.velocity {
+        Some(velocity) => (velocity, Motion::Velocity),
+        None => measured.motion(),
+    };
+    checks.extend(power(&measured.force, motion, kind)?);
+    Ok(checks)
 }
 
 /// Nothing if there are too few samples to tell.
@@ -70,6 +90,11 @@ impl CheckRow {
     /// Whether the user must be warned.
     pub fn is_conspicuous(&self) -> bool {
         self.verdict != Verdict::Good.to_string()
+    }
+
+    /// Whether it says what is wrong.
+    pub fn is_bad(&self) -> bool {
+        self.verdict == Verdict::Bad.to_string()
     }
 
     /// The sentence, with the record it is about.

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use clap::ValueEnum;
-use mechid::estimate::checks::{Check, after_spectral_fit, before_spectral_fit};
+use mechid::estimate::checks::{Check, after_spectral_fit, before_spectral_fit, delay_of_lines};
 use mechid::estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
@@ -149,7 +149,8 @@ pub fn frequency_domain(
         before.push(before_spectral_fit(lines, &held.force, motion, kind, unknowns)?);
         let own = lines.as_slice().len() as f64 / data.len() as f64;
         let fitted = own * estimate.parameters().len() as f64;
-        after.push(Vec::from_iter(of_noise(periods, &estimate, fitted)?));
+        let late = delay_of_lines(&weighted(periods)?, lines.sampling().dt(), unknowns);
+        after.push(late.into_iter().chain(of_noise(periods, &estimate, fitted)?).collect());
     }
     let lines = spectra.swap_remove(0).1;
     let residuals = steady_residuals(records, &estimate)?;
@@ -189,6 +190,14 @@ fn of_noise(
 ) -> Result<Option<Check>, CliError> {
     let Some(pooling) = pooling(periods.count()) else { return Ok(None) };
     Ok(after_spectral_fit(&periods.mean_with_noise(pooling)?, estimate, fitted))
+}
+
+/// The mean of the periods, with their noise if it shows.
+fn weighted(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
+    match pooling(periods.count()) {
+        Some(pooling) => periods.mean_with_noise(pooling),
+        None => periods.mean(),
+    }
 }
 
 /// How the noise of so many periods is averaged over the lines; nothing if it does not show.

@@ -170,18 +170,7 @@ impl Identification {
             records.push(self.channels.record(&input, hold)?);
         }
         let unknowns = self.mass.unknowns(records[0].held.force.channels())?;
-        let choose = |force: &Record, period: usize| self.choose(force, period);
-        let fitted = match (self.domain, self.from_frf) {
-            (Domain::Time, _) => self.time.fit(&records, &unknowns, self.between_samples)?,
-            (Domain::Frequency, Some(estimator)) => {
-                let how = (estimator, &self.segments);
-                responses::fit(&records, &unknowns, choose, how, self.method)?
-            }
-            (Domain::Frequency, None) => {
-                let method = self.method.unwrap_or(Method::LeastSquares);
-                fit::frequency_domain(&records, &unknowns, choose, method)?
-            }
-        };
+        let fitted = self.fit(&records, &unknowns).map_err(|error| explained(error, &records))?;
         let mut report = report(&records, &fitted)?;
         let validated = self.validation.record(&self.input, &self.channels, fitted.course, hold)?;
         if let Some(recorded) = &validated {
@@ -192,6 +181,21 @@ impl Identification {
         }
         let validated = validated.map(Recorded::into_held);
         Ok(Identified { records, validated, fitted, report })
+    }
+
+    fn fit(&self, records: &[Recorded], unknowns: &Unknowns) -> Result<Fitted, CliError> {
+        let choose = |force: &Record, period: usize| self.choose(force, period);
+        match (self.domain, self.from_frf) {
+            (Domain::Time, _) => self.time.fit(records, unknowns, self.between_samples),
+            (Domain::Frequency, Some(estimator)) => {
+                let how = (estimator, &self.segments);
+                responses::fit(records, unknowns, choose, how, self.method)
+            }
+            (Domain::Frequency, None) => {
+                let method = self.method.unwrap_or(Method::LeastSquares);
+                fit::frequency_domain(records, unknowns, choose, method)
+            }
+        }
     }
 
     /// The lines of one period, of so many samples, of a force that are fitted.
@@ -247,12 +251,22 @@ impl Identified {
     }
 }
 
+/// Why a fit failed, as far as the channels themselves tell.
+fn explained(error: CliError, records: &[Recorded]) -> CliError {
+    let CliError::Estimate(error) = error else { return error };
+    let seen = records.iter().filter_map(|r| checks::of_channels(&r.held).ok()).flatten();
+    let reasons: Vec<String> = seen.map(|check| check.text).collect();
+    match reasons.is_empty() {
+        true => CliError::Estimate(error),
+        false => CliError::Unfit { error, reasons: reasons.join("; ") },
+    }
+}
+
 fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
     let records: Vec<&Measurement> = records.iter().map(|r| &r.held).collect();
     let estimate = &fitted.estimate;
     let system = estimate.system()?;
     let unexplained_motion = fitted.unexplained_motion(&system)?;
-    let files: Vec<&str> = records.iter().map(|r| r.file.as_str()).collect();
     let row = |r: &&Measurement| RecordRow { file: r.file.clone(), window: Window::of(r) };
     let mut report = Report {
         file: records[0].file.clone(),
@@ -273,7 +287,7 @@ fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
             unknowns: estimate.parameters().len(),
         },
         records: records.iter().map(row).collect(),
-        checks: checks::rows(fitted, &files)?,
+        checks: checks::rows(fitted, &records)?,
         validation: None,
         remarks: Vec::new(),
         system: SystemMatrices::from(&system),
@@ -294,7 +308,8 @@ fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
 /// What a residual that is no noise can come from, where another method would leave less.
 pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
-    (fitted.least_squares && warned("after") && !warned("before")).then(|| {
+    let explained = checks.iter().any(CheckRow::is_bad);
+    (fitted.least_squares && warned("after") && !warned("before") && !explained).then(|| {
         "least squares takes the measured motion as exact, and noise on it biases the parameters; \
          that alone can be what the warnings after the fit tell of. With --method \
          maximum-likelihood, which allows for noise, they speak of the machine"

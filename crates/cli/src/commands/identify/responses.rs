@@ -1,7 +1,7 @@
 //! Fits frequency responses.
 
 use mechid::estimate::checks::{
-    Check, after_response_fit, before_response_fit, claimed_period, linearity,
+    Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
 };
 use mechid::estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid::estimate::time_domain::{Discretisation, Extent};
@@ -61,7 +61,10 @@ pub fn fit(
         before.push(checks);
         let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / data.len() as f64;
         let fitted = own * found.parameters().len() as f64;
-        let mut checks = after_response_fit(&r.frf, &r.driven, &found, fitted)?;
+        let dt = held.force.sampling().dt();
+        let late = delay_of_lines(&r.frf.data(&r.driven)?, dt, unknowns);
+        let mut checks = Vec::from_iter(late);
+        checks.extend(after_response_fit(&r.frf, &r.driven, &found, fitted)?);
         if !periodic {
             checks.extend(of_linearity(held, r, &found)?);
         }

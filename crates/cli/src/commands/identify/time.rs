@@ -2,12 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use mechid::estimate::checks::{
-    Check, Subject, before_equation_of_motion, before_fit, periodicity_across,
+    Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
+    noise_on_motion, periodicity_across,
 };
 use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
 use mechid::signal::{Interpolation, Record, counted};
 
+use super::CONSPICUOUS;
 use super::course::Course;
 use super::derivatives::{Derivatives, Prepared};
 use super::fit::{BetweenSamples, Fitted, Residual};
@@ -225,6 +227,8 @@ impl TimeArgs {
         estimate.system()?;
         let span = self.noise_span();
         let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate, span));
+        let look = |p: &Prepared| self.at_samples_after(p, &estimate);
+        let after = prepared.iter().map(look).collect::<Result<_, _>>()?;
         Ok(Fitted {
             domain: "time",
             estimator: "least squares on the equation of motion, sample by sample",
@@ -232,13 +236,24 @@ impl TimeArgs {
             equations: rows.rows(),
             frequency: None,
             before,
-            after: Vec::new(),
+            after,
             residuals: residuals.collect::<Result<_, _>>()?,
             course: self.course(Discretisation::FirstOrderHold),
             misfit: None,
-            remarks: self.remarks(prepared),
+            remarks: self.remarks(prepared, &estimate),
             estimate,
         })
+    }
+
+    /// What is looked at beside the residual.
+    fn at_samples_after(&self, p: &Prepared, estimate: &Estimate) -> Result<Vec<Check>, CliError> {
+        let Some(response) = p.response()? else { return Ok(Vec::new()) };
+        let mut checks = Vec::from_iter(delay_at_samples(&response, &p.force, estimate.unknowns()));
+        // What was differentiated has noise in common from sample to sample.
+        if self.derivatives.is_none() {
+            checks.extend(noise_on_motion(&response, &p.force, estimate)?);
+        }
+        Ok(checks)
     }
 
     fn step_by_step(
@@ -272,6 +287,11 @@ impl TimeArgs {
             Ok(Residual { left, fitted, force, noise_span })
         };
         let residuals = records.iter().zip(prepared).map(left).collect::<Result<_, _>>()?;
+        let method = TimeDomain::new(discretisation, Extent::Open);
+        let late = |p: &Prepared| {
+            let [x, v, force] = p.states();
+            Vec::from_iter(delay_between_samples(method, x, v, force, unknowns))
+        };
         Ok(Fitted {
             domain: "time",
             estimator: between.estimator(),
@@ -279,11 +299,11 @@ impl TimeArgs {
             equations: rows.rows(),
             frequency: None,
             before,
-            after: Vec::new(),
+            after: prepared.iter().map(late).collect(),
             residuals,
             course: self.course(discretisation),
             misfit: None,
-            remarks: self.remarks(prepared),
+            remarks: self.remarks(prepared, &estimate),
             estimate,
         })
     }
@@ -304,7 +324,7 @@ impl TimeArgs {
         }
     }
 
-    fn remarks(&self, prepared: &[Prepared]) -> Vec<String> {
+    fn remarks(&self, prepared: &[Prepared], estimate: &Estimate) -> Vec<String> {
         let mut remarks = Vec::new();
         if let Some((factor, way)) = self.refinement() {
             let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
@@ -321,6 +341,15 @@ impl TimeArgs {
             );
         } else if self.derivatives.is_some() {
             remarks.push("two of the three motions are derivatives, not measured".into());
+        }
+        let left = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
+        if self.derivatives == Some(Derivatives::Spectral) && left > CONSPICUOUS {
+            remarks.push(
+                "spectral derivatives hold the noise of every line, driven or not, and of low ones \
+                 most where the acceleration was measured: without --domain time and --derivatives \
+                 the same whole periods are fitted on the lines of the force alone"
+                    .into(),
+            );
         }
         remarks
     }

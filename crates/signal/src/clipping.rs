@@ -1,0 +1,161 @@
+//! Whether an amplifier or a converter has cut a channel off.
+
+/// What [`clipping`] finds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clipping {
+    /// The level at which the channel is cut off, in its unit.
+    pub level: f64,
+    /// Samples there, in rows of three or more.
+    pub samples: usize,
+}
+
+/// So many equal samples in a row are no peak between two samples.
+const ROW: usize = 3;
+
+/// A smooth peak that rests on one step of a converter for [`ROW`] samples has fallen by less than
+/// four of them one sample further; a cut falls off as fast as the signal moves.
+const STEEP: f64 = 6.0;
+
+/// A channel that stands at one end for more than this part of the time rests there.
+const AT_REST: f64 = 0.5;
+
+/// One that, where it does not rest, stands at its ends for more than this part switches between them
+/// on purpose.
+const SWITCHED: f64 = 0.9;
+
+/// The level at which a channel, in any unit, was cut off: it stays there exactly, several times
+/// three samples or more in a row or once, and comes and leaves at an angle. Of two such levels the
+/// one with more samples; nothing if there is none.
+///
+/// Peaks of a coarse converter, signals of two levels (binary sequences, steps), steps held for
+/// several samples, and the value at which a channel rests are not taken for it.
+///
+/// ```
+/// use mechid_signal::clipping;
+///
+/// let sine: Vec<f64> = (0..200).map(|k| (0.1 * k as f64).sin()).collect();
+/// let cut: Vec<f64> = sine.iter().map(|x| x.min(0.8)).collect();
+/// assert_eq!(clipping(&sine), None);
+/// assert_eq!(clipping(&cut).unwrap().level, 0.8);
+/// ```
+///
+/// # Source
+/// Ours.
+pub fn clipping(samples: &[f64]) -> Option<Clipping> {
+    let (low, high) = samples
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    let at = |level: f64| samples.iter().filter(|x| **x == level).count() as f64;
+    let all = samples.len() as f64;
+    let (rests, cut): (Vec<_>, Vec<_>) =
+        [(low, at(low)), (high, at(high))].into_iter().partition(|end| end.1 > AT_REST * all);
+    let time = |ends: &[(f64, f64)]| ends.iter().map(|end| end.1).sum::<f64>();
+    if time(&cut) > SWITCHED * (all - time(&rests)) {
+        return None;
+    }
+    let rows = steep_rows(samples);
+    let in_rows = |level: f64| rows.iter().filter(|row| row.0 == level).map(|row| row.1).sum();
+    let at_ends = rows.iter().filter(|row| row.0 == low || row.0 == high).count();
+    if rows.len() >= 2 * at_ends {
+        return None;
+    }
+    cut.into_iter()
+        .map(|(level, _)| Clipping { level, samples: in_rows(level) })
+        .filter(|cut| cut.samples > 0)
+        .max_by_key(|cut| cut.samples)
+}
+
+/// Value and length of every row of equal samples that begins or ends with a jump.
+fn steep_rows(samples: &[f64]) -> Vec<(f64, usize)> {
+    // No two levels of a converter are nearer than its step.
+    let mut levels = samples.to_vec();
+    levels.sort_unstable_by(f64::total_cmp);
+    let steps = levels.windows(2).map(|x| x[1] - x[0]).filter(|step| *step > 0.0);
+    let steep = STEEP * steps.fold(f64::INFINITY, f64::min);
+    let (mut rows, mut first) = (Vec::new(), 0);
+    for row in samples.chunk_by(|a, b| a == b) {
+        let (value, end) = (row[0], first + row.len());
+        let before = first.checked_sub(1).map(|k| samples[k]);
+        let sides = [before, samples.get(end).copied()];
+        if row.len() >= ROW && sides.into_iter().flatten().any(|x| (x - value).abs() > steep) {
+            rows.push((value, row.len()));
+        }
+        first = end;
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::*;
+    use crate::excitation::Prbs;
+    use crate::noise::add_white;
+    use crate::{Multisine, NoiseLevel, Phases, Record, Sampling, lines};
+
+    fn multisine(seed: u64) -> Record {
+        let flat = Multisine::flat(lines::odd(60), 1.0, Phases::Random { seed }).unwrap();
+        flat.sample(Sampling::new(0.001, 1000).unwrap()).unwrap()
+    }
+
+    fn noisy(seed: u64) -> Vec<f64> {
+        let level = NoiseLevel::FractionOfRms(0.01);
+        add_white(&multisine(seed), level, seed).unwrap().channel(0).to_vec()
+    }
+
+    fn converted(samples: &[f64], step: f64) -> Vec<f64> {
+        samples.iter().map(|x| step * (x / step).round()).collect()
+    }
+
+    #[test]
+    fn what_is_cut_off_is_found_on_either_side_and_after_a_converter() {
+        for seed in 0..20 {
+            let x = noisy(seed);
+            let peak = x.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
+            for step in [1e-12, 1e-4 * peak, 0.01 * peak] {
+                let x = converted(&x, step);
+                let level = step * (0.5 * peak / step).round();
+                for upper in [true, false] {
+                    let cut = |x: &f64| if upper { x.min(level) } else { x.max(-level) };
+                    let cut: Vec<f64> = x.iter().map(cut).collect();
+                    let found = clipping(&cut).unwrap();
+                    assert_eq!(found.level, if upper { level } else { -level });
+                    let there = cut.iter().filter(|x| **x == found.level).count();
+                    assert!(found.samples <= there && found.samples >= 3, "{found:?} {there}");
+                }
+            }
+        }
+        // One overload of a hammer.
+        let blow = |k: usize| if k < 20 { (TAU * k as f64 / 40.0).sin().min(0.7) } else { 0.0 };
+        let hammer: Vec<f64> = (0..500).map(blow).collect();
+        assert_eq!(clipping(&hammer).unwrap().level, 0.7);
+    }
+
+    #[test]
+    fn what_is_not_cut_off_is_left_alone() {
+        for seed in 0..50 {
+            let x = noisy(seed);
+            for step in [1e-12, 0.001, 0.03, 0.3] {
+                assert_eq!(clipping(&converted(&x, step)), None, "seed {seed}, step {step}");
+            }
+            // Held for eight samples.
+            let held: Vec<f64> = x.iter().flat_map(|x| [*x; 8]).collect();
+            assert_eq!(clipping(&held), None, "seed {seed}");
+        }
+        // A slow sine through a coarse converter rests on its greatest value.
+        let slow: Vec<f64> = (0..5000).map(|k| (TAU * k as f64 / 1000.0).sin()).collect();
+        for step in [0.2, 0.01, 0.001, 0.0001] {
+            assert_eq!(clipping(&converted(&slow, step)), None, "step {step}");
+        }
+        let binary = Prbs::new(7, 2.0, 5).unwrap();
+        let binary = binary.sample(Sampling::new(0.01, 127 * 5).unwrap()).unwrap();
+        assert_eq!(clipping(binary.channel(0)), None);
+        // A blow, and rest.
+        let blow = |k: usize| if k < 20 { (TAU * k as f64 / 40.0).sin() } else { 0.0 };
+        assert_eq!(clipping(&(0..500).map(blow).collect::<Vec<_>>()), None);
+        for few in [&[][..], &[1.0], &[2.0; 50]] {
+            assert_eq!(clipping(few), None);
+        }
+    }
+}
