@@ -10,6 +10,7 @@ use mechid::estimate::frequency_domain::{Lines, Motion, RepeatedPeriods, equatio
 use mechid::io::{Table, TimeAxis};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
+    // The record lies in the repository; put the path of your own here.
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
     let table = Table::read(file)?;
     let time = TimeAxis::Column("time");

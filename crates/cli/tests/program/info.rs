@@ -188,3 +188,23 @@ fn a_period_that_is_given_has_exact_lines() {
         close(&peaks[0]["amplitude"], 5.0, 1e-12);
     }
 }
+
+#[test]
+fn a_channel_that_is_cut_off_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = String::from("time,whole,cut\n");
+    for k in 0..400 {
+        let t = f64::from(k) / 100.0;
+        let x = (TAU * 1.3 * t).sin() + 0.4 * (TAU * 3.1 * t).sin();
+        writeln!(text, "{t},{x},{}", x.max(-0.8)).unwrap();
+    }
+    fs::write(folder.path().join("a.csv"), text).unwrap();
+    let report = info(&folder, "a.csv --columns whole,cut");
+    let [whole, cut] = [0, 1].map(|at| &report["channels"][at]["clipping"]);
+    assert!(whole.is_null());
+    close(&cut["level"], -0.8, 1e-15);
+    assert!(cut["samples"].as_u64().unwrap() > 10, "{cut}");
+    let text = mechid(folder.path(), "info a.csv");
+    assert_eq!(text.matches(" is cut off at ").count(), 1, "{text}");
+    assert!(text.contains("\ncolumn 3 cut is cut off at -0.80000: "), "{text}");
+}

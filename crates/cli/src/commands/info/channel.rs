@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid::signal::{Record, Sampling, SignalError, Spectrum, repetition};
+use mechid::signal::{Clipping, Record, Sampling, SignalError, Spectrum, clipping, repetition};
 use serde::Serialize;
 
 use crate::commands::extremes::Extremes;
@@ -28,6 +28,8 @@ pub struct Channel {
     pub crest_factor: Option<f64>,
     pub minimum: f64,
     pub maximum: f64,
+    /// Nothing if it was not cut off.
+    pub clipping: Option<Cut>,
     /// The strongest lines of the spectrum, the strongest first.
     pub spectrum_peaks: Vec<SpectrumPeak>,
     /// Nothing if it does not repeat.
@@ -45,6 +47,15 @@ pub struct SpectrumPeak {
     pub frequency_hz: Option<f64>,
     /// Of the sine, in the unit of the channel.
     pub amplitude: f64,
+}
+
+/// Where an amplifier or a converter has cut a channel off.
+#[derive(Debug, Serialize)]
+pub struct Cut {
+    /// In the unit of the channel.
+    pub level: f64,
+    /// Samples there, in rows of three or more.
+    pub samples: usize,
 }
 
 /// After how long a channel repeats.
@@ -107,7 +118,7 @@ impl Measured {
         given: Option<usize>,
     ) -> Result<Self, SignalError> {
         let Gathered { levels, held, mean_of_held, extremes } = gathered;
-        let (spectral, repeats) = (!held.is_empty(), repetition(&held));
+        let (spectral, repeats, cut) = (!held.is_empty(), repetition(&held), clipping(&held));
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
         let lines = Lines::of(held, mean_of_held, period)?;
         let Levels { peak, minimum, maximum, .. } = levels;
@@ -121,6 +132,7 @@ impl Measured {
             crest_factor: (peak > 0.0).then(|| peak / levels.rms()),
             minimum,
             maximum,
+            clipping: cut.map(|Clipping { level, samples }| Cut { level, samples }),
             spectrum_peaks: lines.strongest(dt),
             period: repeats.map(|r| Period {
                 samples: r.period,

@@ -4,7 +4,7 @@ use mechid::io::Table;
 use mechid::signal::counted;
 use serde::Serialize;
 
-use super::channel::{Channel, Period, SpectrumPeak};
+use super::channel::{Channel, Cut, Period, SpectrumPeak};
 use super::measured::Span;
 use crate::text_table::{compact, significant, text_table};
 
@@ -109,6 +109,15 @@ impl Report {
         };
         text += &self.levels();
         text += &self.lines();
+        for (channel, Cut { level, samples }) in
+            self.channels.iter().filter_map(|c| c.clipping.as_ref().map(|cut| (c, cut)))
+        {
+            text += &format!(
+                "column {} is cut off at {}: {samples} samples stand there, three or more in a row\n",
+                channel.title(),
+                significant(*level, 5)
+            );
+        }
         for Scalar { name, value } in &self.scalars {
             text += &format!("{name} = {value:e}\n");
         }
