@@ -42,13 +42,17 @@ pub enum ForceError {
         /// How many there are.
         dofs: usize,
     },
-    /// The same thing was named twice.
-    #[error("{what} {index} is named twice")]
-    Repeated {
-        /// `"forced degree of freedom"`, `"line"` …
-        what: &'static str,
-        /// The index named twice, counted from 0.
-        index: usize,
+    /// The same spectral line was named twice.
+    #[error("line {line} is named twice")]
+    RepeatedLine {
+        /// Its number, 0 for the mean.
+        line: usize,
+    },
+    /// The same degree of freedom was named twice.
+    #[error("forced degree of freedom {} (counted from 1) is named twice", dof + 1)]
+    RepeatedDof {
+        /// Counted from 0.
+        dof: usize,
     },
     /// Nothing is forced, so nothing is to be found.
     #[error("no forced degree of freedom was named")]

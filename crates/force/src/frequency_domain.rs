@@ -38,7 +38,7 @@ pub const MIN_OUTSIDE_LINES: usize = 8;
 /// Cost: one transform per channel, one n×n solve and one small SVD per line.
 ///
 /// # Errors
-/// [`ForceError::NoLines`], [`ForceError::NoSuchLine`], [`ForceError::Repeated`];
+/// [`ForceError::NoLines`], [`ForceError::NoSuchLine`], [`ForceError::RepeatedLine`];
 /// [`ForceError::NotTransmitted`] at a line that does not show the forces in the channels, as
 /// DC does not in velocities; [`ForceError::MoreForcesThanMeasurements`],
 /// [`ForceError::NoForcedDof`], [`ForceError::NoSuchDof`], [`ForceError::Resonance`],
@@ -168,7 +168,7 @@ pub(crate) fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), Fo
         return Err(ForceError::NoSuchLine { line, last });
     }
     match first_repeated(lines) {
-        Some(index) => Err(ForceError::Repeated { what: "line", index }),
+        Some(line) => Err(ForceError::RepeatedLine { line }),
         None => Ok(()),
     }
 }

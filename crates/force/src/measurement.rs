@@ -126,8 +126,8 @@ impl Measurement {
         if forced.is_empty() {
             return Err(ForceError::NoForcedDof);
         }
-        if let Some(index) = first_repeated(forced) {
-            return Err(ForceError::Repeated { what: "forced degree of freedom", index });
+        if let Some(dof) = first_repeated(forced) {
+            return Err(ForceError::RepeatedDof { dof });
         }
         if forced.len() > self.channels.len() {
             return Err(ForceError::MoreForcesThanMeasurements {

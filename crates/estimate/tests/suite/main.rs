@@ -16,6 +16,7 @@ mod monte_carlo;
 mod noise;
 mod refined;
 mod response_checks;
+mod search_start;
 mod silverbox;
 mod time_domain;
 mod time_domain_invariance;

@@ -174,16 +174,10 @@ fn impossible_requests_are_refused_with_their_numbers() {
     );
     assert_eq!(ask(&both, &[], &[1], &unknown), ForceError::NoForcedDof);
     assert_eq!(ask(&both, &[2], &[1], &unknown), ForceError::NoSuchDof { dof: 2, dofs: 2 });
-    assert_eq!(
-        ask(&both, &[1, 1], &[1], &unknown),
-        ForceError::Repeated { what: "forced degree of freedom", index: 1 }
-    );
+    assert_eq!(ask(&both, &[1, 1], &[1], &unknown), ForceError::RepeatedDof { dof: 1 });
     assert_eq!(ask(&both, &[1], &[], &unknown), ForceError::NoLines);
     assert_eq!(ask(&both, &[1], &[65], &unknown), ForceError::NoSuchLine { line: 65, last: 64 });
-    assert_eq!(
-        ask(&both, &[1], &[4, 4], &unknown),
-        ForceError::Repeated { what: "line", index: 4 }
-    );
+    assert_eq!(ask(&both, &[1], &[4, 4], &unknown), ForceError::RepeatedLine { line: 4 });
     assert_eq!(
         ask(&both, &[1], &[4], &Noise::PerChannel(vec![0.1])),
         ForceError::ChannelCount { record: 2, described: 1 }
