@@ -30,6 +30,9 @@ pub use range::{range, still};
 pub use regressors::noise_on_motion;
 pub use spectral::{before_response_fit, before_spectral_fit};
 
+/// Samples that are looked at, at most, where each takes much time or memory.
+const LOOKED_AT: usize = 1 << 15;
+
 /// How a check came out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Verdict {

@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::after::{ROUNDING, SIGNIFICANT};
-use super::{Check, Subject, Verdict};
+use super::{Check, LOOKED_AT, Subject, Verdict};
 use crate::frequency_domain::{FrequencyData, late_rows};
 use crate::time_domain::{Extent, TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
@@ -25,9 +25,6 @@ const LEFT: f64 = 0.25;
 
 /// Another of the same quality must leave less than this part to be preferred to a smaller one.
 const PREFERRED: f64 = 0.99;
-
-/// Samples looked at, at most, in the time domain.
-const LOOKED_AT: usize = 1 << 15;
 
 /// Whether the equation of motion fits the lines far better if the motion is taken earlier or later:
 /// a delay between the channels, by filters, a scanning converter, or a trigger. `dt` is the step of

@@ -7,7 +7,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::after::{ROUNDING, SIGNIFICANT, p_told};
 use super::correlation::whiteness;
-use super::{Check, Subject, Verdict, six_digits};
+use super::{Check, LOOKED_AT, Subject, Verdict, six_digits};
 use crate::unknowns::MATRICES;
 use crate::{Estimate, EstimateError, LeastSquares, Parameter};
 
@@ -21,7 +21,7 @@ const SPARE: usize = 4;
 /// by sample to displacement, velocity, acceleration and force (N), has left: white noise on the
 /// motion makes it do so, noise on the force does not. Nothing if it does not, if no parameter is
 /// moved by more than its standard error, if the residual is not white (then that is what to look at),
-/// or if there is no noise.
+/// or if there is no noise. Of a long record the first 32768 samples are looked at.
 ///
 /// The value is the probability that noise on the force alone would explain as much. The text names
 /// the parameter that moves most, in standard errors of `estimate`, when those neighbours are taken
@@ -92,7 +92,7 @@ impl Equation {
     ) -> Self {
         let motions = [response.acceleration(), response.velocity(), response.displacement()];
         let motions = motions.map(Record::data);
-        let rows = force.len() - 2;
+        let rows = force.len().min(LOOKED_AT) - 2;
         let at = |p: &Parameter, k: usize| motions[p.matrix() as usize][(k, p.column())];
         let mut target = force.data().column(dof).rows(1, rows).into_owned();
         for matrix in MATRICES {
