@@ -92,6 +92,9 @@ pub struct Residual {
     pub noise_span: usize,
 }
 
+/// The periods of a record on the lines found in its force.
+type Spectra = (RepeatedPeriods, Lines);
+
 /// Fits the spectra of the windows of one or several records, each on the lines that `choose` finds
 /// in a period of its force.
 pub fn frequency_domain(
@@ -107,42 +110,8 @@ pub fn frequency_domain(
         let lines = Lines::new(held.force.sampling().with_len(held.period)?, chosen)?;
         spectra.push((periods(recorded, &lines)?, lines));
     }
-    let mut remarks = one_motion_of(&records[0].held);
-    let together = |of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, EstimateError>| {
-        let mut all = of(&spectra[0].0)?;
-        for (periods, _) in &spectra[1..] {
-            all = all.and(&of(periods)?)?;
-        }
-        Ok::<_, CliError>(all)
-    };
-    let data = together(&RepeatedPeriods::mean)?;
-    let mut misfit = None;
-    let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
-    let (estimator, estimate) = match method {
-        Method::LeastSquares => (
-            "least squares on the equation of motion, in the frequency domain",
-            equation_error(&data, unknowns)?,
-        ),
-        Method::Instrumental => {
-            let first = together(&|periods| Ok(periods.halves()?.0))?;
-            let second = together(&|periods| Ok(periods.halves()?.1))?;
-            (
-                "instrumental variables, half of the periods against the other",
-                instrumental_variables(&first, &second, unknowns)?,
-            )
-        }
-        Method::MaximumLikelihood => {
-            remarks.extend(of_pooling(fewest));
-            let data = match pooling(fewest) {
-                None => data.clone(),
-                Some(pooling) => together(&|periods| periods.mean_with_noise(pooling))?,
-            };
-            let fit = output_error(&data, unknowns)?;
-            let noise = "the noise of the periods";
-            misfit = (fewest > 1).then_some(Misfit { ratio: fit.misfit_ratio, noise });
-            ("maximum likelihood, in the frequency domain", fit.estimate)
-        }
-    };
+    let data = together(&spectra, &RepeatedPeriods::mean)?;
+    let Found { estimator, estimate, misfit, remark } = found(&spectra, &data, unknowns, method)?;
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Recorded { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
         let (motion, kind) = held.motion();
@@ -152,22 +121,81 @@ pub fn frequency_domain(
         let late = delay_of_lines(&weighted(periods)?, lines.sampling().dt(), unknowns);
         after.push(late.into_iter().chain(of_noise(periods, &estimate, fitted)?).collect());
     }
-    let lines = spectra.swap_remove(0).1;
-    let residuals = steady_residuals(records, &estimate)?;
     Ok(Fitted {
         domain: "frequency",
         estimator,
         least_squares: method == Method::LeastSquares,
-        estimate,
         equations: 2 * data.len(),
-        frequency: Some((lines, data)),
+        frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        residuals,
+        residuals: steady_residuals(records, &estimate)?,
         course: Course::Steady,
         misfit,
-        remarks,
+        remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
+        estimate,
     })
+}
+
+/// An estimate from spectra.
+struct Found {
+    estimator: &'static str,
+    estimate: Estimate,
+    misfit: Option<Misfit>,
+    remark: Option<String>,
+}
+
+/// What a method makes of the spectra, of which `data` are the means.
+fn found(
+    spectra: &[Spectra],
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    method: Method,
+) -> Result<Found, CliError> {
+    let plain = |estimator, estimate| Found { estimator, estimate, misfit: None, remark: None };
+    Ok(match method {
+        Method::LeastSquares => plain(
+            "least squares on the equation of motion, in the frequency domain",
+            equation_error(data, unknowns)?,
+        ),
+        Method::Instrumental => {
+            let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
+            let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
+            plain(
+                "instrumental variables, half of the periods against the other",
+                instrumental_variables(&first, &second, unknowns)?,
+            )
+        }
+        Method::MaximumLikelihood => {
+            let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
+            let fit = match pooling(fewest) {
+                None => output_error(data, unknowns)?,
+                Some(pooling) => {
+                    let noisy = together(spectra, &|periods| periods.mean_with_noise(pooling))?;
+                    output_error(&noisy, unknowns)?
+                }
+            };
+            let noise = "the noise of the periods";
+            Found {
+                estimator: "maximum likelihood, in the frequency domain",
+                estimate: fit.estimate,
+                misfit: (fewest > 1).then_some(Misfit { ratio: fit.misfit_ratio, noise }),
+                remark: of_pooling(fewest),
+            }
+        }
+    })
+}
+
+/// The rows of all records.
+fn together(
+    spectra: &[Spectra],
+    of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, EstimateError>,
+) -> Result<FrequencyData, CliError> {
+    let mut all = of(&spectra[0].0)?;
+    for (periods, _) in &spectra[1..] {
+        all = all.and(&of(periods)?)?;
+    }
+    Ok(all)
 }
 
 /// All periods of a record, a stretch at a time.

@@ -29,28 +29,11 @@ pub fn fit(
 ) -> Result<Fitted, CliError> {
     let estimate = |recorded| Responses::of(recorded, segments, estimator, &choose);
     let responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
-    let mut data: Option<FrequencyData> = None;
-    for r in &responses {
-        let own = r.frf.data(&r.driven)?;
-        data = Some(match data {
-            None => own,
-            Some(before) => before.and(&own)?,
-        });
-    }
-    let Some(data) = data else { return Err(CliError::NoMotion) };
-    let mut misfit = None;
-    let (name, found) = match method {
-        Some(Method::Instrumental) => return Err(CliError::InstrumentalResponses),
-        Some(Method::LeastSquares) => (
-            "least squares on frequency responses, all lines alike",
-            equation_error(&data, unknowns)?,
-        ),
-        Some(Method::MaximumLikelihood) | None => {
-            let fit = output_error(&data, unknowns)?;
-            misfit = Some(Misfit { ratio: fit.misfit_ratio, noise: "the coherence" });
-            ("maximum likelihood on frequency responses, weighted by their coherence", fit.estimate)
-        }
-    };
+    let mut all: Vec<FrequencyData> =
+        responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
+    let first = all.remove(0);
+    let data = all.iter().try_fold(first, |data, own| data.and(own))?;
+    let (name, found, misfit) = found(&data, unknowns, method)?;
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Recorded { held, .. }, r) in records.iter().zip(&responses) {
@@ -59,16 +42,7 @@ pub fn fit(
             checks.extend(claimed_period(&held.force, held.period));
         }
         before.push(checks);
-        let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / data.len() as f64;
-        let fitted = own * found.parameters().len() as f64;
-        let dt = held.force.sampling().dt();
-        let late = delay_of_lines(&r.frf.data(&r.driven)?, dt, unknowns);
-        let mut checks = Vec::from_iter(late);
-        checks.extend(after_response_fit(&r.frf, &r.driven, &found, fitted)?);
-        if !periodic {
-            checks.extend(of_linearity(held, r, &found)?);
-        }
-        after.push(checks);
+        after.push(looked_at(held, r, unknowns, &found, (data.len(), periodic))?);
     }
     Ok(Fitted {
         domain: "frequency",
@@ -90,6 +64,46 @@ pub fn fit(
         remarks: one_motion_of(&records[0].held),
         estimate: found,
     })
+}
+
+/// The estimator in words, what it finds, and what it leaves against the coherence.
+fn found(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    method: Option<Method>,
+) -> Result<(&'static str, Estimate, Option<Misfit>), CliError> {
+    match method {
+        Some(Method::Instrumental) => Err(CliError::InstrumentalResponses),
+        Some(Method::LeastSquares) => {
+            let name = "least squares on frequency responses, all lines alike";
+            Ok((name, equation_error(data, unknowns)?, None))
+        }
+        Some(Method::MaximumLikelihood) | None => {
+            let name = "maximum likelihood on frequency responses, weighted by their coherence";
+            let fit = output_error(data, unknowns)?;
+            let misfit = Misfit { ratio: fit.misfit_ratio, noise: "the coherence" };
+            Ok((name, fit.estimate, Some(misfit)))
+        }
+    }
+}
+
+/// What the fit leaves of one record; `rows` are those of all records together.
+fn looked_at(
+    held: &Measurement,
+    r: &Responses,
+    unknowns: &Unknowns,
+    found: &Estimate,
+    (rows, periodic): (usize, bool),
+) -> Result<Vec<Check>, CliError> {
+    let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
+    let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
+    let fitted = own * found.parameters().len() as f64;
+    let mut checks = Vec::from_iter(late);
+    checks.extend(after_response_fit(&r.frf, &r.driven, found, fitted)?);
+    if !periodic {
+        checks.extend(of_linearity(held, r, found)?);
+    }
+    Ok(checks)
 }
 
 /// Between the first and the last line fitted; nothing of a free machine, which has no displacement to
