@@ -208,3 +208,20 @@ fn a_channel_that_is_cut_off_is_told() {
     assert_eq!(text.matches(" is cut off at ").count(), 1, "{text}");
     assert!(text.contains("\ncolumn 3 cut is cut off at -0.80000: "), "{text}");
 }
+
+/// A number that was cut short is a number, too.
+#[test]
+fn a_last_line_that_nothing_ends_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, told) in [
+        ("whole.csv", "t,x\n0,1.25\n1,2.5\n2,3.75\n", None),
+        ("cut.csv", "t,x\n0,1.25\n1,2.5\n2,3", Some("line 4 is the last and no line break")),
+        ("words.txt", "# rig\n0 1.25\n1 2.5\n2 3.7", Some("line 4 is the last and no line break")),
+        ("crlf.csv", "t,x\r\n0,1.25\r\n1,2.5\r\n2,3.75\r\n", None),
+    ] {
+        fs::write(folder.path().join(name), text).unwrap();
+        let said = mechid(folder.path(), &format!("info {name}"));
+        assert_eq!(said.matches("no line break ends it").count(), usize::from(told.is_some()));
+        assert!(said.contains(told.unwrap_or("3 samples")), "{said}");
+    }
+}

@@ -256,7 +256,7 @@ fn spiked() -> (Vec<String>, Vec<(String, Vec<f64>)>) {
 fn levels_of_a_long_text_are_those_of_all_of_it() {
     let folder = tempfile::tempdir().unwrap();
     let (lines, columns) = spiked();
-    fs::write(folder.path().join("rec.csv"), lines.join("\n")).unwrap();
+    fs::write(folder.path().join("rec.csv"), lines.join("\n") + "\n").unwrap();
     let columns: Vec<(String, &[f64])> =
         columns.iter().map(|(name, values)| (name.clone(), values.as_slice())).collect();
     fs::write(folder.path().join("rec.mat"), matlab(&columns, false)).unwrap();

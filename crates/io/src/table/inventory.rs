@@ -17,6 +17,9 @@ pub struct Inventory {
     pub columns: Vec<Result<Tally, IoError>>,
     /// The time axis that the column of instants gives, if there is one, or why it gives none.
     pub sampling: Option<Result<Sampling, IoError>>,
+    /// The last line of a text, counted from 1 in the file, if no line break ends it: the file may
+    /// have been cut off there, within its last number.
+    pub open_line: Option<u64>,
 }
 
 /// What a column holds.
@@ -64,6 +67,7 @@ impl RecordFile {
             samples: self.head.len(),
             columns: columns.iter().map(tally).collect(),
             sampling: instants.map(sampling),
+            open_line: self.head.contents.open_line,
         })
     }
 
@@ -88,6 +92,7 @@ impl RecordFile {
             }
             Ok::<_, IoError>(ControlFlow::Continue(()))
         })?;
+        let open_line = reader.open_line();
         let rows = reader.rows();
         let samples = rows.samples();
         let usable = |column: usize| match &rows.column(column).values {
@@ -104,6 +109,7 @@ impl RecordFile {
             sampling: instants.map(|column| {
                 usable(column).and_then(|()| self.sampling_of(column, steps, samples))
             }),
+            open_line,
         })
     }
 

@@ -72,6 +72,8 @@ pub(crate) struct Contents {
     pub scalars: Vec<(String, f64)>,
     /// What else the file says.
     pub remarks: Vec<String>,
+    /// The last line of a text, if no line break ends it.
+    pub open_line: Option<u64>,
 }
 
 impl Table {

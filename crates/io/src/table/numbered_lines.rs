@@ -15,6 +15,8 @@ pub(super) struct NumberedLines<R> {
     first: u64,
     /// Number of the line read last.
     count: u64,
+    /// Whether it had no line feed.
+    open: bool,
     /// First and last of each run of lines handed out that hold no row: empty ones and comments;
     /// those that rows were read beyond are forgotten.
     idle: VecDeque<(u64, u64)>,
@@ -23,7 +25,15 @@ pub(super) struct NumberedLines<R> {
 impl<R: BufRead> NumberedLines<R> {
     /// A text that follows so many lines.
     pub fn new(text: R, first: u64) -> Self {
-        Self { text, line: Vec::new(), given: 0, first, count: first, idle: VecDeque::new() }
+        Self {
+            text,
+            line: Vec::new(),
+            given: 0,
+            first,
+            count: first,
+            open: false,
+            idle: VecDeque::new(),
+        }
     }
 
     /// The next line and its number.
@@ -34,12 +44,18 @@ impl<R: BufRead> NumberedLines<R> {
             return Ok(None);
         }
         self.count += 1;
+        self.open = !self.line.ends_with(b"\n");
         if self.line.ends_with(b"\r\n") {
             self.line.pop();
             self.line.pop();
             self.line.push(b'\n');
         }
         Ok(Some((self.count, &self.line)))
+    }
+
+    /// Number of the line read last, if nothing ends it.
+    pub fn open_line(&self) -> Option<u64> {
+        self.open.then_some(self.count)
     }
 
     /// The first line from `line` on, of those handed out, that holds a row; no earlier one is asked

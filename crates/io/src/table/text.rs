@@ -66,6 +66,14 @@ impl<'a> TextReader<'a> {
         &mut self.rows
     }
 
+    /// Number of the line read last, if nothing ends it.
+    pub fn open_line(&self) -> Option<u64> {
+        match &self.stream {
+            Stream::Words(text) => text.open_line(),
+            Stream::Fields(reader) => reader.get_ref().open_line(),
+        }
+    }
+
     /// Reads about so many more samples; whether there may be more still.
     pub fn read(&mut self, count: usize) -> Result<bool, IoError> {
         let goal = self.rows.samples().saturating_add(count);
@@ -83,7 +91,11 @@ impl<'a> TextReader<'a> {
     pub fn finish(self) -> Result<Contents, IoError> {
         match self.above() {
             Some(above) if self.table.is_some_and(|t| self.rows.width() < t.fields) => Err(above),
-            _ => self.rows.finish(self.delimiter.name()),
+            _ => {
+                let open_line = self.open_line();
+                let contents = self.rows.finish(self.delimiter.name())?;
+                Ok(Contents { open_line, ..contents })
+            }
         }
     }
 

@@ -58,7 +58,7 @@ impl InfoArgs {
         };
         let asked = self.asked(table)?;
         let mut inventory = file.inventory(&asked, instants)?;
-        let samples = inventory.samples;
+        let (samples, open_line) = (inventory.samples, inventory.open_line);
         let sampling = inventory.sampling.take();
         let (mut shown, len, mut left_out) = self.shown(table, &asked, instants, inventory)?;
         let dt = self.step(&file, time, sampling, &mut left_out)?;
@@ -76,6 +76,12 @@ impl InfoArgs {
             report.remarks.extend(self.choose_drawn(table, &mut shown));
             (report.channels, drawn) = measured(&file, &shown, window, (dt, self.input.period))?;
         }
+        report.remarks.extend(open_line.map(|line| {
+            format!(
+                "line {line} is the last and no line break ends it: if the file was cut off there, so \
+                 may be its last number"
+            )
+        }));
         let title = || picture::title(table.file(), window);
         Outcome::new(report.text(), &report)?
             .with_plot(&self.plot, || picture::figure(table.file(), &title(), &drawn, dt))
