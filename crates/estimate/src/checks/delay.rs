@@ -54,7 +54,7 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
 }
 
 /// As [`delay_of_lines`], of a response fitted sample by sample to the equation of motion and a force
-/// (N); to whole samples.
+/// (N); to whole samples, of a long record in the first 32768.
 ///
 /// # Source
 /// Ours.

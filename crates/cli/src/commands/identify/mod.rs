@@ -47,9 +47,9 @@ use crate::outcome::Outcome;
 /// assumption on the force between the samples; what was not measured, --derivatives finds.
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
-/// it, the checks and a plot in the time domain look at the first 262144 samples. Held whole are
-/// windows for spectral --derivatives, and for --interpolation by a spline or band-limited, one long
-/// period, and what --validate predicts as a steady state.
+/// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
+/// are windows for spectral --derivatives, and for --interpolation by a spline or band-limited, one
+/// long period, and what --validate predicts as a steady state.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify record.csv --force force --displacement displacement
