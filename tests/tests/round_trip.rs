@@ -1,9 +1,9 @@
 //! Several rooms at once: simulate, write, read back, identify; exact responses from elsewhere judge.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
 use mechid::io::{Experiment, Table, TimeAxis, csv_text};
-use mechid::model::{KyxSign, SecondOrderSystem};
+use mechid::model::{KyxSign, ResponseQuantity, SecondOrderSystem};
 use mechid::signal::{Record, lines};
 use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh_periodic, exact_harmonic_periodic,
@@ -73,9 +73,13 @@ fn an_exact_record_goes_through_a_file_to_the_machine() {
             let names: Vec<String> = (0..dof).map(|d| format!("{letter}{d}")).collect();
             table.record(&TimeAxis::Column("time"), &names).unwrap()
         };
-        let data =
-            FrequencyData::from_records(&read("f"), &read("x"), Motion::Displacement, 1..=60)
-                .unwrap();
+        let data = FrequencyData::from_records(
+            &read("f"),
+            &read("x"),
+            ResponseQuantity::Displacement,
+            1..=60,
+        )
+        .unwrap();
         let found = equation_error(&data, &Unknowns::unknown_mass(dof).unwrap()).unwrap();
         let found = found.system().unwrap();
         // Rounding of the transform times the condition of the fit, below 1e4 here.
@@ -97,7 +101,7 @@ fn newmark_is_identified_as_the_trapezoidal_rule() {
     let data = FrequencyData::from_records(
         &simulation.force,
         simulation.response.displacement(),
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
         used,
     )
     .unwrap();

@@ -309,7 +309,7 @@ pub enum CliError {
     #[error("this --estimator needs the {wanted}: name its columns with --{wanted}")]
     SweepMotion {
         /// What is missing.
-        wanted: mechid::estimate::frequency_domain::Motion,
+        wanted: mechid::model::ResponseQuantity,
     },
     /// No setting of a sweep gave an estimate.
     #[error(

@@ -4,13 +4,14 @@
 #[path = "../tests/suite/common/mod.rs"]
 mod common;
 
+use mechid_model::ResponseQuantity;
 use std::hint::black_box;
 
 use common::monte_carlo::{Estimator, Experiment};
 use common::{bearing, displacements, forces, synthesise};
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, Motion, equation_error};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
 use mechid_signal::{Sampling, Spectrum};
 
 /// 1,024 samples of two forces and two displacements to C and K with their covariance.
@@ -25,10 +26,10 @@ fn identify(c: &mut Criterion) {
         let lines = Lines::new(sampling, chosen.clone()).unwrap();
         let amplitudes = forces(&chosen, 2, 1.0);
         let motion = displacements(&system, &lines.omega(), &amplitudes);
-        let force = synthesise(sampling, &chosen, &amplitudes, Motion::Displacement);
-        let motion = synthesise(sampling, &chosen, &motion, Motion::Displacement);
+        let force = synthesise(sampling, &chosen, &amplitudes, ResponseQuantity::Displacement);
+        let motion = synthesise(sampling, &chosen, &motion, ResponseQuantity::Displacement);
         let read = |lines: &Lines| {
-            FrequencyData::read(lines, &force, &motion, Motion::Displacement).unwrap()
+            FrequencyData::read(lines, &force, &motion, ResponseQuantity::Displacement).unwrap()
         };
         group.bench_function(format!("{count} lines, everything included"), |b| {
             b.iter(|| {

@@ -1,12 +1,12 @@
 //! M ẍ + C ẋ + K x = F fitted row by row: the common core of the linear estimators.
 
-use mechid_model::Matrix;
+use mechid_model::{Matrix, Parameter};
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, finite, size, solve_compressed};
 use crate::triangular::TriangularFactor;
-use crate::{Estimate, EstimateError, Parameter, Undetermined, Unknowns};
+use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
 ///
@@ -208,7 +208,7 @@ impl EquationOfMotion {
     fn target(&self, unknowns: &Unknowns, equation: usize) -> DVector<f64> {
         let r = self.factor.r();
         let mut target = r.column(3 * self.dof + equation).into_owned();
-        for matrix in crate::unknowns::MATRICES {
+        for matrix in Matrix::ALL {
             for column in 0..self.dof {
                 if let Some(value) = unknowns.fixed(matrix, equation, column) {
                     target.axpy(-value, &r.column(self.column(matrix, column)), 1.0);

@@ -27,18 +27,6 @@ pub enum EstimateError {
         /// The value given, in the unit of the parameter.
         value: f64,
     },
-    /// There is no such entry.
-    #[error("{matrix} has no entry ({row}, {column}): the problem has {}", counted(*dof, "degree of freedom"))]
-    NoSuchEntry {
-        /// Which matrix.
-        matrix: Matrix,
-        /// Row, counted from 1.
-        row: usize,
-        /// Column, counted from 1.
-        column: usize,
-        /// Degrees of freedom.
-        dof: usize,
-    },
     /// A problem needs at least one degree of freedom.
     #[error("an identification needs at least one degree of freedom")]
     NoDof,
@@ -205,11 +193,11 @@ pub enum EstimateError {
     },
     /// Two experiments measured different quantities.
     #[error("one experiment measured {left}, the other {right}")]
-    MixedMotion {
+    MixedQuantities {
         /// Quantity of the first.
-        left: crate::frequency_domain::Motion,
+        left: mechid_model::ResponseQuantity,
         /// Quantity of the second.
-        right: crate::frequency_domain::Motion,
+        right: mechid_model::ResponseQuantity,
     },
     /// Two sets of spectral lines that must be the same are not.
     #[error("row {row}: {left} rad/s against {right} rad/s; both must hold the same frequencies")]

@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use crate::{EstimateError, Parameter, Unknowns};
+use crate::{EstimateError, Unknowns};
 
 /// M̂, Ĉ, K̂ with the covariance of what was estimated.
 ///
@@ -160,6 +160,17 @@ impl Estimate {
         self.check_determined()?;
         let [mass, damping, stiffness] = self.unknowns.assemble(&self.values);
         Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
+    }
+
+    /// The identified machine with the covariance of what was estimated, such as a force
+    /// reconstruction counts.
+    ///
+    /// # Errors
+    /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, which it is
+    /// not with as many unknowns as equations.
+    pub fn uncertain_system(&self) -> Result<UncertainSystem, EstimateError> {
+        let covariance = self.covariance.clone();
+        Ok(UncertainSystem::new(self.system()?, self.parameters.clone(), covariance)?)
     }
 
     /// An error that names what the data leave open, if they do.

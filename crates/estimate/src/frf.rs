@@ -4,6 +4,7 @@ mod average;
 mod cross_spectra;
 mod segments;
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -11,12 +12,14 @@ pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
 pub use self::segments::{Segments, Window};
 use crate::EstimateError;
-use crate::frequency_domain::{FrequencyData, Lines, Motion, NoiseSpectrum};
+use crate::frequency_domain::{FrequencyData, Lines, NoiseSpectrum};
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
 /// Which signal is believed where force and motion disagree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum FrfEstimator {
     /// S_XF S_FF⁻¹: right when only the motion is noisy; noise on the force makes it too small.
     H1,
@@ -36,7 +39,7 @@ pub struct Frf {
     lines: Vec<usize>,
     /// See [`Segments::line_correlation`].
     line_correlation: Vec<f64>,
-    measured: Motion,
+    measured: ResponseQuantity,
     response: Vec<ComplexMatrix>,
     coherence: DMatrix<f64>,
     variance: Vec<DMatrix<f64>>,
@@ -62,7 +65,7 @@ impl Frf {
     pub fn estimate(
         force: &Record,
         motion: &Record,
-        measured: Motion,
+        measured: ResponseQuantity,
         segments: Segments,
         lines: impl IntoIterator<Item = usize>,
         estimator: FrfEstimator,
@@ -92,7 +95,7 @@ impl Frf {
         response: Vec<ComplexMatrix>,
         coherence: DMatrix<f64>,
         averages: f64,
-        measured: Motion,
+        measured: ResponseQuantity,
     ) -> Result<Self, EstimateError> {
         let size = |what, expected, got| {
             if expected == got { Ok(()) } else { Err(EstimateError::Size { what, expected, got }) }
@@ -252,7 +255,7 @@ impl Frf {
     }
 
     /// The quantity measured: H is a receptance, a mobility or an accelerance.
-    pub fn measured(&self) -> Motion {
+    pub fn measured(&self) -> ResponseQuantity {
         self.measured
     }
 

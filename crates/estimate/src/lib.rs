@@ -53,4 +53,4 @@ pub use prediction::{
     StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,
 };
 pub use sweep::{Sweep, SweepPoint, sweep};
-pub use unknowns::{Parameter, Unknowns};
+pub use unknowns::Unknowns;

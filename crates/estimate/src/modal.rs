@@ -1,12 +1,11 @@
 //! Natural frequencies, damping ratios and mode shapes of an identified machine, with what the
 //! uncertainty of its matrices makes of them.
 
-use mechid_model::{Matrix, Mode, SecondOrderSystem};
+use mechid_model::{Matrix, Mode, Parameter, SecondOrderSystem, UncertainSystem};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::estimate::student_interval;
-use crate::least_squares::size;
-use crate::{Estimate, EstimateError, Parameter};
+use crate::{Estimate, EstimateError};
 
 /// A value with its standard error.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +50,8 @@ impl Estimate {
     /// to first order in those of M̂, Ĉ and K̂.
     ///
     /// ```
-    /// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, Motion, equation_error}};
+    /// use mechid_model::ResponseQuantity;
+    /// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, equation_error}};
     /// use nalgebra::{Complex, DMatrix};
     ///
     /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies, displacements read to a micrometre.
@@ -63,7 +63,7 @@ impl Estimate {
     ///         force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w);
     ///     Complex::new((x.re * 1e6).round() * 1e-6, (x.im * 1e6).round() * 1e-6)
     /// });
-    /// let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)?;
+    /// let data = FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)?;
     /// let modes = equation_error(&data, &Unknowns::unknown_mass(1)?)?.modes()?;
     /// let [low, high] = modes[0].damping_ratio.interval(0.95)?;
     /// assert!(low < 0.4025 && 0.4025 < high && high - low < 0.01);
@@ -79,35 +79,31 @@ impl Estimate {
     /// here bordered and with damping.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, EstimateError> {
         let parameters: Vec<Parameter> = self.parameters().map(|p| p.parameter).collect();
-        let of = self.degrees_of_freedom();
-        identified_modes(&self.system()?, &parameters, self.covariance(), of)
+        modes(&self.system()?, &parameters, self.covariance(), self.degrees_of_freedom())
     }
 }
 
-/// The modes of a machine whose `parameters` have this covariance (one row and column each, in the
-/// products of their units), as [`Estimate::modes`]: for
-/// matrices identified elsewhere or read back from a file.
+/// The modes of a machine identified elsewhere or read back from a file, as [`Estimate::modes`]:
+/// `degrees_of_freedom` are those of the residual variance behind its covariance.
 ///
 /// # Errors
-/// [`EstimateError::Size`] if the covariance has not one row and column per parameter,
-/// [`EstimateError::NoSuchEntry`] for a parameter the machine does not have,
 /// [`EstimateError::Model`] if the eigenvalues do not converge.
 ///
 /// # Source
 /// That of [`Estimate::modes`].
 pub fn identified_modes(
+    machine: &UncertainSystem,
+    degrees_of_freedom: usize,
+) -> Result<Vec<IdentifiedMode>, EstimateError> {
+    modes(machine.system(), machine.parameters(), machine.covariance(), degrees_of_freedom)
+}
+
+fn modes(
     system: &SecondOrderSystem,
     parameters: &[Parameter],
     covariance: &DMatrix<f64>,
     degrees_of_freedom: usize,
 ) -> Result<Vec<IdentifiedMode>, EstimateError> {
-    size("rows of the covariance", parameters.len(), covariance.nrows())?;
-    size("columns of the covariance", parameters.len(), covariance.ncols())?;
-    let dof = system.dof();
-    if let Some(p) = parameters.iter().find(|p| p.row() >= dof || p.column() >= dof) {
-        let (matrix, row, column) = (p.matrix(), p.row() + 1, p.column() + 1);
-        return Err(EstimateError::NoSuchEntry { matrix, row, column, dof });
-    }
     let spread = Spread { covariance, degrees_of_freedom };
     let identify = |mode: Mode| {
         let sensitivity = Sensitivity::of(&mode, system, parameters);

@@ -1,16 +1,18 @@
 //! The covariance of measurement noise, frequency by frequency.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
-use crate::frequency_domain::Motion;
 
 /// Over which lines a noise covariance is averaged.
 ///
 /// A covariance of few periods is itself uncertain, and an estimator weighted with it
 /// loses by that. Noise spectra are smooth, so neighbouring lines may share theirs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Pooling {
     /// Every line has its own covariance: from about 8 periods on.
     PerLine,
@@ -81,7 +83,7 @@ impl NoiseSpectrum {
     pub fn white(
         sampling: Sampling,
         lines: &[usize],
-        measured: Motion,
+        measured: ResponseQuantity,
         motion_deviation: &[f64],
         force_deviation: &[f64],
     ) -> Result<Self, EstimateError> {
@@ -102,7 +104,7 @@ impl NoiseSpectrum {
     pub(crate) fn of_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
-        measured: Motion,
+        measured: ResponseQuantity,
         degrees_of_freedom: usize,
         pooling: Pooling,
     ) -> Result<Self, EstimateError> {
@@ -211,8 +213,12 @@ fn pool(
 }
 
 /// Turns covariances of the quantity measured into covariances of displacement.
-fn to_displacement(omega: &[f64], covariance: &mut [DMatrix<Complex<f64>>], measured: Motion) {
-    if measured == Motion::Displacement {
+fn to_displacement(
+    omega: &[f64],
+    covariance: &mut [DMatrix<Complex<f64>>],
+    measured: ResponseQuantity,
+) {
+    if measured == ResponseQuantity::Displacement {
         return;
     }
     for (c, &w) in covariance.iter_mut().zip(omega) {

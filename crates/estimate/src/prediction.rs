@@ -8,13 +8,12 @@ pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
 pub use self::start::{StartFit, fitted_start};
 
-use mechid_model::{InitialState, Response, SecondOrderSystem};
-use mechid_signal::Record;
+use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem};
+use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use crate::EstimateError;
 use crate::least_squares::size;
-use crate::time_domain::{Discretisation, Extent};
 
 /// How much of the variation of each channel a prediction explains, in per cent:
 /// 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100 is perfect, 0 no better than the mean, negative worse.

@@ -32,11 +32,11 @@ pub struct Sweep<S, E> {
 /// from any thread, with the number of settings done.
 ///
 /// ```
-/// use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+/// use mechid_estimate::time_domain::TimeDomain;
 /// use mechid_estimate::{Unknowns, sweep};
-/// use mechid_model::npi_sampling;
+/// use mechid_model::{Discretisation, npi_sampling};
 /// use mechid_problems::{dissertation_sdof, exact_zoh_periodic};
-/// use mechid_signal::{Multisine, Phases};
+/// use mechid_signal::{Extent, Multisine, Phases};
 ///
 /// let machine = dissertation_sdof();
 /// let system = machine.system();

@@ -1,53 +1,9 @@
 //! Which entries of M, C and K are to be found, and which are known.
 
-use std::fmt;
-
-use mechid_model::Matrix;
+use mechid_model::{Matrix, Parameter};
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
-
-/// One entry of M, C or K; rows and columns are counted from 0, names from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Parameter {
-    matrix: Matrix,
-    row: usize,
-    column: usize,
-    dof: usize,
-}
-
-impl Parameter {
-    /// The matrix it is an entry of.
-    pub fn matrix(&self) -> Matrix {
-        self.matrix
-    }
-
-    /// Row, counted from 0: the degree of freedom whose equation of motion it stands in.
-    pub fn row(&self) -> usize {
-        self.row
-    }
-
-    /// Column, counted from 0: the degree of freedom whose motion it multiplies.
-    pub fn column(&self) -> usize {
-        self.column
-    }
-}
-
-impl fmt::Display for Parameter {
-    /// `k12`; with one degree of freedom `k`; with ten or more `k1,12`.
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (letter, row, column) = (self.matrix.letter(), self.row + 1, self.column + 1);
-        let name = match self.dof {
-            1 => letter.to_string(),
-            2..=9 => format!("{letter}{row}{column}"),
-            _ => format!("{letter}{row},{column}"),
-        };
-        f.pad(&name)
-    }
-}
-
-/// The three matrices, in the order of the parameters.
-pub(crate) const MATRICES: [Matrix; 3] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness];
 
 /// Which entries of M, C and K are free, and the values of those that are not.
 ///
@@ -64,7 +20,11 @@ pub(crate) const MATRICES: [Matrix; 3] = [Matrix::Mass, Matrix::Damping, Matrix:
 /// assert_eq!(names, ["c11", "c22", "k11", "k12", "k21", "k22"]);
 /// # Ok::<(), mechid_estimate::EstimateError>(())
 /// ```
+///
+/// With the feature `serde` it is written as three matrices, `null` where an entry is free.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "form::UnknownsForm", into = "form::UnknownsForm"))]
 pub struct Unknowns {
     dof: usize,
     /// M, C, K: `None` where the entry is free.
@@ -106,7 +66,8 @@ impl Unknowns {
     /// The same, with one entry (counted from 0) known: kg, N·s/m or N/m.
     ///
     /// # Errors
-    /// [`EstimateError::NoSuchEntry`], [`EstimateError::FixedValue`] unless `value` is finite.
+    /// [`EstimateError::Model`] if there is no such entry, [`EstimateError::FixedValue`] unless
+    /// `value` is finite.
     pub fn fix(
         mut self,
         matrix: Matrix,
@@ -114,7 +75,7 @@ impl Unknowns {
         column: usize,
         value: f64,
     ) -> Result<Self, EstimateError> {
-        let parameter = self.entry(matrix, row, column)?;
+        let parameter = Parameter::new(matrix, row, column, self.dof)?;
         if !value.is_finite() {
             return Err(EstimateError::FixedValue { parameter: parameter.to_string(), value });
         }
@@ -125,14 +86,14 @@ impl Unknowns {
     /// The same, with one entry (counted from 0) to be found.
     ///
     /// # Errors
-    /// [`EstimateError::NoSuchEntry`].
+    /// [`EstimateError::Model`] if there is no such entry.
     pub fn release(
         mut self,
         matrix: Matrix,
         row: usize,
         column: usize,
     ) -> Result<Self, EstimateError> {
-        self.entry(matrix, row, column)?;
+        Parameter::new(matrix, row, column, self.dof)?;
         self.fixed[matrix as usize][(row, column)] = None;
         Ok(self)
     }
@@ -152,11 +113,8 @@ impl Unknowns {
 
     /// The free entries in the order of every covariance: M, C, K, each row by row.
     pub fn free(&self) -> Vec<Parameter> {
-        let n = self.dof;
-        let entries = MATRICES.into_iter().flat_map(|matrix| {
-            (0..n * n).map(move |at| Parameter { matrix, row: at / n, column: at % n, dof: n })
-        });
-        entries.filter(|p| self.fixed(p.matrix, p.row, p.column).is_none()).collect()
+        let is_free = |p: &Parameter| self.fixed(p.matrix(), p.row(), p.column()).is_none();
+        Parameter::all(self.dof).filter(is_free).collect()
     }
 
     /// The three matrices with the known values in place and `values` (in the order of
@@ -165,11 +123,11 @@ impl Unknowns {
     /// # Panics
     /// If there are not as many values as free entries.
     pub fn assemble(&self, values: &[f64]) -> [DMatrix<f64>; 3] {
-        let mut matrices = MATRICES.map(|m| self.fixed[m as usize].map(|v| v.unwrap_or(0.0)));
+        let mut matrices = Matrix::ALL.map(|m| self.fixed[m as usize].map(|v| v.unwrap_or(0.0)));
         let free = self.free();
         assert_eq!(free.len(), values.len(), "one value per free entry");
         for (parameter, value) in free.iter().zip(values) {
-            matrices[parameter.matrix as usize][(parameter.row, parameter.column)] = *value;
+            matrices[parameter.matrix() as usize][(parameter.row(), parameter.column())] = *value;
         }
         matrices
     }
@@ -180,14 +138,55 @@ impl Unknowns {
         let values: Option<Vec<f64>> = known.iter().copied().collect();
         values.map(|values| DMatrix::from_vec(self.dof, self.dof, values))
     }
+}
 
-    fn entry(&self, matrix: Matrix, row: usize, column: usize) -> Result<Parameter, EstimateError> {
-        let dof = self.dof;
-        if row >= dof || column >= dof {
-            let (row, column) = (row + 1, column + 1);
-            return Err(EstimateError::NoSuchEntry { matrix, row, column, dof });
+#[cfg(feature = "serde")]
+mod form {
+    use super::{EstimateError, Matrix, Unknowns};
+
+    type Rows = Vec<Vec<Option<f64>>>;
+
+    #[derive(serde::Serialize, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub(super) struct UnknownsForm {
+        mass: Rows,
+        damping: Rows,
+        stiffness: Rows,
+    }
+
+    impl From<Unknowns> for UnknownsForm {
+        fn from(unknowns: Unknowns) -> Self {
+            let [mass, damping, stiffness] = unknowns
+                .fixed
+                .map(|m| m.row_iter().map(|row| row.iter().copied().collect()).collect());
+            Self { mass, damping, stiffness }
         }
-        Ok(Parameter { matrix, row, column, dof })
+    }
+
+    impl TryFrom<UnknownsForm> for Unknowns {
+        type Error = EstimateError;
+
+        fn try_from(form: UnknownsForm) -> Result<Self, EstimateError> {
+            let dof = form.mass.len();
+            let mut unknowns = Self::unknown_mass(dof)?;
+            let matrices = [form.mass, form.damping, form.stiffness];
+            for (matrix, entries) in Matrix::ALL.into_iter().zip(matrices) {
+                let rows = entries.len();
+                let other = entries.iter().map(Vec::len).find(|columns| *columns != dof);
+                if rows != dof || other.is_some() {
+                    let columns = other.unwrap_or(dof);
+                    return Err(EstimateError::Shape { matrix, rows, columns, dof });
+                }
+                for (row, values) in entries.iter().enumerate() {
+                    for (column, value) in values.iter().enumerate() {
+                        if let Some(value) = value {
+                            unknowns = unknowns.fix(matrix, row, column, *value)?;
+                        }
+                    }
+                }
+            }
+            Ok(unknowns)
+        }
     }
 }
 
@@ -197,18 +196,6 @@ mod tests {
 
     use super::*;
 
-    fn names(unknowns: &Unknowns) -> Vec<String> {
-        unknowns.free().iter().map(Parameter::to_string).collect()
-    }
-
-    #[test]
-    fn names_count_from_one_and_are_bare_letters_for_one_degree_of_freedom() {
-        assert_eq!(names(&Unknowns::unknown_mass(1).unwrap()), ["m", "c", "k"]);
-        let two = Unknowns::known_mass(&DMatrix::identity(2, 2)).unwrap();
-        assert_eq!(names(&two), ["c11", "c12", "c21", "c22", "k11", "k12", "k21", "k22"]);
-        assert_eq!(names(&Unknowns::unknown_mass(12).unwrap())[11], "m1,12");
-    }
-
     #[test]
     fn matrices_are_assembled_from_known_and_found_values() {
         let unknowns = Unknowns::known_mass(&dmatrix![3.0, 0.0; 0.0, 4.0]).unwrap();
@@ -217,6 +204,20 @@ mod tests {
         let [_, c, k] = unknowns.assemble(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0]);
         assert_eq!((c, k), (dmatrix![1.0, 2.0; 3.0, 4.0], dmatrix![5.0, 6.0; 7.0, 8.0]));
         assert_eq!(unknowns.release(Matrix::Mass, 0, 0).unwrap().mass(), None);
+    }
+
+    #[cfg(feature = "serde")]
+    #[test]
+    fn unknowns_are_written_as_matrices_and_read_back() {
+        let mass = dmatrix![3.0, 0.0; 0.0, 4.0];
+        let unknowns = Unknowns::known_mass(&mass).unwrap().fix(Matrix::Stiffness, 1, 0, 7.0);
+        let unknowns = unknowns.unwrap();
+        let mut written = serde_json::to_value(&unknowns).unwrap();
+        assert_eq!(written["stiffness"], serde_json::json!([[null, null], [7.0, null]]));
+        assert_eq!(serde_json::from_value::<Unknowns>(written.clone()).unwrap(), unknowns);
+        written["damping"] = serde_json::json!([[null, null]]);
+        let error = serde_json::from_value::<Unknowns>(written).unwrap_err();
+        assert_eq!(error.to_string(), "the known damping matrix is 1×2, expected 2×2");
     }
 
     #[test]
@@ -233,7 +234,7 @@ mod tests {
         let two = Unknowns::unknown_mass(2).unwrap();
         assert_eq!(
             two.fix(Matrix::Damping, 2, 0, 0.0).unwrap_err().to_string(),
-            "damping has no entry (3, 1): the problem has 2 degrees of freedom"
+            "damping has no entry (3, 1): the system has 2 degrees of freedom"
         );
     }
 }

@@ -3,12 +3,14 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use mechid_force::{
-    Discretisation, Ends, Extent, Filter, Measurement, Noise, Quantity, Rule, Start, Tuning,
-    continuous, discretised, frequency_domain, inner_lines, kalman, regularised,
+    Filter, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, continuous, discretised,
+    frequency_domain, inner_lines, kalman, regularised,
 };
-use mechid_model::{InitialState, KyxSign, Response, SecondOrderSystem};
+use mechid_model::{
+    Discretisation, InitialState, KyxSign, Response, ResponseQuantity, SecondOrderSystem,
+};
 use mechid_problems::{dissertation_bearing, exact_foh};
-use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
 use nalgebra::DMatrix;
 
 fn bearing() -> SecondOrderSystem {
@@ -25,7 +27,7 @@ fn response(len: usize) -> Response {
 fn displacements(len: usize) -> Measurement {
     let exact = response(len);
     let noisy = noise::add_white(exact.displacement(), NoiseLevel::FractionOfRms(0.01), 1).unwrap();
-    Measurement::of_all(Quantity::Displacement, noisy)
+    Measurement::of_all(ResponseQuantity::Displacement, noisy)
 }
 
 fn equations(c: &mut Criterion) {
@@ -37,8 +39,8 @@ fn equations(c: &mut Criterion) {
             b.iter(|| continuous(&bearing(), &motion).unwrap());
         });
         group.bench_function(BenchmarkId::new("exact linear", len), |b| {
-            let how = Discretisation::ExactLinear;
-            b.iter(|| discretised(&bearing(), &motion, how, Ends::Open).unwrap());
+            let how = Discretisation::FirstOrderHold;
+            b.iter(|| discretised(&bearing(), &motion, how, Extent::Open).unwrap());
         });
     }
     group.finish();
@@ -57,7 +59,7 @@ fn periods(c: &mut Criterion) {
         for (name, filter) in
             [("Tikhonov, GCV", Filter::Tikhonov(Rule::Gcv)), ("shrinkage", Filter::Shrinkage)]
         {
-            let (extent, noise) = (Extent::Period, Noise::Unknown);
+            let (extent, noise) = (ForceUnknowns::EveryLine, Noise::Unknown);
             group.bench_function(BenchmarkId::new(name, len), |b| {
                 b.iter(|| regularised(&bearing(), &measured, &[1], &extent, filter, &noise));
             });
@@ -72,7 +74,7 @@ fn open_records(c: &mut Criterion) {
     for len in [128, 256, 512] {
         let measured = displacements(len);
         let filter = Filter::Tikhonov(Rule::Likelihood);
-        let (extent, noise) = (Extent::Open(Start::InMotion), Noise::Unknown);
+        let (extent, noise) = (ForceUnknowns::Samples(Start::InMotion), Noise::Unknown);
         group.throughput(Throughput::Elements(len as u64));
         group.bench_function(BenchmarkId::new("Tikhonov, dense", len), |b| {
             b.iter(|| regularised(&bearing(), &measured, &[1], &extent, filter, &noise));
@@ -80,7 +82,7 @@ fn open_records(c: &mut Criterion) {
     }
     for len in [1_000, 10_000, 100_000] {
         let measured = displacements(len);
-        let tuning = Tuning::Given { noise: vec![1e-3; 2], walk: vec![1.0] };
+        let tuning = Tuning::Given { noise_std: vec![1e-3; 2], walk: vec![1.0] };
         group.throughput(Throughput::Elements(len as u64));
         group.bench_function(BenchmarkId::new("Kalman smoother, tuned", len), |b| {
             b.iter(|| kalman(&bearing(), &measured, &[1], Start::InMotion, &tuning));

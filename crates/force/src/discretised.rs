@@ -1,35 +1,12 @@
 //! The discretised equation of motion, solved for the force of each step.
 
-use mechid_model::{Response, SecondOrderSystem};
-use mechid_signal::{Record, Sampling};
+use mechid_model::{Discretisation, Response, SecondOrderSystem};
+use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::continuous::check_dof;
 use crate::transition::Transition;
 use crate::{ForceError, IdentifiedForce};
-
-/// How the state equation is carried from one sample to the next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Discretisation {
-    /// The dissertation's: ẋ(k+1) ≈ ẋ(k) + Δt ẍ(k). The same as `Taylor(1)`.
-    Euler,
-    /// The exponential series cut after the term of this order, 1 … 8; force held over a step.
-    Taylor(usize),
-    /// The matrix exponential; force held over a step.
-    ExactHeld,
-    /// The matrix exponential; force linear over a step.
-    ExactLinear,
-}
-
-/// What comes after the last sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Ends {
-    /// The first sample again: the record is one whole period.
-    Periodic,
-    /// Nothing: the record ends there.
-    Open,
-}
 
 /// The force that carries the response from each sample to the next.
 ///
@@ -48,7 +25,7 @@ pub enum Ends {
 ///
 /// # Errors
 /// [`ForceError::Dof`], [`ForceError::TooShort`] for a response shorter than one step,
-/// [`ForceError::TaylorOrder`], and [`ForceError::StepTooLong`] where the step is so long that
+/// and [`ForceError::StepTooLong`] where the step is so long that
 /// its end does not show the force during it.
 ///
 /// # Source
@@ -58,17 +35,46 @@ pub fn discretised(
     system: &SecondOrderSystem,
     response: &Response,
     discretisation: Discretisation,
-    ends: Ends,
+    extent: Extent,
+) -> Result<IdentifiedForce, ForceError> {
+    let solution = |dt| Solution::of_rule(system, dt, discretisation);
+    force_of_steps(system, response, extent, solution)
+}
+
+/// The same as [`discretised`], with the exponential series cut after the term of this `order`,
+/// 1 … 8, and the force held over a step; order 1 is Euler's rule.
+///
+/// # Errors
+/// As [`discretised`]; [`ForceError::TaylorOrder`].
+///
+/// # Source
+/// That of [`discretised`].
+pub fn discretised_by_taylor(
+    system: &SecondOrderSystem,
+    response: &Response,
+    order: usize,
+    extent: Extent,
+) -> Result<IdentifiedForce, ForceError> {
+    let solution = |dt| match order {
+        1..=8 => Solution::new(Transition::taylor(system, dt, order), dt, true),
+        _ => Err(ForceError::TaylorOrder { order }),
+    };
+    force_of_steps(system, response, extent, solution)
+}
+
+fn force_of_steps(
+    system: &SecondOrderSystem,
+    response: &Response,
+    extent: Extent,
+    solution: impl FnOnce(f64) -> Result<Solution, ForceError>,
 ) -> Result<IdentifiedForce, ForceError> {
     check_dof(system, response)?;
-    let sampling = response.sampling();
-    let needed = if ends == Ends::Open { 2 } else { 1 };
+    let (sampling, dt) = (response.sampling(), response.sampling().dt());
+    let needed = if extent == Extent::Open { 2 } else { 1 };
     if sampling.len() < needed {
         return Err(ForceError::TooShort { samples: sampling.len(), needed });
     }
-    let solution = solution(system, sampling, discretisation)?;
-    let input = solution.input(response, ends);
-    let dt = sampling.dt();
+    let input = solution(dt)?.input(response, extent);
     let force = (system.mass() * input).transpose() / (dt * dt);
     let sampling = sampling.with_len(force.nrows())?;
     Ok(IdentifiedForce::of(Record::new(sampling, force)?))
@@ -82,36 +88,39 @@ pub(crate) struct Solution {
     input: LU<f64, Dyn, Dyn>,
 }
 
-pub(crate) fn solution(
-    system: &SecondOrderSystem,
-    sampling: Sampling,
-    discretisation: Discretisation,
-) -> Result<Solution, ForceError> {
-    let (n, dt) = (system.dof(), sampling.dt());
-    let transition = match discretisation {
-        Discretisation::Euler => Transition::taylor(system, dt, 1),
-        Discretisation::Taylor(order @ 1..=8) => Transition::taylor(system, dt, order),
-        Discretisation::Taylor(order) => return Err(ForceError::TaylorOrder { order }),
-        Discretisation::ExactHeld | Discretisation::ExactLinear => Transition::exact(system, dt),
-    };
-    let Transition { state, held, ramp } = transition;
-    let input = if discretisation == Discretisation::ExactLinear {
-        // (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
-        let mut both = DMatrix::zeros(2 * n, 2 * n);
-        both.columns_mut(0, n).copy_from(&(held - &ramp));
-        both.columns_mut(n, n).copy_from(&ramp);
-        both
-    } else {
-        // Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
-        held.rows(n, n).into_owned()
-    };
-    Ok(Solution { state, input: invertible(input, dt)? })
-}
-
 /// Below this a sample of 16 digits leaves fewer than four for the force.
 const NO_TRACE: f64 = 1e-12;
 
 impl Solution {
+    /// Solution for the steps of a system under this rule.
+    pub fn of_rule(
+        system: &SecondOrderSystem,
+        dt: f64,
+        discretisation: Discretisation,
+    ) -> Result<Self, ForceError> {
+        match discretisation {
+            Discretisation::Euler => Self::new(Transition::taylor(system, dt, 1), dt, true),
+            Discretisation::ZeroOrderHold => Self::new(Transition::exact(system, dt), dt, true),
+            Discretisation::FirstOrderHold => Self::new(Transition::exact(system, dt), dt, false),
+        }
+    }
+
+    fn new(transition: Transition, dt: f64, is_held: bool) -> Result<Self, ForceError> {
+        let Transition { state, held, ramp } = transition;
+        let n = held.ncols();
+        let input = if is_held {
+            // Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.
+            held.rows(n, n).into_owned()
+        } else {
+            // (Γ₀ − Γ₁) q(k) + Γ₁ q(k+1) = z(k+1) − Φ z(k).
+            let mut both = DMatrix::zeros(2 * n, 2 * n);
+            both.columns_mut(0, n).copy_from(&(held - &ramp));
+            both.columns_mut(n, n).copy_from(&ramp);
+            both
+        };
+        Ok(Self { state, input: invertible(input, dt)? })
+    }
+
     /// Of changes, 2n × any number: the input at the start of each step, n × the same; where it is
     /// linear, that at its end too.
     pub fn of(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
@@ -126,13 +135,14 @@ impl Solution {
     }
 
     /// q, n × samples; of a held input n × steps.
-    fn input(&self, response: &Response, ends: Ends) -> DMatrix<f64> {
+    fn input(&self, response: &Response, extent: Extent) -> DMatrix<f64> {
         let len = response.sampling().len();
-        let (start, end) = self.of(changes(&self.state, response, ends));
+        let (start, end) = self.of(changes(&self.state, response, extent));
         let Some(end) = end else { return start };
         let mut input = DMatrix::zeros(response.dof(), len);
         for (k, (start, end)) in start.column_iter().zip(end.column_iter()).enumerate() {
-            let (first, last) = (ends == Ends::Open && k == 0, ends == Ends::Open && k + 2 == len);
+            let (first, last) =
+                (extent == Extent::Open && k == 0, extent == Extent::Open && k + 2 == len);
             let mut at = input.column_mut(k);
             at.axpy(if first { 1.0 } else { 0.5 }, &start, 1.0);
             let mut at = input.column_mut((k + 1) % len);
@@ -143,11 +153,11 @@ impl Solution {
 }
 
 /// z(k+1) − Φ z(k) in step units, 2n × steps.
-fn changes(state: &DMatrix<f64>, response: &Response, ends: Ends) -> DMatrix<f64> {
+fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix<f64> {
     let (n, len, dt) = (response.dof(), response.sampling().len(), response.sampling().dt());
     let (x, v) = (response.displacement().data(), response.velocity().data());
     let z = DMatrix::from_fn(2 * n, len, |i, k| if i < n { x[(k, i)] } else { dt * v[(k, i - n)] });
-    let steps = if ends == Ends::Periodic { len } else { len - 1 };
+    let steps = if extent == Extent::WholePeriod { len } else { len - 1 };
     let mut change = DMatrix::from_fn(2 * n, steps, |i, k| z[(i, (k + 1) % len)]);
     change.gemm(-1.0, state, &z.columns(0, steps), 1.0);
     change

@@ -1,6 +1,6 @@
 //! What can keep a force from being reconstructed.
 
-use mechid_model::{Matrix, ModelError};
+use mechid_model::ModelError;
 use mechid_signal::{SignalError, counted, told_to};
 
 /// A force that cannot be reconstructed; every variant carries the offending numbers.
@@ -204,55 +204,6 @@ pub enum ForceError {
     /// A ratio to a force that is not there.
     #[error("the force compared with is zero on every channel")]
     NoForce,
-    /// A covariance that is not one row and column per entry.
-    #[error("the covariance is {rows}×{columns}, for {}", counted(*entries, "uncertain entry"))]
-    CovarianceShape {
-        /// Its rows.
-        rows: usize,
-        /// Its columns.
-        columns: usize,
-        /// Entries named.
-        entries: usize,
-    },
-    /// A variance that cannot be one, or a covariance that is not a number.
-    #[error(
-        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) has variance {variance}, \
-         or a covariance that is not finite: leave out what was not identified"
-    )]
-    Variance {
-        /// Which matrix.
-        matrix: Matrix,
-        /// Row, counted from 0.
-        row: usize,
-        /// Column, counted from 0.
-        column: usize,
-        /// The variance given, in the squared unit of the entry.
-        variance: f64,
-    },
-    /// The same entry was named twice.
-    #[error("entry ({row}, {column}) of the {matrix} matrix (counted from 0) is named twice")]
-    RepeatedEntry {
-        /// Which matrix.
-        matrix: Matrix,
-        /// Row, counted from 0.
-        row: usize,
-        /// Column, counted from 0.
-        column: usize,
-    },
-    /// An entry outside the matrices.
-    #[error(
-        "entry ({row}, {column}) of the {matrix} matrix (counted from 0) of a system of {}", counted(*dofs, "degree of freedom")
-    )]
-    NoSuchEntry {
-        /// Which matrix.
-        matrix: Matrix,
-        /// Row, counted from 0.
-        row: usize,
-        /// Column, counted from 0.
-        column: usize,
-        /// Degrees of freedom.
-        dofs: usize,
-    },
     /// The model is not usable.
     #[error(transparent)]
     Model(#[from] ModelError),

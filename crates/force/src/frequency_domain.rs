@@ -11,6 +11,8 @@ use crate::{ForceError, IdentifiedForce, Measurement};
 
 /// What is known of the noise in the measured channels, taken as white.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Noise {
     /// Nothing: no standard error, and channels count by their size.
     Unknown,

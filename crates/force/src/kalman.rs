@@ -1,6 +1,6 @@
 //! Force and motion together, by Kalman filter and smoother.
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
 
@@ -10,10 +10,12 @@ use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
 use crate::unexplained::Rest;
-use crate::{ForceError, IdentifiedForce, Measurement, Noise, Quantity, Start};
+use crate::{ForceError, IdentifiedForce, Measurement, Noise, Start};
 
 /// How strong noise and force are taken to be.
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Tuning {
     /// As strong as makes the measurement most likely (innovations form of the likelihood).
@@ -29,7 +31,7 @@ pub enum Tuning {
     /// These.
     Given {
         /// Standard deviation of the noise, one per channel, in the channel's unit.
-        noise: Vec<f64>,
+        noise_std: Vec<f64>,
         /// Intensity of the random walk, one per forced degree of freedom, in N/√s: over a time t
         /// the force wanders by walk·√t.
         walk: Vec<f64>,
@@ -46,7 +48,7 @@ pub struct KalmanForce {
     /// Velocity of every degree of freedom, in m/s, measured or not.
     pub velocity: Record,
     /// Standard deviation of the noise, one per channel, in the unit of the channel.
-    pub noise: Vec<f64>,
+    pub noise_std: Vec<f64>,
     /// Intensity of the random walk, one per forced degree of freedom, in N/√s.
     pub walk: Vec<f64>,
     /// Logarithm of the likelihood of the measurement, dimensionless, constants left out.
@@ -94,9 +96,9 @@ pub fn kalman(
     let scale = match tuning {
         Tuning::Likelihood => sizes(measured.record()),
         Tuning::NoiseKnown(noise) => known(measured, noise)?,
-        Tuning::Given { noise, walk } => {
+        Tuning::Given { noise_std, walk } => {
             check_walks(forced, walk)?;
-            known(measured, noise)?
+            known(measured, noise_std)?
         }
     };
     check_seen(system, measured, forced, &scale)?;
@@ -110,7 +112,7 @@ pub fn kalman(
         }
     };
     let found = model.solve(system, measured, forced, &scale, &parameters)?;
-    let stated = (*tuning != Tuning::Likelihood).then_some(&found.noise[..]);
+    let stated = (*tuning != Tuning::Likelihood).then_some(&found.noise_std[..]);
     let rest = measured.exceeds(forced).then(|| {
         let motion = [&found.displacement, &found.velocity, found.force.record()];
         Rest::of_motion(system, measured, motion, stated)
@@ -215,7 +217,7 @@ impl Model {
             transition: transition.as_slice().to_vec(),
             process: vec![0.0; m * m],
             output: output.as_slice().to_vec(),
-            noise: 1.0,
+            noise_variance: 1.0,
             start_mean: vec![0.0; m],
             start: covariance,
         };
@@ -241,7 +243,7 @@ impl Model {
         }
         StateSpace {
             process,
-            noise: (2.0 * parameters[0]).exp(),
+            noise_variance: (2.0 * parameters[0]).exp(),
             transition: self.space.transition.clone(),
             output: self.space.output.clone(),
             start_mean: self.space.start_mean.clone(),
@@ -334,7 +336,7 @@ impl Model {
             force: force.with_standard_error(Some(Record::new(sampling, error)?)),
             displacement: motion(0, 1.0)?,
             velocity: motion(n, self.dt)?,
-            noise: scale.iter().map(|s| s * level).collect(),
+            noise_std: scale.iter().map(|s| s * level).collect(),
             walk: parameters[1..].iter().map(|log| log.exp() * self.walk_unit()).collect(),
             log_likelihood: self.at(parameters).log_likelihood(&self.data)
                 - sampling.len() as f64 * scaling,
@@ -363,9 +365,9 @@ impl Sizes {
             let step =
                 column.as_slice().windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
             let [x, v, a] = match channel.quantity {
-                Quantity::Displacement => [size, step * fast, step * fast * fast],
-                Quantity::Velocity => [size * slow, size, step * fast],
-                Quantity::Acceleration => [size * slow * slow, size * slow, size],
+                ResponseQuantity::Displacement => [size, step * fast, step * fast * fast],
+                ResponseQuantity::Velocity => [size * slow, size, step * fast],
+                ResponseQuantity::Acceleration => [size * slow * slow, size * slow, size],
             };
             largest.displacement = largest.displacement.max(x);
             largest.velocity = largest.velocity.max(v);

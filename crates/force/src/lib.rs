@@ -13,8 +13,8 @@
 //! side.
 //!
 //! ```
-//! use mechid_force::{Measurement, Noise, Quantity, frequency_domain, relative_error};
-//! use mechid_model::SecondOrderSystem;
+//! use mechid_force::{Measurement, Noise, frequency_domain, relative_error};
+//! use mechid_model::{ResponseQuantity, SecondOrderSystem};
 //! use mechid_signal::{Record, Sampling, Spectrum};
 //! use nalgebra::{Complex, DMatrix, dmatrix, dvector};
 //!
@@ -41,7 +41,7 @@
 //!
 //! // Only the displacement of the first direction is measured: it tells the force all the same.
 //! let measured = Measurement::of_all(
-//!     Quantity::Displacement,
+//!     ResponseQuantity::Displacement,
 //!     Record::from_channel(period, displacement.channel(0).to_vec())?,
 //! );
 //! let found = frequency_domain(&rotor, &measured, &[1], &lines, &Noise::Unknown)?;
@@ -73,16 +73,16 @@ mod uncertainty;
 mod unexplained;
 
 pub use continuous::continuous;
-pub use discretised::{Discretisation, Ends, discretised};
+pub use discretised::{discretised, discretised_by_taylor};
 pub use error::ForceError;
 pub use frequency_domain::{MIN_OUTSIDE_LINES, Noise, frequency_domain, inner_lines};
 pub use identified::IdentifiedForce;
 pub use kalman::{KalmanForce, Tuning, kalman};
-pub use measurement::{Channel, Measurement, Quantity};
+pub use measurement::{Channel, Measurement};
 pub use measures::{channel_errors, line_errors, relative_error, spectrum_ratio, spurious_ratio};
 pub use motion_noise::{MotionNoise, continuous_with_noise, discretised_with_noise};
 pub use open_operator::OPEN_UNKNOWNS;
-pub use regularised::{Extent, RegularisedForce, Start, regularised};
+pub use regularised::{ForceUnknowns, RegularisedForce, Start, regularised};
 pub use rule::{Filter, Rule};
-pub use uncertainty::{Entry, SystemCovariance, with_uncertain_system};
+pub use uncertainty::with_uncertain_system;
 pub use unexplained::Unexplained;

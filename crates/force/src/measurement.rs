@@ -1,52 +1,20 @@
 //! What was measured, and where.
 
-use std::fmt;
-
-use mechid_model::Response;
+use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Sampling};
-use nalgebra::{Complex, DMatrix};
+use nalgebra::DMatrix;
 
 use crate::ForceError;
 
-/// What a sensor measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Quantity {
-    /// x, in m.
-    Displacement,
-    /// ẋ, in m/s.
-    Velocity,
-    /// ẍ, in m/s².
-    Acceleration,
-}
-
-impl Quantity {
-    /// (iω)^d, with d the number of derivatives: displacement to this quantity at ω.
-    pub(crate) fn derivative(self, omega: f64) -> Complex<f64> {
-        match self {
-            Quantity::Displacement => Complex::new(1.0, 0.0),
-            Quantity::Velocity => Complex::new(0.0, omega),
-            Quantity::Acceleration => Complex::new(-omega * omega, 0.0),
-        }
-    }
-}
-
-impl fmt::Display for Quantity {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Quantity::Displacement => "displacement",
-            Quantity::Velocity => "velocity",
-            Quantity::Acceleration => "acceleration",
-        })
-    }
-}
-
 /// One measured channel: a quantity at a degree of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub struct Channel {
     /// Degree of freedom, counted from 0.
     pub dof: usize,
     /// What was measured there.
-    pub quantity: Quantity,
+    pub quantity: ResponseQuantity,
 }
 
 /// A measured record and what each of its channels is.
@@ -74,7 +42,7 @@ impl Measurement {
     }
 
     /// The same quantity on every channel, channel c at degree of freedom c.
-    pub fn of_all(quantity: Quantity, record: Record) -> Self {
+    pub fn of_all(quantity: ResponseQuantity, record: Record) -> Self {
         let channels = (0..record.channels()).map(|dof| Channel { dof, quantity }).collect();
         Self { record, channels }
     }
@@ -82,11 +50,7 @@ impl Measurement {
     /// Displacement, velocity and acceleration of every degree of freedom.
     pub fn of_response(response: &Response) -> Self {
         let dof = response.dof();
-        let parts = [
-            (Quantity::Displacement, response.displacement()),
-            (Quantity::Velocity, response.velocity()),
-            (Quantity::Acceleration, response.acceleration()),
-        ];
+        let parts = ResponseQuantity::ALL.map(|which| (which, response.quantity(which)));
         let data = DMatrix::from_fn(response.sampling().len(), 3 * dof, |k, c| {
             parts[c / dof].1.data()[(k, c % dof)]
         });

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
-use mechid_model::{Response, SecondOrderSystem};
-use mechid_signal::{Record, Sampling};
+use mechid_model::{Discretisation, Response, SecondOrderSystem};
+use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::{DMatrix, DVector};
 
-use crate::discretised::{Solution, solution};
-use crate::{Discretisation, Ends, ForceError, IdentifiedForce, continuous, discretised};
+use crate::discretised::Solution;
+use crate::{ForceError, IdentifiedForce, continuous, discretised};
 
 /// Standard deviation of the noise in each channel of a complete motion; the noise is white and
 /// independent from channel to channel.
@@ -113,16 +113,16 @@ pub fn discretised_with_noise(
     system: &SecondOrderSystem,
     response: &Response,
     discretisation: Discretisation,
-    ends: Ends,
+    extent: Extent,
     noise: &MotionNoise,
 ) -> Result<IdentifiedForce, ForceError> {
-    let force = discretised(system, response, discretisation, ends)?;
+    let force = discretised(system, response, discretisation, extent)?;
     for levels in [&noise.displacement, &noise.velocity] {
         MotionNoise::check(levels, system.dof())?;
     }
-    let sides = sides(&solution(system, response.sampling(), discretisation)?);
+    let sides = sides(&Solution::of_rule(system, response.sampling().dt(), discretisation)?);
     let samples = force.record().len();
-    let at = |k: usize| error(system, response.sampling(), &sides, ends, noise, k);
+    let at = |k: usize| error(system, response.sampling(), &sides, extent, noise, k);
     // All samples between the ends are alike, and there is one of them if there are three.
     let alike = [at(0), at(1.min(samples - 1)), at(samples - 1)];
     let error = DMatrix::from_fn(samples, system.dof(), |k, i| {
@@ -156,14 +156,14 @@ fn error(
     system: &SecondOrderSystem,
     sampling: Sampling,
     sides: &[Side],
-    ends: Ends,
+    extent: Extent,
     noise: &MotionNoise,
     k: usize,
 ) -> DVector<f64> {
     let (n, len, dt) = (system.dof(), sampling.len() as isize, sampling.dt());
     let within = |side: &&Side| {
         let step = k as isize + side.step;
-        ends == Ends::Periodic || (0..len - 1).contains(&step)
+        extent == Extent::WholePeriod || (0..len - 1).contains(&step)
     };
     let sides: Vec<&Side> = sides.iter().filter(within).collect();
     // A sample of a short period may be both before and after another: what it adds to the force

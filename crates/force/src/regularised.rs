@@ -13,24 +13,28 @@ use crate::rule::{choose, factor};
 use crate::unexplained::Rest;
 use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise};
 
-/// What the measured record is.
+/// Unknowns of a force: its lines in a whole period, or its samples in an open record.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
-pub enum Extent {
-    /// One whole period in steady state; a force on every line below Nyquist is possible.
-    Period,
-    /// One whole period in steady state; the force is on these lines only.
-    PeriodLines(Vec<usize>),
-    /// A record that simply ends.
-    Open(Start),
+pub enum ForceUnknowns {
+    /// Every spectral line below Nyquist; the record is one whole period in steady state.
+    EveryLine,
+    /// These spectral lines only; the record is one whole period in steady state.
+    Lines(Vec<usize>),
+    /// Every sample, the force linear between them; the record is open.
+    Samples(Start),
 }
 
-/// What the machine does at the first sample of an open record.
+/// State of the machine at the first sample of an open record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Start {
-    /// Neither displaced nor moving.
+    /// At rest: neither displaced nor moving.
     FromRest,
-    /// Already in motion, nobody knows how: displacement and velocity are sought with the force.
+    /// Unknown: displacement and velocity are estimated with the force.
     InMotion,
 }
 
@@ -43,8 +47,8 @@ pub struct RegularisedForce {
     pub parameter: Option<f64>,
     /// How many real unknowns the filter lets through, a pure number and rarely a whole one.
     pub unknowns: f64,
-    /// Noise level that the fit leaves over, one standard deviation per channel, in its unit.
-    pub noise: Vec<f64>,
+    /// Standard deviation of the noise in each channel, as the residual has it, in the channel's unit.
+    pub noise_std: Vec<f64>,
 }
 
 /// The force that explains the measured channels without amplifying their noise.
@@ -71,21 +75,21 @@ pub fn regularised(
     system: &SecondOrderSystem,
     measured: &Measurement,
     forced: &[usize],
-    extent: &Extent,
+    unknowns: &ForceUnknowns,
     filter: Filter,
     noise: &Noise,
 ) -> Result<RegularisedForce, ForceError> {
     measured.check(system.dof(), forced)?;
     filter.check()?;
-    let lines = match extent {
-        Extent::Period => (0..measured.sampling().len().div_ceil(2)).collect(),
-        Extent::PeriodLines(lines) => lines.clone(),
-        Extent::Open(_) => Vec::new(),
+    let lines = match unknowns {
+        ForceUnknowns::EveryLine => (0..measured.sampling().len().div_ceil(2)).collect(),
+        ForceUnknowns::Lines(lines) => lines.clone(),
+        ForceUnknowns::Samples(_) => Vec::new(),
     };
     let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
     let scale = level.clone().unwrap_or_else(|| sizes(measured.record()));
     let level = level.as_deref();
-    let found = if let Extent::Open(start) = extent {
+    let found = if let ForceUnknowns::Samples(start) = unknowns {
         let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
         solve(&operator, system, measured, forced, filter, &scale)?
     } else {
@@ -93,8 +97,8 @@ pub fn regularised(
         solve(&operator, system, measured, forced, filter, &scale)?
     };
     let force = found.force;
-    let rest = measured.exceeds(forced).then(|| match extent {
-        Extent::Open(start) => {
+    let rest = measured.exceeds(forced).then(|| match unknowns {
+        ForceUnknowns::Samples(start) => {
             let start = (*start, &scale[..]);
             Ok(Rest::of_open(system, measured, forced, force.record(), start, level))
         }
@@ -161,6 +165,6 @@ fn solve(
         force: force.with_standard_error(Some(error)),
         parameter,
         unknowns: fit.unknowns,
-        noise: scale.iter().map(|s| s * noise.sqrt()).collect(),
+        noise_std: scale.iter().map(|s| s * noise.sqrt()).collect(),
     })
 }

@@ -9,6 +9,8 @@ use crate::evidence::Evidence;
 /// λ is in the unit of a singular value: scaled channel per newton. Tikhonov damps the components
 /// of the force that the machine transmits more weakly than λ, truncation drops them.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Rule {
     /// The λ whose force is nearest to the mean of the force given the measurement.
@@ -41,6 +43,8 @@ pub enum Rule {
 
 /// How the components are damped.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Filter {
     /// f̂ = s y/(s² + λ²): least ‖y − H f‖² + λ²‖f‖².

@@ -16,7 +16,8 @@ pub(crate) struct StateSpace {
     pub transition: Vec<f64>,
     pub process: Vec<f64>,
     pub output: Vec<f64>,
-    pub noise: f64,
+    /// R.
+    pub noise_variance: f64,
     /// Mean and covariance of the state at the first sample, before its measurement.
     pub start_mean: Vec<f64>,
     pub start: Vec<f64>,
@@ -153,7 +154,7 @@ impl Filter {
         let m = space.states;
         let z = &space.output[channel * m..][..m];
         times(&self.covariance, z, &mut self.gain);
-        let variance = dot(z, &self.gain) + space.noise;
+        let variance = dot(z, &self.gain) + space.noise_variance;
         let innovation = y - dot(z, &self.mean);
         let weight = innovation / variance;
         self.mean.iter_mut().zip(&self.gain).for_each(|(a, g)| *a += g * weight);
@@ -240,7 +241,7 @@ mod tests {
             transition: vec![0.9, 0.3, 0.1, -0.4, 0.8, 0.5, 0.0, 0.0, 1.0],
             process: vec![0.02, 0.01, 0.03, 0.01, 0.05, 0.02, 0.03, 0.02, 0.3],
             output: vec![1.0, 0.0, 0.0, 0.2, 1.0, 0.7],
-            noise: 0.3,
+            noise_variance: 0.3,
             start_mean: vec![0.0; M],
             start: vec![0.5, 0.1, 0.0, 0.1, 0.7, 0.0, 0.0, 0.0, 4.0],
         }
@@ -270,7 +271,7 @@ mod tests {
         let out = DMatrix::<f64>::identity(LEN, LEN).kronecker(&z);
         let cross = &prior * out.transpose();
         let mut seen = &out * &cross;
-        seen.iter_mut().step_by(LEN * CHANNELS + 1).for_each(|v| *v += s.noise);
+        seen.iter_mut().step_by(LEN * CHANNELS + 1).for_each(|v| *v += s.noise_variance);
         let y = DVector::from_vec(samples());
         let lu = seen.lu();
         let weights = lu.solve(&y).unwrap();

@@ -1,10 +1,10 @@
 //! The machine between unknown forces and measured channels, sample by sample.
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use nalgebra::{DMatrix, DVector};
 
+use crate::Measurement;
 use crate::transition::Transition;
-use crate::{Measurement, Quantity};
 
 /// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
 pub(crate) struct Machine {
@@ -35,9 +35,9 @@ impl Machine {
         let mut through = DMatrix::zeros(channels.len(), forced.len());
         for (c, channel) in channels.iter().enumerate() {
             match channel.quantity {
-                Quantity::Displacement => out[(c, channel.dof)] = 1.0 / scale[c],
-                Quantity::Velocity => out[(c, n + channel.dof)] = 1.0 / (dt * scale[c]),
-                Quantity::Acceleration => {
+                ResponseQuantity::Displacement => out[(c, channel.dof)] = 1.0 / scale[c],
+                ResponseQuantity::Velocity => out[(c, n + channel.dof)] = 1.0 / (dt * scale[c]),
+                ResponseQuantity::Acceleration => {
                     let unit = 1.0 / (dt * dt * scale[c]);
                     out.set_row(c, &(rate.row(n + channel.dof) * unit));
                     through.set_row(c, &(input.row(channel.dof) * unit));

@@ -36,7 +36,7 @@ impl Transfer<'_> {
             .ok_or(ForceError::Resonance { line, omega })?;
         Ok(DMatrix::from_fn(self.channels.len(), self.forced.len(), |i, j| {
             let channel = self.channels[i];
-            motion[(channel.dof, j)] * channel.quantity.derivative(omega) / self.scale[i]
+            motion[(channel.dof, j)] * channel.quantity.per_displacement(omega) / self.scale[i]
         }))
     }
 
@@ -78,7 +78,7 @@ impl Transfer<'_> {
         let stiffness = self.system.dynamic_stiffness(omega);
         let mut inverse = DMatrix::zeros(self.forced.len(), self.channels.len());
         for (c, channel) in self.channels.iter().enumerate() {
-            let derivative = channel.quantity.derivative(omega);
+            let derivative = channel.quantity.per_displacement(omega);
             if derivative.norm() == 0.0 {
                 let (dof, reciprocal_condition) = (channel.dof, 0.0);
                 return Err(ForceError::NotTransmitted { line, omega, dof, reciprocal_condition });

@@ -3,14 +3,14 @@
 //! Where fewer forces are sought than channels were measured, the channels contradict one another
 //! if another force acts, if a sensor is dead or two are exchanged, or if the machine is another.
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::frequency_domain::noise_weight;
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
-use crate::{ForceError, Measurement, Quantity, Start};
+use crate::{ForceError, Measurement, Start};
 
 /// What the force found leaves unexplained of one measured channel.
 ///
@@ -141,8 +141,10 @@ impl Rest {
     ) -> Self {
         let seen = measured.record().data();
         let mut left = seen.clone();
-        let accelerated =
-            measured.channels().iter().any(|channel| channel.quantity == Quantity::Acceleration);
+        let accelerated = measured
+            .channels()
+            .iter()
+            .any(|channel| channel.quantity == ResponseQuantity::Acceleration);
         let acceleration = accelerated.then(|| {
             let mut balance = force.data().transpose();
             balance.gemm(-1.0, system.damping(), &velocity.data().transpose(), 1.0);
@@ -151,8 +153,10 @@ impl Rest {
         });
         for (mut column, channel) in left.column_iter_mut().zip(measured.channels()) {
             let made = match (channel.quantity, &acceleration) {
-                (Quantity::Acceleration, Some(acceleration)) => acceleration.column(channel.dof),
-                (Quantity::Velocity, _) => velocity.data().column(channel.dof),
+                (ResponseQuantity::Acceleration, Some(acceleration)) => {
+                    acceleration.column(channel.dof)
+                }
+                (ResponseQuantity::Velocity, _) => velocity.data().column(channel.dof),
                 _ => displacement.data().column(channel.dof),
             };
             column -= made;

@@ -2,11 +2,12 @@
 //!
 //! The counter is that of the whole program: this file has one test.
 
+use mechid_model::ResponseQuantity;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use mechid_estimate::frequency_domain::{Lines, Motion, RepeatedPeriods};
+use mechid_estimate::frequency_domain::{Lines, RepeatedPeriods};
 use mechid_estimate::{EquationOfMotion, EstimateError, FrfAverage, Segments};
 use mechid_io::{IoError, RecordFile, TimeAxis};
 use mechid_signal::Record;
@@ -69,7 +70,7 @@ fn peak(path: &Path, rows: usize) -> usize {
     assert_eq!(inventory.samples, rows);
     let stretch = survey.sampling.with_len(PERIOD).unwrap();
     let lines = Lines::new(stretch, 1..=20).unwrap();
-    let motion = Motion::Displacement;
+    let motion = ResponseQuantity::Displacement;
     let mut periods = RepeatedPeriods::expecting(&lines, 1, motion, rows / PERIOD);
     let mut average = FrfAverage::new(lines, [1, 1], motion, Segments::Periods(PERIOD)).unwrap();
     let mut equations = EquationOfMotion::new(1);

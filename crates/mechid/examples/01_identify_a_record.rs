@@ -3,10 +3,11 @@
 //! `cargo run --package mechid --example 01_identify_a_record`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
+use mechid::model::ResponseQuantity;
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{Lines, Motion, RepeatedPeriods, equation_error};
+use mechid::estimate::frequency_domain::{Lines, RepeatedPeriods, equation_error};
 use mechid::io::{Table, TimeAxis};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
@@ -20,7 +21,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Two periods of 256 samples; the excitation drives lines 4 to 60.
     let period = force.sampling().with_len(256)?;
     let lines = Lines::new(period, 4..=60)?;
-    let periods = RepeatedPeriods::new(&lines, &force, &displacement, Motion::Displacement)?;
+    let periods =
+        RepeatedPeriods::new(&lines, &force, &displacement, ResponseQuantity::Displacement)?;
     let found = equation_error(&periods.mean()?, &Unknowns::unknown_mass(1)?)?;
     print!("{found}");
 

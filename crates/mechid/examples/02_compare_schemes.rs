@@ -7,11 +7,11 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
 use mechid::integrate::{
     CentralDifference, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta, integrate_periodic,
 };
-use mechid::model::{Response, Sdof, SecondOrderSystem};
+use mechid::model::{Response, ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid::signal::{Multisine, Phases, Record, Sampling};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
@@ -40,7 +40,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
 fn show(name: &str, force: &Record, response: &Response) -> Result<(), Box<dyn Error>> {
     let lines = 20..=90;
     let motion = response.displacement();
-    let data = FrequencyData::from_records(force, motion, Motion::Displacement, lines)?;
+    let data = FrequencyData::from_records(force, motion, ResponseQuantity::Displacement, lines)?;
     let system: SecondOrderSystem = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
     let mode = &system.modes()?[0];
     let (omega, ratio) = (mode.natural_frequency(), mode.damping_ratio());

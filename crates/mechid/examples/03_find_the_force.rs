@@ -6,8 +6,8 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
-use mechid::model::Sdof;
+use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::{Multisine, Phases, Sampling};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
@@ -18,7 +18,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let excitation = Multisine::flat(1..=120, 5.0, Phases::Schroeder)?.sample(sampling)?;
     let response = mechid::exact_periodic(&machine, &excitation)?;
     let motion = response.displacement();
-    let data = FrequencyData::from_records(&excitation, motion, Motion::Displacement, 1..=120)?;
+    let data =
+        FrequencyData::from_records(&excitation, motion, ResponseQuantity::Displacement, 1..=120)?;
     let identified = equation_error(&data, &Unknowns::unknown_mass(1)?)?.system()?;
 
     // At work: an unbalance on line 40, which nobody measures.

@@ -8,9 +8,9 @@ use std::error::Error;
 
 use mechid::estimate::Unknowns;
 use mechid::estimate::frequency_domain::{
-    Lines, Motion, Pooling, RepeatedPeriods, equation_error, output_error,
+    Lines, Pooling, RepeatedPeriods, equation_error, output_error,
 };
-use mechid::model::Sdof;
+use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::noise::{self, NoiseLevel};
 use mechid::signal::{CrestSearch, Multisine, Phases, Sampling, Spectrum, measures};
 
@@ -33,7 +33,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let force = force.repeated(8)?;
 
     let lines = Lines::new(sampling, 10..=80)?;
-    let periods = RepeatedPeriods::new(&lines, &force, &displacement, Motion::Displacement)?;
+    let periods =
+        RepeatedPeriods::new(&lines, &force, &displacement, ResponseQuantity::Displacement)?;
     let unknowns = Unknowns::unknown_mass(1)?;
     let simple = equation_error(&periods.mean()?, &unknowns)?;
     let likely = output_error(&periods.mean_with_noise(Pooling::PerLine)?, &unknowns)?.estimate;

@@ -7,10 +7,10 @@
 use std::error::Error;
 
 use mechid::estimate::frequency_domain::{
-    Lines, Motion, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
+    Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
 };
 use mechid::estimate::{Estimate, Unknowns};
-use mechid::model::Sdof;
+use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::noise::{self, Colour, NoiseLevel};
 use mechid::signal::{Multisine, Phases, Sampling};
 
@@ -26,7 +26,8 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let force = force.repeated(16)?;
 
     let lines = Lines::new(sampling, 4..=120)?;
-    let periods = RepeatedPeriods::new(&lines, &force, &displacement, Motion::Displacement)?;
+    let periods =
+        RepeatedPeriods::new(&lines, &force, &displacement, ResponseQuantity::Displacement)?;
     let unknowns = Unknowns::unknown_mass(1)?;
     show("least squares", &equation_error(&periods.mean()?, &unknowns)?)?;
     let (first, second) = periods.halves()?;

@@ -7,10 +7,10 @@
 use std::error::Error;
 
 use mechid::force::{
-    Extent, Filter, IdentifiedForce, Measurement, Noise, Quantity, Start, Tuning, frequency_domain,
+    Filter, ForceUnknowns, IdentifiedForce, Measurement, Noise, Start, Tuning, frequency_domain,
     kalman, regularised, relative_error,
 };
-use mechid::model::Sdof;
+use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::noise::{self, NoiseLevel};
 use mechid::signal::{Multisine, Phases, Record, Sampling};
 
@@ -21,7 +21,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let truth = Multisine::flat(lines, 20.0, Phases::Schroeder)?.sample(sampling)?;
     let motion = mechid::exact_periodic(&machine, &truth)?;
     let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.01), 5)?;
-    let measured = Measurement::of_all(Quantity::Displacement, noisy);
+    let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
 
     let (all, unknown) = ((1..128).collect::<Vec<_>>(), Noise::Unknown);
     // On all lines the noise of the high ones comes back multiplied by ω²m.
@@ -29,8 +29,14 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     show("every line, as it stands", &naive, &truth)?;
     let known = frequency_domain(&machine, &measured, &[0], &lines, &Noise::OutsideLines)?;
     show("the five lines that are driven", &known, &truth)?;
-    let shrunk =
-        regularised(&machine, &measured, &[0], &Extent::Period, Filter::Shrinkage, &unknown)?;
+    let shrunk = regularised(
+        &machine,
+        &measured,
+        &[0],
+        &ForceUnknowns::EveryLine,
+        Filter::Shrinkage,
+        &unknown,
+    )?;
     show("shrinkage, lines not known", &shrunk.force, &truth)?;
     let smoothed = kalman(&machine, &measured, &[0], Start::InMotion, &Tuning::Likelihood)?;
     show("Kalman smoother, no period", &smoothed.force, &truth)

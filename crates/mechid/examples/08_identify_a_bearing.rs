@@ -7,8 +7,8 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{Lines, Motion, Pooling, RepeatedPeriods, output_error};
-use mechid::model::{JournalBearing, KyxSign, OilFilm};
+use mechid::estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
+use mechid::model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity};
 use mechid::signal::noise::{self, NoiseLevel};
 use mechid::signal::{Multisine, Phases, Record, Sampling, lines};
 use nalgebra::DMatrix;
@@ -44,7 +44,7 @@ pub(crate) fn main() -> Result<(), Box<dyn Error>> {
         &Lines::new(sampling, used)?,
         &force.repeated(10)?,
         &displacement,
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
     )?;
     let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, MASS))?;
     let found = output_error(&periods.mean_with_noise(Pooling::PerLine)?, &unknowns)?.estimate;

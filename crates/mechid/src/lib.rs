@@ -2,8 +2,8 @@
 //!
 //! ```
 //! use mechid::estimate::Unknowns;
-//! use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
-//! use mechid::model::Sdof;
+//! use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+//! use mechid::model::{ResponseQuantity, Sdof};
 //! use mechid::signal::{Multisine, Phases, Sampling, lines};
 //!
 //! // Excite: ten kilograms on a spring and a damper, driven on every line of a period.
@@ -16,7 +16,7 @@
 //! // Identify from force and displacement alone.
 //! let lines = lines::full(sampling);
 //! let data =
-//!     FrequencyData::from_records(&force, response.displacement(), Motion::Displacement, lines)?;
+//!     FrequencyData::from_records(&force, response.displacement(), ResponseQuantity::Displacement, lines)?;
 //! let found = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
 //! let stiffness = found.parameter("k")?;
 //! assert!((stiffness.value / 5000.0 - 1.0).abs() < 1e-10);

@@ -2,7 +2,7 @@
 
 use mechid_signal::{counted, told};
 
-use crate::Matrix;
+use crate::{Matrix, Parameter};
 
 /// A model that cannot be made or evaluated; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -123,9 +123,84 @@ pub enum ModelError {
         /// Rows of the matrix.
         size: usize,
     },
+    /// A word that names none of the choices.
+    #[error("there is no {what} `{name}`: {known}")]
+    UnknownName {
+        /// What was to be named.
+        what: &'static str,
+        /// The word given.
+        name: String,
+        /// The words there are.
+        known: &'static str,
+    },
+    /// An entry outside M, C and K.
+    #[error(
+        "{matrix} has no entry ({row}, {column}): the system has {}",
+        counted(*dof, "degree of freedom")
+    )]
+    NoSuchEntry {
+        /// Which matrix.
+        matrix: Matrix,
+        /// Row, counted from 1.
+        row: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// A name that no entry of M, C and K has.
+    #[error(
+        "a system of {} has no parameter `{name}`: {}",
+        counted(*dof, "degree of freedom"),
+        names(*dof)
+    )]
+    NoSuchParameter {
+        /// The name given.
+        name: String,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// A covariance has not one row and column per parameter.
+    #[error("the covariance is {rows}×{columns} for {}", counted(*parameters, "parameter"))]
+    CovarianceShape {
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+        /// Parameters named.
+        parameters: usize,
+    },
+    /// A negative variance, or a covariance that is not finite.
+    #[error(
+        "{parameter} has the variance {variance}, or a covariance that is not finite: \
+         leave out parameters that the data do not determine",
+        variance = told(*variance)
+    )]
+    Covariance {
+        /// Which parameter.
+        parameter: Parameter,
+        /// The variance given, in the squared unit of the parameter.
+        variance: f64,
+    },
+    /// The same parameter was named twice.
+    #[error("{parameter} is named twice")]
+    RepeatedParameter {
+        /// Which parameter.
+        parameter: Parameter,
+    },
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+}
+
+/// First and last name of the entries for `dof` degrees of freedom.
+fn names(dof: usize) -> String {
+    let all: Vec<Parameter> = Parameter::all(dof).collect();
+    match all.as_slice() {
+        [m, c, k] => format!("{m}, {c}, {k}"),
+        [first, .., last] => format!("{first} … {last}"),
+        _ => String::new(),
+    }
 }
 
 /// `value` must be finite and satisfy `holds`, or it is named in an error.

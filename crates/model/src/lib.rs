@@ -28,28 +28,40 @@
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
 //! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
+//! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
+//! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
 
 mod closed_form;
+mod discretisation;
 mod divided_exp;
 mod error;
 mod frequency_response;
 mod initial_state;
 mod journal_bearing;
 mod modes;
+mod parameter;
 mod real_schur;
 mod response;
+mod response_quantity;
 mod sampled_force;
 mod sampling_rule;
 mod sdof;
 mod second_order;
+#[cfg(feature = "serde")]
+mod serde_forms;
+mod uncertain_system;
 
+pub use discretisation::Discretisation;
 pub use error::ModelError;
 pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
 pub use modes::Mode;
+pub use parameter::Parameter;
 pub use real_schur::RealSchur;
 pub use response::Response;
+pub use response_quantity::ResponseQuantity;
 pub use sampling_rule::npi_sampling;
 pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};
+pub use uncertain_system::UncertainSystem;

@@ -2,7 +2,7 @@
 
 use mechid_signal::{Record, Sampling};
 
-use crate::ModelError;
+use crate::{ModelError, ResponseQuantity};
 
 /// The motion of a system: three records on one time axis, one channel per degree of freedom.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +46,15 @@ impl Response {
     /// Acceleration ẍ, in m/s²: samples × degrees of freedom.
     pub fn acceleration(&self) -> &Record {
         &self.acceleration
+    }
+
+    /// One of the three, by name, in m, m/s or m/s²: samples × degrees of freedom.
+    pub fn quantity(&self, which: ResponseQuantity) -> &Record {
+        match which {
+            ResponseQuantity::Displacement => &self.displacement,
+            ResponseQuantity::Velocity => &self.velocity,
+            ResponseQuantity::Acceleration => &self.acceleration,
+        }
     }
 
     /// The common time axis.

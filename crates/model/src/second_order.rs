@@ -8,6 +8,8 @@ use crate::ModelError;
 
 /// Which of the three matrices of a [`SecondOrderSystem`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Matrix {
     /// M, in kg.
     Mass,
@@ -18,6 +20,9 @@ pub enum Matrix {
 }
 
 impl Matrix {
+    /// M, C, K, in the order of every covariance.
+    pub const ALL: [Self; 3] = [Self::Mass, Self::Damping, Self::Stiffness];
+
     /// The letter of its entries: `m`, `c` or `k`.
     pub fn letter(self) -> char {
         match self {
@@ -58,6 +63,11 @@ impl fmt::Display for Matrix {
 /// # Source
 /// Dissertation eq. (3.2.1); Bathe (1982), eq. (9.1).
 #[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "crate::serde_forms::SystemForm", into = "crate::serde_forms::SystemForm")
+)]
 pub struct SecondOrderSystem {
     mass: DMatrix<f64>,
     damping: DMatrix<f64>,

@@ -1,9 +1,9 @@
 //! What the figures draw: estimates and forces of one simulation, slips replayed or removed.
 
-use mechid::force::{Discretisation, Ends, continuous, discretised};
-use mechid::model::{KyxSign, SecondOrderSystem};
+use mechid::force::{continuous, discretised};
+use mechid::model::{Discretisation, KyxSign, SecondOrderSystem};
 use mechid::plot::Panel;
-use mechid::signal::Spectrum;
+use mechid::signal::{Extent, Spectrum};
 use nalgebra::DMatrix;
 
 use crate::thesis::case::{Case, Machine};
@@ -103,7 +103,7 @@ pub(crate) fn force_lines(
     let found = match equation {
         Equation::Continuous => continuous(&machine, &sequences.response),
         Equation::Discretised => {
-            discretised(&machine, &sequences.response, Discretisation::Euler, Ends::Periodic)
+            discretised(&machine, &sequences.response, Discretisation::Euler, Extent::WholePeriod)
         }
     };
     let spectrum = Spectrum::of(found.map_err(|error| error.to_string())?.record());

@@ -1,9 +1,10 @@
 //! Stiffness and damping from the sequences of a simulation, with and without slips.
 
-use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::time_domain::TimeDomain;
 use mechid::estimate::{LeastSquares, Unknowns};
-use mechid::signal::Spectrum;
+use mechid::model::{Discretisation, ResponseQuantity};
+use mechid::signal::{Extent, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use super::simulate::Sequences;
@@ -17,7 +18,7 @@ pub fn frequency(sequences: &Sequences) -> Listed {
     let data = FrequencyData::from_records(
         &sequences.force,
         sequences.response.displacement(),
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
         1..(sampling.len() - 1).div_ceil(2),
     )
     .map_err(words)?;
@@ -27,8 +28,9 @@ pub fn frequency(sequences: &Sequences) -> Listed {
 /// The same with the harmonic offset: harmonic n at (n + 1)·ω0, the mean among the harmonics.
 pub fn frequency_offset(sequences: &Sequences) -> Listed {
     let (omega, force, displacement) = amplitudes(sequences, 1);
-    let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)
-        .map_err(words)?;
+    let data =
+        FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)
+            .map_err(words)?;
     fit(sequences, &data)
 }
 

@@ -7,7 +7,9 @@
 //! steady state of the other tables; no such run gave the digits either.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::estimate::time_domain::TimeDomain;
+use mechid::model::Discretisation;
+use mechid::signal::Extent;
 use mechid::signal::resample::refine;
 use mechid::signal::{Interpolation, Record};
 

@@ -4,10 +4,10 @@
 //! [`SETTING`]; what can be judged to the digit are the theoretical rows.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid::estimate::time_domain::TimeDomain;
 use mechid::integrate::{Newmark, RungeKutta4, Scheme, integrate_periodic};
-use mechid::model::{Mode, Response, SecondOrderSystem, npi_sampling};
-use mechid::signal::{Multisine, Phases, Record, lines};
+use mechid::model::{Discretisation, Mode, Response, SecondOrderSystem, npi_sampling};
+use mechid::signal::{Extent, Multisine, Phases, Record, lines};
 use mechid_problems::steffen_rade;
 use nalgebra::{Complex, DMatrix};
 

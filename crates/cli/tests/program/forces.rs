@@ -4,13 +4,10 @@ use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
-use mechid::force::{
-    Discretisation, Ends, Entry, MotionNoise, SystemCovariance, discretised,
-    discretised_with_noise, with_uncertain_system,
-};
+use mechid::force::{MotionNoise, discretised, discretised_with_noise, with_uncertain_system};
 use mechid::io::{Table, TimeAxis, csv_text};
-use mechid::model::{Matrix, Response, SecondOrderSystem};
-use mechid::signal::{Record, Sampling};
+use mechid::model::{Discretisation, Parameter, Response, SecondOrderSystem, UncertainSystem};
+use mechid::signal::{Extent, Record, Sampling};
 use nalgebra::dmatrix;
 use serde_json::Value;
 
@@ -195,17 +192,14 @@ fn from_sample_to_sample_stretches_join_without_a_seam() {
     let response = Response::new(channel(x), channel(v), channel(vec![0.0; SAMPLES])).unwrap();
     let [m, c, k] = MACHINE;
     let system = SecondOrderSystem::new(dmatrix![m], dmatrix![c], dmatrix![k]).unwrap();
-    let entries = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness];
-    let entries = entries.map(|matrix| Entry { matrix, row: 0, column: 0 }).to_vec();
     let [vm, vc, vk] = ERRORS.map(|error| error * error);
     let covariance = dmatrix![vm, 0.0, 0.0; 0.0, vc, 0.0; 0.0, 0.0, vk];
-    let covariance = SystemCovariance::new(entries, covariance).unwrap();
-    let (linear, ends) = (Discretisation::ExactLinear, Ends::Open);
+    let machine = UncertainSystem::new(system, Parameter::all(1).collect(), covariance).unwrap();
+    let (linear, ends) = (Discretisation::FirstOrderHold, Extent::Open);
     let noise = MotionNoise::new(vec![1e-6], vec![2e-5], vec![]).unwrap();
-    let alone = with_uncertain_system(&system, &covariance, |system| {
-        discretised(system, &response, linear, ends)
-    });
-    let noisy = with_uncertain_system(&system, &covariance, |system| {
+    let alone =
+        with_uncertain_system(&machine, |system| discretised(system, &response, linear, ends));
+    let noisy = with_uncertain_system(&machine, |system| {
         discretised_with_noise(system, &response, linear, ends, &noise)
     });
     for (written, at_once) in [(machine_alone, alone.unwrap()), (with_noise, noisy.unwrap())] {

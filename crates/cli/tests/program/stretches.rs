@@ -3,12 +3,13 @@
 use std::fs;
 
 use mechid::estimate::derivatives::SavitzkyGolay;
-use mechid::estimate::frequency_domain::Motion;
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
+use mechid::estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid::estimate::{Unknowns, fit_percent, fitted_start, predict};
 use mechid::io::{Table, TimeAxis};
-use mechid::model::Sdof;
-use mechid::signal::{Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid::model::{Discretisation, ResponseQuantity, Sdof};
+use mechid::signal::{
+    Extent, Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise,
+};
 use mechid_problems::exact_harmonic_periodic;
 use serde_json::Value;
 
@@ -221,7 +222,7 @@ fn a_long_text_is_predicted_as_one_record() {
     let number = |at: usize| report["parameters"][at]["value"].as_f64().unwrap();
     let system = Sdof::new(number(0), number(1), number(2)).unwrap().system();
     let hold = Discretisation::FirstOrderHold;
-    let measured = [(Motion::Displacement, &x), (Motion::Velocity, &v)];
+    let measured = [(ResponseQuantity::Displacement, &x), (ResponseQuantity::Velocity, &v)];
     let start = fitted_start(&system, &f, hold, &measured).unwrap();
     let judge = predict(&system, &f, hold, Extent::Open, &start).unwrap();
     for (at, (record, predicted)) in

@@ -1,13 +1,14 @@
 //! Whether a record will do for a time-domain fit.
 
+use mechid_signal::Extent;
 use std::f64::consts::TAU;
 
-use mechid_model::{Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
 use mechid_signal::{Record, Spectrum, counted};
 
 use super::{Check, Subject, Verdict, claimed_period};
-use crate::time_domain::{Discretisation, Extent, TimeDomain, Transitions, equation_of_motion};
+use crate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use crate::{EstimateError, Unknowns};
 
 /// Lines weaker than this share of the strongest do not count as excitation.

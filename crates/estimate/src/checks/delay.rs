@@ -1,14 +1,14 @@
 //! Whether force and motion are apart in time.
 
 use mechid_model::Response;
-use mechid_signal::Record;
+use mechid_signal::{Extent, Record};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::after::{ROUNDING, SIGNIFICANT};
 use super::{Check, LOOKED_AT, Subject, Verdict};
 use crate::frequency_domain::{FrequencyData, late_rows};
-use crate::time_domain::{Extent, TimeDomain, equation_of_motion};
+use crate::time_domain::{TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// Samples that the motion is moved by, at most, to either side.

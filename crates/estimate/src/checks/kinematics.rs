@@ -1,10 +1,10 @@
 //! Whether displacement, velocity and acceleration are those of one motion.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 
 use super::{Check, Subject, Verdict, six_digits};
 use crate::EstimateError;
-use crate::frequency_domain::Motion;
 
 /// A gain beyond this factor of 1 is no error of sensors, nor of the rule between two samples, which
 /// reaches it at four tenths of the sampling rate.
@@ -24,9 +24,15 @@ const ERRORS: f64 = 4.0;
 /// # Source
 /// Ours: regression of x(k+1) − x(k) on the trapezoidal rule for ẋ, and of x(k+1) − 2x(k) + x(k−1) on
 /// ẍ(k)Δt².
-pub fn kinematics(motions: &[(Motion, &Record)]) -> Result<Vec<Check>, EstimateError> {
-    let of = |kind: Motion| motions.iter().find(|motion| motion.0 == kind).map(|motion| motion.1);
-    let kinds = [Motion::Displacement, Motion::Velocity, Motion::Acceleration];
+pub fn kinematics(motions: &[(ResponseQuantity, &Record)]) -> Result<Vec<Check>, EstimateError> {
+    let of = |kind: ResponseQuantity| {
+        motions.iter().find(|motion| motion.0 == kind).map(|motion| motion.1)
+    };
+    let kinds = [
+        ResponseQuantity::Displacement,
+        ResponseQuantity::Velocity,
+        ResponseQuantity::Acceleration,
+    ];
     let [x, v, a] = kinds.map(of);
     let pairs = match (x, v, a) {
         (Some(x), None, Some(a)) => vec![(kinds[0], x, kinds[2], a)],
@@ -41,7 +47,8 @@ pub fn kinematics(motions: &[(Motion, &Record)]) -> Result<Vec<Check>, EstimateE
     for (kind, low, other, high) in pairs {
         low.check_same_sampling(high)?;
         crate::least_squares::size("channels of the motion", low.channels(), high.channels())?;
-        let twice = other == Motion::Acceleration && kind == Motion::Displacement;
+        let twice =
+            other == ResponseQuantity::Acceleration && kind == ResponseQuantity::Displacement;
         for channel in 0..low.channels() {
             let [low, high] = [low, high].map(|record| record.channel(channel));
             let gain = gain(low, high, motions[0].1.sampling().dt(), twice);
@@ -88,7 +95,12 @@ fn gain(low: &[f64], high: &[f64], dt: f64, twice: bool) -> Option<Gain> {
 }
 
 impl Gain {
-    fn check(self, kind: Motion, other: Motion, channel: usize) -> Option<Check> {
+    fn check(
+        self,
+        kind: ResponseQuantity,
+        other: ResponseQuantity,
+        channel: usize,
+    ) -> Option<Check> {
         let near = (1.0 / FACTOR..=FACTOR).contains(&self.value);
         if near || (self.value - 1.0).abs() <= ERRORS * self.standard_error {
             return None;

@@ -1,12 +1,12 @@
 //! Whether what a fit leaves goes with the square or the cube of the motion.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::after::{SIGNIFICANT, p_told};
 use super::{Check, Subject, Verdict};
-use crate::frequency_domain::Motion;
 use crate::{Estimate, EstimateError, predict_periodic};
 
 /// The powers of the displacement that are looked for, and what they are called.
@@ -32,7 +32,7 @@ pub fn linearity(
     estimate: &Estimate,
     force: &Record,
     motion: &Record,
-    measured: Motion,
+    measured: ResponseQuantity,
     band_hz: [f64; 2],
 ) -> Result<Check, EstimateError> {
     force.check_same_sampling(motion)?;

@@ -1,10 +1,10 @@
 //! Whether the force drives the machine, or the machine the force.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 
 use super::{Check, Subject, Verdict};
 use crate::EstimateError;
-use crate::frequency_domain::Motion;
 
 /// Power taken out of a machine, as a part of the apparent power, that is neither noise nor leakage.
 const TAKEN_OUT: f64 = 0.05;
@@ -31,7 +31,7 @@ const CARRIED: f64 = 1e-3;
 pub fn power(
     force: &Record,
     motion: &Record,
-    measured: Motion,
+    measured: ResponseQuantity,
 ) -> Result<Option<Check>, EstimateError> {
     force.check_same_sampling(motion)?;
     crate::least_squares::size("channels of the motion", force.channels(), motion.channels())?;
@@ -46,8 +46,8 @@ pub fn power(
     for dof in 0..force.channels() {
         for n in carried(dof) {
             let omega = forces.omega(n);
-            let per_motion =
-                Motion::Velocity.per_displacement(omega) / measured.per_displacement(omega);
+            let per_motion = ResponseQuantity::Velocity.per_displacement(omega)
+                / measured.per_displacement(omega);
             let (f, v) = (forces.line(n, dof), per_motion * motions.line(n, dof));
             lines.push((f * v.conj()).re);
             apparent += f.norm() * v.norm();

@@ -1,6 +1,6 @@
 //! Whether noise on the measured motion biases least squares where its residual does not show it.
 
-use mechid_model::Response;
+use mechid_model::{Matrix, Parameter, Response};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -8,8 +8,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::after::{ROUNDING, SIGNIFICANT, p_told};
 use super::correlation::whiteness;
 use super::{Check, LOOKED_AT, Subject, Verdict, six_digits};
-use crate::unknowns::MATRICES;
-use crate::{Estimate, EstimateError, LeastSquares, Parameter};
+use crate::{Estimate, EstimateError, LeastSquares};
 
 /// Lags up to which the residual must be white for the test to hold.
 const LAGS: usize = 25;
@@ -95,7 +94,7 @@ impl Equation {
         let rows = force.len().min(LOOKED_AT) - 2;
         let at = |p: &Parameter, k: usize| motions[p.matrix() as usize][(k, p.column())];
         let mut target = force.data().column(dof).rows(1, rows).into_owned();
-        for matrix in MATRICES {
+        for matrix in Matrix::ALL {
             for column in 0..response.dof() {
                 if let Some(value) = estimate.unknowns().fixed(matrix, dof, column) {
                     let motion = motions[matrix as usize].column(column);

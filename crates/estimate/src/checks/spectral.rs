@@ -1,12 +1,13 @@
 //! Whether a record will do for a fit of its spectra.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, counted};
 
 use super::before::{
     LINE_FLOOR, conditioning, fastest_mode, grade, periodicity, unknowns_of_an_equation,
 };
 use super::{Check, Subject, Verdict, claimed_period};
-use crate::frequency_domain::{FrequencyData, Lines, Motion, RepeatedPeriods, equation_rows};
+use crate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods, equation_rows};
 use crate::{Estimate, EstimateError, Frf, Unknowns};
 
 /// Periods that differ from their mean by these shares of the motion are hardly, or not, periods of
@@ -26,7 +27,7 @@ pub fn before_spectral_fit(
     lines: &Lines,
     force: &Record,
     motion: &Record,
-    measured: Motion,
+    measured: ResponseQuantity,
     unknowns: &Unknowns,
 ) -> Result<Vec<Check>, EstimateError> {
     let data = RepeatedPeriods::new(lines, force, motion, measured)?.mean()?;

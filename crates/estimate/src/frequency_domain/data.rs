@@ -1,9 +1,10 @@
 //! Forces and displacements at chosen frequencies: what every estimator of this module takes.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use super::{Lines, Motion, NoiseSpectrum};
+use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
 
 /// Complex amplitudes of forces and displacements, one row per frequency and experiment.
@@ -15,7 +16,7 @@ pub struct FrequencyData {
     omega: Vec<f64>,
     force: DMatrix<Complex<f64>>,
     displacement: DMatrix<Complex<f64>>,
-    measured: Motion,
+    measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
 }
 
@@ -31,7 +32,7 @@ impl FrequencyData {
     pub fn from_records(
         force: &Record,
         motion: &Record,
-        measured: Motion,
+        measured: ResponseQuantity,
         lines: impl IntoIterator<Item = usize>,
     ) -> Result<Self, EstimateError> {
         Self::read(&Lines::new(force.sampling(), lines)?, force, motion, measured)
@@ -46,7 +47,7 @@ impl FrequencyData {
         lines: &Lines,
         force: &Record,
         motion: &Record,
-        measured: Motion,
+        measured: ResponseQuantity,
     ) -> Result<Self, EstimateError> {
         Self::from_amplitudes(lines.omega(), lines.read(force)?, lines.read(motion)?, measured)
     }
@@ -59,7 +60,7 @@ impl FrequencyData {
     pub fn from_spectra(
         force: &Spectrum,
         motion: &Spectrum,
-        measured: Motion,
+        measured: ResponseQuantity,
         lines: impl IntoIterator<Item = usize>,
     ) -> Result<Self, EstimateError> {
         super::lines::check_sampling(force.sampling(), motion.sampling())?;
@@ -82,7 +83,7 @@ impl FrequencyData {
         omega: Vec<f64>,
         force: DMatrix<Complex<f64>>,
         mut motion: DMatrix<Complex<f64>>,
-        measured: Motion,
+        measured: ResponseQuantity,
     ) -> Result<Self, EstimateError> {
         check_shapes(&omega, &force, &motion)?;
         for (r, &w) in omega.iter().enumerate() {
@@ -117,7 +118,7 @@ impl FrequencyData {
     ///
     /// # Errors
     /// [`EstimateError::Size`] if the numbers of degrees of freedom differ,
-    /// [`EstimateError::MixedMotion`] if the quantities measured do.
+    /// [`EstimateError::MixedQuantities`] if the quantities measured do.
     pub fn and(&self, other: &Self) -> Result<Self, EstimateError> {
         if self.dof() != other.dof() {
             let (got, expected) = (other.dof(), self.dof());
@@ -128,7 +129,10 @@ impl FrequencyData {
             });
         }
         if self.measured != other.measured {
-            return Err(EstimateError::MixedMotion { left: self.measured, right: other.measured });
+            return Err(EstimateError::MixedQuantities {
+                left: self.measured,
+                right: other.measured,
+            });
         }
         let stack = |upper: &DMatrix<Complex<f64>>, lower: &DMatrix<Complex<f64>>| {
             let mut both =
@@ -172,7 +176,7 @@ impl FrequencyData {
     }
 
     /// The quantity the motion was measured as.
-    pub fn measured(&self) -> Motion {
+    pub fn measured(&self) -> ResponseQuantity {
         self.measured
     }
 

@@ -15,7 +15,8 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 /// Parameters the lines do not excite are reported in [`Estimate::undetermined`].
 ///
 /// ```
-/// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, Motion, equation_error}};
+/// use mechid_model::ResponseQuantity;
+/// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, equation_error}};
 /// use nalgebra::{Complex, DMatrix};
 ///
 /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies.
@@ -25,7 +26,7 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 ///     let w = omega[row];
 ///     force[(row, 0)] / Complex::new(5000.0 - 10.0 * w * w, 180.0 * w)
 /// });
-/// let data = FrequencyData::from_amplitudes(omega, force, displacement, Motion::Displacement)?;
+/// let data = FrequencyData::from_amplitudes(omega, force, displacement, ResponseQuantity::Displacement)?;
 /// let found = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
 /// assert!((found.stiffness()[(0, 0)] - 5000.0).abs() < 1e-9);
 /// # Ok::<(), mechid_estimate::EstimateError>(())

@@ -1,13 +1,13 @@
 //! Instrumental variables: another measurement of the same motion rids least squares of its bias.
 
-use mechid_model::Matrix;
+use mechid_model::{Matrix, Parameter};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::FrequencyData;
 use super::data::check_same_frequencies;
 use super::equation_error::{equation_rows, real_rows};
 use crate::estimate::Findings;
-use crate::{Estimate, EstimateError, Parameter, Unknowns};
+use crate::{Estimate, EstimateError, Unknowns};
 
 /// The equation of motion solved with two measurements of the same experiment, each the
 /// instrument of the other.

@@ -10,8 +10,9 @@
 //! | [`output_error`] | no bias, the least scatter, intervals that hold | some Gauss–Newton steps |
 //!
 //! ```
+//! use mechid_model::ResponseQuantity;
 //! use mechid_estimate::Unknowns;
-//! use mechid_estimate::frequency_domain::{Lines, Motion, Pooling, RepeatedPeriods, output_error};
+//! use mechid_estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
 //! use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 //!
 //! // Eight periods of 10 ẍ + 180 ẋ + 5000 x = F under five cosines, x measured with 1 % noise.
@@ -31,7 +32,7 @@
 //! let x = noise::add_white(&Record::from_channel(whole, x)?, NoiseLevel::FractionOfRms(0.01), 1)?;
 //!
 //! let lines = Lines::new(period, [1, 3, 5, 7, 9])?;
-//! let periods = RepeatedPeriods::new(&lines, &force, &x, Motion::Displacement)?;
+//! let periods = RepeatedPeriods::new(&lines, &force, &x, ResponseQuantity::Displacement)?;
 //! let data = periods.mean_with_noise(Pooling::AllLines)?;
 //! let fit = output_error(&data, &Unknowns::unknown_mass(1)?)?;
 //! let stiffness = fit.estimate.parameter("k")?;
@@ -46,7 +47,6 @@ mod instrumental;
 mod levenberg_marquardt;
 mod lines;
 mod misfit;
-mod motion;
 mod output_error;
 mod periods;
 
@@ -56,7 +56,6 @@ pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub use lines::Lines;
 pub(crate) use lines::check_sampling;
-pub use motion::Motion;
 pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{OutputErrorFit, output_error};
 pub use periods::RepeatedPeriods;

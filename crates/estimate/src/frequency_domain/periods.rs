@@ -1,9 +1,10 @@
 //! Repeated periods of one experiment: their mean, their scatter, and independent halves.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix};
 
-use super::{FrequencyData, Lines, Motion, NoiseSpectrum, Pooling};
+use super::{FrequencyData, Lines, NoiseSpectrum, Pooling};
 use crate::EstimateError;
 
 /// Forces and motions at chosen lines, period by period, of a steady periodic experiment.
@@ -17,7 +18,7 @@ use crate::EstimateError;
 #[derive(Debug, Clone)]
 pub struct RepeatedPeriods {
     lines: Lines,
-    measured: Motion,
+    measured: ResponseQuantity,
     dof: usize,
     /// Periods to come, by which they are split into halves.
     expected: usize,
@@ -45,7 +46,7 @@ impl RepeatedPeriods {
         lines: &Lines,
         force: &Record,
         motion: &Record,
-        measured: Motion,
+        measured: ResponseQuantity,
     ) -> Result<Self, EstimateError> {
         let periods = force.len() / lines.sampling().len();
         let mut all = Self::expecting(lines, force.channels(), measured, periods);
@@ -55,7 +56,12 @@ impl RepeatedPeriods {
 
     /// No periods yet of a machine of `dof` degrees of freedom; `periods` are to come, a few at a time:
     /// memory does not grow with their number.
-    pub fn expecting(lines: &Lines, dof: usize, measured: Motion, periods: usize) -> Self {
+    pub fn expecting(
+        lines: &Lines,
+        dof: usize,
+        measured: ResponseQuantity,
+        periods: usize,
+    ) -> Self {
         let zero = DMatrix::zeros(lines.as_slice().len(), 2 * dof);
         Self {
             lines: lines.clone(),

@@ -1,5 +1,6 @@
 //! Cross-spectra of force and motion, averaged over pieces of records of any length.
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 use nalgebra::DMatrix;
 
@@ -7,7 +8,7 @@ use super::cross_spectra::CrossSpectra;
 use super::segments::{amplitudes, overlap_loss};
 use super::{Frf, FrfEstimator, Segments};
 use crate::EstimateError;
-use crate::frequency_domain::{Lines, Motion};
+use crate::frequency_domain::Lines;
 
 /// What frequency responses are estimated from, gathered stretch by stretch; memory does not grow
 /// with the record.
@@ -16,7 +17,7 @@ pub struct FrfAverage {
     lines: Lines,
     inputs: usize,
     outputs: usize,
-    measured: Motion,
+    measured: ResponseQuantity,
     segments: Segments,
     weights: Option<Vec<f64>>,
     pieces: usize,
@@ -32,7 +33,7 @@ impl FrfAverage {
     pub fn new(
         lines: Lines,
         [inputs, outputs]: [usize; 2],
-        measured: Motion,
+        measured: ResponseQuantity,
         segments: Segments,
     ) -> Result<Self, EstimateError> {
         let (expected, got) = (segments.samples(), lines.sampling().len());

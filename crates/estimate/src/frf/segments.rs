@@ -17,6 +17,8 @@ const FARTHEST_LINES: usize = 16;
 
 /// How a record is cut into pieces to average over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Segments {
     /// Whole periods of so many samples, for a periodic excitation in steady state: no
     /// window, no leakage.
@@ -37,6 +39,8 @@ pub enum Segments {
 /// # Source
 /// Harris (1978), Proceedings of the IEEE 66, 51–83.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Window {
     /// ½ − ½ cos: the usual choice for a random excitation.
     Hann,

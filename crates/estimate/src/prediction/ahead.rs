@@ -1,13 +1,13 @@
 //! What an identified machine predicts wrong from one measured sample to the next.
 
-use mechid_model::Matrix;
+use mechid_model::{Discretisation, Matrix};
+use mechid_signal::Extent;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::Step;
 use crate::least_squares::{size, solve_compressed};
-use crate::time_domain::{Discretisation, Extent};
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
 
@@ -67,7 +67,7 @@ pub fn missing_force(
     let mut missing = rise(&|k, c| ahead[(k, c)]);
     let predicted = (ahead - v) / dt;
     for equation in 0..n {
-        let of = |parameter: &crate::Parameter| match parameter.matrix() {
+        let of = |parameter: &mechid_model::Parameter| match parameter.matrix() {
             Matrix::Mass => predicted.column(parameter.column()).into_owned(),
             Matrix::Damping => v.column(parameter.column()).into_owned(),
             Matrix::Stiffness => x.column(parameter.column()).into_owned(),

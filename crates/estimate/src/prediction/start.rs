@@ -1,14 +1,12 @@
 //! Where a machine started, from how it moved.
 
-use mechid_model::{InitialState, Response, SecondOrderSystem};
-use mechid_signal::Record;
+use mechid_model::{Discretisation, InitialState, Response, ResponseQuantity, SecondOrderSystem};
+use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::predict;
 use crate::EstimateError;
-use crate::frequency_domain::Motion;
 use crate::least_squares::size;
-use crate::time_domain::{Discretisation, Extent};
 use crate::triangular::TriangularFactor;
 
 /// Relative singular value below which a direction of the start does not show in the motion.
@@ -32,7 +30,7 @@ pub fn fitted_start(
     system: &SecondOrderSystem,
     force: &Record,
     discretisation: Discretisation,
-    measured: &[(Motion, &Record)],
+    measured: &[(ResponseQuantity, &Record)],
 ) -> Result<InitialState, EstimateError> {
     let mut fit = StartFit::new(system, discretisation)?;
     fit.push(force, measured)?;
@@ -83,7 +81,7 @@ impl StartFit {
     pub fn push(
         &mut self,
         force: &Record,
-        measured: &[(Motion, &Record)],
+        measured: &[(ResponseQuantity, &Record)],
     ) -> Result<(), EstimateError> {
         let (n, len) = (self.system.dof(), force.len());
         for (_, record) in measured {
@@ -110,7 +108,7 @@ impl StartFit {
             all.zip(self.channels.iter_mut().zip(&mut self.sizes))
         {
             let own = record.channel(c);
-            let column = |at: usize| channels(&responses[at], kind).channel(c);
+            let column = |at: usize| responses[at].quantity(kind).channel(c);
             let rows = DMatrix::from_fn(len - seen, 2 * n + 1, |k, at| match at {
                 gap if gap == 2 * n => own[seen + k] - column(gap)[seen + k],
                 free => column(free)[seen + k],
@@ -172,12 +170,4 @@ fn last(response: &Response) -> Result<InitialState, EstimateError> {
 
 fn state(values: &DVector<f64>, n: usize) -> Result<InitialState, EstimateError> {
     Ok(InitialState::new(values.rows(0, n).into_owned(), values.rows(n, n).into_owned())?)
-}
-
-fn channels(response: &Response, kind: Motion) -> &Record {
-    match kind {
-        Motion::Displacement => response.displacement(),
-        Motion::Velocity => response.velocity(),
-        Motion::Acceleration => response.acceleration(),
-    }
 }

@@ -1,8 +1,8 @@
 //! From the motion between samples to the motion in time, and how errors follow.
 
+use mechid_model::Discretisation;
 use nalgebra::DMatrix;
 
-use super::Discretisation;
 use crate::EstimateError;
 use crate::logarithm::Generator;
 

@@ -1,14 +1,14 @@
 //! The time-domain estimate: M, C, K and the transition they come from.
 
-use mechid_model::Matrix;
-use mechid_signal::Record;
+use mechid_model::{Discretisation, Matrix, Parameter};
+use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, RowDVector};
 
+use super::Transitions;
 use super::continuous::Continuous;
-use super::{Discretisation, Extent, Transitions};
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, size, solve_compressed};
-use crate::{EquationOfMotion, Estimate, EstimateError, Parameter, Undetermined, Unknowns};
+use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
 /// M̂, Ĉ, K̂ and the sampled and continuous state equations they were found through.
 ///

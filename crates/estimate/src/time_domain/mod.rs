@@ -18,9 +18,10 @@
 //!
 //! ```
 //! use mechid_estimate::Unknowns;
-//! use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+//! use mechid_estimate::time_domain::TimeDomain;
+//! use mechid_model::Discretisation;
 //! use mechid_problems::{dissertation_sdof, exact_zoh_periodic};
-//! use mechid_signal::{Record, Sampling};
+//! use mechid_signal::{Extent, Record, Sampling};
 //!
 //! let machine = dissertation_sdof().system();
 //! let force = Record::from_fn(Sampling::new(0.02, 64)?, |t| 50.0 * (9.0 * t * t).sin())?;
@@ -43,43 +44,14 @@ mod direct;
 mod fit;
 mod transitions;
 
-use mechid_signal::{Interpolation, Record};
+use mechid_model::Discretisation;
+use mechid_signal::{Extent, Interpolation, Record};
 
 pub use direct::equation_of_motion;
 pub use fit::TimeDomainFit;
 pub use transitions::Transitions;
 
 use crate::{EstimateError, Unknowns};
-
-/// What is assumed of the time between two samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Discretisation {
-    /// z⁺ = z + Δt ż: Φ = I + AΔt, Γ = BΔt. Biased by terms of order Δt.
-    ///
-    /// # Source
-    /// Dissertation eqs. (4.5.9)–(4.5.12), (4.5.28).
-    Euler,
-    /// The force is held from its sample to the next: Φ = exp(AΔt), Γ = ∫₀^Δt exp(As) ds B.
-    ///
-    /// # Source
-    /// Åström & Wittenmark, *Computer-Controlled Systems*, 3rd ed. (1997), section 2.3 (zero-order
-    /// hold and its inverse by the matrix logarithm).
-    ZeroOrderHold,
-    /// The force is linear between samples: Φ as above, z⁺ = Φ z + Γ₀ F + Γ₁ F⁺, where
-    /// Γ₀ + Γ₁ = ∫₀^Δt exp(As) ds B.
-    FirstOrderHold,
-}
-
-/// What the samples of a record are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Extent {
-    /// Any stretch of motion: N samples give N − 1 rows.
-    Open,
-    /// Exactly one period: the first sample follows the last again, N samples give N rows.
-    WholePeriod,
-}
 
 /// A time-domain estimator: a discretisation, and what the records are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,12 @@
 //! Pairs of neighbouring samples, gathered from any number of records.
 
+use mechid_model::Discretisation;
+use mechid_signal::Extent;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record, Sampling};
 use nalgebra::{DMatrix, DMatrixView};
 
-use super::{Discretisation, Extent, TimeDomainFit};
+use super::TimeDomainFit;
 use crate::least_squares::size;
 use crate::triangular::TriangularFactor;
 use crate::{EstimateError, Unknowns};

@@ -4,12 +4,14 @@ use mechid_estimate::checks::{
     Check, Subject, Verdict, delay_at_samples, delay_between_samples, delay_of_lines, kinematics,
     noise_on_motion, power, range,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Motion};
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
+use mechid_estimate::frequency_domain::FrequencyData;
+use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{EstimateError, Unknowns};
-use mechid_model::{Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, lines, noise};
+use mechid_signal::{
+    Extent, Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, lines, noise,
+};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
@@ -119,7 +121,8 @@ fn instruments_rid_a_parameter_of_its_bias() {
 }
 
 fn of_lines(system: &SecondOrderSystem, force: &Record, motion: &Record) -> Option<Check> {
-    let data = FrequencyData::from_records(force, motion, Motion::Displacement, lines::odd(127));
+    let data =
+        FrequencyData::from_records(force, motion, ResponseQuantity::Displacement, lines::odd(127));
     let unknowns = Unknowns::unknown_mass(system.dof()).unwrap();
     delay_of_lines(&data.unwrap(), force.sampling().dt(), &unknowns)
 }
@@ -174,8 +177,8 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
                 let said = [
                     of_lines(&system, &force, x),
                     delay_at_samples(&response, &force, &unknowns),
-                    power(&force, x, Motion::Displacement).unwrap(),
-                    power(&force, response.acceleration(), Motion::Acceleration).unwrap(),
+                    power(&force, x, ResponseQuantity::Displacement).unwrap(),
+                    power(&force, response.acceleration(), ResponseQuantity::Acceleration).unwrap(),
                 ];
                 assert_eq!(said, [None, None, None, None], "{seed} {share}");
                 assert_eq!(range("displacement", x), []);
@@ -190,7 +193,7 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
 /// Of motions that have nothing to do with the force, too: half of the lines take power out.
 #[test]
 fn forces_that_take_power_out_are_told() {
-    let kind = Motion::Displacement;
+    let kind = ResponseQuantity::Displacement;
     for seed in 0..50 {
         let force = force(&oscillator(), seed);
         let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
@@ -209,11 +212,11 @@ fn forces_that_take_power_out_are_told() {
     assert!(matches!(power(&one, &two, kind), Err(EstimateError::Signal(_))));
 }
 
-fn motions(response: &Response) -> [(Motion, &Record); 3] {
+fn motions(response: &Response) -> [(ResponseQuantity, &Record); 3] {
     [
-        (Motion::Displacement, response.displacement()),
-        (Motion::Velocity, response.velocity()),
-        (Motion::Acceleration, response.acceleration()),
+        (ResponseQuantity::Displacement, response.displacement()),
+        (ResponseQuantity::Velocity, response.velocity()),
+        (ResponseQuantity::Acceleration, response.acceleration()),
     ]
 }
 

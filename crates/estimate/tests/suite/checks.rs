@@ -3,14 +3,14 @@
 use mechid_estimate::checks::{
     Subject, Verdict, before_fit, claimed_period, cross_correlation, whiteness, whiteness_beyond,
 };
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid_estimate::time_domain::TimeDomain;
 use mechid_estimate::{Estimate, EstimateError, Unknowns, fit_percent, predict, sweep};
-use mechid_model::{InitialState, KyxSign, Response, npi_sampling};
+use mechid_model::{Discretisation, InitialState, KyxSign, Response, npi_sampling};
 use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic, exact_zoh,
     exact_zoh_periodic,
 };
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::DVector;
 
 fn force(sampling: Sampling, lines: std::ops::RangeInclusive<usize>) -> Record {

@@ -3,9 +3,9 @@
 use crate::common::{
     bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, Motion, equation_error};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
 use mechid_estimate::{EstimateError, Unknowns};
-use mechid_model::{Matrix, SecondOrderSystem};
+use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
@@ -29,19 +29,23 @@ fn chain() -> SecondOrderSystem {
 }
 
 /// Force and motion records of the exact steady state over one period.
-fn records(system: &SecondOrderSystem, measured: Motion) -> (Record, Record, Vec<usize>) {
+fn records(system: &SecondOrderSystem, measured: ResponseQuantity) -> (Record, Record, Vec<usize>) {
     let (sampling, lines) = sampling(system);
     let omega: Vec<f64> = lines.iter().map(|&n| n as f64 * sampling.omega0()).collect();
     let force = forces(&lines, system.dof(), 50.0);
     let motion = displacements(system, &omega, &force);
-    let force = synthesise(sampling, &lines, &force, Motion::Displacement);
+    let force = synthesise(sampling, &lines, &force, ResponseQuantity::Displacement);
     (force, synthesise(sampling, &lines, &motion, measured), lines)
 }
 
 #[test]
 fn exact_steady_states_give_the_machine_back() {
     for system in [oscillator(), bearing(), chain()] {
-        for measured in [Motion::Displacement, Motion::Velocity, Motion::Acceleration] {
+        for measured in [
+            ResponseQuantity::Displacement,
+            ResponseQuantity::Velocity,
+            ResponseQuantity::Acceleration,
+        ] {
             let (force, motion, lines) = records(&system, measured);
             let data = FrequencyData::from_records(&force, &motion, measured, lines).unwrap();
             let n = system.dof();
@@ -70,9 +74,10 @@ fn exact_steady_states_give_the_machine_back() {
 #[test]
 fn spectra_and_few_chosen_lines_do_as_well() {
     let system = bearing();
-    let (force, motion, _) = records(&system, Motion::Displacement);
+    let (force, motion, _) = records(&system, ResponseQuantity::Displacement);
     let (f, x) = (Spectrum::of(&force), Spectrum::of(&motion));
-    let data = FrequencyData::from_spectra(&f, &x, Motion::Displacement, [3, 9, 17, 40]).unwrap();
+    let data = FrequencyData::from_spectra(&f, &x, ResponseQuantity::Displacement, [3, 9, 17, 40])
+        .unwrap();
     let found = equation_error(&data, &Unknowns::unknown_mass(2).unwrap()).unwrap();
     assert!(relative_error(&found.stiffness(), system.stiffness()) < 1e-10);
 }
@@ -87,7 +92,8 @@ fn two_experiments_are_one_estimate() {
         let mut force = forces(&lines, 2, 1.0);
         force.column_mut(1 - dof).fill(Complex::default());
         let motion = displacements(&system, &omega, &force);
-        FrequencyData::from_amplitudes(omega.clone(), force, motion, Motion::Displacement).unwrap()
+        FrequencyData::from_amplitudes(omega.clone(), force, motion, ResponseQuantity::Displacement)
+            .unwrap()
     };
     let both = experiment(0).and(&experiment(1)).unwrap();
     let found = equation_error(&both, &Unknowns::unknown_mass(2).unwrap()).unwrap();
@@ -99,7 +105,7 @@ fn two_experiments_are_one_estimate() {
 fn an_unforced_direction_needs_a_known_mass() {
     // As in the dissertation: force on the second direction only.
     let system = bearing();
-    let (force, _, lines) = records(&system, Motion::Displacement);
+    let (force, _, lines) = records(&system, ResponseQuantity::Displacement);
     let zero = vec![0.0; force.len()];
     let force = Record::from_channels(force.sampling(), &[&zero[..], force.channel(1)]).unwrap();
     let amplitudes = Lines::new(force.sampling(), lines.clone()).unwrap();
@@ -107,7 +113,8 @@ fn an_unforced_direction_needs_a_known_mass() {
     let amplitudes = amplitudes.read(&force).unwrap();
     let motion = displacements(&system, &omega, &amplitudes);
     let data =
-        FrequencyData::from_amplitudes(omega, amplitudes, motion, Motion::Displacement).unwrap();
+        FrequencyData::from_amplitudes(omega, amplitudes, motion, ResponseQuantity::Displacement)
+            .unwrap();
     let e = equation_error(&data, &Unknowns::unknown_mass(2).unwrap()).unwrap_err();
     assert!(matches!(e, EstimateError::OnlyRatios { dof: 1, .. }), "{e}");
     let found = equation_error(&data, &Unknowns::known_mass(system.mass()).unwrap()).unwrap();
@@ -125,7 +132,8 @@ fn parameters_that_are_not_excited_are_named_and_the_others_stay_right() {
     });
     let mut driven = force.clone();
     driven.column_mut(1).copy_from(&(motion.column(0) * Complex::new(7.0, 0.0)));
-    let data = FrequencyData::from_amplitudes(w, driven, motion, Motion::Displacement).unwrap();
+    let data =
+        FrequencyData::from_amplitudes(w, driven, motion, ResponseQuantity::Displacement).unwrap();
     let found = equation_error(&data, &Unknowns::unknown_mass(2).unwrap()).unwrap();
     let open: Vec<String> =
         found.parameters().filter(|p| p.value.is_nan()).map(|p| p.parameter.to_string()).collect();
@@ -138,9 +146,14 @@ fn parameters_that_are_not_excited_are_named_and_the_others_stay_right() {
 #[test]
 fn bad_data_are_refused_with_their_numbers() {
     let system = oscillator();
-    let (force, motion, _) = records(&system, Motion::Displacement);
+    let (force, motion, _) = records(&system, ResponseQuantity::Displacement);
     let read = |lines: &[usize]| {
-        FrequencyData::from_records(&force, &motion, Motion::Displacement, lines.iter().copied())
+        FrequencyData::from_records(
+            &force,
+            &motion,
+            ResponseQuantity::Displacement,
+            lines.iter().copied(),
+        )
     };
     let unknown = Unknowns::unknown_mass(1).unwrap();
     assert_eq!(read(&[]), Err(EstimateError::NoExcitedLine));
@@ -150,21 +163,23 @@ fn bad_data_are_refused_with_their_numbers() {
 
     let still = Record::from_channel(force.sampling(), vec![0.0; 256]).unwrap();
     let unforced =
-        FrequencyData::from_records(&still, &motion, Motion::Displacement, 1..=20).unwrap();
+        FrequencyData::from_records(&still, &motion, ResponseQuantity::Displacement, 1..=20)
+            .unwrap();
     assert_eq!(equation_error(&unforced, &unknown), Err(EstimateError::NoExcitedLine));
 
     let two = Record::from_channels(force.sampling(), &[force.channel(0), force.channel(0)]);
-    let e = FrequencyData::from_records(&force, &two.unwrap(), Motion::Displacement, 1..=20);
+    let e =
+        FrequencyData::from_records(&force, &two.unwrap(), ResponseQuantity::Displacement, 1..=20);
     assert!(matches!(e, Err(EstimateError::Size { expected: 1, got: 2, .. })));
 
     let other = motion.window(0, 255).unwrap();
-    let e = FrequencyData::from_records(&force, &other, Motion::Displacement, 1..=20);
+    let e = FrequencyData::from_records(&force, &other, ResponseQuantity::Displacement, 1..=20);
     assert!(matches!(e, Err(EstimateError::Signal(_))));
 
     let one = dmatrix![Complex::new(1.0, 0.0)];
     let nan = dmatrix![Complex::new(f64::NAN, 0.0)];
     let make = |w: f64, x: &DMatrix<Complex<f64>>| {
-        FrequencyData::from_amplitudes(vec![w], one.clone(), x.clone(), Motion::Velocity)
+        FrequencyData::from_amplitudes(vec![w], one.clone(), x.clone(), ResponseQuantity::Velocity)
     };
     assert_eq!(make(0.0, &one), Err(EstimateError::Frequency { value: 0.0 }));
     assert!(matches!(make(1.0, &nan), Err(EstimateError::NotFinite { row: 0, column: 0, .. })));

@@ -3,9 +3,10 @@
 
 use crate::common::{bearing, displacements, forces};
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Motion, NoiseSpectrum, equation_error, instrumental_variables, output_error,
+    FrequencyData, NoiseSpectrum, equation_error, instrumental_variables, output_error,
 };
 use mechid_estimate::{Estimate, Unknowns};
+use mechid_model::ResponseQuantity;
 use nalgebra::{Complex, DMatrix, dmatrix};
 use proptest::prelude::*;
 
@@ -34,7 +35,7 @@ fn data(seed: u64, p: &DMatrix<f64>, q: &DMatrix<f64>) -> FrequencyData {
     covariance.view_mut((0, 0), (2, 2)).copy_from(&(q * q.transpose()).map(Complex::from));
     let noise = NoiseSpectrum::new(omega.clone(), vec![covariance; LINES]).unwrap();
     let (force, motion) = (turned(force, p), turned(motion, q));
-    FrequencyData::from_amplitudes(omega, force, motion, Motion::Displacement)
+    FrequencyData::from_amplitudes(omega, force, motion, ResponseQuantity::Displacement)
         .unwrap()
         .with_noise(noise)
         .unwrap()

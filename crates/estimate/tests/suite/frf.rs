@@ -1,8 +1,9 @@
 //! Frequency response functions: against the closed-form receptance, and what noise does to them.
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
-use mechid_estimate::frequency_domain::{Lines, Motion, equation_error, output_error};
+use mechid_estimate::frequency_domain::{Lines, equation_error, output_error};
 use mechid_estimate::{EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window};
+use mechid_model::ResponseQuantity;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
@@ -31,7 +32,7 @@ fn steady(
         }
         let motion = displacements(system, &omega, &force);
         for (whole, part) in [(&mut f, &force), (&mut x, &motion)] {
-            let record = synthesise(sampling, &lines, part, Motion::Displacement);
+            let record = synthesise(sampling, &lines, part, ResponseQuantity::Displacement);
             whole.rows_mut(128 * p, 128).copy_from(record.data());
         }
     }
@@ -46,7 +47,7 @@ fn exact_steady_states_have_the_closed_form_receptance() {
             let frf = Frf::estimate(
                 &force,
                 &motion,
-                Motion::Displacement,
+                ResponseQuantity::Displacement,
                 Segments::Periods(128),
                 lines.iter().copied(),
                 estimator,
@@ -78,7 +79,7 @@ fn the_estimators_err_to_their_sides() {
         Frf::estimate(
             &noisy_force,
             &noisy_motion,
-            Motion::Displacement,
+            ResponseQuantity::Displacement,
             Segments::Periods(128),
             lines.iter().copied(),
             estimator,
@@ -115,7 +116,7 @@ fn the_stated_variance_is_that_of_repeated_measurements() {
         let frf = Frf::estimate(
             &force,
             &noisy,
-            Motion::Displacement,
+            ResponseQuantity::Displacement,
             Segments::Periods(128),
             [7],
             FrfEstimator::H1,
@@ -141,7 +142,7 @@ fn the_stated_variance_of_h2_is_that_of_repeated_measurements() {
         let level = NoiseLevel::StandardDeviation(170.0);
         let noisy = noise::add_white(&force, level, seed).unwrap();
         let segments = Segments::Periods(128);
-        let quantity = Motion::Displacement;
+        let quantity = ResponseQuantity::Displacement;
         let frf =
             Frf::estimate(&noisy, &motion, quantity, segments, [7], FrfEstimator::H2).unwrap();
         found.push(frf.response(0)[(0, 0)]);
@@ -159,7 +160,7 @@ fn responses_without_noise_give_the_machine_weighted_by_their_coherence() {
     for system in [oscillator(), bearing()] {
         let (force, motion, lines) = steady(&system, 4);
         let driven: Vec<usize> = (0..system.dof()).collect();
-        let (quantity, segments) = (Motion::Displacement, Segments::Periods(128));
+        let (quantity, segments) = (ResponseQuantity::Displacement, Segments::Periods(128));
         for estimator in [FrfEstimator::H1, FrfEstimator::H2] {
             let lines = lines.iter().copied();
             let frf = Frf::estimate(&force, &motion, quantity, segments, lines, estimator).unwrap();
@@ -189,7 +190,7 @@ fn weights_by_coherence_leave_less_error() {
         };
         let data = DMatrix::from_fn(noisy.len(), 1, |k, _| noisy.data()[(k, 0)] + hum(k));
         let noisy = Record::new(noisy.sampling(), data).unwrap();
-        let (quantity, segments) = (Motion::Displacement, Segments::Periods(128));
+        let (quantity, segments) = (ResponseQuantity::Displacement, Segments::Periods(128));
         let frf = Frf::estimate(
             &force,
             &noisy,
@@ -225,7 +226,7 @@ fn windows_and_overlap_are_the_callers() {
     let motion = exact_harmonic_periodic(&oscillator(), &force).unwrap();
     let frf = |hop, window| {
         let segments = Segments::Windowed { len: 256, hop, window };
-        let quantity = Motion::Displacement;
+        let quantity = ResponseQuantity::Displacement;
         let estimator = FrfEstimator::H1;
         Frf::estimate(&force, motion.displacement(), quantity, segments, 5..60, estimator)
     };
@@ -268,7 +269,7 @@ fn random_excitation_is_averaged_under_a_window() {
     let frf = Frf::estimate(
         &force,
         &motion,
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
         Segments::hann(1024),
         20..200,
         FrfEstimator::H1,
@@ -302,7 +303,8 @@ fn coherence_weighs_the_lines() {
     });
     let coherence = DMatrix::from_fn(60, 2, |at, _| gamma(at));
     let frf =
-        Frf::new(omega, measured.collect(), coherence, averages, Motion::Displacement).unwrap();
+        Frf::new(omega, measured.collect(), coherence, averages, ResponseQuantity::Displacement)
+            .unwrap();
     let unknowns = Unknowns::unknown_mass(2).unwrap();
     let weighted = output_error(&frf.data(&[0, 1]).unwrap(), &unknowns).unwrap().estimate;
     assert!(relative_error(&weighted.stiffness(), system.stiffness()) < 0.05);
@@ -317,7 +319,7 @@ fn what_cannot_be_estimated_is_refused() {
     let (force, motion, lines) = steady(&system, 4);
     let estimate = |force: &Record, motion: &Record, line: usize, estimator| {
         let segments = Segments::Periods(128);
-        Frf::estimate(force, motion, Motion::Displacement, segments, [line], estimator)
+        Frf::estimate(force, motion, ResponseQuantity::Displacement, segments, [line], estimator)
     };
     let line = lines[3];
     let short = |r: &Record| r.window(0, 256).unwrap();
@@ -351,7 +353,7 @@ fn what_cannot_be_estimated_is_refused() {
     let coherence = |value| {
         let response = vec![DMatrix::from_element(1, 1, Complex::from(1.0))];
         let coherence = DMatrix::from_element(1, 1, value);
-        Frf::new(vec![1.0], response, coherence, 10.0, Motion::Displacement)
+        Frf::new(vec![1.0], response, coherence, 10.0, ResponseQuantity::Displacement)
     };
     assert!(coherence(1.0).is_ok());
     for value in [0.0, 1.1] {
@@ -370,11 +372,12 @@ fn segments_may_come_a_few_at_a_time() {
         let all = 1..=20;
         let estimate = |f, x| {
             let h1 = FrfEstimator::H1;
-            Frf::estimate(f, x, Motion::Displacement, segments, all.clone(), h1).unwrap()
+            Frf::estimate(f, x, ResponseQuantity::Displacement, segments, all.clone(), h1).unwrap()
         };
         let whole = estimate(&force, &motion);
         let lines = Lines::new(force.sampling().with_len(128).unwrap(), all.clone()).unwrap();
-        let mut average = FrfAverage::new(lines, [2, 2], Motion::Displacement, segments).unwrap();
+        let mut average =
+            FrfAverage::new(lines, [2, 2], ResponseQuantity::Displacement, segments).unwrap();
         // Three segments at a time, the last stretch cut where the record ends.
         for start in (0..force.len()).step_by(3 * hop) {
             let len = (2 * hop + 128).min(force.len() - start);
@@ -388,7 +391,8 @@ fn segments_may_come_a_few_at_a_time() {
         );
     }
     let lines = Lines::new(force.sampling(), [3]).unwrap();
-    let average = FrfAverage::new(lines, [2, 2], Motion::Displacement, Segments::hann(128));
+    let average =
+        FrfAverage::new(lines, [2, 2], ResponseQuantity::Displacement, Segments::hann(128));
     assert!(matches!(average, Err(EstimateError::Size { expected: 128, got: 1152, .. })));
 }
 
@@ -398,8 +402,15 @@ fn some_responses_are_those_estimated_on_their_lines_alone() {
     let motion = noise::add_white(&motion, NoiseLevel::FractionOfRms(0.1), 4).unwrap();
     let on = |lines: Vec<usize>| {
         let segments = Segments::Periods(128);
-        Frf::estimate(&force, &motion, Motion::Displacement, segments, lines, FrfEstimator::H1)
-            .unwrap()
+        Frf::estimate(
+            &force,
+            &motion,
+            ResponseQuantity::Displacement,
+            segments,
+            lines,
+            FrfEstimator::H1,
+        )
+        .unwrap()
     };
     let places = [2, 3, lines.len() - 1];
     let some = on(lines.clone()).at(&places);

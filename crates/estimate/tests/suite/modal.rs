@@ -2,9 +2,9 @@
 
 use crate::common::monte_carlo::{Estimator, Experiment};
 use crate::common::{bearing, displacements, forces, oscillator};
-use mechid_estimate::frequency_domain::{FrequencyData, Motion, equation_error};
+use mechid_estimate::frequency_domain::{FrequencyData, equation_error};
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::{Mode, SecondOrderSystem};
+use mechid_model::{Mode, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::steffen_rade;
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 use rayon::prelude::*;
@@ -20,7 +20,8 @@ fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {
     for (at, x) in motion.iter_mut().enumerate() {
         *x += Complex::from_polar(noise * size, (at * at) as f64);
     }
-    let data = FrequencyData::from_amplitudes(omega, force, motion, Motion::Displacement).unwrap();
+    let data = FrequencyData::from_amplitudes(omega, force, motion, ResponseQuantity::Displacement)
+        .unwrap();
     equation_error(&data, &Unknowns::unknown_mass(system.dof()).unwrap()).unwrap()
 }
 

@@ -2,11 +2,11 @@
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Motion, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods,
-    equation_error, instrumental_variables, output_error,
+    FrequencyData, Lines, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods, equation_error,
+    instrumental_variables, output_error,
 };
 use mechid_estimate::{EstimateError, Unknowns};
-use mechid_model::{Matrix, SecondOrderSystem};
+use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -16,10 +16,10 @@ struct Setup {
     lines: Lines,
     force: Record,
     motion: Record,
-    measured: Motion,
+    measured: ResponseQuantity,
 }
 
-fn setup(system: &SecondOrderSystem, periods: usize, measured: Motion) -> Setup {
+fn setup(system: &SecondOrderSystem, periods: usize, measured: ResponseQuantity) -> Setup {
     let fastest = system.modes().unwrap().last().unwrap().natural_frequency();
     let sampling = Sampling::new(0.3 / fastest, 128).unwrap();
     let lines = Lines::new(sampling, 1..=40).unwrap();
@@ -31,7 +31,8 @@ fn setup(system: &SecondOrderSystem, periods: usize, measured: Motion) -> Setup 
         let all = DMatrix::from_fn(len * periods, system.dof(), |k, c| one.data()[(k % len, c)]);
         Record::new(sampling.with_len(len * periods).unwrap(), all).unwrap()
     };
-    let (force, motion) = (repeat(&force, Motion::Displacement), repeat(&motion, measured));
+    let (force, motion) =
+        (repeat(&force, ResponseQuantity::Displacement), repeat(&motion, measured));
     Setup { lines, force, motion, measured }
 }
 
@@ -52,7 +53,7 @@ impl Setup {
 
 #[test]
 fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
-    let setup = setup(&bearing(), 400, Motion::Acceleration);
+    let setup = setup(&bearing(), 400, ResponseQuantity::Acceleration);
     let periods = setup.measure(0.05, 0.02, 7);
     assert_eq!(periods.count(), 400);
     let motion: Vec<f64> = (0..2).map(|c| 0.05 * Setup::rms(&setup.motion, c)).collect();
@@ -60,7 +61,7 @@ fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
     let known = NoiseSpectrum::white(
         setup.lines.sampling(),
         setup.lines.as_slice(),
-        Motion::Acceleration,
+        ResponseQuantity::Acceleration,
         &motion,
         &force,
     )
@@ -88,7 +89,11 @@ fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
 #[test]
 fn without_noise_every_estimator_is_exact() {
     for system in [oscillator(), bearing()] {
-        for measured in [Motion::Displacement, Motion::Velocity, Motion::Acceleration] {
+        for measured in [
+            ResponseQuantity::Displacement,
+            ResponseQuantity::Velocity,
+            ResponseQuantity::Acceleration,
+        ] {
             let setup = setup(&system, 2, measured);
             let periods =
                 RepeatedPeriods::new(&setup.lines, &setup.force, &setup.motion, measured).unwrap();
@@ -135,7 +140,7 @@ fn judge(
 #[test]
 fn noise_on_the_force_is_allowed_for() {
     let system = oscillator();
-    let setup = setup(&system, 16, Motion::Displacement);
+    let setup = setup(&system, 16, ResponseQuantity::Displacement);
     let fit = |seed, unknowns: &Unknowns| {
         let data = setup.measure(0.05, 0.1, seed).mean_with_noise(Pooling::AllLines).unwrap();
         assert!(data.noise().unwrap().has_force());
@@ -153,7 +158,7 @@ fn noise_on_the_force_is_allowed_for() {
 #[test]
 fn weights_of_few_periods_widen_the_intervals_as_they_should() {
     let system = bearing();
-    let setup = setup(&system, 8, Motion::Acceleration);
+    let setup = setup(&system, 8, ResponseQuantity::Acceleration);
     let fit = |seed, unknowns: &Unknowns| {
         let noise = setup.measure(0.02, 0.0, seed);
         output_error(&noise.mean_with_noise(Pooling::PerLine).unwrap(), unknowns).unwrap()
@@ -169,7 +174,7 @@ fn weights_of_few_periods_widen_the_intervals_as_they_should() {
 #[test]
 fn one_period_is_weighted_by_its_own_residual() {
     let system = bearing();
-    let setup = setup(&system, 1, Motion::Acceleration);
+    let setup = setup(&system, 1, ResponseQuantity::Acceleration);
     let fit = |seed, unknowns: &Unknowns| {
         output_error(&setup.measure(0.02, 0.0, seed).mean().unwrap(), unknowns).unwrap()
     };
@@ -184,7 +189,7 @@ fn one_period_is_weighted_by_its_own_residual() {
 fn a_model_that_is_wrong_shows_in_the_misfit() {
     // Two degrees of freedom of which only one is looked at.
     let system = bearing();
-    let setup = setup(&system, 8, Motion::Displacement);
+    let setup = setup(&system, 8, ResponseQuantity::Displacement);
     let one = |r: &Record| Record::from_channel(r.sampling(), r.channel(0).to_vec()).unwrap();
     let motion = noise::add_white(&one(&setup.motion), NoiseLevel::FractionOfRms(0.01), 1).unwrap();
     let periods =
@@ -198,7 +203,7 @@ fn a_model_that_is_wrong_shows_in_the_misfit() {
 #[test]
 fn a_single_unknown_is_found_by_all() {
     let system = bearing();
-    let setup = setup(&system, 4, Motion::Displacement);
+    let setup = setup(&system, 4, ResponseQuantity::Displacement);
     let periods = setup.measure(0.001, 0.0, 3);
     let (first, second) = periods.halves().unwrap();
     let mut unknowns = Unknowns::known_mass(system.mass()).unwrap();
@@ -223,14 +228,15 @@ fn a_single_unknown_is_found_by_all() {
 #[test]
 fn parameters_that_are_not_excited_are_named() {
     // The second mass stands still: its columns of C and K cannot be known.
-    let setup = setup(&oscillator(), 2, Motion::Displacement);
+    let setup = setup(&oscillator(), 2, ResponseQuantity::Displacement);
     let still = |r: &Record| {
         let zero = vec![0.0; r.len()];
         Record::from_channels(r.sampling(), &[r.channel(0), &zero[..]]).unwrap()
     };
     let (force, motion) = (still(&setup.force), still(&setup.motion));
     let periods =
-        RepeatedPeriods::new(&setup.lines, &force, &motion, Motion::Displacement).unwrap();
+        RepeatedPeriods::new(&setup.lines, &force, &motion, ResponseQuantity::Displacement)
+            .unwrap();
     let unknowns = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 10.0)).unwrap();
     // The second equation then says 0 = 0; a mass of its own would have to move.
     let unknowns = unknowns.fix(Matrix::Mass, 1, 0, 1.0).unwrap();
@@ -247,7 +253,7 @@ fn parameters_that_are_not_excited_are_named() {
 
 #[test]
 fn noise_that_cannot_weigh_is_refused() {
-    let setup = setup(&bearing(), 3, Motion::Displacement);
+    let setup = setup(&bearing(), 3, ResponseQuantity::Displacement);
     let periods = setup.measure(0.01, 0.0, 1);
     let unknowns = Unknowns::unknown_mass(2).unwrap();
     let data = periods.mean_with_noise(Pooling::PerLine).unwrap();
@@ -259,7 +265,7 @@ fn noise_that_cannot_weigh_is_refused() {
         &setup.lines,
         &setup.force.window(0, 128).unwrap(),
         &setup.motion.window(0, 128).unwrap(),
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
     )
     .unwrap();
     let refused = EstimateError::TooFewAverages { got: 1, needed: 2 };
@@ -284,7 +290,7 @@ fn noise_that_cannot_weigh_is_refused() {
         vec![1.0],
         DMatrix::from_element(1, 2, Complex::from(1.0)),
         DMatrix::from_element(1, 2, Complex::from(1.0)),
-        Motion::Displacement,
+        ResponseQuantity::Displacement,
     )
     .unwrap();
     let e = instrumental_variables(&short, &periods.mean().unwrap(), &unknowns).unwrap_err();
@@ -294,7 +300,7 @@ fn noise_that_cannot_weigh_is_refused() {
 /// Judge: the scatter about the mean by its definition, in two passes.
 #[test]
 fn periods_may_come_a_few_at_a_time() {
-    let setup = setup(&bearing(), 7, Motion::Velocity);
+    let setup = setup(&bearing(), 7, ResponseQuantity::Velocity);
     let add = |record: &Record, seed| {
         noise::add_white(record, NoiseLevel::FractionOfRms(0.03), seed).unwrap()
     };
@@ -333,7 +339,7 @@ fn periods_may_come_a_few_at_a_time() {
 
 #[test]
 fn halves_need_all_periods_that_were_expected() {
-    let setup = setup(&oscillator(), 4, Motion::Displacement);
+    let setup = setup(&oscillator(), 4, ResponseQuantity::Displacement);
     let mut periods = RepeatedPeriods::expecting(&setup.lines, 1, setup.measured, 6);
     assert_eq!(periods.mean().unwrap_err(), EstimateError::TooFewAverages { got: 0, needed: 1 });
     periods.push(&setup.force, &setup.motion).unwrap();

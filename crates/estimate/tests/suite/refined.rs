@@ -2,10 +2,11 @@
 //! how often the checks of the residual are right.
 
 use mechid_estimate::checks::{Verdict, after_fit};
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{Unknowns, missing_force};
-use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem};
 use mechid_problems::{dissertation_sdof, exact_foh_periodic, exact_harmonic_periodic, exact_zoh};
+use mechid_signal::Extent;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Multisine, Phases, Record, Sampling, noise};
 use nalgebra::{DMatrix, DVector};

@@ -4,9 +4,9 @@ use crate::common::oscillator;
 use mechid_estimate::checks::{
     Check, Subject, Verdict, after_response_fit, after_spectral_fit, linearity,
 };
-use mechid_estimate::frequency_domain::{Lines, Motion, Pooling, RepeatedPeriods, output_error};
+use mechid_estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
 use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns, Window};
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
@@ -59,7 +59,7 @@ impl Random {
             _ => add(&clean, self.noise[0], 2 * seed + 1),
         };
         let force = add(&force, self.noise[1], 2 * seed + 1_000_001);
-        let kind = Motion::Displacement;
+        let kind = ResponseQuantity::Displacement;
         let frf = Frf::estimate(&force, &motion, kind, self.segments, 5..100, self.estimator);
         let frf = frf.unwrap();
         let unknowns = match self.mass {
@@ -170,7 +170,7 @@ fn the_misfit_of_spectra_is_judged_with_the_noise_of_the_periods() {
         let good = |seed, unknowns: &Unknowns| {
             let level = NoiseLevel::FractionOfRms(0.05);
             let noisy = noise::add_white(&motion, level, seed).unwrap();
-            let kind = Motion::Displacement;
+            let kind = ResponseQuantity::Displacement;
             let all = RepeatedPeriods::new(&lines, &force, &noisy, kind).unwrap();
             let data = all.mean_with_noise(pooling).unwrap();
             let estimate = output_error(&data, unknowns).unwrap().estimate;

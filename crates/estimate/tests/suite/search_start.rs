@@ -1,8 +1,9 @@
 //! Where the search by maximum likelihood starts when most lines are nothing but noise.
 
 use crate::common::{oscillator, relative_error};
-use mechid_estimate::frequency_domain::{Motion, output_error};
+use mechid_estimate::frequency_domain::output_error;
 use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns};
+use mechid_model::ResponseQuantity;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::excitation::Random;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
@@ -26,7 +27,9 @@ fn lines_beyond_the_excitation_do_not_lead_the_search_astray() {
         DMatrix::from_element(1, 1, measured)
     });
     let response = response.collect();
-    let frf = Frf::new(omega.clone(), response, coherence, averages, Motion::Acceleration).unwrap();
+    let frf =
+        Frf::new(omega.clone(), response, coherence, averages, ResponseQuantity::Acceleration)
+            .unwrap();
     let fit = output_error(&frf.data(&[0]).unwrap(), &Unknowns::unknown_mass(1).unwrap()).unwrap();
     let truth = [system.mass()[(0, 0)], system.damping()[(0, 0)], system.stiffness()[(0, 0)]];
     for (found, truth) in fit.estimate.parameters().zip(truth) {
@@ -58,7 +61,7 @@ fn lines_of_next_to_no_force_do_not_lead_the_search_astray() {
             let frf = Frf::estimate(
                 &force,
                 &motion,
-                Motion::Displacement,
+                ResponseQuantity::Displacement,
                 Segments::hann(len),
                 1..len / 2,
                 FrfEstimator::H1,

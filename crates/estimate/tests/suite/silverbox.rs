@@ -4,12 +4,11 @@
 //! system identification", ECC 2013. The data stand beside the project, not in it; without
 //! them this test says so and passes.
 
+use mechid_model::ResponseQuantity;
 use std::path::Path;
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Motion, equation_error, output_error,
-};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
 use mechid_signal::{Record, Sampling};
 
 /// Force (first channel) and displacement (second) of the whole record, in volts.
@@ -42,7 +41,8 @@ fn the_measured_oscillator_has_its_known_frequency_and_damping() {
     let (force, motion) = (channel(0), channel(1));
     let odd: Vec<usize> = (1..=335).step_by(2).collect();
     assert_eq!(Lines::excited(&force, 0.1).unwrap().as_slice(), odd);
-    let data = FrequencyData::from_records(&force, &motion, Motion::Displacement, odd).unwrap();
+    let data =
+        FrequencyData::from_records(&force, &motion, ResponseQuantity::Displacement, odd).unwrap();
     let unknowns = Unknowns::unknown_mass(1).unwrap();
     let found = equation_error(&data, &unknowns).unwrap().system().unwrap();
     let mode = &found.modes().unwrap()[0];

@@ -1,17 +1,15 @@
 //! The time-domain estimators on exact responses to forces that truly are held or linear.
 
-use mechid_estimate::time_domain::{
-    Discretisation, Extent, TimeDomain, Transitions, equation_of_motion,
-};
+use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use mechid_estimate::{Estimate, EstimateError, Unknowns, logarithm};
 use mechid_model::{
-    InitialState, KyxSign, Matrix, Response, Sdof, SecondOrderSystem, npi_sampling,
+    Discretisation, InitialState, KyxSign, Matrix, Response, Sdof, SecondOrderSystem, npi_sampling,
 };
 use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic,
     exact_harmonic_periodic, exact_zoh, exact_zoh_periodic, random_stable,
 };
-use mechid_signal::{Interpolation, Multisine, Phases, Record, Sampling};
+use mechid_signal::{Extent, Interpolation, Multisine, Phases, Record, Sampling};
 use nalgebra::{DMatrix, dmatrix};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

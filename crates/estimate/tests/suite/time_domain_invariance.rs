@@ -1,10 +1,10 @@
 //! What must not matter to a time-domain estimate: units, numbering, the directions of the axes.
 
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain};
+use mechid_estimate::time_domain::TimeDomain;
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::{KyxSign, Matrix};
+use mechid_model::{Discretisation, KyxSign, Matrix};
 use mechid_problems::{dissertation_bearing, exact_zoh_periodic};
-use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
 use nalgebra::{DMatrix, dmatrix};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};

@@ -1,11 +1,11 @@
 //! The estimators of the time domain, on forces that are held, linear or band-limited between samples,
 //! without noise and with: hundreds of seeded experiments, each on an exact response.
 
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, equation_of_motion};
+use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::{Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, SecondOrderSystem};
 use mechid_problems::{exact_foh_periodic, exact_harmonic_periodic, exact_zoh_periodic};
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use rayon::prelude::*;
 
 use crate::common::documentation::documented;

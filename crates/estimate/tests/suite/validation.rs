@@ -4,14 +4,13 @@ use mechid_estimate::checks::{
     Check, Subject, Verdict, after_fit, before_equation_of_motion, before_response_fit,
     before_spectral_fit,
 };
-use mechid_estimate::frequency_domain::{Lines, Motion};
-use mechid_estimate::time_domain::{Discretisation, Extent};
+use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::{
     EstimateError, Frf, StartFit, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
 };
-use mechid_model::{InitialState, KyxSign, SecondOrderSystem};
+use mechid_model::{Discretisation, InitialState, KyxSign, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, exact_foh, exact_harmonic_periodic};
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::{DMatrix, DVector};
 
 fn bearing() -> SecondOrderSystem {
@@ -44,7 +43,8 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
         let three = noise::add_white(&three, NoiseLevel::FractionOfRms(noisy), 1).unwrap();
         let lines = Lines::new(one.sampling().with_len(period).unwrap(), lines).unwrap();
         let force = one.repeated(3).unwrap();
-        before_spectral_fit(&lines, &force, &three, Motion::Displacement, &unknowns).unwrap()
+        before_spectral_fit(&lines, &force, &three, ResponseQuantity::Displacement, &unknowns)
+            .unwrap()
     };
     let good = look(0.2, 1..=60, 512, 0.01);
     assert_eq!(good.iter().map(|c| c.verdict).max(), Some(Verdict::Good), "{good:?}");
@@ -96,7 +96,8 @@ fn trouble_with_responses_is_seen_before_they_are_fitted() {
         let omega: Vec<f64> = (1..=lines).map(|n| 0.1 * n as f64).collect();
         let response = omega.iter().map(|w| system.receptance(*w).unwrap()).collect();
         let coherence = DMatrix::from_element(lines, 2, coherence);
-        let frf = Frf::new(omega, response, coherence, 20.0, Motion::Displacement).unwrap();
+        let frf =
+            Frf::new(omega, response, coherence, 20.0, ResponseQuantity::Displacement).unwrap();
         before_response_fit(&frf, &[0, 1], &unknowns).unwrap()
     };
     let good = look(30, 0.99);
@@ -170,9 +171,12 @@ fn a_start_is_found_from_any_kind_of_motion() {
     let motion = exact_foh(&system, &force, &truth).unwrap();
     let hold = Discretisation::FirstOrderHold;
     for measured in [
-        vec![(Motion::Displacement, motion.displacement())],
-        vec![(Motion::Acceleration, motion.acceleration())],
-        vec![(Motion::Displacement, motion.displacement()), (Motion::Velocity, motion.velocity())],
+        vec![(ResponseQuantity::Displacement, motion.displacement())],
+        vec![(ResponseQuantity::Acceleration, motion.acceleration())],
+        vec![
+            (ResponseQuantity::Displacement, motion.displacement()),
+            (ResponseQuantity::Velocity, motion.velocity()),
+        ],
     ] {
         let found = fitted_start(&system, &force, hold, &measured).unwrap();
         assert!((found.displacement() - truth.displacement()).amax() < 1e-9);
@@ -182,7 +186,7 @@ fn a_start_is_found_from_any_kind_of_motion() {
         for (start, len) in [(0, 7), (6, 2), (7, 393)] {
             let part = |record: &Record| record.window(start, len).unwrap();
             let parts = measured.iter().map(|(kind, record)| (*kind, part(record)));
-            let parts: Vec<(Motion, Record)> = parts.collect();
+            let parts: Vec<(ResponseQuantity, Record)> = parts.collect();
             let parts: Vec<_> = parts.iter().map(|(kind, record)| (*kind, record)).collect();
             fit.push(&part(&force), &parts).unwrap();
         }
@@ -195,7 +199,8 @@ fn a_start_is_found_from_any_kind_of_motion() {
     }
     // Noise on every sample is averaged: the first alone would be off by 10 % of the motion's RMS.
     let noisy = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(0.1), 8).unwrap();
-    let found = fitted_start(&system, &force, hold, &[(Motion::Displacement, &noisy)]).unwrap();
+    let found =
+        fitted_start(&system, &force, hold, &[(ResponseQuantity::Displacement, &noisy)]).unwrap();
     let rms = motion.displacement().data().norm() / (2.0f64 * 400.0).sqrt();
     assert!((found.displacement() - truth.displacement()).amax() < 0.1 * rms);
 
@@ -207,7 +212,7 @@ fn a_start_is_found_from_any_kind_of_motion() {
     let free = SecondOrderSystem::new(one(2.0), one(0.0), one(0.0)).unwrap();
     let push = Record::from_channel(force.sampling(), force.channel(0).to_vec()).unwrap();
     let moved = exact_foh(&free, &push, &InitialState::rest(1)).unwrap();
-    let kind = [(Motion::Acceleration, moved.acceleration())];
+    let kind = [(ResponseQuantity::Acceleration, moved.acceleration())];
     let found = fitted_start(&free, &push, hold, &kind).unwrap();
     assert_eq!((found.displacement()[0], found.velocity()[0]), (0.0, 0.0));
 }

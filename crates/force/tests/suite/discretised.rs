@@ -1,9 +1,11 @@
 //! The discretised equation against responses in closed form.
 
 use crate::common::{Oscillator, mixed, response};
-use mechid_force::{Discretisation, Ends, ForceError, channel_errors, discretised, relative_error};
-use mechid_model::SecondOrderSystem;
-use mechid_signal::{Record, Sampling};
+use mechid_force::{
+    ForceError, channel_errors, discretised, discretised_by_taylor, relative_error,
+};
+use mechid_model::{Discretisation, SecondOrderSystem};
+use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::dmatrix;
 
 const MACHINE: Oscillator = Oscillator { m: 10.0, c: 180.0, k: 5000.0 };
@@ -37,8 +39,8 @@ fn the_exact_held_form_returns_the_held_force() {
         let found = discretised(
             &machine(),
             &response(sampling, x, v),
-            Discretisation::ExactHeld,
-            Ends::Open,
+            Discretisation::ZeroOrderHold,
+            Extent::Open,
         )
         .unwrap();
         let truth = as_record(sampling, &force).window(0, len - 1).unwrap();
@@ -57,8 +59,8 @@ fn the_exact_linear_form_returns_the_linear_force() {
         let found = discretised(
             &machine(),
             &response(sampling, x, v),
-            Discretisation::ExactLinear,
-            Ends::Open,
+            Discretisation::FirstOrderHold,
+            Extent::Open,
         )
         .unwrap();
         let error = relative_error(found.record(), &as_record(sampling, &force)).unwrap();
@@ -77,11 +79,12 @@ fn a_whole_period_wraps_around() {
         .map(|t| (1..100).map(|n| (w * n as f64 * t + (n * n) as f64).cos()).sum())
         .collect();
     let twice = [period.clone(), period.clone()].concat();
-    for (linear, form) in [(false, Discretisation::ExactHeld), (true, Discretisation::ExactLinear)]
+    for (linear, form) in
+        [(false, Discretisation::ZeroOrderHold), (true, Discretisation::FirstOrderHold)]
     {
         let (x, v) = MACHINE.run((0.0, 0.0), &twice, dt, linear);
         let steady = response(sampling, x[len..].to_vec(), v[len..].to_vec());
-        let found = discretised(&machine(), &steady, form, Ends::Periodic).unwrap();
+        let found = discretised(&machine(), &steady, form, Extent::WholePeriod).unwrap();
         assert_eq!(found.record().len(), len);
         let error = relative_error(found.record(), &as_record(sampling, &period)).unwrap();
         assert!(error < ROUNDING, "{form:?}: {error:.1e}");
@@ -93,10 +96,11 @@ fn coupled_machines_with_full_matrices_are_told_apart() {
     let machine = mixed();
     let (sampling, first) = samples(0.03, 200);
     let second: Vec<f64> = sampling.times().map(|t| 8.0 * (5.0 * t).cos() + t).collect();
-    for (linear, form) in [(false, Discretisation::ExactHeld), (true, Discretisation::ExactLinear)]
+    for (linear, form) in
+        [(false, Discretisation::ZeroOrderHold), (true, Discretisation::FirstOrderHold)]
     {
         let (force, motion) = machine.run([&first, &second], 0.03, linear);
-        let found = discretised(&machine.system(), &motion, form, Ends::Open).unwrap();
+        let found = discretised(&machine.system(), &motion, form, Extent::Open).unwrap();
         let len = found.record().len();
         let errors = channel_errors(found.record(), &force.window(0, len).unwrap()).unwrap();
         assert!(errors.iter().all(|e| e.unwrap() < ROUNDING), "{form:?}: {errors:?}");
@@ -113,8 +117,8 @@ fn taylor_forms_converge_at_their_order() {
                 let (sampling, force) = samples(dt, (2.4 / dt) as usize);
                 let (x, v) = MACHINE.run((0.0, 0.0), &force, dt, false);
                 let motion = response(sampling, x, v);
-                let form = Discretisation::Taylor(order);
-                let found = discretised(&machine(), &motion, form, Ends::Open).unwrap();
+                let found =
+                    discretised_by_taylor(&machine(), &motion, order, Extent::Open).unwrap();
                 let truth = as_record(sampling, &force).window(0, sampling.len() - 1).unwrap();
                 relative_error(found.record(), &truth).unwrap()
             })
@@ -130,8 +134,8 @@ fn euler_is_the_first_taylor_form_and_the_printed_equation() {
     let (sampling, force) = samples(0.01, 100);
     let (x, v) = MACHINE.run((0.0, 0.0), &force, 0.01, false);
     let motion = response(sampling, x.clone(), v.clone());
-    let euler = discretised(&machine(), &motion, Discretisation::Euler, Ends::Open).unwrap();
-    let taylor = discretised(&machine(), &motion, Discretisation::Taylor(1), Ends::Open).unwrap();
+    let euler = discretised(&machine(), &motion, Discretisation::Euler, Extent::Open).unwrap();
+    let taylor = discretised_by_taylor(&machine(), &motion, 1, Extent::Open).unwrap();
     assert_eq!(euler, taylor);
     for (k, f) in euler.record().channel(0).iter().enumerate() {
         let printed = 10.0 / 0.01 * (v[k + 1] - v[k]) + 180.0 * v[k] + 5000.0 * x[k];
@@ -150,7 +154,7 @@ fn eulers_dispersion_is_its_transfer_ratio() {
         let v = sampling.times().map(|t| -omega * (omega * t).sin()).collect();
         let motion = response(sampling, x, v);
         let found =
-            discretised(&machine(), &motion, Discretisation::Euler, Ends::Periodic).unwrap();
+            discretised(&machine(), &motion, Discretisation::Euler, Extent::WholePeriod).unwrap();
         let i_omega = nalgebra::Complex::new(0.0, omega);
         let forward = ((i_omega * 0.01).exp() - 1.0) / 0.01;
         let expected = i_omega * forward * 10.0 + i_omega * 180.0 + 5000.0;
@@ -162,20 +166,20 @@ fn eulers_dispersion_is_its_transfer_ratio() {
 #[test]
 fn bad_input_is_refused_with_its_numbers() {
     let one = response(Sampling::new(0.1, 1).unwrap(), vec![1.0], vec![0.0]);
-    let held = Discretisation::ExactHeld;
+    let held = Discretisation::ZeroOrderHold;
     assert_eq!(
-        discretised(&machine(), &one, held, Ends::Open),
+        discretised(&machine(), &one, held, Extent::Open),
         Err(ForceError::TooShort { samples: 1, needed: 2 })
     );
     let motion = response(Sampling::new(0.1, 3).unwrap(), vec![0.0; 3], vec![0.0; 3]);
     for order in [0, 9] {
         assert_eq!(
-            discretised(&machine(), &motion, Discretisation::Taylor(order), Ends::Open),
+            discretised_by_taylor(&machine(), &motion, order, Extent::Open),
             Err(ForceError::TaylorOrder { order })
         );
     }
     assert_eq!(
-        discretised(&mixed().system(), &motion, held, Ends::Open),
+        discretised(&mixed().system(), &motion, held, Extent::Open),
         Err(ForceError::Dof { system: 2, response: 1 })
     );
     // Undamped, one step per whole period: a held force moves nothing.
@@ -183,7 +187,7 @@ fn bad_input_is_refused_with_its_numbers() {
     let sampling = Sampling::new(std::f64::consts::TAU, 3).unwrap();
     let motion = response(sampling, vec![0.0; 3], vec![0.0; 3]);
     assert!(matches!(
-        discretised(&undamped, &motion, held, Ends::Open),
+        discretised(&undamped, &motion, held, Extent::Open),
         Err(ForceError::StepTooLong { reciprocal_condition, .. }) if reciprocal_condition < 1e-12
     ));
 }

@@ -1,13 +1,13 @@
 //! The dissertation's own experiment: exact periodic responses of its schemes, parameters by its
 //! Euler least squares, and the force from its two equations.
 
-use mechid_force::{Discretisation, Ends, continuous, discretised, spectrum_ratio, spurious_ratio};
+use mechid_force::{continuous, discretised, spectrum_ratio, spurious_ratio};
 use mechid_integrate::{
     CentralDifference, Houbolt, Newmark, Scheme, WilsonTheta, integrate_periodic,
 };
-use mechid_model::{KyxSign, Response, SecondOrderSystem, npi_sampling};
+use mechid_model::{Discretisation, KyxSign, Response, SecondOrderSystem, npi_sampling};
 use mechid_problems::{dissertation_bearing, dissertation_sdof};
-use mechid_signal::{Multisine, Phases, Record, Sampling, Spectrum, lines};
+use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, Spectrum, lines};
 use nalgebra::DMatrix;
 
 /// A flat multisine on every line strictly between DC and Nyquist, on the last degree of freedom.
@@ -115,7 +115,7 @@ fn check_single(npi: f64, expected: [Ranges; 4]) {
         let identified = euler_least_squares(machine.system().mass(), &stored, &force);
         let forces = [
             continuous(&identified, &response),
-            discretised(&identified, &stored, Discretisation::Euler, Ends::Periodic),
+            discretised(&identified, &stored, Discretisation::Euler, Extent::WholePeriod),
             continuous(&machine.system(), &response),
         ];
         for (found, (equation, expected)) in
@@ -237,7 +237,7 @@ fn the_discretised_force_is_a_fraction_of_the_force_and_a_residual() {
         let scheme = Newmark::AVERAGE_ACCELERATION;
         let response = integrate_periodic(&scheme, &machine.system(), &force).unwrap();
         let identified = euler_least_squares(machine.system().mass(), &response, &force);
-        let found = discretised(&identified, &response, Discretisation::Euler, Ends::Periodic);
+        let found = discretised(&identified, &response, Discretisation::Euler, Extent::WholePeriod);
         let found = found.unwrap().record().column(0).clone_owned();
         let truth = force.column(0);
         // The residual of a least-squares fit is orthogonal to its regressors, F among them.

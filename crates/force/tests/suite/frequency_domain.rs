@@ -1,10 +1,10 @@
 //! The frequency-domain reconstruction against harmonic motions in closed form.
 
 use mechid_force::{
-    Channel, ForceError, Measurement, Noise, Quantity, frequency_domain, inner_lines, line_errors,
+    Channel, ForceError, Measurement, Noise, frequency_domain, inner_lines, line_errors,
     relative_error, spectrum_ratio, spurious_ratio,
 };
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{NoiseLevel, Record, Sampling, Spectrum, noise};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
@@ -51,8 +51,8 @@ fn harmonic(system: &SecondOrderSystem, forces: [f64; 2]) -> (Record, [Record; 3
     (record(force), motion.map(record))
 }
 
-const QUANTITIES: [Quantity; 3] =
-    [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+const QUANTITIES: [ResponseQuantity; 3] =
+    [ResponseQuantity::Displacement, ResponseQuantity::Velocity, ResponseQuantity::Acceleration];
 
 #[test]
 fn every_quantity_of_every_degree_of_freedom_gives_both_forces() {
@@ -103,7 +103,7 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
         dmatrix![40.0, 50.0 * 1.1; -20.0, 60.0],
     )
     .unwrap();
-    let measured = Measurement::of_all(Quantity::Displacement, x.clone());
+    let measured = Measurement::of_all(ResponseQuantity::Displacement, x.clone());
     let found = frequency_domain(&wrong, &measured, &[0, 1], &LINES, &Noise::Unknown).unwrap();
     let spurious = spurious_ratio(found.spectrum(), &Spectrum::of(&force), 0, 1, &LINES).unwrap();
     let motion = Spectrum::of(&x);
@@ -118,7 +118,9 @@ fn a_force_sought_where_none_acts_is_seen_as_spurious() {
 fn lines_the_machine_does_not_transmit_are_named() {
     let (_, [x, v, a]) = harmonic(&rotor(), [3.0, 100.0]);
     let unknown = Noise::Unknown;
-    for (quantity, record) in [(Quantity::Velocity, v.clone()), (Quantity::Acceleration, a)] {
+    for (quantity, record) in
+        [(ResponseQuantity::Velocity, v.clone()), (ResponseQuantity::Acceleration, a)]
+    {
         let measured = Measurement::of_all(quantity, record);
         for forced in [&[0, 1][..], &[1]] {
             let error =
@@ -134,7 +136,7 @@ fn lines_the_machine_does_not_transmit_are_named() {
     )
     .unwrap();
     let first = Record::from_channel(period(), x.channel(0).to_vec()).unwrap();
-    let measured = Measurement::of_all(Quantity::Displacement, first);
+    let measured = Measurement::of_all(ResponseQuantity::Displacement, first);
     let error = frequency_domain(&apart, &measured, &[1], &[2], &unknown).unwrap_err();
     assert!(matches!(error, ForceError::NotTransmitted { line: 2, dof: 1, .. }), "{error}");
     let undamped = SecondOrderSystem::new(
@@ -145,14 +147,14 @@ fn lines_the_machine_does_not_transmit_are_named() {
     .unwrap();
     let velocity = Measurement::new(
         measured.record().clone(),
-        vec![Channel { dof: 0, quantity: Quantity::Velocity }],
+        vec![Channel { dof: 0, quantity: ResponseQuantity::Velocity }],
     )
     .unwrap();
     // With everything measured the dynamic stiffness is used as it is, zero at the resonance.
     assert!(frequency_domain(&undamped, &velocity, &[0], &[2], &unknown).is_ok());
     // With more channels than forces its inverse is needed, and there is none.
     let both = Record::new(period(), v.data().clone()).unwrap();
-    let twice = vec![Channel { dof: 0, quantity: Quantity::Velocity }; 2];
+    let twice = vec![Channel { dof: 0, quantity: ResponseQuantity::Velocity }; 2];
     let twice = Measurement::new(both, twice).unwrap();
     let error = frequency_domain(&undamped, &twice, &[0], &[2], &unknown).unwrap_err();
     assert!(matches!(error, ForceError::Resonance { line: 2, .. }), "{error}");
@@ -161,9 +163,9 @@ fn lines_the_machine_does_not_transmit_are_named() {
 #[test]
 fn impossible_requests_are_refused_with_their_numbers() {
     let (_, [x, ..]) = harmonic(&rotor(), [3.0, 100.0]);
-    let both = Measurement::of_all(Quantity::Displacement, x.clone());
+    let both = Measurement::of_all(ResponseQuantity::Displacement, x.clone());
     let first = Record::from_channel(period(), x.channel(0).to_vec()).unwrap();
-    let one = Measurement::of_all(Quantity::Displacement, first.clone());
+    let one = Measurement::of_all(ResponseQuantity::Displacement, first.clone());
     let ask = |measured: &Measurement, forced: &[usize], lines: &[usize], noise: &Noise| {
         frequency_domain(&rotor(), measured, forced, lines, noise).unwrap_err()
     };
@@ -205,7 +207,7 @@ fn the_standard_error_is_the_scatter_over_noise() {
     let draws = 200;
     for seed in 0..draws {
         let noisy = noise::add_white(&x, level, seed).unwrap();
-        let measured = Measurement::of_all(Quantity::Displacement, noisy);
+        let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
         let find =
             |noise: &Noise| frequency_domain(&rotor(), &measured, &[1], &LINES, noise).unwrap();
         let found = find(&Noise::PerChannel(sigma.clone()));

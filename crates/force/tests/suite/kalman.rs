@@ -1,9 +1,9 @@
 //! The augmented Kalman smoother on forces that are what it assumes, and on bad requests.
 
 use mechid_force::{
-    Channel, ForceError, KalmanForce, Measurement, Quantity, Start, Tuning, kalman, relative_error,
+    Channel, ForceError, KalmanForce, Measurement, Start, Tuning, kalman, relative_error,
 };
-use mechid_model::{InitialState, KyxSign, Response, SecondOrderSystem};
+use mechid_model::{InitialState, KyxSign, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, dissertation_sdof, exact_foh, random_stable};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{DMatrix, dvector};
@@ -29,7 +29,7 @@ fn walking(sampling: Sampling, dof: usize, forced: usize, walk: f64, seed: u64) 
 fn displacements(response: &Response, level: f64, seed: u64) -> Measurement {
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.displacement(), level, seed).unwrap();
-    Measurement::of_all(Quantity::Displacement, noisy)
+    Measurement::of_all(ResponseQuantity::Displacement, noisy)
 }
 
 /// Mean square of the error over the stated standard error, for one degree of freedom.
@@ -57,7 +57,7 @@ fn likelihood_finds_the_walk_the_noise_and_an_honest_error() {
             kalman(&system, &measured, &[forced], Start::FromRest, &Tuning::Likelihood).unwrap();
         // 4000 samples tell a standard deviation to 1 %; walk and noise are partly confounded.
         assert!((found.walk[0] / 40.0 - 1.0).abs() < 0.1, "walk {:?}", found.walk);
-        for (c, level) in found.noise.iter().enumerate() {
+        for (c, level) in found.noise_std.iter().enumerate() {
             let size = response.displacement().column(c).norm() / 4000f64.sqrt();
             assert!((level / (0.02 * size) - 1.0).abs() < 0.05, "channel {c}: {level}");
         }
@@ -116,13 +116,13 @@ fn accelerations_alone_leave_the_mean_force_uncertain_and_say_so() {
     let response = exact_foh(&system, &truth, &InitialState::rest(1)).unwrap();
     let noise = |record: &Record| record.data().norm() / (800f64).sqrt() * 0.01;
     let find = |quantity, record: &Record| {
-        let given = Tuning::Given { noise: vec![noise(record)], walk: vec![40.0] };
+        let given = Tuning::Given { noise_std: vec![noise(record)], walk: vec![40.0] };
         let measured = Measurement::of_all(quantity, record.clone());
         let found = kalman(&system, &measured, &[0], Start::InMotion, &given).unwrap();
         found.force.standard_error().unwrap().channel(0)[400]
     };
-    let still = find(Quantity::Displacement, response.displacement());
-    let moving = find(Quantity::Acceleration, response.acceleration());
+    let still = find(ResponseQuantity::Displacement, response.displacement());
+    let moving = find(ResponseQuantity::Acceleration, response.acceleration());
     assert!(moving > 3.0 * still, "{moving} {still}");
 }
 
@@ -131,7 +131,7 @@ fn bad_requests_are_refused_with_their_numbers() {
     let system = random_stable(2, 4);
     let sampling = Sampling::new(0.01, 50).unwrap();
     let record = Record::from_channel(sampling, (0..50).map(|k| f64::from(k).sin()).collect());
-    let one = Measurement::of_all(Quantity::Displacement, record.unwrap());
+    let one = Measurement::of_all(ResponseQuantity::Displacement, record.unwrap());
     let ask = |system: &SecondOrderSystem, m: &Measurement, forced: &[usize], tuning: &Tuning| {
         kalman(system, m, forced, Start::InMotion, tuning).unwrap_err()
     };
@@ -142,13 +142,13 @@ fn bad_requests_are_refused_with_their_numbers() {
     );
     let short = one.record().window(0, 2).unwrap();
     assert_eq!(
-        ask(&system, &Measurement::of_all(Quantity::Displacement, short), &[0], &auto),
+        ask(&system, &Measurement::of_all(ResponseQuantity::Displacement, short), &[0], &auto),
         ForceError::TooShort { samples: 2, needed: 3 }
     );
     let silent = Record::new(sampling, DMatrix::zeros(50, 1)).unwrap();
-    let silent = Measurement::of_all(Quantity::Displacement, silent);
+    let silent = Measurement::of_all(ResponseQuantity::Displacement, silent);
     assert_eq!(ask(&system, &silent, &[0], &auto), ForceError::Silent);
-    let given = |noise: Vec<f64>, walk: Vec<f64>| Tuning::Given { noise, walk };
+    let given = |noise_std: Vec<f64>, walk: Vec<f64>| Tuning::Given { noise_std, walk };
     assert_eq!(
         ask(&system, &one, &[0], &given(vec![0.1], vec![1.0, 1.0])),
         ForceError::WalkCount { walks: 2, forces: 1 }
@@ -168,7 +168,7 @@ fn bad_requests_are_refused_with_their_numbers() {
             .unwrap();
     assert_eq!(ask(&apart, &one, &[1], &auto), ForceError::Unseen { dof: 1 });
     let twice = DMatrix::from_fn(50, 2, |k, _| (k as f64).sin());
-    let channel = Channel { dof: 0, quantity: Quantity::Displacement };
+    let channel = Channel { dof: 0, quantity: ResponseQuantity::Displacement };
     let twice = Measurement::new(Record::new(sampling, twice).unwrap(), vec![channel; 2]).unwrap();
     assert!(matches!(ask(&system, &twice, &[0, 1], &auto), ForceError::Unseen { .. }));
 }

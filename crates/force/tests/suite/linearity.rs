@@ -1,12 +1,12 @@
 //! Every method without a choice of its own is a linear map of the measurement.
 
 use mechid_force::{
-    Discretisation, Ends, IdentifiedForce, Measurement, Noise, Quantity, Start, Tuning, continuous,
-    discretised, frequency_domain, kalman,
+    IdentifiedForce, Measurement, Noise, Start, Tuning, continuous, discretised,
+    discretised_by_taylor, frequency_domain, kalman,
 };
-use mechid_model::{Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::random_stable;
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
@@ -27,25 +27,25 @@ fn response(values: &[f64]) -> Response {
 }
 
 fn measured(values: &[f64]) -> Measurement {
-    Measurement::of_all(Quantity::Velocity, record(&values[..LEN * DOF]))
+    Measurement::of_all(ResponseQuantity::Velocity, record(&values[..LEN * DOF]))
 }
 
 fn discretised_by(s: &SecondOrderSystem, v: &[f64], how: Discretisation) -> IdentifiedForce {
-    discretised(s, &response(v), how, Ends::Open).unwrap()
+    discretised(s, &response(v), how, Extent::Open).unwrap()
 }
 
 const METHODS: [(&str, Method); 7] = [
     ("continuous", |s, v| continuous(s, &response(v)).unwrap()),
     ("Euler", |s, v| discretised_by(s, v, Discretisation::Euler)),
-    ("Taylor 4", |s, v| discretised_by(s, v, Discretisation::Taylor(4))),
-    ("exact held", |s, v| discretised_by(s, v, Discretisation::ExactHeld)),
-    ("exact linear", |s, v| discretised_by(s, v, Discretisation::ExactLinear)),
+    ("Taylor 4", |s, v| discretised_by_taylor(s, &response(v), 4, Extent::Open).unwrap()),
+    ("exact held", |s, v| discretised_by(s, v, Discretisation::ZeroOrderHold)),
+    ("exact linear", |s, v| discretised_by(s, v, Discretisation::FirstOrderHold)),
     ("frequency domain", |s, v| {
         let noise = Noise::PerChannel(vec![1.0, 2.0]);
         frequency_domain(s, &measured(v), &[1], &[1, 2, 5], &noise).unwrap()
     }),
     ("Kalman", |s, v| {
-        let tuning = Tuning::Given { noise: vec![0.1, 0.1], walk: vec![5.0] };
+        let tuning = Tuning::Given { noise_std: vec![0.1, 0.1], walk: vec![5.0] };
         kalman(s, &measured(v), &[1], Start::FromRest, &tuning).unwrap().force
     }),
 ];

@@ -1,11 +1,11 @@
 //! The standard error that noise in a complete motion leads to.
 
 use mechid_force::{
-    Discretisation, Ends, Entry, ForceError, MotionNoise, SystemCovariance, continuous_with_noise,
-    discretised, discretised_with_noise, with_uncertain_system,
+    ForceError, MotionNoise, continuous_with_noise, discretised, discretised_with_noise,
+    with_uncertain_system,
 };
-use mechid_model::{Matrix, Response, SecondOrderSystem};
-use mechid_signal::{Record, Sampling, noise};
+use mechid_model::{Discretisation, Parameter, Response, SecondOrderSystem, UncertainSystem};
+use mechid_signal::{Extent, Record, Sampling, noise};
 use nalgebra::{DMatrix, dmatrix};
 
 const DT: f64 = 0.05;
@@ -66,8 +66,8 @@ fn stated_errors_are_the_scatter_over_noisy_motions() {
     let found = continuous_with_noise(&rotor(), &noisy(12, 0), &levels()).unwrap();
     let find = |r: &Response| mechid_force::continuous(&rotor(), r).unwrap().record().clone();
     agree(found.standard_error().unwrap(), &scatter(400, 12, find));
-    for ends in [Ends::Open, Ends::Periodic] {
-        let linear = Discretisation::ExactLinear;
+    for ends in [Extent::Open, Extent::WholePeriod] {
+        let linear = Discretisation::FirstOrderHold;
         let found =
             discretised_with_noise(&rotor(), &noisy(12, 0), linear, ends, &levels()).unwrap();
         let find = |r: &Response| discretised(&rotor(), r, linear, ends).unwrap().record().clone();
@@ -79,15 +79,12 @@ fn stated_errors_are_the_scatter_over_noisy_motions() {
 /// what a unit there does, squared.
 #[test]
 fn every_discretisation_carries_the_noise_of_every_sample() {
-    let forms = [
-        Discretisation::Euler,
-        Discretisation::Taylor(3),
-        Discretisation::ExactHeld,
-        Discretisation::ExactLinear,
-    ];
-    for (form, ends) in forms.into_iter().flat_map(|f| [(f, Ends::Open), (f, Ends::Periodic)]) {
+    let forms = Discretisation::ALL;
+    for (form, ends) in
+        forms.into_iter().flat_map(|f| [(f, Extent::Open), (f, Extent::WholePeriod)])
+    {
         for samples in [1, 2, 3, 6] {
-            if ends == Ends::Open && samples == 1 {
+            if ends == Extent::Open && samples == 1 {
                 continue;
             }
             let still = response(&DMatrix::zeros(samples, 6));
@@ -111,9 +108,9 @@ fn every_discretisation_carries_the_noise_of_every_sample() {
 #[test]
 fn machine_and_noise_add_in_variance() {
     let response = noisy(5, 3);
-    let damping = Entry { matrix: Matrix::Damping, row: 1, column: 0 };
-    let known = SystemCovariance::new(vec![damping], dmatrix![4.0]).unwrap();
-    let found = with_uncertain_system(&rotor(), &known, |system| {
+    let damping = Parameter::named("c21", 2).unwrap();
+    let machine = UncertainSystem::new(rotor(), vec![damping], dmatrix![4.0]).unwrap();
+    let found = with_uncertain_system(&machine, |system| {
         continuous_with_noise(system, &response, &levels())
     });
     let found = found.unwrap();
@@ -137,9 +134,9 @@ fn levels_that_cannot_be_are_refused() {
     let few = MotionNoise::new(vec![1.0; 2], vec![1.0; 2], vec![]).unwrap();
     let missing = Err(ForceError::ChannelCount { record: 2, described: 0 });
     assert_eq!(continuous_with_noise(&rotor(), &motion, &few), missing);
-    let linear = Discretisation::ExactLinear;
-    assert!(discretised_with_noise(&rotor(), &motion, linear, Ends::Open, &few).is_ok());
+    let linear = Discretisation::FirstOrderHold;
+    assert!(discretised_with_noise(&rotor(), &motion, linear, Extent::Open, &few).is_ok());
     let one = MotionNoise::new(vec![1.0; 2], vec![1.0], vec![]).unwrap();
     let missing = Err(ForceError::ChannelCount { record: 2, described: 1 });
-    assert_eq!(discretised_with_noise(&rotor(), &motion, linear, Ends::Open, &one), missing);
+    assert_eq!(discretised_with_noise(&rotor(), &motion, linear, Extent::Open, &one), missing);
 }

@@ -78,7 +78,8 @@ fn more_noise_means_more_regularisation() {
         let case = Case::new("", false, (1..=40).collect(), level);
         let measured = case.measured(1);
         let filter = Filter::Tikhonov(Rule::Likelihood);
-        let (extent, noise) = (mechid_force::Extent::Period, mechid_force::Noise::Unknown);
+        let (extent, noise) =
+            (mechid_force::ForceUnknowns::EveryLine, mechid_force::Noise::Unknown);
         let found = mechid_force::regularised(
             &case.system,
             &measured,

@@ -1,10 +1,10 @@
 //! Regularised reconstruction against explicit normal equations.
 
 use mechid_force::{
-    Channel, Extent, Filter, ForceError, Measurement, Noise, OPEN_UNKNOWNS, Quantity, Rule, Start,
+    Channel, Filter, ForceError, ForceUnknowns, Measurement, Noise, OPEN_UNKNOWNS, Rule, Start,
     regularised, relative_error,
 };
-use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_model::{InitialState, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::{exact_foh, exact_harmonic_periodic, random_stable};
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{DMatrix, DVector};
@@ -19,8 +19,8 @@ fn sampling(len: usize) -> Sampling {
 /// Displacement of the first and acceleration of the last degree of freedom.
 fn channels(dof: usize) -> Vec<Channel> {
     vec![
-        Channel { dof: 0, quantity: Quantity::Displacement },
-        Channel { dof: dof - 1, quantity: Quantity::Acceleration },
+        Channel { dof: 0, quantity: ResponseQuantity::Displacement },
+        Channel { dof: dof - 1, quantity: ResponseQuantity::Acceleration },
     ]
 }
 
@@ -111,7 +111,8 @@ fn open_records_solve_their_normal_equations() {
                 g = with_starts(&system, g, &scale);
             }
             let filter = Filter::Tikhonov(Rule::Given(lambda));
-            let (extent, level) = (Extent::Open(start), Noise::PerChannel(scale.to_vec()));
+            let (extent, level) =
+                (ForceUnknowns::Samples(start), Noise::PerChannel(scale.to_vec()));
             let found = regularised(&system, &measured, &forced, &extent, filter, &level).unwrap();
             let y = stacked(&measured, &scale);
             let expected = normal_equations(&g, &y, lambda, forced.len() * len);
@@ -150,7 +151,8 @@ fn whole_periods_solve_their_normal_equations() {
         let filter = Filter::Tikhonov(Rule::Given(lambda));
         let level = Noise::PerChannel(scale.to_vec());
         let found =
-            regularised(&system, &measured, &forced, &Extent::Period, filter, &level).unwrap();
+            regularised(&system, &measured, &forced, &ForceUnknowns::EveryLine, filter, &level)
+                .unwrap();
         let y = stacked(&measured, &scale);
         let expected = normal_equations(&g, &y, lambda, g.ncols());
         assert_same(found.force.record(), &forced, &expected);
@@ -164,7 +166,9 @@ fn truncation_that_drops_nothing_is_least_squares() {
     let measured = measure(&exact_harmonic_periodic(&system, &truth).unwrap());
     for filter in [Filter::TruncatedSvd(Rule::Given(1e-9)), Filter::Tikhonov(Rule::Given(1e-9))] {
         let noise = Noise::Unknown;
-        let found = regularised(&system, &measured, &[1], &Extent::Period, filter, &noise).unwrap();
+        let found =
+            regularised(&system, &measured, &[1], &ForceUnknowns::EveryLine, filter, &noise)
+                .unwrap();
         let error = relative_error(found.force.record(), &truth).unwrap();
         assert!(error < 1e-9, "{filter:?}: {error:.1e}");
         assert!((found.unknowns - 31.0).abs() < 1e-6);
@@ -182,13 +186,15 @@ fn the_standard_error_is_what_is_seen() {
             let drive = noise::white(sampling(len), 1, 30.0, 1000 + seed).unwrap();
             let truth = force(len, 2, &[1], |k, _| drive.channel(0)[k]);
             let exact = exact_harmonic_periodic(&system, &truth).unwrap();
-            let exact = Measurement::of_all(Quantity::Displacement, exact.displacement().clone());
+            let exact =
+                Measurement::of_all(ResponseQuantity::Displacement, exact.displacement().clone());
             let noisy =
                 noise::add_white(exact.record(), NoiseLevel::FractionOfRms(0.02), seed).unwrap();
-            let measured = Measurement::of_all(Quantity::Displacement, noisy);
+            let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
             let noise = Noise::Unknown;
             let found =
-                regularised(&system, &measured, &[1], &Extent::Period, filter, &noise).unwrap();
+                regularised(&system, &measured, &[1], &ForceUnknowns::EveryLine, filter, &noise)
+                    .unwrap();
             seen += (found.force.record().data() - truth.data()).norm_squared();
             stated += found.force.standard_error().unwrap().data().norm_squared();
         }
@@ -201,10 +207,12 @@ fn the_standard_error_is_what_is_seen() {
 #[test]
 fn without_noise_every_rule_gives_the_force() {
     let system = random_stable(2, 5);
-    for (len, extent) in [(63, Extent::Period), (48, Extent::Open(Start::InMotion))] {
+    for (len, extent) in
+        [(63, ForceUnknowns::EveryLine), (48, ForceUnknowns::Samples(Start::InMotion))]
+    {
         let truth = force(len, 2, &[1], wobble);
         let response = match extent {
-            Extent::Period => exact_harmonic_periodic(&system, &truth).unwrap(),
+            ForceUnknowns::EveryLine => exact_harmonic_periodic(&system, &truth).unwrap(),
             _ => exact_foh(&system, &truth, &InitialState::rest(2)).unwrap(),
         };
         let measured = measure(&response);
@@ -228,10 +236,12 @@ fn velocities_leave_the_mean_force_at_zero() {
     let system = random_stable(2, 5);
     let truth = force(63, 2, &[1], |k, i| 3.0 + wobble(k, i));
     let response = exact_harmonic_periodic(&system, &truth).unwrap();
-    let measured = Measurement::of_all(Quantity::Velocity, response.velocity().clone());
+    let measured = Measurement::of_all(ResponseQuantity::Velocity, response.velocity().clone());
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::TruncatedSvd(Rule::Gcv)] {
         let noise = Noise::Unknown;
-        let found = regularised(&system, &measured, &[1], &Extent::Period, filter, &noise).unwrap();
+        let found =
+            regularised(&system, &measured, &[1], &ForceUnknowns::EveryLine, filter, &noise)
+                .unwrap();
         let (found, expected) = (found.force.record().column(1), truth.column(1));
         assert!(found.mean().abs() < 1e-9, "{filter:?}: {}", found.mean());
         let moving = expected.add_scalar(-expected.mean());
@@ -246,11 +256,11 @@ fn bad_requests_are_refused_with_their_numbers() {
         let data = DMatrix::from_fn(len, 1, |k, _| value * (k as f64).sin());
         Record::new(sampling(len), data).unwrap()
     };
-    let ask = |record: Record, forced: &[usize], extent: &Extent, filter: Filter| {
-        let measured = Measurement::of_all(Quantity::Displacement, record);
+    let ask = |record: Record, forced: &[usize], extent: &ForceUnknowns, filter: Filter| {
+        let measured = Measurement::of_all(ResponseQuantity::Displacement, record);
         regularised(&system, &measured, forced, extent, filter, &Noise::Unknown).unwrap_err()
     };
-    let (open, period) = (Extent::Open(Start::InMotion), Extent::Period);
+    let (open, period) = (ForceUnknowns::Samples(Start::InMotion), ForceUnknowns::EveryLine);
     let auto = Filter::Tikhonov(Rule::Likelihood);
     assert_eq!(
         ask(record(OPEN_UNKNOWNS + 1, 1.0), &[0], &open, auto),
@@ -271,7 +281,10 @@ fn bad_requests_are_refused_with_their_numbers() {
             ForceError::NotPositive { what: "regularisation parameter", value }
         );
     }
-    assert_eq!(ask(record(20, 1.0), &[0], &Extent::PeriodLines(vec![]), auto), ForceError::NoLines);
+    assert_eq!(
+        ask(record(20, 1.0), &[0], &ForceUnknowns::Lines(vec![]), auto),
+        ForceError::NoLines
+    );
 }
 
 proptest! {
@@ -285,11 +298,11 @@ proptest! {
         open in any::<bool>(),
     ) {
         let system = random_stable(1, 3);
-        let extent = if open { Extent::Open(Start::FromRest) } else { Extent::Period };
+        let extent = if open { ForceUnknowns::Samples(Start::FromRest) } else { ForceUnknowns::EveryLine };
         let find = |by: f64, filter: Filter| {
             let scaled = values.iter().map(|v| v * by).collect();
             let record = Record::from_channel(sampling(30), scaled).unwrap();
-            let measured = Measurement::of_all(Quantity::Displacement, record);
+            let measured = Measurement::of_all(ResponseQuantity::Displacement, record);
             regularised(&system, &measured, &[0], &extent, filter, &Noise::Unknown).unwrap()
         };
         for filter in [
@@ -314,9 +327,9 @@ proptest! {
         let system = random_stable(2, 3);
         let find = |values: Vec<f64>| {
             let record = Record::from_channel(sampling(24), values).unwrap();
-            let measured = Measurement::of_all(Quantity::Acceleration, record);
+            let measured = Measurement::of_all(ResponseQuantity::Acceleration, record);
             let filter = Filter::Tikhonov(Rule::Given(0.03));
-            let (extent, noise) = (Extent::Open(Start::InMotion), Noise::PerChannel(vec![1.0]));
+            let (extent, noise) = (ForceUnknowns::Samples(Start::InMotion), Noise::PerChannel(vec![1.0]));
             let found = regularised(&system, &measured, &[1], &extent, filter, &noise).unwrap();
             found.force.record().data().clone()
         };

@@ -1,10 +1,10 @@
 //! What a force leaves of the measured motion, against its definition written out.
 
 use mechid_force::{
-    Channel, Extent, Filter, Measurement, Noise, Quantity, Rule, Start, Tuning, Unexplained,
+    Channel, Filter, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, Unexplained,
     frequency_domain, kalman, regularised,
 };
-use mechid_model::{InitialState, KyxSign, Response, SecondOrderSystem};
+use mechid_model::{InitialState, KyxSign, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, exact_foh, exact_harmonic_periodic, random_stable};
 use mechid_signal::{Multisine, Phases, Record, Sampling, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
@@ -31,7 +31,7 @@ fn displacement(sizes: [f64; 2]) -> Record {
 }
 
 fn measured(record: Record) -> Measurement {
-    Measurement::of_all(Quantity::Displacement, record)
+    Measurement::of_all(ResponseQuantity::Displacement, record)
 }
 
 /// Displacements under a unit force on the first direction, by Cramer's rule.
@@ -88,7 +88,7 @@ fn as_many_channels_as_forces_say_nothing() {
     let all = measured(displacement([70.0, 100.0]));
     let both = frequency_domain(&bearing(), &all, &[0, 1], &LINES, &Noise::Unknown).unwrap();
     assert!(both.unexplained().is_none());
-    let period = Extent::PeriodLines(LINES.to_vec());
+    let period = ForceUnknowns::Lines(LINES.to_vec());
     let filtered =
         regularised(&bearing(), &all, &[0, 1], &period, Filter::Shrinkage, &Noise::Unknown);
     assert!(filtered.unwrap().force.unexplained().is_none());
@@ -141,7 +141,11 @@ fn noise_leaves_what_its_level_says() {
 
 /// Displacement of the first, velocity of the second, acceleration of the third degree of freedom.
 fn mixed(response: &Response) -> Measurement {
-    let quantities = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration];
+    let quantities = [
+        ResponseQuantity::Displacement,
+        ResponseQuantity::Velocity,
+        ResponseQuantity::Acceleration,
+    ];
     let records = [response.displacement(), response.velocity(), response.acceleration()];
     let columns: Vec<_> =
         records.iter().enumerate().map(|(dof, record)| record.column(dof).into_owned()).collect();
@@ -179,7 +183,7 @@ fn on_open_records_the_rest_is_that_of_the_motion_which_the_force_makes() {
         exact_foh(&system, &Record::new(sampling, force).unwrap(), &InitialState::rest(3)).unwrap();
     let measured = mixed(&response);
     let filter = Filter::Tikhonov(Rule::Given(1e-3));
-    let extent = Extent::Open(Start::FromRest);
+    let extent = ForceUnknowns::Samples(Start::FromRest);
     let found =
         regularised(&system, &measured, &[0], &extent, filter, &Noise::Unknown).unwrap().force;
     is_rest_of(&system, found.record(), &measured, found.unexplained().unwrap());
@@ -197,7 +201,7 @@ fn a_motion_at_the_start_is_no_rest() {
     let start = InitialState::new(vec![1e-3; 3].into(), vec![0.2, -0.1, 0.3].into()).unwrap();
     let force = DMatrix::from_fn(120, 3, |k, i| if i == 0 { (0.3 * k as f64).sin() } else { 0.0 });
     let response = exact_foh(&system, &Record::new(sampling, force).unwrap(), &start).unwrap();
-    let extent = Extent::Open(Start::InMotion);
+    let extent = ForceUnknowns::Samples(Start::InMotion);
     let filter = Filter::Tikhonov(Rule::Given(1e-7));
     let found =
         regularised(&system, &mixed(&response), &[0], &extent, filter, &Noise::Unknown).unwrap();

@@ -2,39 +2,43 @@
 
 use std::fmt;
 
-/// What numbers measure, as far as a unit tells.
+use mechid_model::ResponseQuantity;
+
+/// Quantity that the numbers of a column measure, as far as a unit tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
-    /// In N.
+    /// A force, in N.
     Force,
-    /// In m.
-    Displacement,
-    /// In m/s.
-    Velocity,
-    /// In m/s².
-    Acceleration,
+    /// A response, in m, m/s or m/s².
+    Response(ResponseQuantity),
 }
 
 impl Quantity {
+    const DISPLACEMENT: Self = Self::Response(ResponseQuantity::Displacement);
+    const VELOCITY: Self = Self::Response(ResponseQuantity::Velocity);
+    const ACCELERATION: Self = Self::Response(ResponseQuantity::Acceleration);
+
     /// Its unit in the SI.
     pub fn si(self) -> &'static str {
         match self {
             Self::Force => "N",
-            Self::Displacement => "m",
-            Self::Velocity => "m/s",
-            Self::Acceleration => "m/s²",
+            Self::Response(quantity) => quantity.unit(),
         }
+    }
+}
+
+impl From<ResponseQuantity> for Quantity {
+    fn from(quantity: ResponseQuantity) -> Self {
+        Self::Response(quantity)
     }
 }
 
 impl fmt::Display for Quantity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Force => "force",
-            Self::Displacement => "displacement",
-            Self::Velocity => "velocity",
-            Self::Acceleration => "acceleration",
-        })
+        match self {
+            Self::Force => f.write_str("force"),
+            Self::Response(quantity) => quantity.fmt(f),
+        }
     }
 }
 
@@ -61,7 +65,10 @@ const fn unit(name: &'static str, quantity: Quantity, in_si: f64) -> Unit {
 
 /// Exact by definition: the pound since 1959, g and with it the kilopond since 1901.
 const UNITS: [Unit; 32] = {
-    use Quantity::{Acceleration, Displacement, Force, Velocity};
+    use Quantity::Force;
+    const DISPLACEMENT: Quantity = Quantity::DISPLACEMENT;
+    const VELOCITY: Quantity = Quantity::VELOCITY;
+    const ACCELERATION: Quantity = Quantity::ACCELERATION;
     [
         unit("N", Force, 1.0),
         unit("mN", Force, 1e-3),
@@ -72,29 +79,29 @@ const UNITS: [Unit; 32] = {
         unit("kp", Force, G),
         unit("lbf", Force, 0.45359237 * G),
         unit("kip", Force, 453.59237 * G),
-        unit("m", Displacement, 1.0),
-        unit("cm", Displacement, 1e-2),
-        unit("mm", Displacement, 1e-3),
-        unit("µm", Displacement, 1e-6),
-        unit("um", Displacement, 1e-6),
-        unit("nm", Displacement, 1e-9),
-        unit("in", Displacement, INCH),
-        unit("mil", Displacement, 1e-3 * INCH),
-        unit("mils", Displacement, 1e-3 * INCH),
-        unit("ft", Displacement, 12.0 * INCH),
-        unit("m/s", Velocity, 1.0),
-        unit("cm/s", Velocity, 1e-2),
-        unit("mm/s", Velocity, 1e-3),
-        unit("µm/s", Velocity, 1e-6),
-        unit("in/s", Velocity, INCH),
-        unit("ft/s", Velocity, 12.0 * INCH),
-        unit("m/s²", Acceleration, 1.0),
-        unit("cm/s²", Acceleration, 1e-2),
-        unit("mm/s²", Acceleration, 1e-3),
-        unit("in/s²", Acceleration, INCH),
-        unit("ft/s²", Acceleration, 12.0 * INCH),
-        unit("g", Acceleration, G),
-        unit("gal", Acceleration, 1e-2),
+        unit("m", DISPLACEMENT, 1.0),
+        unit("cm", DISPLACEMENT, 1e-2),
+        unit("mm", DISPLACEMENT, 1e-3),
+        unit("µm", DISPLACEMENT, 1e-6),
+        unit("um", DISPLACEMENT, 1e-6),
+        unit("nm", DISPLACEMENT, 1e-9),
+        unit("in", DISPLACEMENT, INCH),
+        unit("mil", DISPLACEMENT, 1e-3 * INCH),
+        unit("mils", DISPLACEMENT, 1e-3 * INCH),
+        unit("ft", DISPLACEMENT, 12.0 * INCH),
+        unit("m/s", VELOCITY, 1.0),
+        unit("cm/s", VELOCITY, 1e-2),
+        unit("mm/s", VELOCITY, 1e-3),
+        unit("µm/s", VELOCITY, 1e-6),
+        unit("in/s", VELOCITY, INCH),
+        unit("ft/s", VELOCITY, 12.0 * INCH),
+        unit("m/s²", ACCELERATION, 1.0),
+        unit("cm/s²", ACCELERATION, 1e-2),
+        unit("mm/s²", ACCELERATION, 1e-3),
+        unit("in/s²", ACCELERATION, INCH),
+        unit("ft/s²", ACCELERATION, 12.0 * INCH),
+        unit("g", ACCELERATION, G),
+        unit("gal", ACCELERATION, 1e-2),
     ]
 };
 
@@ -142,23 +149,23 @@ mod tests {
 
     #[test]
     fn units_are_read_where_people_write_them() {
-        use Quantity::{Acceleration, Displacement, Force, Velocity};
+        use Quantity::Force;
         for (name, about, quantity, in_si) in [
             ("Force [kN]", "", Force, 1e3),
-            ("x (mm)", "", Displacement, 1e-3),
+            ("x (mm)", "", Quantity::DISPLACEMENT, 1e-3),
             ("F / kN", "", Force, 1e3),
             ("F/N", "", Force, 1.0),
-            ("v / mm/s", "", Velocity, 1e-3),
-            ("Acc [m/s^2]", "", Acceleration, 1.0),
-            ("Acc (m/s2)", "", Acceleration, 1.0),
-            ("a [g]", "", Acceleration, 9.80665),
-            ("Shaft x [µm]", "", Displacement, 1e-6),
-            ("Shaft x [μm]", "", Displacement, 1e-6),
-            ("x_mm", "", Displacement, 1e-3),
-            ("Disp um", "", Displacement, 1e-6),
-            ("Disp", "[mil]", Displacement, 25.4e-6),
+            ("v / mm/s", "", Quantity::VELOCITY, 1e-3),
+            ("Acc [m/s^2]", "", Quantity::ACCELERATION, 1.0),
+            ("Acc (m/s2)", "", Quantity::ACCELERATION, 1.0),
+            ("a [g]", "", Quantity::ACCELERATION, 9.80665),
+            ("Shaft x [µm]", "", Quantity::DISPLACEMENT, 1e-6),
+            ("Shaft x [μm]", "", Quantity::DISPLACEMENT, 1e-6),
+            ("x_mm", "", Quantity::DISPLACEMENT, 1e-3),
+            ("Disp um", "", Quantity::DISPLACEMENT, 1e-6),
+            ("Disp", "[mil]", Quantity::DISPLACEMENT, 25.4e-6),
             ("Load", "lbf", Force, 4.448_221_615_260_5),
-            ("Vibration", "in/sec", Velocity, 0.0254),
+            ("Vibration", "in/sec", Quantity::VELOCITY, 0.0254),
         ] {
             let unit = Unit::of(name, about).unwrap_or_else(|| panic!("{name} {about}"));
             assert_eq!(unit.quantity, quantity, "{name} {about}");

@@ -35,6 +35,8 @@ use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// A way to find values between samples; compared in the [module documentation](self).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Interpolation {
     /// Straight lines from sample to sample.
     Linear,

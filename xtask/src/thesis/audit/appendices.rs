@@ -1,6 +1,6 @@
 //! Reruns of Appendices B and E, whose settings the text leaves open.
 
-use mechid::estimate::time_domain::Discretisation;
+use mechid::model::Discretisation;
 use mechid::signal::Interpolation;
 use nalgebra::Complex;
 

@@ -1,10 +1,10 @@
 //! Simulations and estimates that no printed table asks for.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, Motion, equation_error};
-use mechid::force::{Discretisation, Ends, continuous, discretised, spectrum_ratio};
-use mechid::model::SecondOrderSystem;
-use mechid::signal::Spectrum;
+use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::force::{continuous, discretised, discretised_by_taylor, spectrum_ratio};
+use mechid::model::{Discretisation, ResponseQuantity, SecondOrderSystem};
+use mechid::signal::{Extent, Spectrum};
 use nalgebra::DMatrix;
 
 use super::super::case::{Case, Machine};
@@ -79,9 +79,13 @@ pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, S
     let machine = sequences.machine;
     let displacement = sequences.response.displacement();
     let lines = 1..last + 1;
-    let data =
-        FrequencyData::from_records(&sequences.force, displacement, Motion::Displacement, lines)
-            .map_err(words)?;
+    let data = FrequencyData::from_records(
+        &sequences.force,
+        displacement,
+        ResponseQuantity::Displacement,
+        lines,
+    )
+    .map_err(words)?;
     let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
     let found = equation_error(&data, &unknowns).map_err(words)?;
     Ok(percent(&machine.listed(&found.stiffness(), &found.damping()), machine))
@@ -122,6 +126,8 @@ pub enum Equation {
     Continuous,
     /// Step by step, eqs. (4.7.1)–(4.7.3) or better.
     Discretised(Discretisation),
+    /// Step by step, with the Taylor series cut after the term of this order.
+    Taylor(usize),
 }
 
 /// The dissertation's discretised equation.
@@ -146,8 +152,11 @@ impl Ratios {
     ) -> Result<Self, String> {
         let found = match equation {
             Equation::Continuous => continuous(machine, &sequences.response),
+            Equation::Taylor(order) => {
+                discretised_by_taylor(machine, &sequences.response, order, Extent::WholePeriod)
+            }
             Equation::Discretised(d) => {
-                discretised(machine, &sequences.response, d, Ends::Periodic)
+                discretised(machine, &sequences.response, d, Extent::WholePeriod)
             }
         }
         .map_err(|e| e.to_string())?;

@@ -1,6 +1,7 @@
 //! What the dissertation proposes for later, and what the library does about it.
 
-use mechid::force::{Discretisation, Measurement, Noise, Quantity, frequency_domain, inner_lines};
+use mechid::force::{Measurement, Noise, frequency_domain, inner_lines};
+use mechid::model::{Discretisation, ResponseQuantity};
 use mechid::signal::Interpolation;
 
 use super::super::published::Method::{Newmark, Rk4};
@@ -42,8 +43,7 @@ fn noise() -> Vec<String> {
 }
 
 fn taylor() -> Result<Vec<String>, String> {
-    let rms = |d| {
-        let equation = Equation::Discretised(d);
+    let rms = |equation| {
         let found = force(Source::Corrected, sdof(3.4), Rk4, Parameters::Exact, equation)?;
         Ok::<String, String>(number(found.rms()))
     };
@@ -51,14 +51,14 @@ fn taylor() -> Result<Vec<String>, String> {
         "S2",
         "The discretised force equation with more terms of the Taylor series.",
         format!(
-            "`mechid::force::discretised` with `Discretisation::Taylor(1 … 8)`, `ExactHeld` and \
-             `ExactLinear`. More terms alone do not help: on Runge-Kutta data at NPI 3.4 the rms \
-             deviation of |F̂/F| is {} with one term, {} with eight, {} with the exact exponential \
+            "`mechid::force::discretised_by_taylor` with one to eight terms, and \
+             `mechid::force::discretised` with `ZeroOrderHold` and `FirstOrderHold`. More terms \
+             alone do not help: on Runge-Kutta data at NPI 3.4 the rms deviation of |F̂/F| is {} with one term, {} with eight, {} with the exact exponential \
              for a force that is linear over a step, as it was. See [claim 24](#claim-24) and \
              the book, “Which force method”.",
-            rms(Discretisation::Euler)?,
-            rms(Discretisation::Taylor(8))?,
-            rms(Discretisation::ExactLinear)?
+            rms(Equation::Discretised(Discretisation::Euler))?,
+            rms(Equation::Taylor(8))?,
+            rms(Equation::Discretised(Discretisation::FirstOrderHold))?
         ),
     ))
 }
@@ -66,8 +66,10 @@ fn taylor() -> Result<Vec<String>, String> {
 fn spectra() -> Result<Vec<String>, String> {
     let case = sdof(8.0);
     let sequences = correct(case, Rk4)?;
-    let measured =
-        Measurement::of_all(Quantity::Displacement, sequences.response.displacement().clone());
+    let measured = Measurement::of_all(
+        ResponseQuantity::Displacement,
+        sequences.response.displacement().clone(),
+    );
     let machine = case.machine.system();
     let lines = inner_lines(&measured);
     let found = frequency_domain(&machine, &measured, &[0], &lines, &Noise::Unknown)

@@ -4,13 +4,13 @@ use std::f64::consts::TAU;
 
 use clap::ValueEnum;
 use mechid::force::{
-    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement,
-    MotionNoise, Noise, OPEN_UNKNOWNS, Quantity, Rule, Start, Tuning, Unexplained, continuous,
-    continuous_with_noise, discretised, discretised_with_noise, frequency_domain, inner_lines,
-    kalman, regularised, with_uncertain_system,
+    Channel, Filter, ForceError, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
+    OPEN_UNKNOWNS, Rule, Start, Tuning, Unexplained, continuous, continuous_with_noise,
+    discretised, discretised_with_noise, frequency_domain, inner_lines, kalman, regularised,
+    with_uncertain_system,
 };
-use mechid::model::SecondOrderSystem;
-use mechid::signal::Spectrum;
+use mechid::model::{Discretisation, ResponseQuantity, SecondOrderSystem};
+use mechid::signal::{Extent, Spectrum};
 
 use super::machine::Machine;
 use super::motion::{complete, response};
@@ -140,8 +140,8 @@ pub fn find(request: &Request, machine: &Machine, motion: &Measurement) -> Resul
 type Finder<'a> = dyn Fn(&SecondOrderSystem) -> Result<IdentifiedForce, ForceError> + 'a;
 
 fn with_machine(machine: &Machine, find: &Finder<'_>) -> Result<IdentifiedForce, CliError> {
-    Ok(match &machine.covariance {
-        Some(covariance) => with_uncertain_system(&machine.system, covariance, find)?,
+    Ok(match &machine.uncertain {
+        Some(uncertain) => with_uncertain_system(uncertain, find)?,
         None => find(&machine.system)?,
     })
 }
@@ -160,8 +160,8 @@ pub fn equation(
     let with_acceleration = method == Method::Continuous;
     let response = response(motion, machine.system.dof(), with_acceleration)
         .ok_or(CliError::ForceMotions { with_acceleration })?;
-    let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
-    let linear = Discretisation::ExactLinear;
+    let ends = if request.periodic { Extent::WholePeriod } else { Extent::Open };
+    let linear = Discretisation::FirstOrderHold;
     let noise = motion_noise(request, motion, machine.system.dof())?;
     with_machine(machine, &|system| match (with_acceleration, &noise) {
         (true, None) => continuous(system, &response),
@@ -181,11 +181,16 @@ fn motion_noise(
     if levels.is_empty() {
         return Ok(None);
     }
-    let of = |quantity: Quantity| -> Vec<f64> {
+    let of = |quantity: ResponseQuantity| -> Vec<f64> {
         let find = |dof| channels.iter().position(|c| *c == Channel { dof, quantity });
         (0..dofs).filter_map(find).map(|at| levels[at]).collect()
     };
-    let [x, v, a] = [Quantity::Displacement, Quantity::Velocity, Quantity::Acceleration].map(of);
+    let [x, v, a] = [
+        ResponseQuantity::Displacement,
+        ResponseQuantity::Velocity,
+        ResponseQuantity::Acceleration,
+    ]
+    .map(of);
     Ok(Some(MotionNoise::new(x, v, a)?))
 }
 
@@ -243,9 +248,9 @@ fn filtered(
 ) -> Result<Found, CliError> {
     let forced = &request.forced;
     let extent = match (&request.lines, request.periodic) {
-        (Some(lines), true) => Extent::PeriodLines(lines.clone()),
-        (None, true) => Extent::Period,
-        (_, false) => Extent::Open(request.start),
+        (Some(lines), true) => ForceUnknowns::Lines(lines.clone()),
+        (None, true) => ForceUnknowns::EveryLine,
+        (_, false) => ForceUnknowns::Samples(request.start),
     };
     let noise = noise(request, Noise::Unknown);
     let found = regularised(&machine.system, motion, forced, &extent, filter, &noise)?;
@@ -258,7 +263,7 @@ fn filtered(
     let find = |system: &SecondOrderSystem| {
         regularised(system, motion, forced, &extent, fixed, &noise).map(|found| found.force)
     };
-    let force = match machine.covariance {
+    let force = match machine.uncertain {
         Some(_) => with_machine(machine, &find)?,
         None => found.force,
     };
@@ -267,7 +272,7 @@ fn filtered(
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
     }
     chosen.push(("unknowns let through".into(), found.unknowns, ""));
-    chosen.extend(noise_levels(motion, &found.noise, request.averaged));
+    chosen.extend(noise_levels(motion, &found.noise_std, request.averaged));
     let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = match filter {
         Filter::Tikhonov(_) => "Tikhonov regularisation",
@@ -314,9 +319,9 @@ fn noise_levels<'a>(
     let levels = (1..).zip(motion.channels().iter().zip(noise));
     levels.map(move |(number, (channel, level))| {
         let unit = match channel.quantity {
-            Quantity::Displacement => "m",
-            Quantity::Velocity => "m/s",
-            Quantity::Acceleration => "m/s²",
+            ResponseQuantity::Displacement => "m",
+            ResponseQuantity::Velocity => "m/s",
+            ResponseQuantity::Acceleration => "m/s²",
         };
         (format!("noise of channel {number}"), level * (averaged as f64).sqrt(), unit)
     })
@@ -337,11 +342,11 @@ fn smoothed(
         level => Tuning::NoiseKnown(level.to_vec()),
     };
     let found = kalman(&machine.system, motion, forced, request.start, &tuning)?;
-    let fixed = Tuning::Given { noise: found.noise.clone(), walk: found.walk.clone() };
+    let fixed = Tuning::Given { noise_std: found.noise_std.clone(), walk: found.walk.clone() };
     let find = |system: &SecondOrderSystem| {
         kalman(system, motion, forced, request.start, &fixed).map(|found| found.force)
     };
-    let force = match machine.covariance {
+    let force = match machine.uncertain {
         Some(_) => with_machine(machine, &find)?,
         None => found.force,
     };
@@ -349,7 +354,7 @@ fn smoothed(
     for (dof, walk) in forced.iter().zip(&found.walk) {
         chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
     }
-    chosen.extend(noise_levels(motion, &found.noise, 1));
+    chosen.extend(noise_levels(motion, &found.noise_std, 1));
     let mut unexplained = force.unexplained().map(<[_]>::to_vec);
     if request.noise.is_empty() {
         // The level is that of the fit, which takes for noise what it does not explain.

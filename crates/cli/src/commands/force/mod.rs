@@ -187,14 +187,14 @@ impl ForceArgs {
         let channels = Measured::all(recorded, unexplained);
         let dofs = machine.system.dof();
         remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
-        if machine.covariance.is_some() && !how.counts_noise {
+        if machine.uncertain.is_some() && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
                  record: state that with --noise"
                     .to_owned(),
             );
         }
-        if machine.covariance.is_none() {
+        if machine.uncertain.is_none() {
             remarks.push(
                 "the machine is taken as exactly known: its file has no covariance".to_owned(),
             );
@@ -207,7 +207,7 @@ impl ForceArgs {
             samples: recorded.sampling.len(),
             periods: request.periodic.then_some(recorded.periods),
             sample_rate_hz: recorded.sampling.rate_hz(),
-            machine_uncertainty: machine.covariance.is_some(),
+            machine_uncertainty: machine.uncertain.is_some(),
             noise_uncertainty: how.counts_noise,
             chosen: how
                 .chosen

@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use clap::Args;
-use mechid::force::{Channel, Measurement, Quantity};
+use mechid::force::{Channel, Measurement};
 use mechid::io::{self, RecordFile};
-use mechid::model::Response;
+use mechid::model::{Response, ResponseQuantity};
 use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
@@ -95,9 +95,9 @@ impl MotionArgs {
     /// The columns that are named.
     fn columns(&self, dofs: usize) -> Result<Columns<'_>, CliError> {
         let groups = [
-            ("--displacement", Quantity::Displacement, &self.displacement),
-            ("--velocity", Quantity::Velocity, &self.velocity),
-            ("--acceleration", Quantity::Acceleration, &self.acceleration),
+            ("--displacement", ResponseQuantity::Displacement, &self.displacement),
+            ("--velocity", ResponseQuantity::Velocity, &self.velocity),
+            ("--acceleration", ResponseQuantity::Acceleration, &self.acceleration),
         ];
         let (mut roles, mut channels) = (Vec::new(), Vec::new());
         for (option, quantity, columns) in groups {
@@ -105,20 +105,11 @@ impl MotionArgs {
                 return Err(CliError::MotionCount { option, got: columns.len(), dofs });
             }
             for (dof, column) in columns.iter().enumerate().filter(|(_, c)| *c != NOT_MEASURED) {
-                roles.push((column, held(quantity), option));
+                roles.push((column, io::Quantity::from(quantity), option));
                 channels.push(Channel { dof, quantity });
             }
         }
         if channels.is_empty() { Err(CliError::NoMotion) } else { Ok((roles, channels)) }
-    }
-}
-
-/// What a column holds that was measured as this.
-fn held(quantity: Quantity) -> io::Quantity {
-    match quantity {
-        Quantity::Displacement => io::Quantity::Displacement,
-        Quantity::Velocity => io::Quantity::Velocity,
-        Quantity::Acceleration => io::Quantity::Acceleration,
     }
 }
 
@@ -207,7 +198,7 @@ impl Recorded {
 }
 
 /// The channels with this quantity of every degree of freedom, if all were measured.
-fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<usize>> {
+fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Option<Vec<usize>> {
     let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
     (0..dofs).map(find).collect()
 }
@@ -215,8 +206,8 @@ fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<u
 /// Whether displacement and velocity of every degree of freedom were measured, and, if asked for,
 /// acceleration.
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
-    let mut needed = vec![Quantity::Displacement, Quantity::Velocity];
-    needed.extend(with_acceleration.then_some(Quantity::Acceleration));
+    let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];
+    needed.extend(with_acceleration.then_some(ResponseQuantity::Acceleration));
     needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
 }
 
@@ -224,14 +215,14 @@ pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> b
 /// without accelerations these are zero.
 pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
     let record = measured.record();
-    let all = |quantity: Quantity| -> Option<Record> {
+    let all = |quantity: ResponseQuantity| -> Option<Record> {
         let columns = of_all(measured.channels(), quantity, dofs)?;
         let data = DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
         Record::new(record.sampling(), data).ok()
     };
-    let (x, v) = (all(Quantity::Displacement)?, all(Quantity::Velocity)?);
+    let (x, v) = (all(ResponseQuantity::Displacement)?, all(ResponseQuantity::Velocity)?);
     let a = if with_acceleration {
-        all(Quantity::Acceleration)?
+        all(ResponseQuantity::Acceleration)?
     } else {
         Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
     };

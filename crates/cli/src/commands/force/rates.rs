@@ -1,6 +1,7 @@
 //! Whether a velocity is the rate of its displacement, and an acceleration that of its velocity.
 
-use mechid::force::{Channel, Measurement, Quantity};
+use mechid::force::{Channel, Measurement};
+use mechid::model::ResponseQuantity;
 
 use crate::text_table::significant;
 
@@ -28,14 +29,14 @@ const ANOTHER_UNIT: f64 = 3.0;
 impl Rates {
     /// The pairs among these channels.
     pub fn of(channels: &[Channel]) -> Self {
-        let find = |dof: usize, quantity: Quantity| {
+        let find = |dof: usize, quantity: ResponseQuantity| {
             channels.iter().position(|c| *c == Channel { dof, quantity })
         };
         let pair = |(motion, channel): (usize, &Channel)| {
             let rate = match channel.quantity {
-                Quantity::Displacement => find(channel.dof, Quantity::Velocity)?,
-                Quantity::Velocity => find(channel.dof, Quantity::Acceleration)?,
-                Quantity::Acceleration => return None,
+                ResponseQuantity::Displacement => find(channel.dof, ResponseQuantity::Velocity)?,
+                ResponseQuantity::Velocity => find(channel.dof, ResponseQuantity::Acceleration)?,
+                ResponseQuantity::Acceleration => return None,
             };
             Some(Pair { motion, rate, product: 0.0, changes: 0.0, by_rate: 0.0 })
         };

@@ -1,9 +1,9 @@
 //! Frequency responses for people and for programs.
 
+use mechid::model::ResponseQuantity;
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
 
-use mechid::estimate::frequency_domain::Motion;
 use mechid::estimate::{Segments, Window};
 use mechid::signal::counted;
 use serde::Serialize;
@@ -90,9 +90,9 @@ impl Report {
             segments: SegmentRow::of(found),
             quantity: kind.to_string(),
             unit: match kind {
-                Motion::Displacement => "m/N",
-                Motion::Velocity => "m/(s·N)",
-                Motion::Acceleration => "m/(s²·N)",
+                ResponseQuantity::Displacement => "m/N",
+                ResponseQuantity::Velocity => "m/(s·N)",
+                ResponseQuantity::Acceleration => "m/(s²·N)",
             },
             frequency_hz: frf.omega().iter().map(|omega| omega / TAU).collect(),
             responses,

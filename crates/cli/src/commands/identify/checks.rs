@@ -1,7 +1,7 @@
 //! What was looked at before and after the fit, for people and for programs.
 
 use mechid::estimate::checks::{Check, Verdict, after_fit, kinematics, power, range, still};
-use mechid::estimate::frequency_domain::Motion;
+use mechid::model::ResponseQuantity;
 use serde::Serialize;
 
 use super::fit::{Fitted, Residual};
@@ -59,7 +59,7 @@ pub fn of_channels(measured: &Measurement) -> Result<Vec<Check>, CliError> {
     checks.extend(kinematics(&measured.motions())?);
     // A velocity tells the power without its neighbours in time.
     let (motion, kind) = match &measured.velocity {
-        Some(velocity) => (velocity, Motion::Velocity),
+        Some(velocity) => (velocity, ResponseQuantity::Velocity),
         None => measured.motion(),
     };
     checks.extend(power(&measured.force, motion, kind)?);

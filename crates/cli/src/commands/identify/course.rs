@@ -1,10 +1,8 @@
 //! What the machine found does under a measured force.
 
-use mechid::estimate::frequency_domain::Motion;
-use mechid::estimate::time_domain::{Discretisation, Extent};
 use mechid::estimate::{EstimateError, fitted_start, predict, predict_periodic};
-use mechid::model::{InitialState, Response, SecondOrderSystem};
-use mechid::signal::Record;
+use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity, SecondOrderSystem};
+use mechid::signal::{Extent, Record};
 
 use super::measurement::Measurement;
 use crate::error::CliError;
@@ -21,7 +19,7 @@ pub enum Course {
 /// One kind of motion, measured and predicted.
 #[derive(Debug)]
 pub struct Compared {
-    pub kind: Motion,
+    pub kind: ResponseQuantity,
     pub measured: Record,
     pub predicted: Record,
 }
@@ -37,7 +35,7 @@ impl Course {
         let motions = measured.motions();
         let response =
             self.response(system, measured).map_err(|reason| failed(reason, system, measured))?;
-        let compared = |(kind, record): (Motion, &Record)| {
+        let compared = |(kind, record): (ResponseQuantity, &Record)| {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             match self {
                 // Transducers have offsets, and a spectrum's mean was not fitted.
@@ -93,10 +91,10 @@ fn growth(system: &SecondOrderSystem) -> Option<f64> {
 }
 
 /// One kind of motion of a response.
-pub fn channels(response: &Response, kind: Motion) -> &Record {
+pub fn channels(response: &Response, kind: ResponseQuantity) -> &Record {
     match kind {
-        Motion::Displacement => response.displacement(),
-        Motion::Velocity => response.velocity(),
-        Motion::Acceleration => response.acceleration(),
+        ResponseQuantity::Displacement => response.displacement(),
+        ResponseQuantity::Velocity => response.velocity(),
+        ResponseQuantity::Acceleration => response.acceleration(),
     }
 }

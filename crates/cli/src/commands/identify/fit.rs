@@ -8,9 +8,8 @@ use mechid::estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
 };
-use mechid::estimate::time_domain::Discretisation;
 use mechid::estimate::{Estimate, EstimateError, Unknowns};
-use mechid::model::SecondOrderSystem;
+use mechid::model::{Discretisation, SecondOrderSystem};
 use mechid::signal::Record;
 
 use super::course::Course;

@@ -1,9 +1,9 @@
 //! The columns of a record as the forces and motions of a machine.
 
+use mechid::model::ResponseQuantity;
 use std::ops::Range;
 
 use clap::Args;
-use mechid::estimate::frequency_domain::Motion;
 use mechid::io::{Quantity, RecordFile};
 use mechid::signal::{Record, Sampling};
 use nalgebra::{DMatrix, DVector};
@@ -107,17 +107,17 @@ pub fn joined(record: &Record, later: &Record) -> Result<Record, CliError> {
 
 impl Measurement {
     /// The first kind of motion measured, and what it is.
-    pub fn motion(&self) -> (&Record, Motion) {
+    pub fn motion(&self) -> (&Record, ResponseQuantity) {
         let (kind, record) = self.motions()[0];
         (record, kind)
     }
 
     /// Every kind of motion measured.
-    pub fn motions(&self) -> Vec<(Motion, &Record)> {
+    pub fn motions(&self) -> Vec<(ResponseQuantity, &Record)> {
         let candidates = [
-            (Motion::Displacement, &self.displacement),
-            (Motion::Velocity, &self.velocity),
-            (Motion::Acceleration, &self.acceleration),
+            (ResponseQuantity::Displacement, &self.displacement),
+            (ResponseQuantity::Velocity, &self.velocity),
+            (ResponseQuantity::Acceleration, &self.acceleration),
         ];
         let measured = candidates.into_iter();
         measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()
@@ -258,9 +258,9 @@ impl ChannelArgs {
         let forces = self.force.iter().filter(|c| *c != NO_FORCE);
         let forces = forces.map(|column| (column, Quantity::Force, "--force"));
         let motions = [
-            (&self.displacement, Quantity::Displacement, "--displacement"),
-            (&self.velocity, Quantity::Velocity, "--velocity"),
-            (&self.acceleration, Quantity::Acceleration, "--acceleration"),
+            (&self.displacement, ResponseQuantity::Displacement.into(), "--displacement"),
+            (&self.velocity, ResponseQuantity::Velocity.into(), "--velocity"),
+            (&self.acceleration, ResponseQuantity::Acceleration.into(), "--acceleration"),
         ];
         let motions = motions.into_iter().flat_map(|(columns, quantity, option)| {
             columns.iter().map(move |column| (column, quantity, option))

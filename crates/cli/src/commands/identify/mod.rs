@@ -14,10 +14,11 @@ mod responses;
 mod time;
 pub(super) mod validation;
 
+use mechid::model::Parameter;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mechid::estimate::{Estimate, Parameter, Unknowns};
+use mechid::estimate::{Estimate, Unknowns};
 use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
 use mechid::plot::Figure;
 use mechid::signal::Record;

@@ -14,9 +14,9 @@ pub fn motion(title: &str, compared: &Compared) -> Figure {
     let shown = measured.len().min(SHOWN);
     let time: Vec<f64> = measured.sampling().times().take(shown).collect();
     let unit = match compared.kind {
-        mechid::estimate::frequency_domain::Motion::Displacement => "m",
-        mechid::estimate::frequency_domain::Motion::Velocity => "m/s",
-        mechid::estimate::frequency_domain::Motion::Acceleration => "m/s²",
+        mechid::model::ResponseQuantity::Displacement => "m",
+        mechid::model::ResponseQuantity::Velocity => "m/s",
+        mechid::model::ResponseQuantity::Acceleration => "m/s²",
     };
     let mut name = compared.kind.to_string();
     name[..1].make_ascii_uppercase();

@@ -4,9 +4,9 @@ use mechid::estimate::checks::{
     Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
 };
 use mechid::estimate::frequency_domain::{FrequencyData, equation_error, output_error};
-use mechid::estimate::time_domain::{Discretisation, Extent};
 use mechid::estimate::{Estimate, EstimateError, Unknowns};
-use mechid::signal::Record;
+use mechid::model::Discretisation;
+use mechid::signal::{Extent, Record};
 
 use super::course::Course;
 use super::fit::{Fitted, Method, Misfit, one_motion_of, steady_residuals};

@@ -5,9 +5,10 @@ use mechid::estimate::checks::{
     Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
     noise_on_motion, periodicity_across,
 };
-use mechid::estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use mechid::estimate::time_domain::{TimeDomain, Transitions};
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
-use mechid::signal::{Interpolation, Record, counted};
+use mechid::model::Discretisation;
+use mechid::signal::{Extent, Interpolation, Record, counted};
 
 use super::CONSPICUOUS;
 use super::course::Course;

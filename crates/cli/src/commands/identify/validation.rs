@@ -1,12 +1,11 @@
 //! How much of a record that was not fitted the machine found predicts.
 
+use mechid::signal::Extent;
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::estimate::frequency_domain::Motion;
-use mechid::estimate::time_domain::{Discretisation, Extent};
 use mechid::estimate::{StartFit, fit_percent, predict};
-use mechid::model::{InitialState, SecondOrderSystem};
+use mechid::model::{Discretisation, InitialState, ResponseQuantity, SecondOrderSystem};
 use serde::Serialize;
 
 use super::course::{Course, channels, failed};
@@ -100,7 +99,7 @@ impl Validation {
     ) -> Result<Self, CliError> {
         let measured = &recorded.held;
         let mut shares = Vec::new();
-        let mut add = |kind: Motion, fits: Vec<f64>| {
+        let mut add = |kind: ResponseQuantity, fits: Vec<f64>| {
             for (at, fit_percent) in fits.into_iter().enumerate() {
                 let quantity = kind.to_string();
                 shares.push(Share { quantity, degree_of_freedom: at + 1, fit_percent });
@@ -149,7 +148,7 @@ fn in_stretches(
     recorded: &Recorded,
     system: &SecondOrderSystem,
     discretisation: Discretisation,
-) -> Result<Vec<(Motion, Vec<f64>)>, CliError> {
+) -> Result<Vec<(ResponseQuantity, Vec<f64>)>, CliError> {
     let held = &recorded.held;
     let told = |reason| failed(reason, system, held);
     let mut start = StartFit::new(system, discretisation)?;
@@ -172,7 +171,10 @@ fn in_stretches(
             }
         }
         let row = |kind| channels(&response, kind).data().row(stretch.force.len() - 1).transpose();
-        state = InitialState::new(row(Motion::Displacement), row(Motion::Velocity))?;
+        state = InitialState::new(
+            row(ResponseQuantity::Displacement),
+            row(ResponseQuantity::Velocity),
+        )?;
         Ok(())
     })?;
     let fits = |levels: Vec<Level>| levels.iter().map(Level::fit_percent).collect();

@@ -5,10 +5,9 @@ mod picture;
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::estimate::{IdentifiedMode, Parameter, Unknowns, identified_modes};
+use mechid::estimate::{IdentifiedMode, Unknowns, identified_modes};
 use mechid::io::{ParameterCovariance, SystemMatrices, read_covariance, read_system};
-use mechid::model::SecondOrderSystem;
-use nalgebra::DMatrix;
+use mechid::model::{Parameter, SecondOrderSystem, UncertainSystem};
 use serde::Serialize;
 
 use super::identify::report::{CONFIDENCE, Uncertain};
@@ -79,9 +78,11 @@ impl ModalArgs {
             Some(covariance) => {
                 let parameters = parameters(&file, &system, covariance)?;
                 let of = covariance.degrees_of_freedom;
-                identified_modes(&system, &parameters, &covariance.matrix(), of)?
+                let matrix = covariance.matrix();
+                let machine = UncertainSystem::new(system.clone(), parameters, matrix)?;
+                identified_modes(&machine, of)?
             }
-            None => identified_modes(&system, &[], &DMatrix::zeros(0, 0), 0)?,
+            None => identified_modes(&UncertainSystem::exact(system.clone()), 0)?,
         };
         let known = covariance.is_none();
         let rows = modes.iter().map(|mode| ModeRow::of(mode, known));

@@ -1,6 +1,6 @@
 //! The pictures of the report.
 
-use mechid::estimate::frequency_domain::Motion;
+use mechid::model::ResponseQuantity;
 use mechid::plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid::signal::{Record, Spectrum};
 
@@ -40,11 +40,11 @@ fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, CliError>
 }
 
 /// Symbol and unit of a kind of motion.
-pub fn symbol(kind: Motion) -> (&'static str, &'static str) {
+pub fn symbol(kind: ResponseQuantity) -> (&'static str, &'static str) {
     match kind {
-        Motion::Displacement => ("Displacement", "m"),
-        Motion::Velocity => ("Velocity", "m/s"),
-        Motion::Acceleration => ("Acceleration", "m/s²"),
+        ResponseQuantity::Displacement => ("Displacement", "m"),
+        ResponseQuantity::Velocity => ("Velocity", "m/s"),
+        ResponseQuantity::Acceleration => ("Acceleration", "m/s²"),
     }
 }
 

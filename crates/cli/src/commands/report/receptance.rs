@@ -1,9 +1,8 @@
 //! The receptance that records show, whatever was fitted.
 
 use mechid::estimate::frequency_domain::{FrequencyData, Lines};
-use mechid::estimate::time_domain::Extent;
 use mechid::estimate::{FrfEstimator, Segments, Window};
-use mechid::signal::lines;
+use mechid::signal::{Extent, lines};
 
 use super::Part;
 use crate::commands::frf::responses::average;

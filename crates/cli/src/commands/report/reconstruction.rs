@@ -1,8 +1,7 @@
 //! The force found from the motion with the identified machine, against the measured one.
 
-use mechid::force::{
-    self, Channel, Entry, IdentifiedForce, Quantity, Rule, Start, SystemCovariance, channel_errors,
-};
+use mechid::force::{self, Channel, IdentifiedForce, Rule, Start, channel_errors};
+use mechid::model::ResponseQuantity;
 use mechid::signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -59,22 +58,16 @@ impl Reconstruction {
 
 fn machine(found: &Identified) -> Result<Machine, CliError> {
     let estimate = &found.fitted.estimate;
-    let entry = |p: mechid::estimate::Parameter| Entry {
-        matrix: p.matrix(),
-        row: p.row(),
-        column: p.column(),
-    };
-    let entries = estimate.parameters().map(|p| entry(p.parameter)).collect();
-    let covariance = SystemCovariance::new(entries, estimate.covariance().clone())?;
-    Ok(Machine { system: estimate.system()?, covariance: Some(covariance) })
+    let uncertain = estimate.uncertain_system()?;
+    Ok(Machine { system: uncertain.system().clone(), uncertain: Some(uncertain) })
 }
 
 /// Every motion that was measured.
 fn motion(source: &Measurement) -> Result<force::Measurement, CliError> {
     let groups = [
-        (&source.displacement, Quantity::Displacement),
-        (&source.velocity, Quantity::Velocity),
-        (&source.acceleration, Quantity::Acceleration),
+        (&source.displacement, ResponseQuantity::Displacement),
+        (&source.velocity, ResponseQuantity::Velocity),
+        (&source.acceleration, ResponseQuantity::Acceleration),
     ];
     let (mut columns, mut channels) = (Vec::new(), Vec::new());
     for (record, quantity) in groups {

@@ -1,11 +1,10 @@
 //! The estimators, and what they gather from samples that come a stretch at a time.
 
 use clap::ValueEnum;
-use mechid::estimate::frequency_domain::{
-    Lines, Motion, RepeatedPeriods, equation_error, output_error,
-};
-use mechid::estimate::time_domain::{Discretisation, Transitions};
+use mechid::estimate::frequency_domain::{Lines, RepeatedPeriods, equation_error, output_error};
+use mechid::estimate::time_domain::Transitions;
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns};
+use mechid::model::{Discretisation, ResponseQuantity};
 
 use super::samples::Samples;
 use crate::commands::identify::excited::choose_lines;
@@ -96,8 +95,8 @@ impl Gathered {
         let force = &samples.force;
         match self {
             Self::Steps(_, rows) => {
-                let x = samples.motion(Motion::Displacement)?;
-                let v = samples.motion(Motion::Velocity)?;
+                let x = samples.motion(ResponseQuantity::Displacement)?;
+                let v = samples.motion(ResponseQuantity::Velocity)?;
                 rows.push(x, v, force, samples.extent)?;
             }
             Self::Instants(rows) => {

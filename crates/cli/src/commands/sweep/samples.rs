@@ -2,11 +2,9 @@
 
 use std::borrow::Cow;
 
-use mechid::estimate::frequency_domain::Motion;
-use mechid::estimate::time_domain::Extent;
 use mechid::io::{Experiment, ResponseKind};
-use mechid::model::Response;
-use mechid::signal::{Record, Sampling};
+use mechid::model::{Response, ResponseQuantity};
+use mechid::signal::{Extent, Record, Sampling};
 use nalgebra::DMatrix;
 
 use crate::commands::identify::measurement::{Measurement, joined};
@@ -16,7 +14,7 @@ use crate::error::CliError;
 #[derive(Debug)]
 pub struct Samples<'a> {
     pub force: Cow<'a, Record>,
-    motions: Vec<(Motion, Cow<'a, Record>)>,
+    motions: Vec<(ResponseQuantity, Cow<'a, Record>)>,
     pub extent: Extent,
 }
 
@@ -29,9 +27,9 @@ impl<'a> Samples<'a> {
         Ok(Self {
             force: own(&simulation.measured_force),
             motions: vec![
-                (Motion::Displacement, own(motion.displacement())),
-                (Motion::Velocity, own(motion.velocity())),
-                (Motion::Acceleration, own(motion.acceleration())),
+                (ResponseQuantity::Displacement, own(motion.displacement())),
+                (ResponseQuantity::Velocity, own(motion.velocity())),
+                (ResponseQuantity::Acceleration, own(motion.acceleration())),
             ],
             extent: match experiment.response {
                 ResponseKind::Periodic => Extent::WholePeriod,
@@ -82,13 +80,13 @@ impl<'a> Samples<'a> {
     ///
     /// # Errors
     /// [`CliError::SweepMotion`] if it was not measured.
-    pub fn motion(&self, wanted: Motion) -> Result<&Record, CliError> {
+    pub fn motion(&self, wanted: ResponseQuantity) -> Result<&Record, CliError> {
         let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
         found.map(|(_, record)| record.as_ref()).ok_or(CliError::SweepMotion { wanted })
     }
 
     /// The first kind of motion there is.
-    pub fn first_motion(&self) -> (Motion, &Record) {
+    pub fn first_motion(&self) -> (ResponseQuantity, &Record) {
         (self.motions[0].0, &self.motions[0].1)
     }
 
@@ -97,8 +95,12 @@ impl<'a> Samples<'a> {
     /// # Errors
     /// As [`Samples::motion`].
     pub fn response(&self) -> Result<Response, CliError> {
-        let [x, v, a] = [Motion::Displacement, Motion::Velocity, Motion::Acceleration]
-            .map(|kind| self.motion(kind));
+        let [x, v, a] = [
+            ResponseQuantity::Displacement,
+            ResponseQuantity::Velocity,
+            ResponseQuantity::Acceleration,
+        ]
+        .map(|kind| self.motion(kind));
         Ok(Response::new(x?.clone(), v?.clone(), a?.clone())?)
     }
 

@@ -4,12 +4,12 @@ mod row;
 #[cfg(test)]
 mod tests;
 
-use mechid_model::Matrix;
+use mechid_model::{Matrix, Parameter};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::levenberg_marquardt::SumOfSquares;
 use super::{FrequencyData, NoiseSpectrum};
-use crate::{EstimateError, Parameter, Unknowns};
+use crate::{EstimateError, Unknowns};
 use row::Row;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;

@@ -1,9 +1,9 @@
 //! One spectral line at one set of parameters, in buffers that are reused.
 
+use mechid_model::Parameter;
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 
 use super::{ComplexMatrix, ComplexVector, cholesky};
-use crate::Parameter;
 
 /// One row of the data at one set of parameters.
 pub(super) struct Row {

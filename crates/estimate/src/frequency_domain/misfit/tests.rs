@@ -1,9 +1,9 @@
 //! Derivatives against differences, and the likelihood against its definition.
 
+use mechid_model::ResponseQuantity;
 use nalgebra::dmatrix;
 
 use super::*;
-use crate::frequency_domain::Motion;
 
 /// Two degrees of freedom, nothing symmetric, at three frequencies, off the truth.
 fn data() -> FrequencyData {
@@ -14,7 +14,7 @@ fn data() -> FrequencyData {
     let force = DMatrix::from_fn(3, 2, |l, c| z(2 * l + c));
     let motion = DMatrix::from_fn(3, 2, |l, c| z(11 + 2 * l + c) * 0.1);
     let omega = vec![1.0, 2.5, 4.0];
-    FrequencyData::from_amplitudes(omega, force, motion, Motion::Displacement).unwrap()
+    FrequencyData::from_amplitudes(omega, force, motion, ResponseQuantity::Displacement).unwrap()
 }
 
 /// Positive definite, every entry of it in use.

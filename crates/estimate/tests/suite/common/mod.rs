@@ -3,8 +3,7 @@
 pub mod documentation;
 pub mod monte_carlo;
 
-use mechid_estimate::frequency_domain::Motion;
-use mechid_model::{JournalBearing, KyxSign, OilFilm, Sdof, SecondOrderSystem};
+use mechid_model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -58,7 +57,7 @@ pub fn synthesise(
     sampling: Sampling,
     lines: &[usize],
     amplitudes: &ComplexMatrix,
-    quantity: Motion,
+    quantity: ResponseQuantity,
 ) -> Record {
     let len = sampling.len();
     let data = DMatrix::from_fn(len, amplitudes.ncols(), |k, c| {

@@ -1,10 +1,10 @@
 //! Repeated experiments with seeded noise, and the bound no unbiased estimator can beat.
 
 use mechid_estimate::frequency_domain::{
-    Lines, Motion, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
+    Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
 };
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{NoiseLevel, Record, noise};
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
@@ -46,7 +46,8 @@ impl Experiment {
         let force = forces(lines.as_slice(), system.dof(), 50.0);
         let motion = displacements(&system, &lines.omega(), &force);
         let repeat = |amplitudes: &DMatrix<Complex<f64>>| {
-            let one = synthesise(period, lines.as_slice(), amplitudes, Motion::Displacement);
+            let one =
+                synthesise(period, lines.as_slice(), amplitudes, ResponseQuantity::Displacement);
             let len = period.len();
             let all =
                 DMatrix::from_fn(len * periods, system.dof(), |k, c| one.data()[(k % len, c)]);
@@ -60,7 +61,8 @@ impl Experiment {
     pub fn measure(&self, seed: u64) -> RepeatedPeriods {
         let level = NoiseLevel::FractionOfRms(self.noise);
         let motion = noise::add_white(&self.motion, level, seed).unwrap();
-        RepeatedPeriods::new(&self.lines, &self.force, &motion, Motion::Displacement).unwrap()
+        RepeatedPeriods::new(&self.lines, &self.force, &motion, ResponseQuantity::Displacement)
+            .unwrap()
     }
 
     pub fn estimate(&self, periods: &RepeatedPeriods, estimator: Estimator) -> Estimate {
@@ -83,7 +85,7 @@ impl Experiment {
     pub fn truth(&self) -> DVector<f64> {
         let free = self.unknowns.free();
         let entry =
-            |p: &mechid_estimate::Parameter| self.system.matrix(p.matrix())[(p.row(), p.column())];
+            |p: &mechid_model::Parameter| self.system.matrix(p.matrix())[(p.row(), p.column())];
         DVector::from_iterator(free.len(), free.iter().map(entry))
     }
 

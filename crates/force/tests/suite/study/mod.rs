@@ -3,12 +3,14 @@
 //! Used by the example that writes the tables and by the test that checks them.
 
 use mechid_force::{
-    Discretisation, Ends, Extent, Filter, IdentifiedForce, Measurement, Noise, Quantity, Rule,
-    Start, Tuning, continuous, discretised, frequency_domain, inner_lines, kalman, regularised,
+    Filter, ForceUnknowns, IdentifiedForce, Measurement, Noise, Rule, Start, Tuning, continuous,
+    discretised, frequency_domain, inner_lines, kalman, regularised,
 };
-use mechid_model::{KyxSign, Response, SecondOrderSystem, npi_sampling};
+use mechid_model::{
+    Discretisation, KyxSign, Response, ResponseQuantity, SecondOrderSystem, npi_sampling,
+};
 use mechid_problems::{dissertation_bearing, dissertation_sdof, exact_harmonic_periodic};
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Spectrum, noise};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Spectrum, noise};
 use nalgebra::DMatrix;
 
 /// Noise realisations per case.
@@ -60,7 +62,7 @@ impl Case {
     pub fn measured(&self, seed: u64) -> Measurement {
         let level = NoiseLevel::FractionOfRms(self.level);
         let noisy = noise::add_white(&self.exact, level, seed).unwrap();
-        Measurement::of_all(Quantity::Displacement, noisy)
+        Measurement::of_all(ResponseQuantity::Displacement, noisy)
     }
 
     /// ‖F̂ − F‖ / ‖F‖; a held force has its last step's value at the last sample.
@@ -129,12 +131,14 @@ fn differenced(x: &Record) -> Response {
 pub type Method = (&'static str, fn(&Case, &Measurement) -> IdentifiedForce);
 
 fn discretised_from(case: &Case, m: &Measurement, how: Discretisation) -> IdentifiedForce {
-    discretised(&case.system, &differenced(m.record()), how, Ends::Periodic).unwrap()
+    discretised(&case.system, &differenced(m.record()), how, Extent::WholePeriod).unwrap()
 }
 
 pub fn filtered(case: &Case, m: &Measurement, filter: Filter) -> IdentifiedForce {
     let (system, forced) = (&case.system, case.forced());
-    regularised(system, m, &forced, &Extent::Period, filter, &Noise::Unknown).unwrap().force
+    regularised(system, m, &forced, &ForceUnknowns::EveryLine, filter, &Noise::Unknown)
+        .unwrap()
+        .force
 }
 
 fn at_lines(case: &Case, m: &Measurement, lines: &[usize]) -> IdentifiedForce {
@@ -146,13 +150,13 @@ pub const KNOWN: [Method; 3] = [
     ("frequency domain, excited lines", |c, m| at_lines(c, m, &c.lines)),
     ("Tikhonov on the excited lines, likelihood", |c, m| {
         let (extent, filter) =
-            (Extent::PeriodLines(c.lines.clone()), Filter::Tikhonov(Rule::Likelihood));
+            (ForceUnknowns::Lines(c.lines.clone()), Filter::Tikhonov(Rule::Likelihood));
         let noise = Noise::Unknown;
         regularised(&c.system, m, &c.forced(), &extent, filter, &noise).unwrap().force
     }),
     ("truncated SVD on the excited lines, likelihood", |c, m| {
         let (extent, filter) =
-            (Extent::PeriodLines(c.lines.clone()), Filter::TruncatedSvd(Rule::Likelihood));
+            (ForceUnknowns::Lines(c.lines.clone()), Filter::TruncatedSvd(Rule::Likelihood));
         let noise = Noise::Unknown;
         regularised(&c.system, m, &c.forced(), &extent, filter, &noise).unwrap().force
     }),
@@ -167,7 +171,7 @@ pub const UNKNOWN: [Method; 13] = [
         discretised_from(c, m, Discretisation::Euler)
     }),
     ("discretised, exact held, differences for ẋ", |c, m| {
-        discretised_from(c, m, Discretisation::ExactHeld)
+        discretised_from(c, m, Discretisation::ZeroOrderHold)
     }),
     ("frequency domain, every line", |c, m| at_lines(c, m, &inner_lines(m))),
     ("Tikhonov, likelihood", |c, m| filtered(c, m, Filter::Tikhonov(Rule::Likelihood))),

@@ -1,6 +1,6 @@
 //! Sections 5.4 and 5.5: the force on one degree of freedom.
 
-use mechid::force::Discretisation;
+use mechid::model::Discretisation;
 use mechid_problems::{exact_foh_periodic, exact_zoh_periodic};
 
 use super::super::super::case::Machine;
@@ -147,17 +147,15 @@ fn truncation_is_the_cause(view: &View) -> Result<Finding, String> {
         data.push((method.name(), sequences(view.source, case, method)?));
     }
     let steps = [
-        Discretisation::Euler,
-        Discretisation::Taylor(2),
-        Discretisation::Taylor(8),
-        Discretisation::ExactHeld,
-        Discretisation::ExactLinear,
+        Equation::Discretised(Discretisation::Euler),
+        Equation::Taylor(2),
+        Equation::Taylor(8),
+        Equation::Discretised(Discretisation::ZeroOrderHold),
+        Equation::Discretised(Discretisation::FirstOrderHold),
     ];
     let (mut tests, mut lines) = (Vec::new(), Vec::new());
     for (name, sequences) in &data {
-        let rms = |d: &Discretisation| {
-            Ok(Ratios::of(sequences, &machine, Equation::Discretised(*d))?.rms())
-        };
+        let rms = |step: &Equation| Ok(Ratios::of(sequences, &machine, *step)?.rms());
         let rms: Vec<f64> = steps.iter().map(rms).collect::<Result<_, String>>()?;
         tests.push(rms[2] < 0.1 * rms[0]);
         let shown: Vec<String> = rms.iter().map(|r| number(*r)).collect();

@@ -1,6 +1,6 @@
 //! Appendices B and E, and the general conclusions of section 6.1.
 
-use mechid::estimate::time_domain::Discretisation;
+use mechid::model::Discretisation;
 use mechid::signal::Interpolation;
 
 use super::super::super::published::Method::{self, CentralDifference as Central, Newmark, Rk4};

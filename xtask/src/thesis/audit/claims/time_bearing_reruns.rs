@@ -1,7 +1,7 @@
 //! Section 5.6: the direction of the excitation.
 
-use mechid::estimate::time_domain::Discretisation;
 use mechid::integrate::integrate_periodic;
+use mechid::model::Discretisation;
 use mechid::signal::{Multisine, Phases, Record, lines};
 use nalgebra::DMatrix;
 

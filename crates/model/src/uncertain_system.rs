@@ -1,0 +1,135 @@
+//! A system whose entries are known with an uncertainty.
+
+use nalgebra::DMatrix;
+
+use crate::{ModelError, Parameter, SecondOrderSystem};
+
+/// A system, those of its entries that are uncertain, and their covariance; all other entries are
+/// known.
+///
+/// ```
+/// use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
+/// use nalgebra::dmatrix;
+///
+/// // The stiffness is known to ±0.2 N/m.
+/// let system = SecondOrderSystem::new(dmatrix![2.0], dmatrix![3.0], dmatrix![8.0])?;
+/// let stiffness = Parameter::named("k", 1)?;
+/// let uncertain = UncertainSystem::new(system, vec![stiffness], dmatrix![0.2 * 0.2])?;
+/// assert_eq!(uncertain.standard_error(stiffness), 0.2);
+/// # Ok::<(), mechid_model::ModelError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(
+        try_from = "crate::serde_forms::UncertainForm",
+        into = "crate::serde_forms::UncertainForm"
+    )
+)]
+pub struct UncertainSystem {
+    system: SecondOrderSystem,
+    parameters: Vec<Parameter>,
+    covariance: DMatrix<f64>,
+}
+
+impl UncertainSystem {
+    /// A system and the covariance of these entries, one row and column each, in the products of
+    /// their units (kg, N·s/m, N/m).
+    ///
+    /// # Errors
+    /// [`ModelError::CovarianceShape`] if it is not one row and column per parameter,
+    /// [`ModelError::Covariance`] if it has a negative variance or an entry that is not finite,
+    /// [`ModelError::RepeatedParameter`] if a parameter is named twice,
+    /// [`ModelError::NoSuchParameter`] if it belongs to a system of other size.
+    pub fn new(
+        system: SecondOrderSystem,
+        parameters: Vec<Parameter>,
+        covariance: DMatrix<f64>,
+    ) -> Result<Self, ModelError> {
+        let ((rows, columns), dof) = (covariance.shape(), system.dof());
+        if (rows, columns) != (parameters.len(), parameters.len()) {
+            let parameters = parameters.len();
+            return Err(ModelError::CovarianceShape { rows, columns, parameters });
+        }
+        for (at, parameter) in parameters.iter().enumerate() {
+            if parameter.dof() != dof {
+                let name = parameter.to_string();
+                return Err(ModelError::NoSuchParameter { name, dof });
+            }
+            if parameters[..at].contains(parameter) {
+                return Err(ModelError::RepeatedParameter { parameter: *parameter });
+            }
+            let variance = covariance[(at, at)];
+            if variance < 0.0 || covariance.column(at).iter().any(|value| !value.is_finite()) {
+                return Err(ModelError::Covariance { parameter: *parameter, variance });
+            }
+        }
+        Ok(Self { system, parameters, covariance })
+    }
+
+    /// A system of which every entry is known.
+    pub fn exact(system: SecondOrderSystem) -> Self {
+        Self { system, parameters: Vec::new(), covariance: DMatrix::zeros(0, 0) }
+    }
+
+    /// The system with the uncertain entries at their estimates.
+    pub fn system(&self) -> &SecondOrderSystem {
+        &self.system
+    }
+
+    /// Uncertain entries, in the order of the covariance.
+    pub fn parameters(&self) -> &[Parameter] {
+        &self.parameters
+    }
+
+    /// Covariance of the uncertain entries, one row and column each, in the products of their units
+    /// (kg, N·s/m, N/m).
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    /// Standard error of one entry, in its unit (kg, N·s/m or N/m); 0 for an entry that is known.
+    pub fn standard_error(&self, parameter: Parameter) -> f64 {
+        let at = self.parameters.iter().position(|p| *p == parameter);
+        at.map_or(0.0, |at| self.covariance[(at, at)].sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::dmatrix;
+
+    use super::*;
+
+    #[test]
+    fn what_cannot_be_a_covariance_is_refused() {
+        let system = SecondOrderSystem::new(dmatrix![2.0], dmatrix![3.0], dmatrix![8.0]).unwrap();
+        let k = Parameter::named("k", 1).unwrap();
+        let of = |parameters: &[Parameter], covariance| {
+            UncertainSystem::new(system.clone(), parameters.to_vec(), covariance)
+        };
+        let refused =
+            |parameters: &[Parameter], covariance| of(parameters, covariance).unwrap_err();
+        assert_eq!(
+            refused(&[k], DMatrix::identity(2, 2)),
+            ModelError::CovarianceShape { rows: 2, columns: 2, parameters: 1 }
+        );
+        for variance in [-1.0, f64::INFINITY] {
+            let error = ModelError::Covariance { parameter: k, variance };
+            assert_eq!(refused(&[k], dmatrix![variance]), error);
+        }
+        assert_eq!(
+            refused(&[k, k], DMatrix::identity(2, 2)),
+            ModelError::RepeatedParameter { parameter: k }
+        );
+        let k22 = Parameter::named("k22", 2).unwrap();
+        assert_eq!(
+            refused(&[k22], dmatrix![1.0]),
+            ModelError::NoSuchParameter { name: "k22".into(), dof: 1 }
+        );
+        let c = Parameter::named("c", 1).unwrap();
+        assert_eq!(of(&[k], dmatrix![4.0]).unwrap().standard_error(c), 0.0);
+        assert_eq!(UncertainSystem::exact(system).parameters(), []);
+    }
+}
