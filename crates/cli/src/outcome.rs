@@ -6,8 +6,9 @@ use mechid::io::{BegunFile, OutputFile, is_standard_output, write_all};
 use mechid::plot::Figure;
 use serde::Serialize;
 
+use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::options::{PlotArgs, ReportArgs};
+use crate::options;
 
 /// Pixels of a PNG file for each px of the drawing.
 const PNG_SCALE: f64 = 2.0;
@@ -29,6 +30,7 @@ impl Outcome {
     /// An outcome told as `text` to a person and as the fields of `report` to a program.
     pub fn new(text: String, report: &impl Serialize) -> Result<Self, CliError> {
         let json = serde_json::to_string_pretty(report)? + "\n";
+        let text = options::spelled(&text);
         Ok(Self { text, json, files: Vec::new(), begun: Vec::new() })
     }
 

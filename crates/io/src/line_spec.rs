@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use mechid_signal::{Sampling, lines};
-use serde::{Deserialize, Deserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::IoError;
 
@@ -115,5 +115,11 @@ impl fmt::Display for LineSpec {
 impl<'de> Deserialize<'de> for LineSpec {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+impl Serialize for LineSpec {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
     }
 }

@@ -56,11 +56,21 @@ mod book {
     mod force {}
 }
 
+pub use mechid_analysis as analysis;
+pub use mechid_analysis::identify::{LineChoice, Method};
+pub use mechid_analysis::{
+    Channels, Detrend, FrfSettings, Identified, Identify, InspectSettings, Machine, Measurement,
+    Motion, Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify, inspect,
+    reconstruct,
+};
 pub use mechid_estimate as estimate;
 pub use mechid_force as force;
 pub use mechid_integrate as integrate;
 pub use mechid_io as io;
 pub use mechid_model as model;
+#[cfg(feature = "report")]
 pub use mechid_plot as plot;
+#[cfg(feature = "report")]
+pub use mechid_report as report;
 pub use mechid_signal as signal;
-pub use simulation::{SimulateError, Simulation, exact_periodic, simulate};
+pub use simulation::{SimulateError, Simulation, exact_periodic, simulate, sweep};

@@ -4,8 +4,8 @@ use clap::{Args, CommandFactory as _};
 use clap_complete::Shell;
 
 use super::Cli;
+use crate::args::ReportArgs;
 use crate::error::CliError;
-use crate::options::ReportArgs;
 use crate::outcome::Outcome;
 
 /// Print a script that lets a shell complete subcommands and options

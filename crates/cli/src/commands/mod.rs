@@ -6,12 +6,10 @@
 //! [`CliError`].
 
 mod completions;
-mod extremes;
 mod force;
 mod frf;
 mod identify;
 mod info;
-mod levels;
 mod modal;
 mod multisine;
 mod report;
@@ -21,8 +19,8 @@ mod sweep;
 
 use clap::{Parser, Subcommand};
 
+use crate::args::ReportArgs;
 use crate::error::CliError;
-use crate::options::ReportArgs;
 use crate::outcome::Outcome;
 
 /// From a measured force and response to the machine behind it.

@@ -13,10 +13,10 @@ use mechid::model::{Sdof, SecondOrderSystem};
 use mechid::plot::{Axis, Curve, Figure, Panel, Reference};
 use serde::Serialize;
 
+use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::options::{PlotArgs, ReportArgs};
 use crate::outcome::Outcome;
-use crate::text_table::{compact, significant, text_table};
+use mechid::analysis::text::{compact, significant, text_table};
 
 /// Show stability and accuracy of the time-stepping schemes
 ///

@@ -11,8 +11,8 @@ use mechid::plot::{Axis, Curve, Figure, Panel};
 use mechid::signal::resample::refine;
 use mechid::signal::{Interpolation, Sampling};
 
+use crate::args::{PlotArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
-use crate::options::{PlotArgs, ReportArgs, at_least_one};
 use crate::outcome::Outcome;
 use design::Channel;
 use report::Report;

@@ -4,7 +4,7 @@ use mechid::signal::{Sampling, SignalError, Spectrum, counted, measures};
 use serde::Serialize;
 
 use super::design::Channel;
-use crate::text_table::{significant, text_table};
+use mechid::analysis::text::{significant, text_table};
 
 /// Lines weaker than this fraction of the strongest are taken as rounding.
 const FLOOR: f64 = 1e-9;

@@ -10,10 +10,10 @@ use mechid::io::{CsvFile, Experiment, ResponseKind, SystemMatrices};
 use mechid::signal::{Record, counted};
 use serde::Serialize;
 
+use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::options::{PlotArgs, ReportArgs};
 use crate::outcome::Outcome;
-use crate::text_table::{compact, significant, text_table};
+use mechid::analysis::text::{compact, significant, text_table};
 
 /// Simulate the experiment described in a file and write its record
 ///

@@ -1,0 +1,372 @@
+//! What can go wrong between a record and the result.
+
+use mechid_estimate::EstimateError;
+use mechid_estimate::frequency_domain::Motion;
+use mechid_signal::{counted, ordinal, told, told_to};
+
+use crate::text::significant;
+
+/// A failure of an analysis.
+///
+/// Messages write the settings that they name between backticks, as the fields of the option structs
+/// are called, so that each door can show its own spelling (`--sample-rate` on the command line).
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// A file cannot be read or understood.
+    #[error(transparent)]
+    Io(#[from] mechid_io::IoError),
+    /// The record does not have all samples of the window.
+    #[error(
+        "the window needs samples {first} to {last} (counted from 1), {file} has {len}: choose \
+         `start`, `period` and `periods` to fit"
+    )]
+    Window {
+        /// The record.
+        file: String,
+        /// First sample needed, counted from 1.
+        first: usize,
+        /// Last sample needed, counted from 1.
+        last: usize,
+        /// Number of samples in the record.
+        len: usize,
+    },
+    /// Neither a time column nor a sampling rate is known.
+    #[error(
+        "{file} has no column called time, time_s or t: name the time column with `time`, or give \
+         `sample_rate` in Hz; its columns are {available}"
+    )]
+    NoTimeAxis {
+        /// The record.
+        file: String,
+        /// Numbers and names of its columns.
+        available: String,
+    },
+    /// An array in memory has no column of this name.
+    #[error("there is no column \"{column}\"; the columns are {available}")]
+    NoColumn {
+        /// The column asked for.
+        column: String,
+        /// Names of the columns.
+        available: String,
+    },
+    /// An array in memory has another shape than the others.
+    #[error(
+        "{name} has {} × {} values, expected {} × {} (samples × degrees of freedom)",
+        got[0], got[1], expected[0], expected[1]
+    )]
+    ArrayShape {
+        /// Name of the array.
+        name: String,
+        /// Its samples and columns.
+        got: [usize; 2],
+        /// Samples and columns of the others.
+        expected: [usize; 2],
+    },
+    /// No record was given.
+    #[error("no record: an identification needs one at least")]
+    NoRecord,
+    /// No force column is named.
+    #[error("the force is missing: name its columns with `force`")]
+    NoForce,
+    /// No response column is named.
+    #[error(
+        "the response is missing: name its columns with `displacement`, `velocity` or `acceleration`"
+    )]
+    NoMotion,
+    /// The columns do not pair up with the degrees of freedom.
+    #[error(
+        "`{response}` names {} and `force` {forces}: every degree of freedom needs one of each \
+         (`force` 0 where no force acts)", counted(*got, "column")
+    )]
+    ColumnCount {
+        /// Kind of response with the wrong number of columns.
+        response: Motion,
+        /// Number of columns that it names.
+        got: usize,
+        /// Number of force columns.
+        forces: usize,
+    },
+    /// The identified system is unstable, so its response to a record cannot be predicted.
+    #[error(
+        "{file}: the identified system is unstable (free response grows e-fold every {} s), so its \
+         response to this record cannot be predicted; fit a longer record, other lines, or fewer \
+         parameters",
+        significant(1.0 / rate, 3)
+    )]
+    Diverges {
+        /// The record.
+        file: String,
+        /// Rate of growth, in 1/s.
+        rate: f64,
+    },
+    /// A column is in a unit of another quantity than it is used for.
+    #[error(
+        "{file}: column {column} is in {unit}, a unit of {measures}; `{setting}` takes columns of {wanted}"
+    )]
+    Unit {
+        /// The record.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+        /// Unit that its name or the line of units says.
+        unit: &'static str,
+        /// Quantity of that unit.
+        measures: mechid_io::Quantity,
+        /// Setting that names the column.
+        setting: &'static str,
+        /// Quantity that it must hold.
+        wanted: mechid_io::Quantity,
+    },
+    /// Not one response column per degree of freedom of the system.
+    #[error(
+        "`{response}` names {}, the system has {}: name one for each, 0 where it was not measured",
+        counted(*got, "column"), counted(*dofs, "degree of freedom")
+    )]
+    MotionCount {
+        /// Kind of response with the wrong number of columns.
+        response: Motion,
+        /// Number of columns that it names.
+        got: usize,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+    },
+    /// A force is to be identified on a degree of freedom that the system does not have.
+    #[error(
+        "`forced` names degree of freedom {dof}, the system has {}",
+        counted(*dofs, "degree of freedom")
+    )]
+    Forced {
+        /// Degree of freedom, counted from 1.
+        dof: usize,
+        /// Degrees of freedom of the system.
+        dofs: usize,
+    },
+    /// Not one noise level per measured column.
+    #[error(
+        "`noise` gives {}, the response has {}: give one for each",
+        counted(*levels, "level"), counted(*columns, "column")
+    )]
+    NoiseCount {
+        /// Number of levels given.
+        levels: usize,
+        /// Number of response columns.
+        columns: usize,
+    },
+    /// The equation of motion needs all its terms.
+    #[error(
+        "this method needs displacement, velocity{} of every degree of freedom: measure them, or \
+         choose another `method`",
+        if *with_acceleration { " and acceleration" } else { "" }
+    )]
+    ForceMotions {
+        /// Whether accelerations are needed, too.
+        with_acceleration: bool,
+    },
+    /// Spectral lines belong to whole periods.
+    #[error("the frequency domain needs whole periods: say how long one is with `period`")]
+    ForceNeedsPeriods,
+    /// The Kalman smoother has no periods.
+    #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
+    KalmanIsOpen,
+    /// The reconstruction failed.
+    #[error(transparent)]
+    Force(#[from] mechid_force::ForceError),
+    /// The fit failed, and the checks of its data say why.
+    #[error("{error}; {reasons}")]
+    Unfit {
+        /// The failure.
+        error: EstimateError,
+        /// Findings of the checks before the fit.
+        reasons: String,
+    },
+    /// The force is zero.
+    #[error(
+        "{file}: the force (column {columns}) is zero throughout the window: nothing drives the machine"
+    )]
+    ZeroForce {
+        /// The record.
+        file: String,
+        /// The force columns.
+        columns: String,
+    },
+    /// A known mass is not positive.
+    #[error("a mass must be positive and finite, got {value} kg", value = told(*value))]
+    Mass {
+        /// The value given, in kg.
+        value: f64,
+    },
+    /// Not one mass per degree of freedom.
+    #[error(
+        "`mass` gives {}, the record has {}: give one mass for each, or all entries of the \
+         {dof}×{dof} matrix row by row", counted(*got, "value"), counted(*dof, "degree of freedom")
+    )]
+    MassCount {
+        /// Number of values given.
+        got: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
+    /// The force has no spectral line.
+    #[error("no excited line: over a period of {} the force does not vary", counted(*period, "sample"))]
+    StillForce {
+        /// Number of samples in the period.
+        period: usize,
+    },
+    /// The force has no spectral line in the band.
+    #[error(
+        "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
+         {first_hz} and {last_hz} Hz",
+        low_hz = told(*low_hz), high_hz = told(*high_hz),
+        first_hz = told_to(*first_hz, 6), last_hz = told_to(*last_hz, 6)
+    )]
+    EmptyBand {
+        /// Lower end asked for, in Hz.
+        low_hz: f64,
+        /// Upper end asked for, in Hz.
+        high_hz: f64,
+        /// Lowest frequency with force, in Hz.
+        first_hz: f64,
+        /// Highest frequency with force, in Hz.
+        last_hz: f64,
+    },
+    /// None of the chosen lines carries force.
+    #[error("no excited line among {lines}: the force has its lines between {first} and {last}")]
+    NoExcitedLine {
+        /// The choice.
+        lines: String,
+        /// Lowest line with force.
+        first: usize,
+        /// Highest line with force.
+        last: usize,
+    },
+    /// The time domain needs the whole state.
+    #[error(
+        "in the time domain `displacement` and `velocity` are both needed (in the frequency domain \
+         one kind of response is enough); with displacement or acceleration alone, `derivatives` says \
+         how to find the others: spectral for whole periods, savitzky-golay:WINDOW:ORDER for any record"
+    )]
+    TimeDomainMotions,
+    /// Derivatives belong to one measured kind of response.
+    #[error(
+        "`derivatives` completes a record of the displacement alone or of the acceleration alone: name \
+         one of them, or leave `derivatives` out"
+    )]
+    NothingToDerive,
+    /// Second derivatives fit the equation of motion only.
+    #[error(
+        "with the acceleration alone, a sliding polynomial gives second derivatives of force and \
+         response, which only the equation of motion takes: leave `between_samples` out"
+    )]
+    TwiceDifferentiated,
+    /// Frequency responses are averages, which have no halves.
+    #[error(
+        "instrumental variables need periods, not their averages: leave `from_frf` or `method` \
+         instrumental out"
+    )]
+    InstrumentalResponses,
+    /// A steady state is predicted over whole periods.
+    #[error("`validate_samples` {samples} is less than one period of {period}")]
+    ValidationPeriod {
+        /// Number of samples asked for.
+        samples: usize,
+        /// Number of samples in a period.
+        period: usize,
+    },
+    /// The record that validates a fit has other columns than the records fitted.
+    #[error("{file} has {got} degrees of freedom, the identified system has {dofs}")]
+    DegreesOfFreedom {
+        /// The record, or the file of the system.
+        file: String,
+        /// Its degrees of freedom.
+        got: usize,
+        /// Those of the system it is compared with.
+        dofs: usize,
+    },
+    /// A covariance names a parameter that the system does not have.
+    #[error("{file}: the covariance names \"{name}\"; the parameters of this machine are {known}")]
+    UnknownParameter {
+        /// The file.
+        file: String,
+        /// The name found.
+        name: String,
+        /// The names there can be.
+        known: String,
+    },
+    /// A record has no such sampling rate.
+    #[error(
+        "a record of {own_hz} Hz has no samples at {rate_hz} Hz: its rates are {own_hz} Hz divided by \
+         whole numbers"
+    )]
+    SweepRate {
+        /// Rate asked for, in Hz.
+        rate_hz: f64,
+        /// Rate of the record, in Hz.
+        own_hz: f64,
+    },
+    /// NPI belong to a described experiment, whose sampling can be chosen.
+    #[error(
+        "`npi` belongs to the description of an experiment: a record has its rate; `decimate` takes \
+         every n-th sample"
+    )]
+    NpiOfRecord,
+    /// A decimation is a whole number.
+    #[error("every n-th sample of a record: n is a whole number, got {value}")]
+    Decimation {
+        /// The number asked for.
+        value: f64,
+    },
+    /// A period is no whole number of the samples taken.
+    #[error("a period of {} is no whole number of every {} sample", counted(*period, "sample"), ordinal(*factor))]
+    DecimatedPeriod {
+        /// Number of samples in a period.
+        period: usize,
+        /// The decimation.
+        factor: usize,
+    },
+    /// The estimator needs a response that was not measured.
+    #[error("this `estimator` needs the {wanted}: name its columns with `{wanted}`")]
+    SweepMotion {
+        /// The response that is missing.
+        wanted: Motion,
+    },
+    /// A sweep has no settings.
+    #[error("a sweep needs one setting at least")]
+    NoSetting,
+    /// No setting of a sweep gave an estimate.
+    #[error(
+        "no setting gave an estimate; at the first one, {setting}: {reason}",
+        setting = told(*setting)
+    )]
+    EmptySweep {
+        /// The first setting.
+        setting: f64,
+        /// The failure there.
+        reason: String,
+    },
+    /// An experiment cannot be simulated at a setting of a sweep.
+    #[error("{0}")]
+    Simulation(String),
+    /// No record shows a receptance.
+    #[error(
+        "nothing to plot: several forces act on every line, so the record shows no single receptance"
+    )]
+    NoReceptance,
+    /// A setting cannot be understood.
+    #[error("`{setting}`: {why}")]
+    Setting {
+        /// The setting.
+        setting: &'static str,
+        /// The reason.
+        why: String,
+    },
+    /// The identification failed.
+    #[error(transparent)]
+    Estimate(#[from] EstimateError),
+    /// A signal cannot be used.
+    #[error(transparent)]
+    Signal(#[from] mechid_signal::SignalError),
+    /// A model cannot be used.
+    #[error(transparent)]
+    Model(#[from] mechid_model::ModelError),
+}

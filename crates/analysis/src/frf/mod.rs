@@ -1,0 +1,206 @@
+//! Frequency responses of a record: response per unit force, frequency by frequency.
+
+pub mod table;
+
+use mechid_estimate::frequency_domain::Lines;
+use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
+use mechid_signal::Record;
+use serde::{Deserialize, Serialize};
+
+pub use self::table::FrfTable;
+use crate::AnalysisError;
+use crate::identify::lines::{LineChoice, choose_lines};
+use crate::measurement::{CHUNK_SAMPLES, Hold, Measurement, Windowed};
+
+/// How to estimate frequency responses.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FrfSettings {
+    /// Frequency response estimator.
+    pub estimator: Estimator,
+    /// Spectral lines of a segment.
+    pub lines: LineChoice,
+    /// Segments that are averaged.
+    pub segments: Segmentation,
+}
+
+/// Estimates the frequency responses and the coherence of a record.
+///
+/// With a periodic excitation the periods of the window are the segments that are averaged.
+///
+/// # Errors
+/// [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`] or [`AnalysisError::EmptyBand`] if
+/// no chosen line carries force, [`AnalysisError::Estimate`] if the segments are too few or too long,
+/// and if a file cannot be read again.
+pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
+    let recorded = measurement.hold(how.segments.hold())?;
+    let found = Responses::of(&recorded, &how.segments, how.estimator, &how.lines)?;
+    Ok(FrfTable::new(&recorded.held, &found, how))
+}
+
+/// Frequency response estimator: where the noise is.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Estimator {
+    /// Noise on the response.
+    #[default]
+    H1,
+    /// Noise on the force.
+    H2,
+    /// Noise on both force and response.
+    Hv,
+}
+
+impl Estimator {
+    /// Returns the usual symbol.
+    pub fn name(self) -> &'static str {
+        match self {
+            Estimator::H1 => "H1",
+            Estimator::H2 => "H2",
+            Estimator::Hv => "Hv",
+        }
+    }
+
+    fn estimator(self) -> FrfEstimator {
+        match self {
+            Estimator::H1 => FrfEstimator::H1,
+            Estimator::H2 => FrfEstimator::H2,
+            Estimator::Hv => FrfEstimator::Hv,
+        }
+    }
+}
+
+/// Segments of a record to average over.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Segmentation {
+    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments.
+    pub segment: Option<usize>,
+    /// Window that weights the samples of a segment.
+    pub window: Weight,
+    /// Part of a segment that the next one repeats, in per cent, from 0 to below 100.
+    pub overlap_percent: f64,
+}
+
+impl Default for Segmentation {
+    fn default() -> Self {
+        Self { segment: None, window: Weight::Hann, overlap_percent: 50.0 }
+    }
+}
+
+/// Window that weights the samples of a segment.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weight {
+    /// The usual choice.
+    #[default]
+    Hann,
+    /// A narrower peak, more leakage from far away.
+    Hamming,
+    /// The least leakage, a wider peak.
+    Blackman,
+    /// No weighting, for bursts that begin and end at rest.
+    Rectangular,
+}
+
+impl Weight {
+    fn window(self) -> Window {
+        match self {
+            Weight::Hann => Window::Hann,
+            Weight::Hamming => Window::Hamming,
+            Weight::Blackman => Window::Blackman,
+            Weight::Rectangular => Window::Rectangular,
+        }
+    }
+}
+
+impl Segmentation {
+    /// Returns segments of this many samples, half overlapped under a Hann window.
+    pub fn of(samples: usize) -> Self {
+        Self { segment: Some(samples), ..Self::default() }
+    }
+
+    /// Whether the segments are whole periods.
+    pub fn are_periods(&self) -> bool {
+        self.segment.is_none()
+    }
+
+    /// Returns how much of a record must be held in memory: segments are averaged one after another.
+    pub(crate) fn hold(&self) -> Hold {
+        self.segment.map_or(Hold::Periods, Hold::Samples)
+    }
+
+    /// Returns the segments of a window with periods of `period` samples.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] for an overlap outside 0 to below 100 %.
+    fn segments(&self, period: usize) -> Result<Segments, AnalysisError> {
+        let Some(len) = self.segment else { return Ok(Segments::Periods(period)) };
+        if !(0.0..100.0).contains(&self.overlap_percent) {
+            let why = format!(
+                "an overlap lies from 0 to below 100 %, got {}",
+                mechid_signal::told(self.overlap_percent)
+            );
+            return Err(AnalysisError::Setting { setting: "segment_overlap", why });
+        }
+        let advance = 1.0 - self.overlap_percent / 100.0;
+        let hop = ((len as f64 * advance).round() as usize).clamp(1, len.max(1));
+        Ok(Segments::Windowed { len, hop, window: self.window.window() })
+    }
+}
+
+/// The frequency responses of a measurement.
+#[derive(Debug)]
+pub(crate) struct Responses {
+    pub frf: Frf,
+    /// Of a segment.
+    pub lines: Lines,
+    /// Degrees of freedom a force acts on, counted from 0.
+    pub driven: Vec<usize>,
+    pub segments: Segments,
+}
+
+impl Responses {
+    /// From the forces that act to the first kind of motion measured, on the lines that `choose`
+    /// finds in a segment of the force.
+    pub fn of(
+        recorded: &Windowed,
+        segments: &Segmentation,
+        estimator: Estimator,
+        choice: &LineChoice,
+    ) -> Result<Self, AnalysisError> {
+        let held = &recorded.held;
+        let segments = segments.segments(held.period)?;
+        let (force, driven) = (&held.force, held.driven.clone());
+        let len = segments.samples();
+        let chosen = match segments {
+            Segments::Periods(period) => choose_lines(force, period, choice)?,
+            Segments::Windowed { len, .. } => choose_lines(&force.window(0, len)?, len, choice)?,
+        };
+        let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
+        let average = average(recorded, &lines, segments)?;
+        let frf = average.frf(estimator.estimator())?;
+        Ok(Self { frf, lines, driven, segments })
+    }
+}
+
+/// From the forces that act to the first kind of motion measured, on some lines of a segment, over all
+/// of the window.
+pub(crate) fn average(
+    recorded: &Windowed,
+    lines: &Lines,
+    segments: Segments,
+) -> Result<FrfAverage, AnalysisError> {
+    let driven = &recorded.held.driven;
+    let (motion, kind) = recorded.held.response();
+    let channels = [driven.len(), motion.channels()];
+    let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;
+    let (hop, at_once) = (segments.hop(), (CHUNK_SAMPLES / segments.hop()).max(1));
+    let (samples, advance) = ((at_once - 1) * hop + segments.samples(), at_once * hop);
+    recorded.chunks(samples, advance, &mut |chunk| {
+        let acting: Vec<&[f64]> = driven.iter().map(|dof| chunk.force.channel(*dof)).collect();
+        let acting = Record::from_channels(chunk.force.sampling(), &acting)?;
+        Ok(average.push(&acting, chunk.response().0)?)
+    })?;
+    Ok(average)
+}

@@ -1,0 +1,242 @@
+//! Frequency responses for people and for programs.
+
+use mechid::model::ResponseQuantity;
+use std::f64::consts::TAU;
+use std::fmt::{self, Write as _};
+
+use mechid_estimate::frequency_domain::Motion;
+use mechid_estimate::{Segments, Window};
+use mechid_signal::counted;
+use serde::Serialize;
+
+use super::{FrfSettings, Responses};
+use crate::measurement::Block;
+use crate::text::{compact, paragraph, significant, text_table};
+
+/// Everything `mechid frf` has to say.
+#[derive(Debug, Serialize)]
+pub struct FrfTable {
+    /// The record.
+    pub file: String,
+    /// Counted from 1.
+    pub first_sample: usize,
+    /// Last sample, counted from 1.
+    pub last_sample: usize,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+    /// Name of the estimator.
+    pub estimator: &'static str,
+    /// Segments that were averaged.
+    pub segments: SegmentRow,
+    /// What the motion was measured as.
+    pub quantity: String,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Frequencies, in Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Frequency responses, one per pair of response and force.
+    pub responses: Vec<Response>,
+    /// Coherence, one per response.
+    pub coherence: Vec<Coherence>,
+    /// What to know of the numbers.
+    pub remarks: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: FrfSettings,
+}
+
+/// How the record was cut.
+#[derive(Debug, Serialize)]
+pub struct SegmentRow {
+    /// Number of samples.
+    pub samples: usize,
+    /// From the start of one to that of the next.
+    pub hop: usize,
+    /// Nothing for whole periods.
+    pub window: Option<&'static str>,
+    /// How many independent segments the averages are worth.
+    pub averages: f64,
+}
+
+/// The motion of one degree of freedom per unit force on another, frequency by frequency.
+#[derive(Debug, Serialize)]
+pub struct Response {
+    /// Degree of freedom that moves, counted from 1.
+    pub motion: usize,
+    /// Degree of freedom that is driven, counted from 1.
+    pub force: usize,
+    /// Real part, one value per frequency, in the unit of the table.
+    pub real: Vec<f64>,
+    /// Imaginary part, likewise.
+    pub imaginary: Vec<f64>,
+    /// Magnitude, likewise.
+    pub magnitude: Vec<f64>,
+    /// Phase, in degrees.
+    pub phase_deg: Vec<f64>,
+    /// Of the magnitude: of real and imaginary part alike, √(E|ΔH|²/2).
+    pub standard_error: Vec<f64>,
+}
+
+/// Share of a motion's power that is linear in the forces.
+#[derive(Debug, Serialize)]
+pub struct Coherence {
+    /// Degree of freedom, counted from 1.
+    pub motion: usize,
+    /// Values, one per frequency.
+    pub values: Vec<f64>,
+}
+
+impl FrfTable {
+    pub(super) fn new(measured: &Block, found: &Responses, how: &FrfSettings) -> Self {
+        let (frf, n) = (&found.frf, measured.force.channels());
+        let mut responses = Vec::new();
+        for motion in 0..n {
+            for (input, dof) in found.driven.iter().enumerate() {
+                responses.push(Response::of(found, (motion, input), *dof));
+            }
+        }
+        let coherence = (0..n).map(|motion| Coherence {
+            motion: motion + 1,
+            values: frf.coherence().column(motion).iter().copied().collect(),
+        });
+        let kind = frf.measured();
+        Self {
+            file: measured.file.clone(),
+            first_sample: measured.first_sample,
+            last_sample: measured.last_sample(),
+            sample_rate_hz: measured.force.sampling().rate_hz(),
+            estimator: how.estimator.name(),
+            segments: SegmentRow::of(found),
+            quantity: kind.to_string(),
+            unit: match kind {
+                ResponseQuantity::Displacement => "m/N",
+                ResponseQuantity::Velocity => "m/(s·N)",
+                ResponseQuantity::Acceleration => "m/(s²·N)",
+            },
+            frequency_hz: frf.omega().iter().map(|omega| omega / TAU).collect(),
+            responses,
+            coherence: coherence.collect(),
+            remarks: measured.unit_remarks.clone(),
+            analysis: how.clone(),
+        }
+    }
+
+    /// Returns the result as a person reads it.
+    fn text(&self) -> String {
+        let s = &self.segments;
+        let cut = match s.window {
+            None => format!("periods of {}", counted(s.samples, "sample")),
+            Some(window) => {
+                let samples = counted(s.samples, "sample");
+                format!("segments of {samples} every {} under a {window} window", s.hop)
+            }
+        };
+        let [low, high] = [self.frequency_hz.first(), self.frequency_hz.last()]
+            .map(|hz| compact(hz.copied().unwrap_or(0.0), 5));
+        let lines = match self.frequency_hz.len() {
+            1 => format!("1 line, {low} Hz"),
+            n => format!("{n} lines, {low} to {high} Hz"),
+        };
+        let mut text = format!(
+            "{}: samples {} to {}, {} Hz\n{} from {cut}, worth {} averages; {lines}\n\n",
+            self.file,
+            self.first_sample,
+            self.last_sample,
+            compact(self.sample_rate_hz, 8),
+            self.estimator,
+            compact(s.averages, 4),
+        );
+        let mut rows = vec![
+            ["response", "largest magnitude", "at", "least coherence", "median"]
+                .map(String::from)
+                .to_vec(),
+        ];
+        for r in &self.responses {
+            let (at, largest) = r.peak();
+            let mut sorted = self.coherence[r.motion - 1].values.clone();
+            sorted.sort_by(f64::total_cmp);
+            rows.push(vec![
+                format!("{} {} / force {}", self.quantity, r.motion, r.force),
+                format!("{} {}", significant(largest, 4), self.unit),
+                format!("{} Hz", significant(self.frequency_hz[at], 5)),
+                format!("{:.4}", sorted[0]),
+                format!("{:.4}", sorted[sorted.len() / 2]),
+            ]);
+        }
+        text += &text_table(&rows);
+        text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    /// One row per frequency.
+    pub fn csv(&self) -> String {
+        let mut text = String::from("frequency_hz");
+        for r in &self.responses {
+            let name = format!("h_{}_{}", r.motion, r.force);
+            let _ = write!(text, ",{name}_real,{name}_imaginary,{name}_standard_error");
+        }
+        for c in &self.coherence {
+            let _ = write!(text, ",coherence_{}", c.motion);
+        }
+        for (at, hz) in self.frequency_hz.iter().enumerate() {
+            let _ = write!(text, "\n{hz:?}");
+            for r in &self.responses {
+                let _ = write!(
+                    text,
+                    ",{:?},{:?},{:?}",
+                    r.real[at], r.imaginary[at], r.standard_error[at]
+                );
+            }
+            for c in &self.coherence {
+                let _ = write!(text, ",{:?}", c.values[at]);
+            }
+        }
+        text + "\n"
+    }
+}
+
+impl fmt::Display for FrfTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}
+
+impl Response {
+    fn of(found: &Responses, (motion, input): (usize, usize), dof: usize) -> Self {
+        let frf = &found.frf;
+        let lines = 0..frf.omega().len();
+        let h: Vec<_> = lines.clone().map(|at| frf.response(at)[(motion, input)]).collect();
+        let error = |at| (0.5 * frf.variance(at)[(motion, input)]).sqrt();
+        Self {
+            motion: motion + 1,
+            force: dof + 1,
+            real: h.iter().map(|z| z.re).collect(),
+            imaginary: h.iter().map(|z| z.im).collect(),
+            magnitude: h.iter().map(|z| z.norm()).collect(),
+            phase_deg: h.iter().map(|z| z.arg().to_degrees()).collect(),
+            standard_error: lines.map(error).collect(),
+        }
+    }
+
+    /// Where the magnitude is largest, and how large.
+    fn peak(&self) -> (usize, f64) {
+        let larger = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
+        self.magnitude.iter().copied().enumerate().fold((0, 0.0), larger)
+    }
+}
+
+impl SegmentRow {
+    fn of(found: &Responses) -> Self {
+        let averages = found.frf.averages();
+        match found.segments {
+            Segments::Periods(samples) => Self { samples, hop: samples, window: None, averages },
+            Segments::Windowed { len, hop, window } => {
+                let name = match window {
+                    Window::Hann => "hann",
+                    Window::Hamming => "hamming",
+                    Window::Blackman => "blackman",
+                    Window::Rectangular => "rectangular",
+                };
+                Self { samples: len, hop, window: Some(name), averages }
+            }
+        }
+    }
+}

@@ -1,0 +1,263 @@
+//! Identification of a machine from measured forces and responses.
+//!
+//! | File | What it does |
+//! |---|---|
+//! | `options` | settings, as values |
+//! | `lines`, `mass` | spectral lines to use; known masses |
+//! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
+//! | `derivatives` | velocity and acceleration that were not measured |
+//! | `prediction` | response of the identified system to a measured force |
+//! | `checks` | checks before and after a fit, in order |
+//! | `validation` | prediction of a record that was not fitted |
+//! | `summary` | the result: numbers, checks, remarks |
+
+pub mod checks;
+mod derivatives;
+pub mod lines;
+pub mod mass;
+pub mod options;
+pub mod prediction;
+mod responses;
+mod samples;
+pub mod spectra;
+pub mod summary;
+pub mod validation;
+
+use std::fmt;
+
+use mechid_estimate::{Estimate, Unknowns};
+use mechid_model::SecondOrderSystem;
+use serde::{Serialize, Serializer};
+
+use self::checks::CheckRow;
+pub use self::lines::{Band, LineChoice};
+pub use self::mass::KnownMass;
+pub use self::options::{
+    Between, BetweenSamples, Derivatives, Fit, Identify, Method, Refinement, ResponseFit,
+    SampleFit, WindowExtent,
+};
+use self::prediction::{Compared, Prediction};
+use self::spectra::Fitted;
+use self::summary::IdentificationSummary;
+pub use self::validation::{Validation, ValidationWindow};
+use crate::AnalysisError;
+use crate::machine::Machine;
+use crate::measurement::{Block, Hold, Measurement, Windowed};
+
+/// Unexplained part of the response above which the result says so.
+pub const CONSPICUOUS: f64 = 0.05;
+
+/// Identifies the machine behind one or several records.
+///
+/// Several records are fitted together; they need the same columns, but not the same length.
+///
+/// # Errors
+/// [`AnalysisError::NoRecord`]; [`AnalysisError::Unfit`] if the fit fails and the checks of its data
+/// say why, otherwise that failure as it is; what the settings of `how` cannot be done with, such as
+/// [`AnalysisError::TimeDomainMotions`]; and if a file cannot be read again.
+pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
+    let hold = how.hold();
+    let records = measurements.iter().map(|measured| measured.hold(hold));
+    let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
+    let first = records.first().ok_or(AnalysisError::NoRecord)?;
+    let dofs = first.held.force.channels();
+    for record in &records {
+        let got = record.held.force.channels();
+        if got != dofs {
+            let file = record.held.file.clone();
+            return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
+        }
+    }
+    let unknowns = how.mass.unknowns(dofs)?;
+    let fitted = how.fitted(&records, &unknowns).map_err(|error| explained(error, &records))?;
+    let summary = IdentificationSummary::new(&records, &fitted, how)?;
+    Ok(Identified {
+        measurements: measurements.to_vec(),
+        records,
+        validated: None,
+        fitted,
+        summary,
+    })
+}
+
+/// An identified machine, and what it was identified from.
+///
+/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+#[derive(Debug)]
+pub struct Identified {
+    measurements: Vec<Measurement>,
+    records: Vec<Windowed>,
+    validated: Option<Block>,
+    fitted: Fitted,
+    summary: IdentificationSummary,
+}
+
+impl Identify {
+    /// Returns how much of a record must be held in memory to fit it.
+    pub(crate) fn hold(&self) -> Hold {
+        match &self.fit {
+            Fit::Spectra { .. } => Hold::Periods,
+            Fit::Responses(how) => how.segments.hold(),
+            Fit::Samples(how) => how.hold(),
+        }
+    }
+
+    fn fitted(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+        match &self.fit {
+            Fit::Spectra { method } => spectra::fit(records, unknowns, &self.lines, *method),
+            Fit::Responses(how) => responses::fit(records, unknowns, &self.lines, how),
+            Fit::Samples(how) => how.fit(records, unknowns),
+        }
+    }
+}
+
+impl Identified {
+    /// Returns the numbers, checks and remarks.
+    pub fn summary(&self) -> &IdentificationSummary {
+        &self.summary
+    }
+
+    /// Returns the estimate of M, C and K with its covariance.
+    pub fn estimate(&self) -> &Estimate {
+        &self.fitted.estimate
+    }
+
+    /// Returns the identified system.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
+        Ok(self.fitted.estimate.system()?)
+    }
+
+    /// Returns the identified system with the covariance of its parameters, for the reconstruction of
+    /// a force.
+    ///
+    /// # Errors
+    /// As [`Identified::system`].
+    pub fn machine(&self) -> Result<Machine, AnalysisError> {
+        Machine::of_estimate(&self.fitted.estimate)
+    }
+
+    /// Returns every check, those before the fit first.
+    pub fn checks(&self) -> &[CheckRow] {
+        &self.summary.checks
+    }
+
+    /// Returns what in the numbers themselves speaks against them, a sentence each.
+    pub fn doubts(&self) -> Vec<String> {
+        self.summary.doubts()
+    }
+
+    /// Returns the records that were fitted.
+    pub fn measurements(&self) -> &[Measurement] {
+        &self.measurements
+    }
+
+    /// Predicts a record that was not fitted, and adds the result to [`Identified::summary`].
+    ///
+    /// The window of `other` is predicted; a steady state over whole periods, anything else from the
+    /// start that fits it best.
+    ///
+    /// # Errors
+    /// [`AnalysisError::DegreesOfFreedom`] if the record has another number of them,
+    /// [`AnalysisError::Diverges`] if the identified system is unstable.
+    pub fn add_validation(&mut self, other: &Measurement) -> Result<(), AnalysisError> {
+        let (validation, held) = self.predict(other)?;
+        let of_other = held.unit_remarks.iter().filter(|_| held.file != self.summary.file);
+        self.summary.remarks.extend(of_other.cloned());
+        self.summary.validation = Some(validation);
+        self.validated = Some(held);
+        Ok(())
+    }
+
+    /// Predicts a record that was not fitted: returns how much of each channel is predicted, in per
+    /// cent.
+    ///
+    /// # Errors
+    /// As [`Identified::add_validation`].
+    pub fn validate(&self, other: &Measurement) -> Result<Validation, AnalysisError> {
+        Ok(self.predict(other)?.0)
+    }
+
+    fn predict(&self, other: &Measurement) -> Result<(Validation, Block), AnalysisError> {
+        let prediction = self.fitted.prediction;
+        let record = other.hold(validation::hold(self.summary.analysis.hold(), prediction))?;
+        let (got, dofs) = (record.held.force.channels(), self.fitted.estimate.dof());
+        if got != dofs {
+            let file = record.held.file.clone();
+            return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
+        }
+        let validation = Validation::of(&record, &self.system()?, prediction)?;
+        Ok((validation, record.into_held()))
+    }
+
+    /// Returns the window of a record to predict, in keeping with how the machine was identified:
+    /// whole periods of a steady state as of the record fitted, otherwise any samples.
+    ///
+    /// # Errors
+    /// [`AnalysisError::ValidationPeriod`] if the samples are less than a period of a steady state,
+    /// [`AnalysisError::Window`] if the record does not have them.
+    pub fn validation_window(
+        &self,
+        other: Measurement,
+        samples: &ValidationWindow,
+    ) -> Result<Measurement, AnalysisError> {
+        let period = self.measurements[0].window_settings().period;
+        other.window(samples.window(period, self.fitted.prediction)?)
+    }
+
+    pub(crate) fn records(&self) -> &[Windowed] {
+        &self.records
+    }
+
+    pub(crate) fn validated(&self) -> Option<&Block> {
+        self.validated.as_ref()
+    }
+
+    /// Returns how the fit was done, and what it leaves.
+    pub fn fitted(&self) -> &Fitted {
+        &self.fitted
+    }
+
+    /// Returns each kind of response of the first record, measured and predicted.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Diverges`] if the identified system is unstable.
+    pub fn compared(&self) -> Result<Vec<Compared>, AnalysisError> {
+        self.fitted.prediction.predict(&self.system()?, &self.records[0].held)
+    }
+
+    /// Returns how the response of the identified system to a record is predicted.
+    pub fn prediction(&self) -> Prediction {
+        self.fitted.prediction
+    }
+
+    /// Returns the spectra that were fitted; `None` for a fit in the time domain.
+    pub fn spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
+        self.fitted.frequency.as_ref().map(|(_, data)| data)
+    }
+}
+
+impl fmt::Display for Identified {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for Identified {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}
+
+/// Adds what the checks of the channels say to the failure of a fit.
+fn explained(error: AnalysisError, records: &[Windowed]) -> AnalysisError {
+    let AnalysisError::Estimate(error) = error else { return error };
+    let seen = records.iter().filter_map(|r| checks::of_channels(&r.held).ok()).flatten();
+    let reasons: Vec<String> = seen.map(|check| check.text).collect();
+    match reasons.is_empty() {
+        true => AnalysisError::Estimate(error),
+        false => AnalysisError::Unfit { error, reasons: reasons.join("; ") },
+    }
+}

@@ -1,0 +1,350 @@
+//! Settings of an identification, as values that can be saved and repeated.
+
+use std::fmt;
+use std::str::FromStr;
+
+use mechid_estimate::derivatives::SavitzkyGolay;
+use mechid_estimate::time_domain::{Discretisation, Extent};
+use mechid_signal::Interpolation;
+use serde::{Deserialize, Serialize};
+
+use super::lines::LineChoice;
+use super::mass::KnownMass;
+use crate::AnalysisError;
+use crate::frf::{Estimator, Segmentation};
+
+/// How to identify a machine from its records.
+///
+/// ```
+/// use mechid_analysis::{Identify, identify::Method};
+///
+/// let how = Identify::spectra(Method::MaximumLikelihood);
+/// let saved = serde_json::to_string(&how)?;
+/// assert_eq!(serde_json::from_str::<Identify>(&saved)?, how);
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Identify {
+    /// What is fitted: spectra, averaged frequency responses, or samples.
+    pub fit: Fit,
+    /// Spectral lines to use, of spectra and frequency responses.
+    pub lines: LineChoice,
+    /// Known masses.
+    pub mass: KnownMass,
+}
+
+/// What is fitted, and how.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "domain", rename_all = "kebab-case")]
+pub enum Fit {
+    /// Spectral lines of whole periods.
+    Spectra {
+        /// Estimator.
+        method: Method,
+    },
+    /// Frequency responses, averaged over segments.
+    Responses(ResponseFit),
+    /// Samples in time, of any record.
+    Samples(SampleFit),
+}
+
+impl Default for Fit {
+    fn default() -> Self {
+        Fit::Spectra { method: Method::default() }
+    }
+}
+
+/// Estimator of the parameters from spectra.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Least squares on the equation of motion; biased by noise on the response.
+    #[default]
+    LeastSquares,
+    /// Instrumental variables, one half of the periods against the other; not biased.
+    Instrumental,
+    /// Maximum likelihood on the response, weighted by the noise estimated from the periods; not
+    /// biased, of least scatter.
+    MaximumLikelihood,
+}
+
+/// Fit of averaged frequency responses.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ResponseFit {
+    /// Frequency response estimator.
+    pub estimator: Estimator,
+    /// Segments that are averaged.
+    pub segments: Segmentation,
+    /// Estimator of the parameters; `None`: maximum likelihood, weighted by the coherence.
+    pub method: Option<Method>,
+}
+
+/// Fit in the time domain.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SampleFit {
+    /// Assumption on the force between samples; `None`: the equation of motion at the samples if
+    /// there is an acceleration, otherwise linear.
+    pub between_samples: Option<BetweenSamples>,
+    /// Extent of the window; `None`: open, or whole periods with spectral derivatives.
+    pub extent: Option<WindowExtent>,
+    /// How to find the velocity and acceleration that were not measured.
+    pub derivatives: Option<Derivatives>,
+    /// Steps between the samples.
+    pub refine: Option<Refinement>,
+}
+
+/// Assumption on the force between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BetweenSamples {
+    /// Euler's rule, the dissertation's; biased in proportion to the step.
+    Euler,
+    /// The force is held, as a digital converter drives a shaker; then exact.
+    Held,
+    /// The force is linear; then exact.
+    Linear,
+}
+
+impl BetweenSamples {
+    /// Returns the discretisation of the equation of motion that is exact under this assumption.
+    pub fn discretisation(self) -> Discretisation {
+        match self {
+            BetweenSamples::Euler => Discretisation::Euler,
+            BetweenSamples::Held => Discretisation::ZeroOrderHold,
+            BetweenSamples::Linear => Discretisation::FirstOrderHold,
+        }
+    }
+
+    /// Returns the name of the estimator.
+    pub fn estimator(self) -> &'static str {
+        match self {
+            BetweenSamples::Euler => "least squares from sample to sample, Euler's rule",
+            BetweenSamples::Held => {
+                "least squares from sample to sample, the force held between them"
+            }
+            BetweenSamples::Linear => {
+                "least squares from sample to sample, the force linear between them"
+            }
+        }
+    }
+}
+
+/// Extent of a window in the time domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WindowExtent {
+    /// Any part of a response.
+    Open,
+    /// Whole periods: the first sample follows the last again.
+    Period,
+}
+
+/// Additional steps in every sampling interval, which make the error of a [`BetweenSamples`]
+/// assumption smaller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Refinement {
+    /// Number of steps per interval.
+    pub factor: usize,
+    /// Interpolation between the samples.
+    pub interpolation: Between,
+}
+
+/// Interpolation between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Between {
+    /// Straight lines.
+    Linear,
+    /// A cubic spline.
+    Spline,
+    /// The Fourier series of the window, which must hold whole periods.
+    BandLimited,
+}
+
+impl Between {
+    fn interpolation(self) -> Interpolation {
+        match self {
+            Between::Linear => Interpolation::Linear,
+            Between::Spline => Interpolation::NotAKnotSpline,
+            Between::BandLimited => Interpolation::BandLimited,
+        }
+    }
+}
+
+/// How to find the kinds of response that were not measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Derivatives {
+    /// By the spectrum of whole periods.
+    Spectral,
+    /// By a sliding polynomial.
+    SavitzkyGolay {
+        /// Number of samples in the window, odd.
+        window: usize,
+        /// Order of the polynomial, at least 2 and less than the window.
+        order: usize,
+    },
+}
+
+impl Derivatives {
+    /// Returns the sliding polynomial, if it is one.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] if window and order do not make one.
+    pub(crate) fn filter(self) -> Result<Option<SavitzkyGolay>, AnalysisError> {
+        let Self::SavitzkyGolay { window, order } = self else { return Ok(None) };
+        let wrong = |why: String| AnalysisError::Setting { setting: "derivatives", why };
+        if window % 2 == 0 {
+            return Err(wrong(format!(
+                "the window has a middle: an odd number of samples, not {window}"
+            )));
+        }
+        if order < 2 {
+            return Err(wrong(format!(
+                "two derivatives need a polynomial of order 2 or more, not {order}"
+            )));
+        }
+        SavitzkyGolay::new(window / 2, order).map(Some).map_err(|error| wrong(error.to_string()))
+    }
+
+    /// Returns the number of samples in the sliding window; 0 where all samples are used at once.
+    pub(crate) fn window(self) -> usize {
+        match self {
+            Self::Spectral => 0,
+            Self::SavitzkyGolay { window, .. } => window,
+        }
+    }
+}
+
+impl FromStr for Derivatives {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "spectral" {
+            return Ok(Self::Spectral);
+        }
+        let numbers: Option<Vec<usize>> = text
+            .strip_prefix("savitzky-golay:")
+            .and_then(|rest| rest.split(':').map(|n| n.parse().ok()).collect());
+        let Some([window, order]) = numbers.as_deref() else {
+            return Err("write spectral or savitzky-golay:WINDOW:ORDER, such as \
+                        savitzky-golay:11:4"
+                .into());
+        };
+        let parsed = Self::SavitzkyGolay { window: *window, order: *order };
+        match parsed.filter() {
+            Ok(_) => Ok(parsed),
+            Err(AnalysisError::Setting { why, .. }) => Err(why),
+            Err(other) => Err(other.to_string()),
+        }
+    }
+}
+
+impl fmt::Display for Derivatives {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Spectral => f.write_str("spectral"),
+            Self::SavitzkyGolay { window, order } => write!(f, "savitzky-golay:{window}:{order}"),
+        }
+    }
+}
+
+impl Identify {
+    /// Fits spectral lines of whole periods.
+    pub fn spectra(method: Method) -> Self {
+        Self { fit: Fit::Spectra { method }, ..Self::default() }
+    }
+
+    /// Fits frequency responses averaged over segments.
+    pub fn responses(estimator: Estimator, segments: Segmentation) -> Self {
+        let fit = ResponseFit { estimator, segments, method: None };
+        Self { fit: Fit::Responses(fit), ..Self::default() }
+    }
+
+    /// Fits samples in time: the equation of motion at the samples if there is an acceleration,
+    /// otherwise exactly for a force that is linear between them.
+    pub fn samples() -> Self {
+        Self { fit: Fit::Samples(SampleFit::default()), ..Self::default() }
+    }
+
+    /// Uses these spectral lines.
+    #[must_use]
+    pub fn lines(self, lines: LineChoice) -> Self {
+        Self { lines, ..self }
+    }
+
+    /// Takes these masses as known.
+    #[must_use]
+    pub fn mass(self, mass: KnownMass) -> Self {
+        Self { mass, ..self }
+    }
+}
+
+impl SampleFit {
+    pub(crate) fn extent(&self) -> Extent {
+        match (self.extent, self.derivatives) {
+            (Some(WindowExtent::Period), _) | (None, Some(Derivatives::Spectral)) => {
+                Extent::WholePeriod
+            }
+            _ => Extent::Open,
+        }
+    }
+
+    pub(crate) fn refinement(&self) -> Option<(usize, Interpolation)> {
+        let Refinement { factor, interpolation } = self.refine?;
+        Some((factor, interpolation.interpolation()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn derivatives_are_written_out() {
+        assert_eq!("spectral".parse(), Ok(Derivatives::Spectral));
+        let polynomial = Derivatives::SavitzkyGolay { window: 11, order: 4 };
+        assert_eq!("savitzky-golay:11:4".parse(), Ok(polynomial));
+        assert_eq!(polynomial.to_string(), "savitzky-golay:11:4");
+        for text in [
+            "",
+            "savitzky-golay",
+            "savitzky-golay:11",
+            "savitzky-golay:10:4",
+            "euler:3:2",
+            "savitzky-golay:11:4:1",
+            "savitzky-golay:11:1",
+            "savitzky-golay:3:4",
+            "savitzky-golay:1:2",
+        ] {
+            assert!(text.parse::<Derivatives>().is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn settings_survive_json() {
+        let samples = SampleFit {
+            between_samples: Some(BetweenSamples::Held),
+            extent: Some(WindowExtent::Period),
+            derivatives: Some(Derivatives::SavitzkyGolay { window: 11, order: 4 }),
+            refine: Some(Refinement { factor: 8, interpolation: Between::BandLimited }),
+        };
+        let all = [
+            Identify::default(),
+            Identify::spectra(Method::Instrumental).lines("odd".parse().unwrap()),
+            Identify::responses(Estimator::Hv, Segmentation::default()),
+            Identify { fit: Fit::Samples(samples), ..Identify::default() }
+                .mass("2.5,unknown".parse().unwrap()),
+        ];
+        for how in all {
+            let saved = serde_json::to_string(&how).unwrap();
+            assert_eq!(serde_json::from_str::<Identify>(&saved).unwrap(), how, "{saved}");
+        }
+        assert_eq!(serde_json::from_str::<Identify>("{}").unwrap(), Identify::default());
+        assert!(serde_json::from_str::<Identify>("{\"methd\": 1}").is_err());
+    }
+}

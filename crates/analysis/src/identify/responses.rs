@@ -1,0 +1,123 @@
+//! Fits frequency responses.
+
+use mechid_estimate::checks::{
+    Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
+};
+use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
+use mechid_estimate::time_domain::{Discretisation, Extent};
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
+
+use super::lines::LineChoice;
+use super::options::{Method, ResponseFit};
+use super::prediction::Prediction;
+use super::spectra::{Fitted, Misfit, one_motion_of, steady_residuals};
+use super::summary::LinesUsed;
+use crate::AnalysisError;
+use crate::frf::Responses;
+use crate::measurement::{Block, Windowed};
+
+/// Fits the frequency responses of one or several records, weighted by their coherence unless least
+/// squares is asked for.
+///
+/// # Errors
+/// [`AnalysisError::InstrumentalResponses`] for instrumental variables.
+pub fn fit(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    lines: &LineChoice,
+    how: &ResponseFit,
+) -> Result<Fitted, AnalysisError> {
+    let ResponseFit { estimator, segments, method } = how;
+    let estimate = |recorded| Responses::of(recorded, segments, *estimator, lines);
+    let responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
+    let mut all: Vec<FrequencyData> =
+        responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
+    let first = all.remove(0);
+    let data = all.iter().try_fold(first, |data, own| data.and(own))?;
+    let (name, found, misfit) = found(&data, unknowns, *method)?;
+    let periodic = segments.are_periods();
+    let (mut before, mut after) = (Vec::new(), Vec::new());
+    for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
+        let mut checks = before_response_fit(&r.frf, &r.driven, unknowns)?;
+        if periodic {
+            checks.extend(claimed_period(&held.force, held.period));
+        }
+        before.push(checks);
+        after.push(looked_at(held, r, unknowns, &found, (data.len(), periodic))?);
+    }
+    Ok(Fitted {
+        domain: "frequency",
+        estimator: name,
+        least_squares: *method == Some(Method::LeastSquares),
+        equations: 2 * data.len(),
+        frequency: responses.into_iter().next().map(|r| (r.lines, data)),
+        before,
+        after,
+        residuals: if periodic { steady_residuals(records, &found)? } else { Vec::new() },
+        prediction: match periodic {
+            true => Prediction::Steady,
+            false => Prediction::Sampled {
+                discretisation: Discretisation::FirstOrderHold,
+                extent: Extent::Open,
+            },
+        },
+        misfit,
+        remarks: one_motion_of(&records[0].held),
+        estimate: found,
+    })
+}
+
+/// The estimator in words, what it finds, and what it leaves against the coherence.
+fn found(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    method: Option<Method>,
+) -> Result<(&'static str, Estimate, Option<Misfit>), AnalysisError> {
+    match method {
+        Some(Method::Instrumental) => Err(AnalysisError::InstrumentalResponses),
+        Some(Method::LeastSquares) => {
+            let name = "least squares on frequency responses, all lines alike";
+            Ok((name, equation_error(data, unknowns)?, None))
+        }
+        Some(Method::MaximumLikelihood) | None => {
+            let name = "maximum likelihood on frequency responses, weighted by their coherence";
+            let fit = output_error(data, unknowns)?;
+            let misfit = Misfit { ratio: fit.misfit_ratio, noise: "the coherence" };
+            Ok((name, fit.estimate, Some(misfit)))
+        }
+    }
+}
+
+/// What the fit leaves of one record; `rows` are those of all records together.
+fn looked_at(
+    held: &Block,
+    r: &Responses,
+    unknowns: &Unknowns,
+    found: &Estimate,
+    (rows, periodic): (usize, bool),
+) -> Result<Vec<Check>, AnalysisError> {
+    let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
+    let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
+    let fitted = own * found.parameters().len() as f64;
+    let mut checks = Vec::from_iter(late);
+    checks.extend(after_response_fit(&r.frf, &r.driven, found, fitted)?);
+    if !periodic {
+        checks.extend(of_linearity(held, r, found)?);
+    }
+    Ok(checks)
+}
+
+/// Between the first and the last line fitted; nothing of a free machine, which has no displacement to
+/// take powers of.
+fn of_linearity(
+    measured: &Block,
+    responses: &Responses,
+    found: &Estimate,
+) -> Result<Option<Check>, AnalysisError> {
+    let (motion, kind) = measured.response();
+    let used = LinesUsed::of(&responses.lines);
+    match linearity(found, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
+        Err(EstimateError::Model(_)) => Ok(None),
+        looked => Ok(Some(looked?)),
+    }
+}

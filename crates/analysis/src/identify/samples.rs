@@ -1,0 +1,311 @@
+//! Fits sample by sample.
+
+use mechid_estimate::checks::{
+    Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
+    noise_on_motion, periodicity_across,
+};
+use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
+use mechid_signal::{Interpolation, Record, counted};
+
+use super::CONSPICUOUS;
+use super::derivatives::Prepared;
+use super::options::{Between, BetweenSamples, Derivatives, SampleFit};
+use super::prediction::Prediction;
+use super::spectra::{Fitted, Residual};
+use crate::AnalysisError;
+use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
+
+impl SampleFit {
+    /// How much of a record must be held: all of it where every sample needs all others.
+    pub fn hold(&self) -> Hold {
+        match (self.derivatives, self.refine.map(|refine| refine.interpolation)) {
+            (Some(Derivatives::Spectral), _) => Hold::Whole,
+            (_, Some(Between::Spline | Between::BandLimited)) => Hold::Whole,
+            (derivatives, _) => Hold::Samples(derivatives.map_or(0, Derivatives::window)),
+        }
+    }
+
+    /// Fits the samples of one or several windows: the equation of motion itself where there is an
+    /// acceleration and nothing else is asked for, otherwise what leads from one sample to the next.
+    pub fn fit(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+        let between = self.between_samples;
+        let prepare = |r: &Windowed| Prepared::of(&r.held, self.derivatives);
+        let prepared: Vec<Prepared> = records.iter().map(prepare).collect::<Result<_, _>>()?;
+        if between.is_some() && prepared.iter().any(|p| p.twice_differentiated) {
+            return Err(AnalysisError::TwiceDifferentiated);
+        }
+        match between {
+            None if prepared[0].acceleration.is_some() => {
+                self.at_samples(records, &prepared, unknowns)
+            }
+            _ => self.step_by_step(records, &prepared, unknowns, between),
+        }
+    }
+
+    /// Goes through a record in stretches of which each but the first begins with the last sample of
+    /// the one before, and says which is the last; in one, where every sample needs all others.
+    fn chunks(
+        &self,
+        recorded: &Windowed,
+        take: &mut dyn FnMut(Prepared, bool) -> Result<(), AnalysisError>,
+    ) -> Result<(), AnalysisError> {
+        let held = &recorded.held;
+        let advance = match self.hold() {
+            Hold::Whole => held.force.len(),
+            _ => (CHUNK_SAMPLES / self.refine.map_or(1, |refine| refine.factor.max(1))).max(1),
+        };
+        // A sliding polynomial has no middle at the first and last samples it sees.
+        let margin = self.noise_span() / 2;
+        recorded.chunks(advance + 1 + 2 * margin, advance, &mut |chunk| {
+            let len = chunk.force.len();
+            let first = chunk.first_sample == held.first_sample;
+            let last = chunk.first_sample + len - 1 == held.last_sample();
+            let inside = if first { 0 } else { margin }..if last { len } else { len - margin };
+            take(Prepared::of(chunk, self.derivatives)?.window(inside)?, last)
+        })
+    }
+
+    /// What a window is as far as it is held.
+    fn extent_of(&self, held: &Block) -> Extent {
+        if held.held_to().is_some() { Extent::Open } else { self.extent() }
+    }
+
+    /// With what was seen before the fit, whether a period that is not held whole is one, by its last
+    /// samples.
+    fn with_seam(
+        &self,
+        mut seen: Vec<Check>,
+        recorded: &Windowed,
+        p: &Prepared,
+        end: Option<Record>,
+    ) -> Vec<Check> {
+        let long = self.extent() == Extent::WholePeriod && recorded.held.held_to().is_some();
+        if let Some(end) = end.filter(|_| long) {
+            let step = seen.iter().position(|check| check.subject == Subject::Step);
+            seen.insert(step.unwrap_or(seen.len()), periodicity_across(&p.displacement, &end));
+        }
+        seen
+    }
+
+    /// Gathers the samples of a record; the displacements of its last two.
+    fn push_instants(
+        &self,
+        recorded: &Windowed,
+        rows: &mut EquationOfMotion,
+    ) -> Result<Option<Record>, AnalysisError> {
+        let mut end = None;
+        self.chunks(recorded, &mut |p, last| {
+            let Some(response) = p.response()? else {
+                return Err(AnalysisError::TimeDomainMotions);
+            };
+            // The next chunk begins with the last sample of this one.
+            let own = if last { p.force.len() } else { p.force.len() - 1 };
+            let [a, v, x] = [response.acceleration(), response.velocity(), response.displacement()]
+                .map(|r| r.data().rows(0, own));
+            rows.push_rows(a, v, x, p.force.data().rows(0, own))?;
+            end = last_two(&p)?;
+            Ok(())
+        })?;
+        Ok(end)
+    }
+
+    /// Gathers what leads from sample to sample of a record that begins as `held`; the displacements
+    /// of its last two.
+    fn push_steps(
+        &self,
+        recorded: &Windowed,
+        held: &Prepared,
+        rows: &mut Transitions,
+    ) -> Result<Option<Record>, AnalysisError> {
+        let (extent, mut end) = (self.extent(), None);
+        self.chunks(recorded, &mut |p, last| {
+            end = last_two(&p)?;
+            if let Some((factor, interpolation)) = self.refinement() {
+                return Ok(rows.push_refined(p.states(), extent, factor, interpolation)?);
+            }
+            // After the last sample of a period comes its first.
+            let closes = last && extent == Extent::WholePeriod;
+            let p = if closes { p.followed_by(held)? } else { p };
+            let [x, v, force] = p.states();
+            Ok(rows.push(x, v, force, Extent::Open)?)
+        })?;
+        Ok(end)
+    }
+
+    fn at_samples(
+        &self,
+        records: &[Windowed],
+        prepared: &[Prepared],
+        unknowns: &Unknowns,
+    ) -> Result<Fitted, AnalysisError> {
+        let mut rows = EquationOfMotion::new(unknowns.dof());
+        let mut before = Vec::new();
+        for (recorded, p) in records.iter().zip(prepared) {
+            let end = self.push_instants(recorded, &mut rows)?;
+            let Some(response) = p.response()? else {
+                return Err(AnalysisError::TimeDomainMotions);
+            };
+            let extent = self.extent_of(&recorded.held);
+            let seen = before_equation_of_motion(&response, &p.force, unknowns, extent)?;
+            before.push(self.with_seam(seen, recorded, p, end));
+        }
+        let estimate = rows.solve(unknowns)?;
+        // Says what the data leave open, before anything is made of it.
+        estimate.system()?;
+        let span = self.noise_span();
+        let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate, span));
+        let look = |p: &Prepared| self.at_samples_after(p, &estimate);
+        let after = prepared.iter().map(look).collect::<Result<_, _>>()?;
+        Ok(Fitted {
+            domain: "time",
+            estimator: "least squares on the equation of motion, sample by sample",
+            least_squares: false,
+            equations: rows.rows(),
+            frequency: None,
+            before,
+            after,
+            residuals: residuals.collect::<Result<_, _>>()?,
+            prediction: self.prediction(Discretisation::FirstOrderHold),
+            misfit: None,
+            remarks: self.remarks(prepared, &estimate),
+            estimate,
+        })
+    }
+
+    /// What is looked at beside the residual.
+    fn at_samples_after(
+        &self,
+        p: &Prepared,
+        estimate: &Estimate,
+    ) -> Result<Vec<Check>, AnalysisError> {
+        let Some(response) = p.response()? else { return Ok(Vec::new()) };
+        let mut checks = Vec::from_iter(delay_at_samples(&response, &p.force, estimate.unknowns()));
+        // What was differentiated has noise in common from sample to sample.
+        if self.derivatives.is_none() {
+            checks.extend(noise_on_motion(&response, &p.force, estimate)?);
+        }
+        Ok(checks)
+    }
+
+    fn step_by_step(
+        &self,
+        records: &[Windowed],
+        prepared: &[Prepared],
+        unknowns: &Unknowns,
+        between: Option<BetweenSamples>,
+    ) -> Result<Fitted, AnalysisError> {
+        let between = between.unwrap_or(BetweenSamples::Linear);
+        let discretisation = between.discretisation();
+        let dt = prepared[0].force.sampling().dt();
+        let steps = self.refine.map_or(1, |refine| refine.factor.max(1)) as f64;
+        let mut rows = Transitions::new(unknowns.dof(), dt / steps)?;
+        let mut before = Vec::new();
+        for (recorded, p) in records.iter().zip(prepared) {
+            let end = self.push_steps(recorded, p, &mut rows)?;
+            let [x, v, force] = p.states();
+            let method = TimeDomain::new(discretisation, self.extent_of(&recorded.held));
+            before.push(self.with_seam(before_fit(method, x, v, force)?, recorded, p, end));
+        }
+        let fit = rows.fit(discretisation, unknowns)?;
+        let estimate = fit.into_estimate();
+        let left = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
+            let extent = self.extent_of(&recorded.held);
+            let [left, fitted] =
+                missing_force(&estimate, p.states(), discretisation, extent, self.refinement())?;
+            let force = p.force.window(0, left.len())?;
+            // An error of a measured state is in the interval before it and in the one after.
+            let noise_span = self.noise_span() + 1;
+            Ok(Residual { left, fitted, force, noise_span })
+        };
+        let residuals = records.iter().zip(prepared).map(left).collect::<Result<_, _>>()?;
+        let method = TimeDomain::new(discretisation, Extent::Open);
+        let late = |p: &Prepared| {
+            let [x, v, force] = p.states();
+            Vec::from_iter(delay_between_samples(method, x, v, force, unknowns))
+        };
+        Ok(Fitted {
+            domain: "time",
+            estimator: between.estimator(),
+            least_squares: false,
+            equations: rows.rows(),
+            frequency: None,
+            before,
+            after: prepared.iter().map(late).collect(),
+            residuals,
+            prediction: self.prediction(discretisation),
+            misfit: None,
+            remarks: self.remarks(prepared, &estimate),
+            estimate,
+        })
+    }
+
+    fn prediction(&self, discretisation: Discretisation) -> Prediction {
+        match &self.derivatives {
+            // What was differentiated by its spectrum is predicted by it.
+            Some(Derivatives::Spectral) => Prediction::Steady,
+            _ => Prediction::Sampled { discretisation, extent: self.extent() },
+        }
+    }
+
+    /// Samples apart that the noise of one sample still reaches.
+    fn noise_span(&self) -> usize {
+        self.derivatives.map_or(0, Derivatives::window).saturating_sub(1)
+    }
+
+    fn remarks(&self, prepared: &[Prepared], estimate: &Estimate) -> Vec<String> {
+        let mut remarks = Vec::new();
+        if let Some((factor, way)) = self.refinement() {
+            let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
+            remarks.push(format!(
+                "{} in every interval; the standard errors count measured samples only{}",
+                counted(factor, "step"),
+                if open { ", and the interpolation takes the window as open" } else { "" }
+            ));
+        }
+        if prepared.iter().any(|p| p.twice_differentiated) {
+            remarks.push(
+                "the equation of motion was fitted to second derivatives of force and acceleration"
+                    .into(),
+            );
+        } else if self.derivatives.is_some() {
+            remarks.push("two of the three motions are derivatives, not measured".into());
+        }
+        let left = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
+        if self.derivatives == Some(Derivatives::Spectral) && left > CONSPICUOUS {
+            remarks.push(
+                "spectral derivatives hold the noise of every line, driven or not, and of low ones \
+                 most where the acceleration was measured: without --domain time and --derivatives \
+                 the same whole periods are fitted on the lines of the force alone"
+                    .into(),
+            );
+        }
+        remarks
+    }
+}
+
+/// The displacements of the last two samples.
+fn last_two(p: &Prepared) -> Result<Option<Record>, AnalysisError> {
+    let (x, len) = (&p.displacement, p.displacement.len());
+    Ok(if len < 2 { None } else { Some(x.window(len - 2, 2)?) })
+}
+
+/// F − M ẍ − C ẋ − K x, left of the inertia.
+fn left_of_equation(
+    p: &Prepared,
+    estimate: &Estimate,
+    noise_span: usize,
+) -> Option<Result<Residual, AnalysisError>> {
+    let a = p.acceleration.as_ref()?;
+    let inertia = a.data() * estimate.mass().transpose();
+    let left = p.force.data()
+        - &inertia
+        - p.velocity.data() * estimate.damping().transpose()
+        - p.displacement.data() * estimate.stiffness().transpose();
+    let record = |data| Record::new(a.sampling(), data);
+    let residual = || {
+        let (left, fitted) = (record(left)?, record(inertia)?);
+        Ok(Residual { left, fitted, force: p.force.clone(), noise_span })
+    };
+    Some(residual())
+}

@@ -1,0 +1,464 @@
+//! What an identification found, for people and for programs.
+
+use std::fmt;
+use std::path::Path;
+
+use mechid_estimate::{
+    self as estimate, Estimate, IdentifiedMode, Parameter, Unknowns, frequency_domain,
+};
+use mechid_io::{ParameterCovariance, SystemMatrices};
+use mechid_signal::counted;
+use serde::Serialize;
+
+use super::CONSPICUOUS;
+use super::checks::{self, CheckRow};
+use super::options::Identify;
+use super::prediction::Prediction;
+use super::spectra::Fitted;
+use super::validation::Validation;
+use crate::AnalysisError;
+use crate::measurement::{Block, Windowed};
+use crate::text::{compact, paragraph, significant, text_table};
+
+/// Level of the confidence intervals.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// Everything `mechid identify` has to say.
+#[derive(Debug, Serialize)]
+pub struct IdentificationSummary {
+    /// The record.
+    pub file: String,
+    /// Domain of the fit: frequency or time.
+    pub domain: &'static str,
+    /// Name of the estimator.
+    pub estimator: &'static str,
+    /// Samples used.
+    pub window: WindowRow,
+    /// Whether the windows are whole periods.
+    #[serde(skip)]
+    pub repeats: bool,
+    /// Lines used; none in the time domain.
+    pub lines: Option<LinesUsed>,
+    /// Level of the confidence intervals.
+    pub confidence: f64,
+    /// Parameters, one each.
+    pub parameters: Vec<ParameterRow>,
+    /// Modes, by rising frequency.
+    pub modes: Vec<ModeRow>,
+    /// How well the model explains the record.
+    pub fit: FitRow,
+    /// Every record, the first included.
+    pub records: Vec<RecordRow>,
+    /// What was looked at before and after the fit.
+    pub checks: Vec<CheckRow>,
+    /// How much of a record that was not fitted is predicted.
+    pub validation: Option<Validation>,
+    /// What the user should know before believing the numbers.
+    pub remarks: Vec<String>,
+    /// M, C and K, as `mechid force --system` and others read them back.
+    pub system: SystemMatrices,
+    /// Covariance of the parameters, for what is derived from them.
+    pub covariance: ParameterCovariance,
+    /// The settings, which repeat the analysis.
+    pub analysis: Identify,
+}
+
+/// One of the records fitted.
+#[derive(Debug, Serialize)]
+pub struct RecordRow {
+    /// The record.
+    pub file: String,
+    #[serde(flatten)]
+    /// Samples used.
+    pub window: WindowRow,
+}
+
+/// The samples used, counted from 1.
+#[derive(Debug, Serialize)]
+pub struct WindowRow {
+    /// First sample, counted from 1.
+    pub first_sample: usize,
+    /// Last sample, counted from 1.
+    pub last_sample: usize,
+    /// Number of samples in a period.
+    pub period_samples: usize,
+    /// Number of periods.
+    pub periods: usize,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+}
+
+/// Spectral lines that were used.
+#[derive(Debug, Serialize)]
+pub struct LinesUsed {
+    /// Number of lines.
+    pub count: usize,
+    /// Lowest line.
+    pub first: usize,
+    /// Highest line.
+    pub last: usize,
+    /// Lowest frequency, in Hz.
+    pub first_hz: f64,
+    /// Highest frequency, in Hz.
+    pub last_hz: f64,
+}
+
+/// A value with its standard error and confidence interval.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Uncertain {
+    /// Value, in its unit.
+    pub value: f64,
+    /// Nothing for a value that is known.
+    pub standard_error: Option<f64>,
+    /// Confidence interval; `None` for a value that is known.
+    pub interval: Option<[f64; 2]>,
+}
+
+/// One entry of M, C or K.
+#[derive(Debug, Serialize)]
+pub struct ParameterRow {
+    /// Name.
+    pub name: String,
+    /// Matrix of the parameter: mass, damping or stiffness.
+    pub matrix: String,
+    /// Counted from 1.
+    pub row: usize,
+    /// Counted from 1.
+    pub column: usize,
+    /// SI unit.
+    pub unit: &'static str,
+    /// Whether it was given, not estimated.
+    pub known: bool,
+    #[serde(flatten)]
+    /// Estimate with its uncertainty.
+    pub estimate: Uncertain,
+}
+
+/// One mode of the identified system.
+#[derive(Debug, Serialize)]
+pub struct ModeRow {
+    /// Whether the mode is underdamped.
+    pub oscillates: bool,
+    /// Natural frequency, in Hz.
+    pub natural_frequency_hz: Uncertain,
+    /// Damped frequency, in Hz.
+    pub damped_frequency_hz: Uncertain,
+    /// Damping ratio.
+    pub damping_ratio: Uncertain,
+}
+
+/// How well the model explains the record.
+#[derive(Debug, Serialize)]
+pub struct FitRow {
+    /// RMS of the residual over RMS of what was fitted: the force, or with maximum likelihood the
+    /// motion.
+    pub nrmse: f64,
+    /// RMS of measured minus modelled motion over RMS of the measured motion: what the linear model
+    /// leaves unexplained. Nothing where it was not computed.
+    pub unexplained_motion: Option<f64>,
+    /// Power of the residual over what the noise explains; nothing where the noise is not known.
+    pub misfit_ratio: Option<f64>,
+    /// Condition number of the column-scaled regressor.
+    pub condition_number: f64,
+    /// Number of real equations per degree of freedom.
+    pub equations: usize,
+    /// Number of unknowns.
+    pub unknowns: usize,
+}
+
+impl IdentificationSummary {
+    /// Gathers the numbers, checks and remarks of a fit.
+    pub(super) fn new(
+        records: &[Windowed],
+        fitted: &Fitted,
+        how: &Identify,
+    ) -> Result<Self, AnalysisError> {
+        let records: Vec<&Block> = records.iter().map(|r| &r.held).collect();
+        let estimate = &fitted.estimate;
+        let system = estimate.system()?;
+        let unexplained_motion = fitted.unexplained_motion(&system)?;
+        let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
+        let mut summary = Self {
+            file: records[0].file.clone(),
+            domain: fitted.domain,
+            estimator: fitted.estimator,
+            window: WindowRow::of(records[0]),
+            repeats: fitted.prediction == Prediction::Steady,
+            lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
+            confidence: CONFIDENCE,
+            parameters: parameters(fitted)?,
+            modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
+            fit: FitRow {
+                nrmse: fitted.nrmse(),
+                unexplained_motion,
+                misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
+                condition_number: estimate.condition(),
+                equations: fitted.equations,
+                unknowns: estimate.parameters().len(),
+            },
+            records: records.iter().map(row).collect(),
+            checks: checks::rows(fitted, &records)?,
+            validation: None,
+            remarks: Vec::new(),
+            system: SystemMatrices::from(&system),
+            covariance: covariance(estimate),
+            analysis: how.clone(),
+        };
+        let looked_at = records.iter().filter_map(|record| {
+            let (first, last) = (record.first_sample, record.held_to()?);
+            let file = &record.file;
+            Some(format!(
+                "checks of single samples looked at samples {first} to {last} of {file} only"
+            ))
+        });
+        let of_method = of_least_squares(fitted, &summary.checks);
+        let of_units = records.iter().flat_map(|record| record.unit_remarks.iter().cloned());
+        let remarks = of_units.chain(fitted.remarks.iter().cloned()).chain(looked_at);
+        summary.remarks = remarks.chain(summary.doubts()).chain(of_method).collect();
+        Ok(summary)
+    }
+
+    /// Returns what in the numbers themselves speaks against them.
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        if let Some(part) = self.fit.unexplained_motion.filter(|part| *part > CONSPICUOUS) {
+            doubts.push(format!(
+            "the linear model leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \
+             degree of freedom more, or a record that is not periodic",
+            100.0 * part
+        ));
+        }
+        for p in self.parameters.iter().filter(|p| p.row == p.column && p.estimate.value < 0.0) {
+            doubts.push(format!("{} is negative: no passive machine has that", p.name));
+        }
+        doubts
+    }
+
+    /// Returns the result as a person reads it.
+    fn text(&self) -> String {
+        let mut text = self.heading();
+        text.push('\n');
+        text += &self.parameter_table();
+        text.push('\n');
+        text += &self.mode_table();
+        text.push('\n');
+        text += &self.fit_lines();
+        if let Some(validation) = &self.validation {
+            text += &format!("\n{}", validation.text());
+        }
+        text.push('\n');
+        for check in self.checks.iter().filter(|check| !check.is_conspicuous()) {
+            text += &format!("{}: {}\n", check.subject, check.sentence());
+        }
+        let conspicuous = self.checks.iter().filter(|check| check.is_conspicuous());
+        text +=
+            &paragraph(conspicuous.map(|c| format!("warning, {}: {}", c.subject, c.sentence())));
+        text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    /// What a picture of it is called: the record and its modes.
+    pub fn title(&self) -> String {
+        let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
+        let modes: Vec<String> = self
+            .modes
+            .iter()
+            .map(|mode| {
+                let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
+                format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
+            })
+            .collect();
+        format!("{name}: {}", modes.join("; "))
+    }
+
+    fn heading(&self) -> String {
+        let mut text = String::new();
+        for RecordRow { file, window } in &self.records {
+            let rate = compact(window.sample_rate_hz, 8);
+            let periods = match (self.repeats, window.periods) {
+                (false, _) => String::new(),
+                (_, n) => format!(", {} of {}", counted(n, "period"), window.period_samples),
+            };
+            let (first, last) = (window.first_sample, window.last_sample);
+            text += &format!("{file}: samples {first} to {last}{periods}, {rate} Hz\n");
+        }
+        text += self.estimator;
+        if let Some(l) = &self.lines {
+            let [low, high] = [l.first_hz, l.last_hz].map(|hz| compact(hz, 5));
+            text += &match l.count {
+                1 => format!("; 1 line, {} ({low} Hz)", l.first),
+                n => format!("; {n} lines, {} to {} ({low} to {high} Hz)", l.first, l.last),
+            };
+        }
+        text + "\n"
+    }
+
+    fn parameter_table(&self) -> String {
+        let mut rows = vec![self.header("parameter")];
+        for p in &self.parameters {
+            let mut row = vec![p.name.clone()];
+            row.extend(p.estimate.cells());
+            row.push(p.unit.into());
+            rows.push(row);
+        }
+        text_table(&rows)
+    }
+
+    fn mode_table(&self) -> String {
+        let mut rows = vec![self.header("mode")];
+        for (number, mode) in (1..).zip(&self.modes) {
+            let mut add = |name: String, value: &Uncertain, unit: &str| {
+                let mut row = vec![name];
+                row.extend(value.cells());
+                row.push(unit.into());
+                rows.push(row);
+            };
+            add(format!("{number} natural frequency"), &mode.natural_frequency_hz, "Hz");
+            add(format!("{number} damping ratio"), &mode.damping_ratio, "–");
+        }
+        text_table(&rows)
+    }
+
+    fn header(&self, what: &str) -> Vec<String> {
+        let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
+        [what, "value", "standard error", &interval, "unit"].map(String::from).to_vec()
+    }
+
+    fn fit_lines(&self) -> String {
+        let fit = &self.fit;
+        let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
+        let mut rows = vec![
+            vec!["residual of the fit (NRMSE)".into(), percent(fit.nrmse)],
+            vec!["condition number".into(), significant(fit.condition_number, 3)],
+            vec!["equations / unknowns".into(), format!("{} / {}", fit.equations, fit.unknowns)],
+        ];
+        if let Some(unexplained) = fit.unexplained_motion {
+            rows.insert(
+                1,
+                vec!["motion the linear model leaves unexplained".into(), percent(unexplained)],
+            );
+        }
+        text_table(&rows)
+    }
+}
+
+impl fmt::Display for IdentificationSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}
+
+impl WindowRow {
+    /// The samples of a measurement.
+    pub fn of(measured: &Block) -> Self {
+        Self {
+            first_sample: measured.first_sample,
+            last_sample: measured.last_sample(),
+            period_samples: measured.period,
+            periods: measured.periods,
+            sample_rate_hz: measured.force.sampling().rate_hz(),
+        }
+    }
+}
+
+impl ModeRow {
+    /// Frequencies and damping of an identified mode.
+    pub fn of(found: &IdentifiedMode) -> Result<Self, AnalysisError> {
+        Ok(Self {
+            oscillates: found.mode.oscillates(),
+            natural_frequency_hz: Uncertain::of(&found.natural_frequency_hz)?,
+            damped_frequency_hz: Uncertain::of(&found.damped_frequency_hz)?,
+            damping_ratio: Uncertain::of(&found.damping_ratio)?,
+        })
+    }
+}
+
+impl LinesUsed {
+    /// The first, the last and the number of the lines used.
+    pub fn of(used: &frequency_domain::Lines) -> Self {
+        let (lines, spacing_hz) = (used.as_slice(), used.sampling().line_spacing_hz());
+        let first = lines.iter().copied().min().unwrap_or(0);
+        let last = lines.iter().copied().max().unwrap_or(0);
+        let (first_hz, last_hz) = (first as f64 * spacing_hz, last as f64 * spacing_hz);
+        Self { count: lines.len(), first, last, first_hz, last_hz }
+    }
+}
+
+impl Uncertain {
+    /// A value that was estimated.
+    pub fn new(value: f64, standard_error: f64, interval: [f64; 2]) -> Self {
+        Self { value, standard_error: Some(standard_error), interval: Some(interval) }
+    }
+
+    /// A value derived from what was estimated.
+    pub fn of(found: &estimate::Uncertain) -> Result<Self, AnalysisError> {
+        Ok(Self::new(found.value, found.standard_error, found.interval(CONFIDENCE)?))
+    }
+
+    /// A value that was given.
+    pub fn known(value: f64) -> Self {
+        Self { value, standard_error: None, interval: None }
+    }
+
+    /// Value, standard error and interval; the error tells how many digits the value deserves.
+    pub fn cells(&self) -> [String; 3] {
+        let (Some(error), Some([low, high])) = (self.standard_error, self.interval) else {
+            return [significant(self.value, 6), "known".into(), String::new()];
+        };
+        let digits = digits(self.value, error);
+        [
+            significant(self.value, digits),
+            significant(error, 2),
+            format!("{} … {}", significant(low, digits), significant(high, digits)),
+        ]
+    }
+}
+
+/// Significant digits of `value` down to the second of its standard error, 3 to 12.
+fn digits(value: f64, error: f64) -> usize {
+    let ratio = (value.abs() / error).log10();
+    if ratio.is_finite() { (ratio.floor() as i32 + 3).clamp(3, 12) as usize } else { 6 }
+}
+
+/// What a residual that is no noise can come from, where another method would leave less.
+pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
+    let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
+    let explained = checks.iter().any(CheckRow::is_bad);
+    (fitted.least_squares && warned("after") && !warned("before") && !explained).then(|| {
+        "least squares takes the measured motion as exact, and noise on it biases the parameters; \
+         that alone can be what the warnings after the fit tell of. With --method \
+         maximum-likelihood, which allows for noise, they speak of the machine"
+            .into()
+    })
+}
+
+fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, AnalysisError> {
+    let (estimate, mut rows) = (&fitted.estimate, Vec::new());
+    let found = |parameter: Parameter| {
+        let at = estimate.parameters().position(|p| p.parameter == parameter);
+        at.and_then(|at| estimate.parameters().nth(at))
+    };
+    for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
+        let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
+        let value = match found(parameter) {
+            Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
+            None => {
+                Uncertain::known(estimate.unknowns().fixed(matrix, row, column).unwrap_or_default())
+            }
+        };
+        rows.push(ParameterRow {
+            name: parameter.to_string(),
+            matrix: matrix.to_string(),
+            row: row + 1,
+            column: column + 1,
+            unit: matrix.unit(),
+            known: value.standard_error.is_none(),
+            estimate: value,
+        });
+    }
+    Ok(rows)
+}
+
+fn covariance(estimate: &Estimate) -> ParameterCovariance {
+    let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
+    ParameterCovariance::new(names, estimate.covariance(), estimate.degrees_of_freedom())
+}

@@ -1,0 +1,202 @@
+//! How much of a record the identified system predicts.
+
+use mechid_estimate::frequency_domain::Motion;
+use mechid_estimate::time_domain::{Discretisation, Extent};
+use mechid_estimate::{StartFit, fit_percent, predict};
+use mechid_model::{InitialState, SecondOrderSystem};
+use serde::{Deserialize, Serialize};
+
+use super::prediction::{Prediction, channels, failed};
+use crate::AnalysisError;
+use crate::measurement::{CHUNK_SAMPLES, Hold, Window, Windowed};
+use crate::text::{significant, text_table};
+
+/// A record predicted.
+#[derive(Debug, Serialize)]
+pub struct Validation {
+    /// The record.
+    pub file: String,
+    /// Counted from 1.
+    pub first_sample: usize,
+    /// Last sample, counted from 1.
+    pub last_sample: usize,
+    /// Channels, one each.
+    pub channels: Vec<Share>,
+}
+
+/// How much of one channel is predicted.
+#[derive(Debug, Serialize)]
+pub struct Share {
+    /// Quantity that was measured.
+    pub quantity: String,
+    /// Degree of freedom, counted from 1.
+    pub degree_of_freedom: usize,
+    /// 100 (1 − ‖measured − predicted‖ / ‖measured − mean‖): 100 is perfect, 0 no better than the
+    /// mean, negative worse.
+    pub fit_percent: f64,
+}
+
+/// Samples of a record to predict.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ValidationWindow {
+    /// First sample, counted from 1; `None`: the first of the record.
+    pub start: Option<usize>,
+    /// Number of samples; `None`: all from `start` on.
+    pub samples: Option<usize>,
+}
+
+impl ValidationWindow {
+    /// Returns the window to predict of a record whose fitted window had periods of `period` samples.
+    ///
+    /// # Errors
+    /// [`AnalysisError::ValidationPeriod`] if the samples are less than a period of a steady state.
+    pub(super) fn window(
+        &self,
+        period: Option<usize>,
+        prediction: Prediction,
+    ) -> Result<Window, AnalysisError> {
+        let period = period.filter(|_| prediction == Prediction::Steady);
+        let (period, periods) = match (period, self.samples) {
+            (Some(period), Some(samples)) if samples < period => {
+                return Err(AnalysisError::ValidationPeriod { samples, period });
+            }
+            (Some(period), samples) => (Some(period), samples.map(|samples| samples / period)),
+            (None, samples) => (samples, Some(1)),
+        };
+        Ok(Window { start: self.start.unwrap_or(1), period, periods })
+    }
+}
+
+/// Returns how much of a window that is predicted must be held: of an open record, whose prediction
+/// goes through it in chunks, no more than of a record that is fitted.
+pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
+    match (fitted, prediction) {
+        (Hold::Whole, _) => Hold::Whole,
+        (_, Prediction::Sampled { extent: Extent::Open, .. }) => Hold::Samples(0),
+        _ => Hold::Whole,
+    }
+}
+
+impl Validation {
+    /// Holds the prediction against the record.
+    pub fn of(
+        recorded: &Windowed,
+        system: &SecondOrderSystem,
+        prediction: Prediction,
+    ) -> Result<Self, AnalysisError> {
+        let measured = &recorded.held;
+        let mut shares = Vec::new();
+        let mut add = |kind: ResponseQuantity, fits: Vec<f64>| {
+            for (at, fit_percent) in fits.into_iter().enumerate() {
+                let quantity = kind.to_string();
+                shares.push(Share { quantity, degree_of_freedom: at + 1, fit_percent });
+            }
+        };
+        match prediction {
+            Prediction::Sampled { discretisation, extent: Extent::Open } => {
+                let found = in_stretches(recorded, system, discretisation)?;
+                found.into_iter().for_each(|(kind, fits)| add(kind, fits));
+            }
+            _ => {
+                for compared in prediction.predict(system, measured)? {
+                    add(compared.kind, fit_percent(&compared.measured, &compared.predicted)?);
+                }
+            }
+        }
+        Ok(Self {
+            file: measured.file.clone(),
+            first_sample: measured.first_sample,
+            last_sample: measured.last_sample(),
+            channels: shares,
+        })
+    }
+
+    /// As a person reads it.
+    pub fn text(&self) -> String {
+        let (first, last) = (self.first_sample, self.last_sample);
+        let several = self.channels.iter().any(|share| share.degree_of_freedom > 1);
+        let mut rows = vec![vec![
+            format!("predicted of {}, samples {first} to {last}", self.file),
+            "fit".into(),
+        ]];
+        for share in &self.channels {
+            let number =
+                if several { format!(" {}", share.degree_of_freedom) } else { String::new() };
+            let fit = format!("{} %", significant(share.fit_percent, 4));
+            rows.push(vec![format!("{}{number}", share.quantity), fit]);
+        }
+        text_table(&rows)
+    }
+}
+
+/// How much of each motion of an open record is predicted, in per cent: one pass finds where it
+/// started, another follows it from there.
+fn in_stretches(
+    recorded: &Windowed,
+    system: &SecondOrderSystem,
+    discretisation: Discretisation,
+) -> Result<Vec<(Motion, Vec<f64>)>, AnalysisError> {
+    let held = &recorded.held;
+    let told = |reason| failed(reason, system, held);
+    let mut start = StartFit::new(system, discretisation)?;
+    recorded.chunks(CHUNK_SAMPLES + 1, CHUNK_SAMPLES, &mut |chunk| {
+        start.push(&chunk.force, &chunk.responses()).map_err(told)
+    })?;
+    let mut state = start.start().map_err(told)?;
+    let motions = held.responses();
+    let mut levels: Vec<_> =
+        motions.iter().map(|(kind, _)| (*kind, vec![Level::default(); system.dof()])).collect();
+    recorded.chunks(CHUNK_SAMPLES + 1, CHUNK_SAMPLES, &mut |chunk| {
+        let response = predict(system, &chunk.force, discretisation, Extent::Open, &state);
+        let response = response.map_err(told)?;
+        // The next chunk begins with the last sample of this one.
+        let seen = usize::from(chunk.first_sample > held.first_sample);
+        for ((kind, levels), (_, measured)) in levels.iter_mut().zip(chunk.responses()) {
+            for (c, level) in levels.iter_mut().enumerate() {
+                let predicted = channels(&response, *kind).channel(c);
+                level.add(&measured.channel(c)[seen..], &predicted[seen..]);
+            }
+        }
+        let row = |kind| channels(&response, kind).data().row(chunk.force.len() - 1).transpose();
+        state = InitialState::new(row(Motion::Displacement), row(Motion::Velocity))?;
+        Ok(())
+    })?;
+    let fits = |levels: Vec<Level>| levels.iter().map(Level::fit_percent).collect();
+    Ok(levels.into_iter().map(|(kind, levels)| (kind, fits(levels))).collect())
+}
+
+/// A channel measured, and what a prediction leaves of it.
+#[derive(Debug, Clone, Default)]
+struct Level {
+    count: f64,
+    mean: f64,
+    /// Sum of the squares about the mean.
+    squares: f64,
+    /// Sum of the squares of what is left.
+    left: f64,
+}
+
+impl Level {
+    /// # Source
+    /// Chan, Golub & LeVeque (1983), The American Statistician 37, 242–247: sums of squares about
+    /// the mean, put together from parts.
+    fn add(&mut self, measured: &[f64], predicted: &[f64]) {
+        let count = measured.len() as f64;
+        if measured.is_empty() {
+            return;
+        }
+        let mean = measured.iter().sum::<f64>() / count;
+        let squares: f64 = measured.iter().map(|x| (x - mean).powi(2)).sum();
+        let apart = mean - self.mean;
+        let all = self.count + count;
+        self.squares += squares + apart * apart * self.count * count / all;
+        self.mean += apart * count / all;
+        self.count = all;
+        self.left += measured.iter().zip(predicted).map(|(x, p)| (x - p).powi(2)).sum::<f64>();
+    }
+
+    fn fit_percent(&self) -> f64 {
+        100.0 * (1.0 - self.left.sqrt() / self.squares.sqrt())
+    }
+}

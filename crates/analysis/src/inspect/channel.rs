@@ -1,0 +1,232 @@
+//! What can be said of one channel.
+
+use std::f64::consts::TAU;
+
+use mechid_signal::{Clipping, Record, Sampling, SignalError, Spectrum, clipping, repetition};
+use serde::Serialize;
+
+use crate::extremes::Extremes;
+use crate::levels::Levels;
+
+/// Spectral lines told of a channel.
+const STRONGEST: usize = 3;
+
+/// Weaker lines are not told, as a part of the strongest one.
+const FAINTEST: f64 = 0.01;
+
+/// The measures of a channel.
+#[derive(Debug, Serialize)]
+pub struct Channel {
+    /// Column.
+    pub column: usize,
+    /// Name.
+    pub name: String,
+    /// What the file says of it beyond its name.
+    pub about: String,
+    /// Mean, in the unit of the channel.
+    pub mean: f64,
+    /// RMS value, in the unit of the channel.
+    pub rms: f64,
+    /// Largest magnitude, in the unit of the channel.
+    pub peak: f64,
+    /// Peak over RMS; 1.41 for a sine. Nothing for a channel of zeros.
+    pub crest_factor: Option<f64>,
+    /// Smallest sample, in the unit of the channel.
+    pub minimum: f64,
+    /// Largest sample, in the unit of the channel.
+    pub maximum: f64,
+    /// Nothing if it was not cut off.
+    pub clipping: Option<Cut>,
+    /// The strongest lines of the spectrum, the strongest first.
+    pub spectrum_peaks: Vec<SpectrumPeak>,
+    /// Nothing if it does not repeat.
+    pub period: Option<Period>,
+    /// Whether lines and period were looked for.
+    #[serde(skip)]
+    pub spectral: bool,
+}
+
+/// A line of a spectrum that is higher than its neighbours.
+#[derive(Debug, Serialize)]
+pub struct SpectrumPeak {
+    /// Frequency, in cycles per sample.
+    pub cycles_per_sample: f64,
+    /// Nothing without a time axis.
+    pub frequency_hz: Option<f64>,
+    /// Of the sine, in the unit of the channel.
+    pub amplitude: f64,
+}
+
+/// Where an amplifier or a converter has cut a channel off.
+#[derive(Debug, Serialize)]
+pub struct Cut {
+    /// In the unit of the channel.
+    pub level: f64,
+    /// Samples there, in rows of three or more.
+    pub samples: usize,
+}
+
+/// After how long a channel repeats.
+#[derive(Debug, Serialize)]
+pub struct Period {
+    /// Number of samples.
+    pub samples: usize,
+    /// Nothing without a time axis.
+    pub seconds: Option<f64>,
+    /// RMS difference from one period to the next, over √2 times the RMS about the mean.
+    pub mismatch: f64,
+}
+
+/// What is gathered of a channel, block by block.
+#[derive(Debug, Default)]
+pub struct Gathered {
+    levels: Levels,
+    /// The first samples, which are looked at together; none where nothing is looked for.
+    held: Vec<f64>,
+    mean_of_held: f64,
+    /// What a picture shows over time; nothing if none is drawn.
+    extremes: Option<Extremes>,
+}
+
+/// A channel and its curves.
+#[derive(Debug)]
+pub struct Measured {
+    /// The channel.
+    pub channel: Channel,
+    /// Amplitude spectrum.
+    pub lines: AmplitudeSpectrum,
+    /// Nothing if it is not drawn.
+    pub extremes: Option<Extremes>,
+}
+
+impl Gathered {
+    /// Nothing yet of a channel that may be drawn, over a window of so many samples.
+    pub fn of(window: usize, drawn: bool) -> Self {
+        Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
+    }
+
+    /// The next samples; whole blocks are held until there are `hold` of them.
+    pub fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
+        self.levels.push(values)?;
+        if let Some(extremes) = &mut self.extremes {
+            extremes.push(values);
+        }
+        if self.held.len() < hold {
+            self.held.extend_from_slice(values);
+            self.mean_of_held = self.levels.mean();
+        }
+        Ok(())
+    }
+}
+
+impl Measured {
+    /// Measures a channel whose step, in s, may be unknown, and of which a period may be `given`.
+    pub fn of(
+        column: usize,
+        name: String,
+        about: String,
+        gathered: Gathered,
+        dt: Option<f64>,
+        given: Option<usize>,
+    ) -> Result<Self, SignalError> {
+        let Gathered { levels, held, mean_of_held, extremes } = gathered;
+        let (spectral, repeats, cut) = (!held.is_empty(), repetition(&held), clipping(&held));
+        let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
+        let lines = AmplitudeSpectrum::of(held, mean_of_held, period)?;
+        let Levels { peak, minimum, maximum, .. } = levels;
+        let channel = Channel {
+            column,
+            name,
+            about,
+            mean: levels.mean(),
+            rms: levels.rms(),
+            peak,
+            crest_factor: (peak > 0.0).then(|| peak / levels.rms()),
+            minimum,
+            maximum,
+            clipping: cut.map(|Clipping { level, samples }| Cut { level, samples }),
+            spectrum_peaks: lines.strongest(dt),
+            period: repeats.map(|r| Period {
+                samples: r.period,
+                seconds: dt.map(|dt| r.period as f64 * dt),
+                mismatch: r.mismatch,
+            }),
+            spectral,
+        };
+        Ok(Self { channel, lines, extremes })
+    }
+}
+
+/// Amplitudes closer than this, relative to the largest, are one.
+const EQUAL: f64 = 1e-9;
+
+/// The spectrum about the mean: of whole periods where the channel repeats or somebody says so,
+/// otherwise of all samples weighted by a Hann window.
+#[derive(Debug)]
+pub struct AmplitudeSpectrum {
+    /// From zero on.
+    amplitude: Vec<f64>,
+    /// That were transformed.
+    samples: usize,
+    period: Option<usize>,
+}
+
+impl AmplitudeSpectrum {
+    fn of(mut values: Vec<f64>, mean: f64, period: Option<usize>) -> Result<Self, SignalError> {
+        if let Some(period) = period {
+            values.truncate(values.len() / period * period);
+        }
+        let samples = values.len();
+        if samples == 0 {
+            return Ok(Self { amplitude: Vec::new(), samples, period });
+        }
+        for (k, value) in values.iter_mut().enumerate() {
+            // The window's mean is 1, so that a sine keeps its amplitude.
+            let weight = match period {
+                Some(_) => 1.0,
+                None => 1.0 - (TAU * k as f64 / samples as f64).cos(),
+            };
+            *value = weight * (*value - mean);
+        }
+        let record = Record::from_channel(Sampling::new(1.0, samples)?, values)?;
+        let spectrum = Spectrum::of(&record);
+        let amplitude = (0..spectrum.len()).map(|n| spectrum.line(n, 0).norm()).collect();
+        Ok(Self { amplitude, samples, period })
+    }
+
+    /// The highest of those that no neighbour surpasses, the strongest first.
+    fn strongest(&self, dt: Option<f64>) -> Vec<SpectrumPeak> {
+        let at = |n: usize| self.amplitude.get(n).copied().unwrap_or(0.0);
+        let strongest = self.amplitude.iter().skip(1).copied().fold(0.0, f64::max);
+        // Lines of the same amplitude but for rounding stand in order.
+        let level = |n: usize| (at(n) / strongest / EQUAL).round();
+        let is_peak = |n: &usize| level(*n) >= level(n - 1).max(level(n + 1));
+        let mut peaks: Vec<usize> = (1..self.amplitude.len())
+            .filter(|n| is_peak(n) && at(*n) > FAINTEST * strongest)
+            .collect();
+        peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
+        let told = peaks.into_iter().take(STRONGEST);
+        told.map(|n| SpectrumPeak {
+            cycles_per_sample: self.cycles_per_sample(n),
+            frequency_hz: dt.map(|dt| self.cycles_per_sample(n) / dt),
+            amplitude: at(n),
+        })
+        .collect()
+    }
+
+    fn cycles_per_sample(&self, n: usize) -> f64 {
+        n as f64 / self.samples as f64
+    }
+
+    /// Samples of the period whose mean [`points`](Self::points) are of.
+    pub fn period(&self) -> Option<usize> {
+        self.period
+    }
+
+    /// Cycles per sample and amplitudes, without the mean: of the mean period where there is one.
+    pub fn points(&self) -> impl Iterator<Item = (f64, f64)> {
+        let every = self.period.map_or(1, |period| self.samples / period);
+        let lines = self.amplitude.iter().copied().enumerate().step_by(every).skip(1);
+        lines.map(|(n, amplitude)| (self.cycles_per_sample(n), amplitude))
+    }
+}

@@ -1,0 +1,230 @@
+//! Inspection of a record: format, columns, sampling, levels, strongest lines, period.
+
+pub mod channel;
+mod measured;
+pub mod summary;
+
+use std::fmt;
+use std::path::Path;
+
+use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis};
+use mechid_signal::{self as signal, counted};
+use serde::{Deserialize, Serialize, Serializer};
+
+pub use self::measured::Drawn;
+use self::measured::{Shown, Span, measured};
+pub use self::summary::RecordSummary;
+use crate::AnalysisError;
+use crate::measurement::units::doubtful_time;
+use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
+
+/// Number of columns drawn at most.
+pub const DRAWN_COLUMNS: usize = 8;
+
+/// How to inspect a record.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct InspectSettings {
+    /// Columns to show, by name or number; empty: every column that holds numbers only.
+    pub columns: Vec<String>,
+    /// Whether to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
+    pub curves: bool,
+}
+
+/// What is in a record.
+///
+/// [`Display`](fmt::Display) gives it as a person reads it, `serde` the same for programs.
+#[derive(Debug)]
+pub struct Inspected {
+    summary: RecordSummary,
+    drawn: Vec<Drawn>,
+    held: Option<(usize, usize)>,
+    dt: Option<f64>,
+}
+
+/// Inspects a record file.
+///
+/// Of a long text the levels are those of all samples of the window; period and spectral lines are
+/// those of its first [`IN_MEMORY_SAMPLES`].
+///
+/// # Errors
+/// [`AnalysisError::Io`] if the file cannot be read or has no such columns, [`AnalysisError::Window`]
+/// if the record does not have all of the window.
+pub fn inspect(
+    path: impl AsRef<Path>,
+    reading: &Reading,
+    window: &Window,
+    how: &InspectSettings,
+) -> Result<Inspected, AnalysisError> {
+    Inspection { reading, window, columns: &how.columns, how }.run(path.as_ref())
+}
+
+impl Inspected {
+    /// Returns the numbers and remarks.
+    pub fn summary(&self) -> &RecordSummary {
+        &self.summary
+    }
+
+    /// Returns the curves of a picture, where they were asked for.
+    pub fn drawn(&self) -> &[Drawn] {
+        &self.drawn
+    }
+
+    /// Returns the first and the last sample, counted from 1, that period and lines come from, if
+    /// these are not all.
+    pub fn spectral_samples(&self) -> Option<(usize, usize)> {
+        self.held
+    }
+
+    /// Returns the time step, in s; `None` without a time axis.
+    pub fn dt(&self) -> Option<f64> {
+        self.dt
+    }
+}
+
+impl fmt::Display for Inspected {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for Inspected {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}
+
+/// An inspection before it is done.
+struct Inspection<'a> {
+    reading: &'a Reading,
+    window: &'a Window,
+    columns: &'a [String],
+    how: &'a InspectSettings,
+}
+
+impl Inspection<'_> {
+    /// Reads the record and measures each of its columns.
+    fn run(&self, path: &Path) -> Result<Inspected, AnalysisError> {
+        let file = self.reading.open(path, IN_MEMORY_SAMPLES)?;
+        let table = file.head();
+        let time = self.reading.time_axis(table);
+        let instants = match time {
+            Some(TimeAxis::Column(name)) => table.find(name).ok(),
+            _ => None,
+        };
+        let asked = self.asked(table)?;
+        let mut inventory = file.inventory(&asked, instants)?;
+        let (samples, open_line) = (inventory.samples, inventory.open_line);
+        let sampling = inventory.sampling.take();
+        let (mut shown, len, mut left_out) = self.shown(table, &asked, instants, inventory)?;
+        let dt = self.step(&file, time, sampling, &mut left_out)?;
+        let window = match len {
+            0 => None,
+            len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
+        };
+        let mut summary = RecordSummary::begin(table, samples, window, dt, left_out, self.how);
+        summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
+            doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
+        }));
+        let mut drawn = Vec::new();
+        if let (Some(window), false) = (window, shown.is_empty()) {
+            summary.remarks.extend(window.looked_at(table.file()));
+            summary.remarks.extend(self.choose_drawn(table, &mut shown));
+            let period = self.window.period;
+            (summary.channels, drawn) = measured(&file, &shown, window, (dt, period))?;
+        }
+        summary.remarks.extend(open_line.map(|line| {
+            format!(
+                "line {line} is the last and no line break ends it: if the file was cut off there, so \
+                 may be its last number"
+            )
+        }));
+        Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
+    }
+
+    /// Chooses the columns that are drawn, and returns a remark on the others.
+    fn choose_drawn(&self, table: &Table, shown: &mut [Shown]) -> Option<String> {
+        if !self.how.curves {
+            return None;
+        }
+        let mut wanted = shown.iter_mut().filter(|s| s.spectral);
+        wanted.by_ref().take(DRAWN_COLUMNS).for_each(|s| s.drawn = true);
+        let others: Vec<String> = wanted.map(|s| table.label(s.column)).collect();
+        (!others.is_empty()).then(|| {
+            format!(
+                "the picture shows {DRAWN_COLUMNS} columns; not drawn, unless `columns` chooses them: {}",
+                others.join(", ")
+            )
+        })
+    }
+
+    /// Indices of the columns asked for, or of all that are more than a trailing delimiter.
+    fn asked(&self, table: &Table) -> Result<Vec<usize>, AnalysisError> {
+        match self.columns {
+            [] => Ok(table.filled_columns().collect()),
+            named => Ok(named.iter().map(|c| table.find(c)).collect::<Result<_, _>>()?),
+        }
+    }
+
+    /// The columns asked for, or those that are numbers and as long as most; how many samples they
+    /// have; and what is wrong with the others.
+    fn shown(
+        &self,
+        table: &Table,
+        asked: &[usize],
+        instants: Option<usize>,
+        inventory: Inventory,
+    ) -> Result<(Vec<Shown>, usize, Vec<String>), AnalysisError> {
+        let offset = |mean: f64| match self.reading.detrend {
+            Detrend::Mean => mean,
+            Detrend::None => 0.0,
+        };
+        let (mut shown, mut len, mut left_out) = (Vec::new(), inventory.samples, Vec::new());
+        for (&column, tally) in asked.iter().zip(inventory.columns) {
+            match tally {
+                Ok(tally) if !self.columns.is_empty() || tally.samples == inventory.samples => {
+                    len = tally.samples;
+                    // Instants are no signal.
+                    let spectral = !self.columns.is_empty() || Some(column) != instants;
+                    let offset = offset(tally.mean);
+                    shown.push(Shown { column, offset, spectral, drawn: false });
+                }
+                Ok(tally) => left_out.push(format!(
+                    "column {} has {}, most have {}",
+                    table.label(column),
+                    counted(tally.samples, "sample"),
+                    inventory.samples
+                )),
+                Err(reason) if !self.columns.is_empty() => return Err(reason.into()),
+                Err(reason) => left_out.push(reason.to_string()),
+            }
+        }
+        table.common_length(self.columns)?;
+        Ok((shown, len, left_out))
+    }
+
+    /// The time step, in s. A time axis that nobody asked for may be wrong: that is told, no error.
+    fn step(
+        &self,
+        file: &RecordFile,
+        time: Option<TimeAxis<'_>>,
+        sampling: Option<Result<signal::Sampling, IoError>>,
+        left_out: &mut Vec<String>,
+    ) -> Result<Option<f64>, AnalysisError> {
+        let Some(time) = time else { return Ok(None) };
+        let asked_for = self.reading.time.is_some() || matches!(time, TimeAxis::RateHz(_));
+        let sampling = match sampling {
+            Some(sampling) if !file.is_whole() => sampling,
+            // Of a text the beginning says it too, and other files bring more to compare.
+            _ => file.head().sampling(&time, self.columns),
+        };
+        match sampling {
+            Ok(sampling) => Ok(Some(sampling.dt())),
+            Err(reason) if asked_for => Err(reason.into()),
+            Err(reason) => {
+                left_out.push(format!("time axis: {reason}"));
+                Ok(None)
+            }
+        }
+    }
+}

@@ -1,0 +1,218 @@
+//! The inventory of a record.
+
+use std::fmt;
+
+use mechid_io::Table;
+use mechid_signal::counted;
+use serde::Serialize;
+
+use super::InspectSettings;
+use super::channel::{Channel, Cut, Period, SpectrumPeak};
+use super::measured::Span;
+use crate::text::{compact, significant, text_table};
+
+/// What is in a record.
+#[derive(Debug, Serialize)]
+pub struct RecordSummary {
+    /// The record.
+    pub file: String,
+    /// Format of the file.
+    pub format: String,
+    /// Number of columns.
+    pub columns: usize,
+    /// Samples that most columns have.
+    pub samples: usize,
+    /// Nothing if no column can be shown.
+    pub window: Option<WindowRow>,
+    /// Nothing without a time axis.
+    pub sampling: Option<SamplingRow>,
+    /// Channels, one each.
+    pub channels: Vec<Channel>,
+    /// Single numbers in the file.
+    pub scalars: Vec<Scalar>,
+    /// What else the file says.
+    pub remarks: Vec<String>,
+    /// Columns not shown, and why.
+    pub left_out: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: InspectSettings,
+}
+
+/// The samples shown, counted from 1.
+#[derive(Debug, Serialize)]
+pub struct WindowRow {
+    /// Counted from 1.
+    pub first_sample: usize,
+    /// Counted from 1.
+    pub last_sample: usize,
+}
+
+/// Time axis of the samples shown.
+#[derive(Debug, Serialize)]
+pub struct SamplingRow {
+    /// In Hz.
+    pub rate_hz: f64,
+    /// In s.
+    pub step_s: f64,
+    /// In s.
+    pub duration_s: f64,
+}
+
+/// A single number in the file.
+#[derive(Debug, Serialize)]
+pub struct Scalar {
+    /// Name.
+    pub name: String,
+    /// Value, in its unit.
+    pub value: f64,
+}
+
+impl WindowRow {
+    fn of(start: usize, len: usize) -> Self {
+        Self { first_sample: start + 1, last_sample: start + len }
+    }
+}
+
+impl SamplingRow {
+    fn of(dt: f64, len: usize) -> Self {
+        Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt }
+    }
+}
+
+impl RecordSummary {
+    /// All but the channels.
+    pub fn begin(
+        table: &Table,
+        samples: usize,
+        window: Option<Span>,
+        dt: Option<f64>,
+        left_out: Vec<String>,
+        settings: &InspectSettings,
+    ) -> Self {
+        let scalars = table.scalars().iter();
+        Self {
+            file: table.file().into(),
+            format: table.format(),
+            columns: table.width(),
+            samples,
+            window: window.map(|window| WindowRow::of(window.start, window.len)),
+            sampling: dt.zip(window).map(|(dt, window)| SamplingRow::of(dt, window.len)),
+            channels: Vec::new(),
+            scalars: scalars
+                .map(|(name, value)| Scalar { name: name.clone(), value: *value })
+                .collect(),
+            remarks: table.remarks().to_vec(),
+            left_out,
+            analysis: settings.clone(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{}: {}, {}, {}",
+            self.file,
+            self.format,
+            counted(self.columns, "column"),
+            counted(self.samples, "sample")
+        );
+        if let Some(WindowRow { first_sample, last_sample }) = &self.window {
+            text += &format!("; shown: samples {first_sample} to {last_sample}");
+        }
+        text += &match &self.sampling {
+            Some(s) => format!(
+                "\n{} Hz, a step of {} s, {} s long\n",
+                compact(s.rate_hz, 8),
+                compact(s.step_s, 6),
+                compact(s.duration_s, 6)
+            ),
+            None => "\nno time axis: give --time or --sample-rate\n".into(),
+        };
+        text += &self.levels();
+        text += &self.lines();
+        for (channel, Cut { level, samples }) in
+            self.channels.iter().filter_map(|c| c.clipping.as_ref().map(|cut| (c, cut)))
+        {
+            text += &format!(
+                "column {} is cut off at {}: {samples} samples stand there, three or more in a row\n",
+                channel.title(),
+                significant(*level, 5)
+            );
+        }
+        for Scalar { name, value } in &self.scalars {
+            text += &format!("{name} = {value:e}\n");
+        }
+        for remark in &self.remarks {
+            text += &format!("{remark}\n");
+        }
+        for reason in &self.left_out {
+            text += &format!("left out: {reason}\n");
+        }
+        text
+    }
+
+    fn levels(&self) -> String {
+        if self.channels.is_empty() {
+            return String::new();
+        }
+        let header = ["column", "mean", "RMS", "peak", "crest factor", "minimum", "maximum"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for c in &self.channels {
+            let mut row = vec![c.title()];
+            row.extend([c.mean, c.rms, c.peak].map(|v| significant(v, 5)));
+            row.push(c.crest_factor.map_or("–".into(), |v| significant(v, 4)));
+            row.extend([c.minimum, c.maximum].map(|v| significant(v, 5)));
+            rows.push(row);
+        }
+        format!("\n{}\n", text_table(&rows))
+    }
+
+    fn lines(&self) -> String {
+        if !self.channels.iter().any(|c| c.spectral) {
+            return String::new();
+        }
+        let unit = if self.sampling.is_some() { "Hz" } else { "cycles/sample" };
+        let mut rows = vec![
+            [
+                "column",
+                "period, samples",
+                "mismatch",
+                &format!("strongest lines, {unit}: amplitude"),
+            ]
+            .map(String::from)
+            .to_vec(),
+        ];
+        for c in self.channels.iter().filter(|c| c.spectral) {
+            let (period, mismatch) = match &c.period {
+                Some(Period { samples, mismatch, .. }) => {
+                    (samples.to_string(), format!("{} %", significant(100.0 * mismatch, 3)))
+                }
+                None => ("–".into(), "–".into()),
+            };
+            let peaks: Vec<String> = c.spectrum_peaks.iter().map(SpectrumPeak::text).collect();
+            rows.push(vec![format!("{} {}", c.column, c.name), period, mismatch, peaks.join(", ")]);
+        }
+        format!("{}\n", text_table(&rows)).replace("\n\n\n", "\n\n")
+    }
+}
+
+impl Channel {
+    /// Number and name of the column, and what the file says of it.
+    pub fn title(&self) -> String {
+        let about =
+            if self.about.is_empty() { String::new() } else { format!(" ({})", self.about) };
+        format!("{} {}{about}", self.column, self.name)
+    }
+}
+
+impl SpectrumPeak {
+    fn text(&self) -> String {
+        let frequency = self.frequency_hz.unwrap_or(self.cycles_per_sample);
+        format!("{}: {}", compact(frequency, 5), significant(self.amplitude, 3))
+    }
+}
+
+impl fmt::Display for RecordSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}

@@ -1,0 +1,511 @@
+//! Measured forces and responses: which file or arrays, which columns, and which window of them.
+
+pub mod channels;
+pub mod units;
+mod window;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use mechid_estimate::frequency_domain::Motion;
+use mechid_io::{RecordFile, Table, TimeAxis, Unit};
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+pub use self::channels::Channels;
+use self::channels::{ABSENT, KINDS};
+use self::units::ToSi;
+pub(crate) use self::window::Hold;
+pub use self::window::{Window, Windowed};
+use crate::AnalysisError;
+
+/// Number of samples held in memory of a window of which not all samples are needed at once.
+pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
+
+/// Number of samples read at a time from a window that is not held in memory.
+pub const CHUNK_SAMPLES: usize = 1 << 16;
+
+/// How to read a record file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Reading {
+    /// Number of header lines to skip above a table of text.
+    pub skip_lines: u64,
+    /// Time column, by name or number counted from 1; `None`: the file's own time axis, or a column
+    /// called time or t.
+    pub time: Option<String>,
+    /// Sampling rate, in Hz, where there is no time column.
+    pub sample_rate_hz: Option<f64>,
+    /// Constant to subtract from every channel.
+    pub detrend: Detrend,
+}
+
+/// Constant to subtract from a channel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Detrend {
+    /// No constant.
+    #[default]
+    None,
+    /// The mean of the whole record, not only of the window.
+    Mean,
+}
+
+impl Reading {
+    /// Opens a record file, of whose text at most `rows` rows are held in memory.
+    ///
+    /// # Errors
+    /// As [`RecordFile::open`].
+    pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
+        Ok(RecordFile::open(path, self.skip_lines, rows)?)
+    }
+
+    /// Returns the time axis asked for, that of the file, or the time column found by its name.
+    pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
+        match (self.sample_rate_hz, &self.time) {
+            (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
+            (None, Some(column)) => Some(TimeAxis::Column(column)),
+            (None, None) if table.has_time_axis() => Some(TimeAxis::OfFile),
+            (None, None) => table.time_column().map(TimeAxis::Column),
+        }
+    }
+}
+
+/// A record file with all that says what is in it: the saved form of a [`Measurement`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecordPlan {
+    /// The file; `-` is standard input.
+    pub path: PathBuf,
+    /// Columns of force and response.
+    pub channels: Channels,
+    /// How to read the file.
+    pub reading: Reading,
+    /// Samples to use.
+    pub window: Window,
+}
+
+impl RecordPlan {
+    /// Opens the record.
+    ///
+    /// # Errors
+    /// As [`Measurement::open_with`].
+    pub fn open(&self) -> Result<Measurement, AnalysisError> {
+        let measurement = Measurement::open_with(&self.path, &self.channels, &self.reading)?;
+        Ok(Measurement { window: self.window.clone(), ..measurement })
+    }
+}
+
+/// Forces and responses of a machine, in a file of any length or in memory, and the window of them to
+/// use.
+///
+/// Columns in other units are converted to SI units, wherever they come from.
+///
+/// ```
+/// use mechid_analysis::{Channels, Measurement, Motion};
+/// use mechid_signal::Sampling;
+///
+/// let (force, x) = (vec![1.0, 2.0, 1.0, 2.0], vec![10.0, 20.0, 10.0, 20.0]);
+/// let columns = [("force", force.as_slice()), ("x [um]", x.as_slice())];
+/// let channels = Channels::new("force", Motion::Displacement, "x [um]");
+/// let test = Measurement::from_columns(Sampling::new(0.01, 4)?, &columns, &channels)?.period(2)?;
+/// assert_eq!(test.responses()?[0].1.channel(0)[1], 20e-6);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Measurement {
+    source: Arc<Source>,
+    window: Window,
+}
+
+/// Samples of the columns used, and what one pass over them tells.
+#[derive(Debug)]
+pub(crate) struct Source {
+    /// Name for messages.
+    pub name: String,
+    /// Path that the record was read from; `None` for arrays.
+    pub path: Option<PathBuf>,
+    pub channels: Channels,
+    pub reading: Reading,
+    /// Time axis of the whole record.
+    pub sampling: Sampling,
+    /// Largest magnitude of each column used, in its own unit.
+    pub peaks: Vec<f64>,
+    /// Constant to subtract from each column used, in its own unit.
+    pub offsets: Vec<f64>,
+    pub units: ToSi,
+    samples: Samples,
+}
+
+#[derive(Debug)]
+enum Samples {
+    File(RecordFile),
+    /// Samples × columns used.
+    Memory(DMatrix<f64>),
+}
+
+/// Consecutive samples, sorted into forces and responses.
+#[derive(Debug, Clone)]
+pub struct Block {
+    /// Name of the record for messages.
+    pub file: String,
+    /// Samples × degrees of freedom, in N; of a long window the first samples only, as of the
+    /// responses.
+    pub force: Record,
+    /// Samples × degrees of freedom, in m.
+    pub displacement: Option<Record>,
+    /// Samples × degrees of freedom, in m/s.
+    pub velocity: Option<Record>,
+    /// Samples × degrees of freedom, in m/s².
+    pub acceleration: Option<Record>,
+    /// First sample of the window, counted from 1.
+    pub first_sample: usize,
+    /// Number of samples in a period.
+    pub period: usize,
+    /// Number of periods in the window.
+    pub periods: usize,
+    /// Degrees of freedom on which a force acts, counted from 0.
+    pub driven: Vec<usize>,
+    /// Columns that were in other than SI units, and a time axis that may be.
+    pub unit_remarks: Vec<String>,
+}
+
+impl Measurement {
+    /// Opens a record file: text, MATLAB or universal file, packed with gzip or not.
+    ///
+    /// A long text is gone through once and not held in memory.
+    ///
+    /// # Errors
+    /// As [`Measurement::open_with`].
+    pub fn open(path: impl AsRef<Path>, channels: &Channels) -> Result<Self, AnalysisError> {
+        Self::open_with(path, channels, &Reading::default())
+    }
+
+    /// As [`Measurement::open`], with a time axis, lines to skip or a mean to subtract.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
+    /// [`AnalysisError::NoTimeAxis`], [`AnalysisError::Unit`] if a column is in a unit of another
+    /// quantity.
+    pub fn open_with(
+        path: impl AsRef<Path>,
+        channels: &Channels,
+        reading: &Reading,
+    ) -> Result<Self, AnalysisError> {
+        let path = path.as_ref();
+        let file = reading.open(path, IN_MEMORY_SAMPLES)?;
+        let units = ToSi::of_table(file.head(), &channels.roles())?;
+        let time = reading.time_axis(file.head()).ok_or_else(|| AnalysisError::NoTimeAxis {
+            file: file.head().file().into(),
+            available: file.head().available(),
+        })?;
+        let survey = file.survey(&time, &channels.used())?;
+        let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
+        let mut units = units;
+        units.remarks.extend(doubt);
+        let source = Source {
+            name: file.head().file().to_owned(),
+            path: Some(path.to_owned()),
+            channels: channels.clone(),
+            reading: reading.clone(),
+            sampling: survey.sampling,
+            peaks: survey.peaks,
+            offsets: offsets(reading.detrend, survey.means),
+            units,
+            samples: Samples::File(file),
+        };
+        Ok(Self { source: Arc::new(source), window: Window::default() })
+    }
+
+    /// Takes a force and one or several kinds of response from memory, in SI units, samples × degrees
+    /// of freedom each.
+    ///
+    /// # Errors
+    /// [`AnalysisError::ArrayShape`] if a response is not as long as the force or has not as many
+    /// degrees of freedom.
+    pub fn from_records(
+        force: &Record,
+        responses: &[(Motion, &Record)],
+    ) -> Result<Self, AnalysisError> {
+        let name = |group: &str, dof: usize| format!("{group} {}", dof + 1);
+        let names = |group: &str| (0..force.channels()).map(|dof| name(group, dof)).collect();
+        let mut channels = Channels { force: names("force"), ..Channels::default() };
+        let mut columns: Vec<&[f64]> =
+            (0..force.channels()).map(|dof| force.channel(dof)).collect();
+        for kind in KINDS {
+            let Some((_, record)) = responses.iter().find(|(given, _)| *given == kind) else {
+                continue;
+            };
+            let (samples, dofs) = (record.len(), record.channels());
+            if (samples, dofs) != (force.len(), force.channels()) {
+                let expected = [force.len(), force.channels()];
+                let name = kind.to_string();
+                return Err(AnalysisError::ArrayShape { name, got: [samples, dofs], expected });
+            }
+            let all: Vec<String> = names(&kind.to_string());
+            channels = channels.and(kind, &all.join(","));
+            columns.extend((0..dofs).map(|dof| record.channel(dof)));
+        }
+        let named = channels.used().into_iter().map(String::as_str).zip(columns);
+        let named: Vec<(&str, &[f64])> = named.collect();
+        Self::from_columns(force.sampling(), &named, &channels)
+    }
+
+    /// Takes named columns from memory; a name may say a unit, as in a file (`x [um]`).
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoColumn`] if a channel has no column, [`AnalysisError::ArrayShape`] if a
+    /// column is not as long as the time axis, [`AnalysisError::Signal`] if a value is not finite,
+    /// [`AnalysisError::Unit`].
+    pub fn from_columns(
+        sampling: Sampling,
+        columns: &[(&str, &[f64])],
+        channels: &Channels,
+    ) -> Result<Self, AnalysisError> {
+        let roles = channels.roles();
+        let find = |wanted: &String| {
+            let found = columns.iter().find(|(name, _)| *name == wanted);
+            let available = || columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+            found.ok_or_else(|| AnalysisError::NoColumn {
+                column: wanted.clone(),
+                available: available(),
+            })
+        };
+        let mut data = DMatrix::zeros(sampling.len(), roles.len());
+        let mut labels = Vec::new();
+        for (mut into, role) in data.column_iter_mut().zip(&roles) {
+            let (name, values) = find(role.column)?;
+            if values.len() != sampling.len() {
+                let (got, expected) = ([values.len(), 1], [sampling.len(), 1]);
+                return Err(AnalysisError::ArrayShape { name: (*name).into(), got, expected });
+            }
+            into.copy_from_slice(values);
+            labels.push((format!("\"{name}\""), Unit::of(name, "")));
+        }
+        // Finite, or an error that says where not.
+        let record = Record::new(sampling, data)?;
+        let units = ToSi::new("the record", labels.into_iter(), &roles)?;
+        let data = record.data();
+        let source = Source {
+            name: "the record".into(),
+            path: None,
+            channels: channels.clone(),
+            reading: Reading::default(),
+            sampling,
+            peaks: data.column_iter().map(|column| column.amax()).collect(),
+            offsets: vec![0.0; roles.len()],
+            units,
+            samples: Samples::Memory(data.clone()),
+        };
+        Ok(Self { source: Arc::new(source), window: Window::default() })
+    }
+
+    /// Uses whole periods of this many samples, from the first sample of the window on.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Window`] if the record is shorter than one period.
+    pub fn period(mut self, samples: usize) -> Result<Self, AnalysisError> {
+        self.window.period = Some(samples);
+        self.span().map(|_| self)
+    }
+
+    /// Uses a part of the record.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Window`] if the record does not have all of it.
+    pub fn window(mut self, window: Window) -> Result<Self, AnalysisError> {
+        self.window = window;
+        self.span().map(|_| self)
+    }
+
+    /// Gives the record a name for messages and results, as for a record from memory.
+    #[must_use]
+    pub fn named(mut self, name: &str) -> Self {
+        if let Some(source) = Arc::get_mut(&mut self.source) {
+            source.name = name.into();
+        }
+        self
+    }
+
+    /// Returns the name of the record in messages: that of the file as the user wrote it.
+    pub fn name(&self) -> &str {
+        &self.source.name
+    }
+
+    /// Returns the columns of force and response.
+    pub fn channels(&self) -> &Channels {
+        &self.source.channels
+    }
+
+    /// Returns the time axis of the whole record.
+    pub fn sampling(&self) -> Sampling {
+        self.source.sampling
+    }
+
+    /// Returns the force of the whole window, samples × degrees of freedom, in N.
+    ///
+    /// # Errors
+    /// If the file cannot be read again.
+    pub fn force(&self) -> Result<Record, AnalysisError> {
+        Ok(self.hold(Hold::Whole)?.held.force)
+    }
+
+    /// Returns every kind of response measured, over the whole window, samples × degrees of freedom
+    /// in m, m/s or m/s².
+    ///
+    /// # Errors
+    /// If the file cannot be read again.
+    pub fn responses(&self) -> Result<Vec<(Motion, Record)>, AnalysisError> {
+        let held = self.hold(Hold::Whole)?.held;
+        Ok(held.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
+    }
+
+    /// Returns the saved form; `None` for a record from memory.
+    pub fn plan(&self) -> Option<RecordPlan> {
+        Some(RecordPlan {
+            path: self.source.path.clone()?,
+            channels: self.source.channels.clone(),
+            reading: self.source.reading.clone(),
+            window: self.window.clone(),
+        })
+    }
+
+    /// Returns the settings of the window.
+    pub fn window_settings(&self) -> &Window {
+        &self.window
+    }
+
+    pub(crate) fn source(&self) -> &Arc<Source> {
+        &self.source
+    }
+
+    /// Returns the first sample, counted from 0, and the number of samples of the window.
+    pub(crate) fn span(&self) -> Result<(usize, usize), AnalysisError> {
+        self.window.span(&self.source.name, self.source.sampling.len())
+    }
+
+    /// Reads the window and holds as much of it in memory as `hold` says.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Window`], [`AnalysisError::ZeroForce`] if no force acts, and if the file
+    /// cannot be read again.
+    pub(crate) fn hold(&self, hold: Hold) -> Result<Windowed, AnalysisError> {
+        Windowed::new(self, hold)
+    }
+}
+
+fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
+    match detrend {
+        Detrend::Mean => means,
+        Detrend::None => vec![0.0; means.len()],
+    }
+}
+
+impl Source {
+    /// Passes the samples `window` of the columns used on in blocks of `rows` rows (samples ×
+    /// columns, SI units, offsets subtracted), each beginning `advance` rows after the one before;
+    /// the last may be shorter.
+    pub fn blocks(
+        &self,
+        window: std::ops::Range<usize>,
+        rows: usize,
+        advance: usize,
+        take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), AnalysisError>,
+    ) -> Result<(), AnalysisError> {
+        let mut converted = |mut block: DMatrix<f64>| {
+            for (mut column, offset) in block.column_iter_mut().zip(&self.offsets) {
+                column.add_scalar_mut(-offset);
+            }
+            for (mut column, factor) in block.column_iter_mut().zip(&self.units.factors) {
+                column *= *factor;
+            }
+            take(block)
+        };
+        match &self.samples {
+            Samples::File(file) => {
+                file.blocks(&self.channels.used(), window, rows, advance, &mut converted)
+            }
+            Samples::Memory(data) => {
+                let mut first = window.start;
+                loop {
+                    let end = window.end.min(first + rows);
+                    converted(data.rows(first, end - first).into_owned())?;
+                    if end == window.end {
+                        return Ok(());
+                    }
+                    first += advance;
+                }
+            }
+        }
+    }
+
+    /// Sorts a block that begins with sample `first`, counted from 1, into forces and responses.
+    pub fn sorted(&self, block: &DMatrix<f64>, first: usize) -> Result<Block, AnalysisError> {
+        let sampling = self.sampling.with_len(block.nrows())?;
+        let mut next = block.column_iter();
+        let mut take = |columns: &[String]| {
+            let mut data = DMatrix::zeros(sampling.len(), columns.len());
+            let used = columns.iter().enumerate().filter(|(_, c)| *c != ABSENT);
+            for (at, column) in used.map(|(at, _)| at).zip(&mut next) {
+                data.set_column(at, &column);
+            }
+            Record::new(sampling, data)
+        };
+        let force = take(&self.channels.force)?;
+        let mut response = |columns: &[String]| {
+            if columns.is_empty() { Ok(None) } else { take(columns).map(Some) }
+        };
+        Ok(Block {
+            file: self.name.clone(),
+            displacement: response(&self.channels.displacement)?,
+            velocity: response(&self.channels.velocity)?,
+            acceleration: response(&self.channels.acceleration)?,
+            first_sample: first,
+            period: force.len(),
+            periods: 1,
+            driven: Vec::new(),
+            unit_remarks: self.units.remarks.clone(),
+            force,
+        })
+    }
+}
+
+impl Block {
+    /// Returns the first kind of response measured.
+    pub fn response(&self) -> (&Record, Motion) {
+        let (kind, record) = self.responses()[0];
+        (record, kind)
+    }
+
+    /// Returns every kind of response measured.
+    pub fn responses(&self) -> Vec<(Motion, &Record)> {
+        let candidates = [
+            (Motion::Displacement, &self.displacement),
+            (Motion::Velocity, &self.velocity),
+            (Motion::Acceleration, &self.acceleration),
+        ];
+        let measured = candidates.into_iter();
+        measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()
+    }
+
+    /// Returns the last sample of the window, counted from 1.
+    pub fn last_sample(&self) -> usize {
+        self.first_sample + self.period * self.periods - 1
+    }
+
+    /// Returns the last sample that is held, counted from 1, if others follow in the window.
+    pub fn held_to(&self) -> Option<usize> {
+        let held = self.first_sample + self.force.len() - 1;
+        (held < self.last_sample()).then_some(held)
+    }
+}
+
+/// Returns a record followed by the samples of a later one.
+pub(crate) fn joined(record: &Record, later: &Record) -> Result<Record, AnalysisError> {
+    let (before, len) = (record.len(), record.len() + later.len());
+    let mut data = DMatrix::zeros(len, record.channels());
+    data.rows_mut(0, before).copy_from(record.data());
+    data.rows_mut(before, later.len()).copy_from(later.data());
+    Ok(Record::new(record.sampling().with_len(len)?, data)?)
+}

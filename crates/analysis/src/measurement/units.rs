@@ -1,0 +1,118 @@
+//! Conversion of columns to SI units, and time axes in a doubtful unit.
+
+use mechid_io::{Quantity, Table, TimeAxis, Unit};
+use mechid_signal::Sampling;
+
+use crate::AnalysisError;
+use crate::text::compact;
+
+/// Use of a column: its name or number, the quantity that it must hold, and the setting that names it.
+#[derive(Debug, Clone, Copy)]
+pub struct Role<'a> {
+    /// Column.
+    pub column: &'a String,
+    /// Quantity that was measured.
+    pub quantity: Quantity,
+    /// The setting.
+    pub setting: &'static str,
+}
+
+/// Factors that convert columns to SI units.
+#[derive(Debug, Clone, Default)]
+pub struct ToSi {
+    /// One per column.
+    pub factors: Vec<f64>,
+    /// Columns in other units, and a time axis that may be.
+    pub remarks: Vec<String>,
+}
+
+impl ToSi {
+    /// Returns the factors for columns with these labels and units; `None` stands for SI.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Unit`] if a unit is one of another quantity.
+    pub fn new(
+        file: &str,
+        columns: impl Iterator<Item = (String, Option<Unit>)>,
+        roles: &[Role<'_>],
+    ) -> Result<Self, AnalysisError> {
+        let (mut factors, mut converted) = (Vec::new(), Vec::new());
+        for ((label, unit), role) in columns.zip(roles) {
+            let Some(unit) = unit else {
+                factors.push(1.0);
+                continue;
+            };
+            if unit.quantity != role.quantity {
+                return Err(AnalysisError::Unit {
+                    file: file.into(),
+                    column: label,
+                    unit: unit.name,
+                    measures: unit.quantity,
+                    setting: role.setting,
+                    wanted: role.quantity,
+                });
+            }
+            if unit.in_si != 1.0 {
+                converted.push(format!("{label} in {}", unit.name));
+            }
+            factors.push(unit.in_si);
+        }
+        let remark = (!converted.is_empty())
+            .then(|| format!("{file}: converted to SI units: {}", converted.join(", ")));
+        Ok(Self { factors, remarks: remark.into_iter().collect() })
+    }
+
+    /// Returns the factors by the units that the columns of `table` say.
+    ///
+    /// # Errors
+    /// As [`ToSi::new`], and if there is no such column.
+    pub fn of_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
+        let places = roles.iter().map(|role| table.find(role.column));
+        let places: Vec<usize> = places.collect::<Result<_, _>>()?;
+        let columns = places.into_iter().map(|at| (table.label(at), table.unit(at)));
+        Self::new(table.file(), columns, roles)
+    }
+
+    /// Returns the factor of a column; 1 where there is no such column.
+    pub fn factor(&self, column: usize) -> f64 {
+        self.factors.get(column).copied().unwrap_or(1.0)
+    }
+}
+
+/// Sampling rate, in Hz, below which a time column without a unit is doubtful whatever its length:
+/// structures that need no more swing in minutes. Milliseconds taken as seconds look so at all rates
+/// up to 2 kHz, numbers of samples at any.
+const SLOW_HZ: f64 = 2.0;
+
+/// Sampling rate, in Hz, below which records longer than [`LONG_S`] are doubtful: buildings are
+/// sampled so, but seldom without a unit. Milliseconds look so at all rates up to 20 kHz in records
+/// of a second or more.
+const RATHER_SLOW_HZ: f64 = 20.0;
+
+/// Duration, in s, from which [`RATHER_SLOW_HZ`] holds.
+const LONG_S: f64 = 1000.0;
+
+/// Returns a remark if a time column without a unit gives a record so slow and long that it may be in
+/// milliseconds.
+pub fn doubtful_time(table: &Table, time: &TimeAxis<'_>, sampling: Sampling) -> Option<String> {
+    let TimeAxis::Column(name) = time else { return None };
+    let column = table.find(name).ok()?;
+    let (rate_hz, long_s) = (1.0 / sampling.dt(), sampling.len() as f64 * sampling.dt());
+    let doubtful = rate_hz <= SLOW_HZ || (rate_hz <= RATHER_SLOW_HZ && long_s >= LONG_S);
+    if !doubtful || table.says_unit_of_time(column) {
+        return None;
+    }
+    let name = match table.names()[column].trim() {
+        "" => "time",
+        name => name,
+    };
+    Some(format!(
+        "{}: the time in column {} has no unit and is taken as seconds: {} Hz, {} s long; if it is in \
+         ms, call it {name}_ms in the file or give `sample_rate` {}; if in s, {name}_s",
+        table.file(),
+        table.label(column),
+        compact(rate_hz, 6),
+        compact(long_s, 6),
+        compact(1000.0 * rate_hz, 8),
+    ))
+}

@@ -1,0 +1,148 @@
+//! The window of a record, and how much of it is held in memory.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+
+use super::channels::ABSENT;
+use super::{Block, IN_MEMORY_SAMPLES, Measurement, Source};
+use crate::AnalysisError;
+
+/// Part of a record to use.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Window {
+    /// First sample, counted from 1.
+    pub start: usize,
+    /// Number of samples in one period; `None`: all samples from `start` on are one window.
+    pub period: Option<usize>,
+    /// Number of whole periods; `None`: as many as there are.
+    pub periods: Option<usize>,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self { start: 1, period: None, periods: None }
+    }
+}
+
+impl Window {
+    /// Returns the first sample, counted from 0, and the number of samples of the window into a
+    /// record of `samples` samples called `file`.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Window`] if the record does not have all of them.
+    pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), AnalysisError> {
+        let start = self.start.saturating_sub(1);
+        let rest = samples.saturating_sub(start);
+        let period = self.period.unwrap_or(rest);
+        let periods = self.periods.unwrap_or(rest.checked_div(period).unwrap_or(0)).max(1);
+        let len = period.max(1).saturating_mul(periods);
+        if len > rest {
+            return Err(AnalysisError::Window {
+                file: file.into(),
+                first: self.start,
+                last: self.start.saturating_add(len - 1),
+                len: samples,
+            });
+        }
+        Ok((start, len))
+    }
+}
+
+/// How much of a window is held in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Hold {
+    /// All of it.
+    Whole,
+    /// As many whole periods as [`IN_MEMORY_SAMPLES`] samples have, one at least.
+    Periods,
+    /// [`IN_MEMORY_SAMPLES`] samples, or this number if it is larger.
+    Samples(usize),
+}
+
+impl Hold {
+    /// Number of samples to keep in memory for a window of `len` samples with period `period`.
+    fn samples(self, len: usize, period: usize) -> usize {
+        let held = match self {
+            Hold::Whole => len,
+            Hold::Periods => period * (IN_MEMORY_SAMPLES / period).max(1),
+            Hold::Samples(least) => least.max(IN_MEMORY_SAMPLES),
+        };
+        held.min(len)
+    }
+}
+
+/// The window of a measurement, which can be gone through from beginning to end, however long it is.
+#[derive(Debug, Clone)]
+pub struct Windowed {
+    /// Samples held in memory, from the first one on.
+    pub held: Block,
+    source: Arc<Source>,
+    /// Samples, counted from 0.
+    window: Range<usize>,
+}
+
+impl Windowed {
+    pub(super) fn new(measurement: &Measurement, hold: Hold) -> Result<Self, AnalysisError> {
+        let source = Arc::clone(measurement.source());
+        source.channels.check_pairs()?;
+        let (start, len) = measurement.span()?;
+        let period = measurement.window_settings().period.unwrap_or(len);
+        let samples = hold.samples(len, period);
+        let mut first = None;
+        source.blocks(start..start + samples, samples, samples, &mut |block| {
+            first = Some(source.sorted(&block, start + 1)?);
+            Ok(())
+        })?;
+        let Some(mut held) = first else {
+            let (file, first, last) = (source.name.clone(), start + 1, start + len);
+            return Err(AnalysisError::Window { file, first, last, len: source.sampling.len() });
+        };
+        (held.period, held.periods) = (period, len / period);
+        held.driven = driven(&source, &held);
+        if held.driven.is_empty() {
+            let columns = source.channels.force.join(", ");
+            return Err(AnalysisError::ZeroForce { file: source.name.clone(), columns });
+        }
+        Ok(Self { held, source, window: start..start + len })
+    }
+
+    /// Returns the samples held in memory and drops the rest.
+    pub fn into_held(self) -> Block {
+        self.held
+    }
+
+    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples after
+    /// the one before; the last may be shorter. A window that is held and fits into one chunk is not
+    /// read again.
+    pub fn chunks(
+        &self,
+        samples: usize,
+        advance: usize,
+        take: &mut dyn FnMut(&Block) -> Result<(), AnalysisError>,
+    ) -> Result<(), AnalysisError> {
+        if self.held.held_to().is_none() && self.held.force.len() <= samples {
+            return take(&self.held);
+        }
+        let mut first = self.held.first_sample;
+        self.source.blocks(self.window.clone(), samples, advance, &mut |block| {
+            let chunk = self.source.sorted(&block, first)?;
+            first += advance;
+            take(&chunk)
+        })
+    }
+}
+
+/// Returns the degrees of freedom whose force is not zero throughout.
+fn driven(source: &Source, held: &Block) -> Vec<usize> {
+    let mut peaks = source.peaks.iter();
+    let acts = |(dof, column): (usize, &String)| {
+        let peak = if column == ABSENT { None } else { peaks.next() };
+        let seen = held.force.channel(dof).iter().any(|f| *f != 0.0);
+        let beyond = held.held_to().is_some() && peak.is_some_and(|peak| *peak > 0.0);
+        (seen || beyond).then_some(dof)
+    };
+    source.channels.force.iter().enumerate().filter_map(acts).collect()
+}

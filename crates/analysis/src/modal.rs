@@ -1,0 +1,162 @@
+//! Natural frequencies, damping ratios and mode shapes of a machine.
+
+use std::fmt;
+
+use mechid_estimate::IdentifiedMode;
+use mechid_io::SystemMatrices;
+use serde::Serialize;
+
+use crate::AnalysisError;
+use crate::identify::summary::{CONFIDENCE, Uncertain};
+use crate::machine::Machine;
+use crate::text::{compact, significant, text_table};
+
+/// Modes of a machine, with standard errors and intervals where its parameters have them.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModalSummary {
+    /// The machine.
+    pub file: String,
+    /// Its degrees of freedom.
+    pub degrees_of_freedom: usize,
+    /// Level of the intervals.
+    pub confidence: f64,
+    /// Its modes, by rising frequency.
+    pub modes: Vec<ModeRow>,
+    /// M, C and K.
+    pub system: SystemMatrices,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModeRow {
+    /// Whether it is underdamped.
+    pub oscillates: bool,
+    /// Real and imaginary part, in rad/s.
+    pub eigenvalue: [f64; 2],
+    /// In Hz.
+    pub damped_frequency_hz: Uncertain,
+    /// In Hz.
+    pub natural_frequency_hz: Uncertain,
+    /// Dimensionless.
+    pub damping_ratio: Uncertain,
+    /// One entry per degree of freedom; the largest is 1.
+    pub shape: Vec<ShapeEntry>,
+}
+
+/// One entry of a mode shape: real and imaginary part.
+#[derive(Debug, Clone, Serialize)]
+pub struct ShapeEntry {
+    /// Real and imaginary part.
+    pub value: [f64; 2],
+    /// `None` for a machine that is exactly known.
+    pub standard_error: Option<[f64; 2]>,
+}
+
+impl ModalSummary {
+    /// Finds the modes of a machine.
+    ///
+    /// # Errors
+    /// As [`Machine::modes`].
+    pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
+        let known = machine.uncertainty.is_none();
+        let modes = machine.modes()?;
+        let rows = modes.iter().map(|mode| ModeRow::of(mode, known));
+        Ok(Self {
+            file: machine.name.clone(),
+            degrees_of_freedom: machine.system.dof(),
+            confidence: CONFIDENCE,
+            modes: rows.collect::<Result<_, _>>()?,
+            system: SystemMatrices::from(&machine.system),
+        })
+    }
+}
+
+impl ModeRow {
+    fn of(found: &IdentifiedMode, known: bool) -> Result<Self, AnalysisError> {
+        let uncertain = |value: &mechid_estimate::Uncertain| match known {
+            true => Ok(Uncertain::known(value.value)),
+            false => Uncertain::of(value),
+        };
+        let eigenvalue = found.mode.eigenvalue();
+        let entries = found.mode.shape().iter().zip(found.shape_standard_error.iter());
+        Ok(Self {
+            oscillates: found.mode.oscillates(),
+            eigenvalue: [eigenvalue.re, eigenvalue.im],
+            damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
+            natural_frequency_hz: uncertain(&found.natural_frequency_hz)?,
+            damping_ratio: uncertain(&found.damping_ratio)?,
+            shape: entries
+                .map(|(value, error)| ShapeEntry {
+                    value: [value.re, value.im],
+                    standard_error: (!known).then_some([error.re, error.im]),
+                })
+                .collect(),
+        })
+    }
+}
+
+impl fmt::Display for ModalSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}
+
+impl ModalSummary {
+    fn text(&self) -> String {
+        let (dof, modes) = (self.degrees_of_freedom, self.modes.len());
+        let plural = |count: usize| if count == 1 { "" } else { "s" };
+        let freedom = if dof == 1 { "degree" } else { "degrees" };
+        format!(
+            "{}: {dof} {freedom} of freedom, {modes} mode{}\n\n{}\n{}",
+            self.file,
+            plural(modes),
+            self.mode_table(),
+            self.shape_table()
+        )
+    }
+
+    fn mode_table(&self) -> String {
+        let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
+        let header = ["mode", "value", "standard error", &interval, "unit"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for (number, mode) in (1..).zip(&self.modes) {
+            for (name, value, unit) in [
+                ("natural frequency", &mode.natural_frequency_hz, "Hz"),
+                ("damped frequency", &mode.damped_frequency_hz, "Hz"),
+                ("damping ratio", &mode.damping_ratio, "–"),
+            ] {
+                // A mode that does not oscillate has no damped frequency to speak of.
+                if mode.oscillates || !name.starts_with("damped") {
+                    let mut row = vec![format!("{number} {name}")];
+                    row.extend(value.cells());
+                    row.push(unit.into());
+                    rows.push(row);
+                }
+            }
+        }
+        text_table(&rows)
+    }
+
+    fn shape_table(&self) -> String {
+        let header = ["shape", "modulus", "phase, °", "real part", "±", "imaginary part", "±"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for (number, mode) in (1..).zip(&self.modes) {
+            for (dof, entry) in (1..).zip(&mode.shape) {
+                let [re, im] = entry.value;
+                let error = |part: usize| {
+                    entry.standard_error.map_or("–".into(), |e| significant(e[part], 2))
+                };
+                rows.push(vec![
+                    format!("{number} direction {dof}"),
+                    significant(re.hypot(im), 5),
+                    format!("{:.1}", im.atan2(re).to_degrees()),
+                    format!("{re:.5}"),
+                    error(0),
+                    format!("{im:.5}"),
+                    error(1),
+                ]);
+            }
+        }
+        text_table(&rows)
+    }
+}

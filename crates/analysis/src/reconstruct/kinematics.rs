@@ -1,0 +1,77 @@
+//! Whether a velocity is the rate of its displacement, and an acceleration that of its velocity.
+
+use mechid_force::{Channel, Measurement, Quantity};
+
+use crate::text::significant;
+
+/// Two channels, one of which should be the rate of the other, as a record goes by.
+#[derive(Debug)]
+struct Pair {
+    motion: usize,
+    rate: usize,
+    /// Sums over the steps: change of the motion times that by the rate, and the square of each.
+    product: f64,
+    changes: f64,
+    by_rate: f64,
+}
+
+/// All such pairs of a record.
+#[derive(Debug)]
+pub struct KinematicConsistency(Vec<Pair>);
+
+/// Less alike than this, noise may have made the difference.
+const ALIKE: f64 = 0.7;
+
+/// A ratio that no sampling makes: the trapezoidal rule is as far out with 2.4 samples per period.
+const ANOTHER_UNIT: f64 = 3.0;
+
+impl KinematicConsistency {
+    /// The pairs among these channels.
+    pub fn of(channels: &[Channel]) -> Self {
+        let find = |dof: usize, quantity: ResponseQuantity| {
+            channels.iter().position(|c| *c == Channel { dof, quantity })
+        };
+        let pair = |(motion, channel): (usize, &Channel)| {
+            let rate = match channel.quantity {
+                ResponseQuantity::Displacement => find(channel.dof, ResponseQuantity::Velocity)?,
+                ResponseQuantity::Velocity => find(channel.dof, ResponseQuantity::Acceleration)?,
+                ResponseQuantity::Acceleration => return None,
+            };
+            Some(Pair { motion, rate, product: 0.0, changes: 0.0, by_rate: 0.0 })
+        };
+        Self(channels.iter().enumerate().filter_map(pair).collect())
+    }
+
+    /// Takes the steps of some samples: x(k+1) − x(k) and Δt (ẋ(k) + ẋ(k+1))/2.
+    pub fn push(&mut self, measured: &Measurement) {
+        let (record, half) = (measured.record(), 0.5 * measured.sampling().dt());
+        for pair in &mut self.0 {
+            let motion = record.channel(pair.motion).windows(2).map(|w| w[1] - w[0]);
+            let rate = record.channel(pair.rate).windows(2).map(|w| half * (w[0] + w[1]));
+            for (change, by_rate) in motion.zip(rate) {
+                pair.product += change * by_rate;
+                pair.changes += change * change;
+                pair.by_rate += by_rate * by_rate;
+            }
+        }
+    }
+
+    /// Of each pair that does not belong together, how much larger the one is than it should be.
+    pub fn remarks(&self, columns: &[String]) -> Vec<String> {
+        let told = |pair: &Pair| {
+            let alike = pair.product / (pair.changes * pair.by_rate).sqrt();
+            let ratio = (pair.by_rate / pair.changes).sqrt() * alike.signum();
+            let right = (1.0 / ANOTHER_UNIT..ANOTHER_UNIT).contains(&ratio);
+            (alike.abs() > ALIKE && !right).then(|| {
+                format!(
+                    "{} is {} times the rate of {}: one of them is in another unit, of another \
+                     sign, or another column",
+                    columns[pair.rate],
+                    significant(ratio, 3),
+                    columns[pair.motion]
+                )
+            })
+        };
+        self.0.iter().filter_map(told).collect()
+    }
+}

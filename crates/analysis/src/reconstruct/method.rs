@@ -1,0 +1,358 @@
+//! The methods, which of them suits a record, and what it finds.
+
+use std::f64::consts::TAU;
+
+use mechid_force::{
+    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement,
+    MotionNoise, Noise, OPEN_UNKNOWNS, Quantity, Rule, Start, SystemCovariance, Tuning,
+    Unexplained, continuous, continuous_with_noise, discretised, discretised_with_noise,
+    frequency_domain, inner_lines, kalman, regularised, with_uncertain_system,
+};
+use mechid_model::SecondOrderSystem;
+use mechid_signal::Spectrum;
+
+use super::motion::{complete, response};
+use super::options::Method;
+use crate::AnalysisError;
+use crate::text::significant;
+
+/// Everything the user said about the reconstruction.
+pub struct Request {
+    pub method: Method,
+    /// Degrees of freedom with an unknown force, counted from 0.
+    pub forced: Vec<usize>,
+    pub lines: Option<Vec<usize>>,
+    pub periodic: bool,
+    pub start: Start,
+    pub rule: Rule,
+    /// Standard deviation of the noise in each measured channel, in its SI unit, as far as the mean
+    /// of the periods has it; empty if not known.
+    pub noise: Vec<f64>,
+    /// Periods in that mean.
+    pub averaged: usize,
+}
+
+/// The machine, as the methods take it.
+pub struct KnownMachine {
+    pub system: SecondOrderSystem,
+    /// `None` for a machine that is taken as exactly known.
+    pub covariance: Option<SystemCovariance>,
+}
+
+/// A force and how it was found.
+pub struct Found {
+    pub force: IdentifiedForce,
+    pub how: How,
+}
+
+/// How a force was found.
+pub struct How {
+    pub method: &'static str,
+    /// Why this method.
+    pub why: String,
+    /// Whether the standard error counts the noise of the record.
+    pub counts_noise: bool,
+    /// Parameters that were chosen, with their units.
+    pub chosen: Vec<(String, f64, &'static str)>,
+    /// What the force leaves of each measured channel; nothing where nothing is left over.
+    pub unexplained: Option<Vec<Unexplained>>,
+    /// What to beware of.
+    pub remarks: Vec<String>,
+}
+
+/// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
+const SHORT: usize = OPEN_UNKNOWNS / 2;
+
+/// The method for a record of these channels and so many samples, and the reason for it.
+pub fn choose(
+    request: &Request,
+    channels: &[Channel],
+    samples: usize,
+    dofs: usize,
+) -> (Method, String) {
+    if request.method != Method::Auto {
+        return (request.method, "it was asked for".into());
+    }
+    let unknowns = samples * request.forced.len();
+    let (method, why) = if request.periodic && request.lines.is_some() {
+        (Method::FrequencyDomain, "whole periods, and the lines with force are given".into())
+    } else if complete(channels, dofs, true) && request.forced.len() == dofs {
+        (
+            Method::Continuous,
+            "displacement, velocity and acceleration of every degree of freedom are there".into(),
+        )
+    } else if request.periodic {
+        (Method::Shrinkage, "whole periods, the lines with force not given".into())
+    } else if unknowns <= SHORT {
+        (Method::Tikhonov, format!("an open record of {unknowns} unknowns, at most {SHORT}"))
+    } else {
+        (Method::Kalman, format!("an open record of {unknowns} unknowns, more than {SHORT}"))
+    };
+    (method, why)
+}
+
+/// Finds the force, with the uncertainty of the machine if that is known.
+pub fn find(
+    request: &Request,
+    machine: &KnownMachine,
+    motion: &Measurement,
+) -> Result<Found, AnalysisError> {
+    let samples = motion.sampling().len();
+    let (method, why) = choose(request, motion.channels(), samples, machine.system.dof());
+    match method {
+        Method::Continuous | Method::Discretised => {
+            let force = equation(request, machine, motion, method)?;
+            Ok(Found { force, how: How::of_equation(method, why, request) })
+        }
+        Method::FrequencyDomain => lines(request, machine, motion, why),
+        Method::Kalman => smoothed(request, machine, motion, why),
+        Method::Auto | Method::Shrinkage => {
+            filtered(request, machine, motion, Filter::Shrinkage, why)
+        }
+        Method::Tikhonov => filtered(request, machine, motion, Filter::Tikhonov(request.rule), why),
+        Method::TruncatedSvd => {
+            filtered(request, machine, motion, Filter::TruncatedSvd(request.rule), why)
+        }
+    }
+}
+
+type Finder<'a> = dyn Fn(&SecondOrderSystem) -> Result<IdentifiedForce, ForceError> + 'a;
+
+fn with_machine(
+    machine: &KnownMachine,
+    find: &Finder<'_>,
+) -> Result<IdentifiedForce, AnalysisError> {
+    Ok(match &machine.covariance {
+        Some(covariance) => with_uncertain_system(&machine.system, covariance, find)?,
+        None => find(&machine.system)?,
+    })
+}
+
+fn noise(request: &Request, unknown: Noise) -> Noise {
+    if request.noise.is_empty() { unknown } else { Noise::PerChannel(request.noise.clone()) }
+}
+
+/// The force by the equation of motion, sample by sample or from each to the next.
+pub fn equation(
+    request: &Request,
+    machine: &KnownMachine,
+    motion: &Measurement,
+    method: Method,
+) -> Result<IdentifiedForce, AnalysisError> {
+    let with_acceleration = method == Method::Continuous;
+    let response = response(motion, machine.system.dof(), with_acceleration)
+        .ok_or(AnalysisError::ForceMotions { with_acceleration })?;
+    let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
+    let linear = Discretisation::ExactLinear;
+    let noise = motion_noise(request, motion, machine.system.dof())?;
+    with_machine(machine, &|system| match (with_acceleration, &noise) {
+        (true, None) => continuous(system, &response),
+        (true, Some(noise)) => continuous_with_noise(system, &response, noise),
+        (false, None) => discretised(system, &response, linear, ends),
+        (false, Some(noise)) => discretised_with_noise(system, &response, linear, ends, noise),
+    })
+}
+
+/// The noise of each channel as that of a complete motion, if it is stated.
+fn motion_noise(
+    request: &Request,
+    motion: &Measurement,
+    dofs: usize,
+) -> Result<Option<MotionNoise>, AnalysisError> {
+    let (channels, levels) = (motion.channels(), &request.noise);
+    if levels.is_empty() {
+        return Ok(None);
+    }
+    let of = |quantity: ResponseQuantity| -> Vec<f64> {
+        let find = |dof| channels.iter().position(|c| *c == Channel { dof, quantity });
+        (0..dofs).filter_map(find).map(|at| levels[at]).collect()
+    };
+    let [x, v, a] = [
+        ResponseQuantity::Displacement,
+        ResponseQuantity::Velocity,
+        ResponseQuantity::Acceleration,
+    ]
+    .map(of);
+    Ok(Some(MotionNoise::new(x, v, a)?))
+}
+
+impl How {
+    /// How [`equation`] finds it.
+    pub fn of_equation(method: Method, why: String, request: &Request) -> Self {
+        let method = if method == Method::Continuous {
+            "equation of motion, sample by sample"
+        } else {
+            "equation of motion from sample to sample, the force linear between them"
+        };
+        Self {
+            method,
+            why,
+            counts_noise: !request.noise.is_empty(),
+            chosen: Vec::new(),
+            unexplained: None,
+            remarks: Vec::new(),
+        }
+    }
+}
+
+fn lines(
+    request: &Request,
+    machine: &KnownMachine,
+    motion: &Measurement,
+    why: String,
+) -> Result<Found, AnalysisError> {
+    if !request.periodic {
+        return Err(AnalysisError::ForceNeedsPeriods);
+    }
+    let all = inner_lines(motion);
+    let lines = request.lines.clone().unwrap_or_else(|| all.clone());
+    // Where nothing was driven the record shows its own noise.
+    let enough = all.len() >= lines.len() + mechid_force::MIN_OUTSIDE_LINES;
+    let noise = noise(request, if enough { Noise::OutsideLines } else { Noise::Unknown });
+    let find = |system: &SecondOrderSystem| {
+        frequency_domain(system, motion, &request.forced, &lines, &noise)
+    };
+    let force = with_machine(machine, &find)?;
+    let chosen = vec![("lines used".into(), lines.len() as f64, "")];
+    let counts_noise = noise != Noise::Unknown;
+    let unexplained = force.unexplained().map(<[_]>::to_vec);
+    let method = "dynamic stiffness, line by line";
+    let remarks = elsewhere(motion, request).into_iter().collect();
+    Ok(Found { force, how: How { method, why, counts_noise, chosen, unexplained, remarks } })
+}
+
+fn filtered(
+    request: &Request,
+    machine: &KnownMachine,
+    motion: &Measurement,
+    filter: Filter,
+    why: String,
+) -> Result<Found, AnalysisError> {
+    let forced = &request.forced;
+    let extent = match (&request.lines, request.periodic) {
+        (Some(lines), true) => ForceUnknowns::Lines(lines.clone()),
+        (None, true) => ForceUnknowns::EveryLine,
+        (_, false) => ForceUnknowns::Samples(request.start),
+    };
+    let noise = noise(request, Noise::Unknown);
+    let found = regularised(&machine.system, motion, forced, &extent, filter, &noise)?;
+    // The machine is moved with the parameter that was chosen, not with another choice.
+    let fixed = match (filter, found.parameter) {
+        (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
+        (Filter::TruncatedSvd(_), Some(lambda)) => Filter::TruncatedSvd(Rule::Given(lambda)),
+        _ => filter,
+    };
+    let find = |system: &SecondOrderSystem| {
+        regularised(system, motion, forced, &extent, fixed, &noise).map(|found| found.force)
+    };
+    let force = match machine.uncertain {
+        Some(_) => with_machine(machine, &find)?,
+        None => found.force,
+    };
+    let mut chosen = Vec::new();
+    if let Some(lambda) = found.parameter {
+        chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
+    }
+    chosen.push(("unknowns let through".into(), found.unknowns, ""));
+    chosen.extend(noise_levels(motion, &found.noise_std, request.averaged));
+    let unexplained = force.unexplained().map(<[_]>::to_vec);
+    let method = match filter {
+        Filter::Tikhonov(_) => "Tikhonov regularisation",
+        Filter::TruncatedSvd(_) => "truncated singular value decomposition",
+        _ => "mean of the force given the measurement (shrinkage)",
+    };
+    let remarks = elsewhere(motion, request).into_iter().collect();
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
+}
+
+/// Less of a motion than this on the lines of the force says that it has another cause.
+const FEW: f64 = 0.5;
+
+/// Tells of the channel of which the lines given hold least, if that is little: they may have been
+/// counted in another period than that of the window.
+fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
+    let lines = request.lines.as_deref().filter(|_| request.periodic)?;
+    let spectrum = Spectrum::of(motion.record());
+    let power = |lines: &mut dyn Iterator<Item = usize>, channel: usize| -> f64 {
+        lines.map(|n| spectrum.line(n, channel).norm_sqr()).sum()
+    };
+    let shares = (0..motion.channels().len()).map(|channel| {
+        let all = power(&mut (1..spectrum.len()), channel);
+        let held = power(&mut lines.iter().copied(), channel);
+        (channel, if all > 0.0 { held / all } else { 1.0 })
+    });
+    let (channel, share) = shares.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|c| c.1 < FEW)?;
+    let (samples, step) = (motion.sampling().len(), motion.sampling().omega0() / TAU);
+    Some(format!(
+        "the lines given hold {} % of the power of channel {} about its mean, and a force on others \
+         is not sought: they are counted in the period of {samples} samples, {} Hz apart",
+        significant(100.0 * share, 3),
+        channel + 1,
+        significant(step, 5)
+    ))
+}
+
+/// The noise of every channel as it was measured, in its own unit, from that of the mean of periods.
+fn noise_levels<'a>(
+    motion: &'a Measurement,
+    noise: &'a [f64],
+    averaged: usize,
+) -> impl Iterator<Item = (String, f64, &'static str)> + 'a {
+    let levels = (1..).zip(motion.channels().iter().zip(noise));
+    levels.map(move |(number, (channel, level))| {
+        let unit = match channel.quantity {
+            ResponseQuantity::Displacement => "m",
+            ResponseQuantity::Velocity => "m/s",
+            ResponseQuantity::Acceleration => "m/s²",
+        };
+        (format!("noise of channel {number}"), level * (averaged as f64).sqrt(), unit)
+    })
+}
+
+fn smoothed(
+    request: &Request,
+    machine: &KnownMachine,
+    motion: &Measurement,
+    why: String,
+) -> Result<Found, AnalysisError> {
+    if request.periodic {
+        return Err(AnalysisError::KalmanIsOpen);
+    }
+    let forced = &request.forced;
+    let tuning = match request.noise.as_slice() {
+        [] => Tuning::Likelihood,
+        level => Tuning::NoiseKnown(level.to_vec()),
+    };
+    let found = kalman(&machine.system, motion, forced, request.start, &tuning)?;
+    let fixed = Tuning::Given { noise_std: found.noise_std.clone(), walk: found.walk.clone() };
+    let find = |system: &SecondOrderSystem| {
+        kalman(system, motion, forced, request.start, &fixed).map(|found| found.force)
+    };
+    let force = match machine.uncertain {
+        Some(_) => with_machine(machine, &find)?,
+        None => found.force,
+    };
+    let mut chosen = Vec::new();
+    for (dof, walk) in forced.iter().zip(&found.walk) {
+        chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
+    }
+    chosen.extend(noise_levels(motion, &found.noise_std, 1));
+    let mut unexplained = force.unexplained().map(<[_]>::to_vec);
+    if request.noise.is_empty() {
+        // The level is that of the fit, which takes for noise what it does not explain.
+        unexplained.iter_mut().flatten().for_each(|channel| channel.noise = None);
+    }
+    let method = "augmented Kalman filter and smoother, tuned by likelihood";
+    let remarks = Vec::new();
+    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
+}
+
+/// A chosen parameter as a person reads it.
+pub fn told(value: f64, unit: &str) -> String {
+    let number = if value.fract() == 0.0 && value.abs() < 1e6 {
+        format!("{value}")
+    } else {
+        significant(value, 4)
+    };
+    format!("{number} {unit}").trim_end().into()
+}

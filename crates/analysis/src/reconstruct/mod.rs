@@ -1,0 +1,302 @@
+//! Reconstruction of the unknown force that drove a known machine.
+//!
+//! | File | What it does |
+//! |---|---|
+//! | `options` | settings, as values |
+//! | `motion` | the measured responses |
+//! | `method` | which method suits a record, and what it finds |
+//! | `chunks` | the same where the record is not held in memory |
+//! | `unexplained`, `periods`, `kinematics` | what speaks against the result |
+//! | `tally`, `peak_line` | levels and strongest line of the force |
+//! | `summary` | the result: numbers and remarks |
+
+mod chunks;
+mod kinematics;
+pub(crate) mod method;
+mod motion;
+pub mod options;
+mod peak_line;
+mod periods;
+pub mod summary;
+mod tally;
+mod unexplained;
+
+use std::fmt;
+use std::ops::Range;
+
+use mechid_force::{IdentifiedForce, Start};
+use serde::{Serialize, Serializer};
+
+use self::kinematics::KinematicConsistency;
+use self::method::{Found, How, KnownMachine, Request};
+use self::motion::Recorded;
+pub use self::options::{Method, ParameterRule, Reconstruct};
+use self::summary::{Chosen, ForceSummary};
+use self::tally::{Take, Tally};
+pub use self::unexplained::Measured;
+use crate::AnalysisError;
+use crate::machine::Machine;
+use crate::measurement::Measurement;
+
+/// The force that drove a machine, and how it was found.
+///
+/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+#[derive(Debug)]
+pub struct Reconstructed {
+    summary: ForceSummary,
+    force: IdentifiedForce,
+    forced: Vec<usize>,
+    lines: Option<Vec<usize>>,
+}
+
+/// Some samples of a force, as they are found.
+#[derive(Debug)]
+pub struct ForceChunk<'a> {
+    /// The force, of which `samples` are new.
+    pub force: &'a IdentifiedForce,
+    /// Samples of `force` that follow those of the chunk before.
+    pub samples: Range<usize>,
+    /// Whether its standard error counts the noise of the record.
+    pub counts_noise: bool,
+}
+
+impl ForceChunk<'_> {
+    /// Returns the columns of a table, named: force and, where known, its standard error, which
+    /// without the noise is that of the machine alone, in N.
+    pub fn columns(&self) -> Vec<(String, &[f64])> {
+        let dofs = self.force.record().channels();
+        let name = |base: &str, dof| numbered(base, dof, dofs);
+        let record = self.force.record();
+        let mut columns: Vec<(String, &[f64])> =
+            (0..dofs).map(|dof| (name("force", dof), record.channel(dof))).collect();
+        if let Some(error) = self.force.standard_error() {
+            let base =
+                if self.counts_noise { "standard_error" } else { "standard_error_of_machine" };
+            columns.extend((0..dofs).map(|dof| (name(base, dof), error.channel(dof))));
+        }
+        for (_, column) in &mut columns {
+            *column = &column[self.samples.clone()];
+        }
+        columns
+    }
+}
+
+/// Returns `base`, or `base_1`, `base_2` … where there are several degrees of freedom.
+pub fn numbered(base: &str, dof: usize, dofs: usize) -> String {
+    if dofs == 1 { base.into() } else { format!("{base}_{}", dof + 1) }
+}
+
+/// Reconstructs the force that drove a known machine from its measured response.
+///
+/// The window is whole periods if the measurement has a period or `lines` are given (they are
+/// averaged), an open record otherwise. The uncertainty of an identified machine counts in the
+/// standard error of the force.
+///
+/// # Errors
+/// [`AnalysisError::MotionCount`] or [`AnalysisError::NoMotion`] if the responses do not fit the
+/// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], what the method cannot be done
+/// with ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
+/// [`AnalysisError::KalmanIsOpen`]), and its own failure.
+pub fn reconstruct(
+    run: &Measurement,
+    machine: &Machine,
+    how: &Reconstruct,
+) -> Result<Reconstructed, AnalysisError> {
+    reconstruct_with(run, machine, how, &mut |_| Ok(()))
+}
+
+/// As [`reconstruct`], and passes the force on to `take`.
+///
+/// # Errors
+/// As [`reconstruct`], and whatever `take` gives.
+pub fn reconstruct_with(
+    run: &Measurement,
+    machine: &Machine,
+    how: &Reconstruct,
+    take: &mut Take<'_>,
+) -> Result<Reconstructed, AnalysisError> {
+    let task = Task::new(run, machine, how)?;
+    let (summary, force) = task.find(machine, how, true, take)?;
+    let Some(force) = force else { return Err(AnalysisError::NoMotion) };
+    let Request { forced, lines, .. } = task.request;
+    Ok(Reconstructed { summary, force, forced, lines })
+}
+
+/// As [`reconstruct`] for a record of any length: passes the force on to `take` as it is found, chunk
+/// by chunk in order, and holds no more of it than the method needs.
+///
+/// # Errors
+/// As [`reconstruct`], and whatever `take` gives.
+pub fn reconstruct_in_chunks(
+    run: &Measurement,
+    machine: &Machine,
+    how: &Reconstruct,
+    take: &mut Take<'_>,
+) -> Result<ForceSummary, AnalysisError> {
+    Ok(Task::new(run, machine, how)?.find(machine, how, false, take)?.0)
+}
+
+impl Reconstructed {
+    /// Returns the numbers and remarks.
+    pub fn summary(&self) -> &ForceSummary {
+        &self.summary
+    }
+
+    /// Returns the force with its standard error and its spectrum.
+    pub fn force(&self) -> &IdentifiedForce {
+        &self.force
+    }
+
+    /// Returns the degrees of freedom where a force was sought, counted from 0.
+    pub fn forced(&self) -> &[usize] {
+        &self.forced
+    }
+
+    /// Returns the spectral lines where a force was sought; `None`: all.
+    pub fn lines(&self) -> Option<&[usize]> {
+        self.lines.as_deref()
+    }
+}
+
+impl fmt::Display for Reconstructed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for Reconstructed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}
+
+/// A reconstruction before it is done.
+struct Task {
+    recorded: Recorded,
+    request: Request,
+    known: KnownMachine,
+}
+
+impl Task {
+    fn new(run: &Measurement, machine: &Machine, how: &Reconstruct) -> Result<Self, AnalysisError> {
+        let periodic = run.window_settings().period.is_some() || how.lines.is_some();
+        let recorded = Recorded::new(run, machine.system.dof(), periodic)?;
+        let request = Request::new(how, &recorded, machine.system.dof(), periodic)?;
+        let known =
+            KnownMachine { system: machine.system.clone(), covariance: machine.covariance()? };
+        Ok(Self { recorded, request, known })
+    }
+
+    /// Finds the force, chunk by chunk where that will do and all of it is not asked for; only
+    /// otherwise it is returned.
+    fn find(
+        &self,
+        machine: &Machine,
+        settings: &Reconstruct,
+        all_at_once: bool,
+        take: &mut Take<'_>,
+    ) -> Result<(ForceSummary, Option<IdentifiedForce>), AnalysisError> {
+        let Self { recorded, request, known } = self;
+        let (dofs, samples) = (known.system.dof(), recorded.sampling.len());
+        let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
+        let (method, why) = method::choose(request, &recorded.channels, samples, dofs);
+        let mut rates = KinematicConsistency::of(&recorded.channels);
+        let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request) {
+            chunks::find(request, known, recorded, method, &mut |chunk, force, kept| {
+                rates.push(chunk);
+                tally.push(force, kept, !request.noise.is_empty())
+            })?;
+            (How::of_equation(method, why, request), None)
+        } else {
+            let held = recorded.hold()?;
+            rates.push(&held.motion);
+            let Found { force, mut how } = method::find(request, known, &held.motion)?;
+            tally.push_all(&force, how.counts_noise)?;
+            how.remarks.extend(periods::remark(recorded, &held));
+            periods::tell_noise(how.unexplained.as_mut(), recorded, &held);
+            (how, Some(force))
+        };
+        how.remarks.extend(rates.remarks(recorded.columns()));
+        Ok((self.summary(machine, settings, &how, &tally), force))
+    }
+
+    fn summary(
+        &self,
+        machine: &Machine,
+        settings: &Reconstruct,
+        how: &How,
+        tally: &Tally<'_>,
+    ) -> ForceSummary {
+        let Self { recorded, request, known } = self;
+        let mut remarks = recorded.unit_remarks().to_vec();
+        remarks.extend(tally.remark());
+        remarks.extend(how.remarks.iter().cloned());
+        let unexplained = how.unexplained.as_deref();
+        let channels = Measured::all(recorded, unexplained);
+        let dofs = known.system.dof();
+        remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
+        if known.covariance.is_some() && !how.counts_noise {
+            remarks.push(
+                "the standard error counts the uncertainty of the machine, not the noise of the \
+                 record: state that with `noise`"
+                    .to_owned(),
+            );
+        }
+        if known.covariance.is_none() {
+            remarks.push(
+                "the machine is taken as exactly known: its file has no covariance".to_owned(),
+            );
+        }
+        ForceSummary {
+            file: recorded.file().to_owned(),
+            machine: machine.name.clone(),
+            method: how.method,
+            why: how.why.clone(),
+            samples: recorded.sampling.len(),
+            periods: request.periodic.then_some(recorded.periods),
+            sample_rate_hz: recorded.sampling.rate_hz(),
+            machine_uncertainty: known.covariance.is_some(),
+            noise_uncertainty: how.counts_noise,
+            chosen: how
+                .chosen
+                .iter()
+                .map(|(name, value, unit)| Chosen { name: name.clone(), value: *value, unit })
+                .collect(),
+            channels,
+            forces: tally.forces(&request.forced),
+            remarks,
+            analysis: settings.clone(),
+        }
+    }
+}
+
+impl Request {
+    fn new(
+        how: &Reconstruct,
+        recorded: &Recorded,
+        dofs: usize,
+        periodic: bool,
+    ) -> Result<Self, AnalysisError> {
+        let (levels, columns) = (how.noise.len(), recorded.columns().len());
+        if levels > 0 && levels != columns {
+            return Err(AnalysisError::NoiseCount { levels, columns });
+        }
+        if let Some(dof) = how.forced.iter().copied().find(|dof| !(1..=dofs).contains(dof)) {
+            return Err(AnalysisError::Forced { dof, dofs });
+        }
+        let lines = how.lines.as_ref().map(|spec| spec.lines(recorded.sampling));
+        Ok(Self {
+            method: how.method,
+            forced: match how.forced.as_slice() {
+                [] => (0..dofs).collect(),
+                some => some.iter().map(|dof| dof - 1).collect(),
+            },
+            lines: lines.transpose()?,
+            periodic,
+            start: if how.at_rest { Start::FromRest } else { Start::InMotion },
+            rule: how.rule.rule(),
+            noise: recorded.levels(&how.noise),
+            averaged: recorded.periods,
+        })
+    }
+}

@@ -1,0 +1,194 @@
+//! Measured responses of a machine whose force is unknown.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use mechid_force::{Channel, Measurement, Quantity};
+use mechid_model::Response;
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+
+use super::periods::{Scatter, Sums};
+use crate::AnalysisError;
+use crate::measurement::channels::{ABSENT, KINDS};
+use crate::measurement::{self, CHUNK_SAMPLES, Source};
+
+/// The responses in a record, of which no more is held in memory than is asked for.
+pub struct Recorded {
+    source: Arc<Source>,
+    columns: Vec<String>,
+    /// Number of force columns, which stand before those of the responses.
+    forces: usize,
+    /// Degree of freedom and quantity of each column.
+    pub channels: Vec<Channel>,
+    /// Samples, counted from 0.
+    window: Range<usize>,
+    /// Time axis of the window, or of its mean period.
+    pub sampling: Sampling,
+    /// Number of periods in the window; 1 for an open record.
+    pub periods: usize,
+}
+
+/// The samples of a window, or of its mean period.
+pub struct Held {
+    pub motion: Measurement,
+    /// How the periods differ from their mean, one per channel; nothing where there is one period.
+    pub scatter: Option<Vec<Scatter>>,
+}
+
+impl Recorded {
+    /// Finds the responses and the window of a measurement; a periodic window is averaged over its
+    /// periods.
+    pub fn new(
+        measured: &measurement::Measurement,
+        dofs: usize,
+        periodic: bool,
+    ) -> Result<Self, AnalysisError> {
+        let source = Arc::clone(measured.source());
+        let (mut columns, mut channels) = (Vec::new(), Vec::new());
+        for kind in KINDS {
+            let named = source.channels.response(kind);
+            if !named.is_empty() && named.len() != dofs {
+                let got = named.len();
+                return Err(AnalysisError::MotionCount { response: kind, got, dofs });
+            }
+            for (dof, column) in named.iter().enumerate().filter(|(_, c)| *c != ABSENT) {
+                columns.push(column.clone());
+                channels.push(Channel { dof, quantity: quantity(kind) });
+            }
+        }
+        if channels.is_empty() {
+            return Err(AnalysisError::NoMotion);
+        }
+        let (start, len) = measured.span()?;
+        let period = measured.window_settings().period.filter(|_| periodic).unwrap_or(len);
+        let sampling = source.sampling.with_len(period)?;
+        let forces = source.channels.force.iter().filter(|column| *column != ABSENT).count();
+        let (window, periods) = (start..start + len, len / period);
+        Ok(Self { source, columns, forces, channels, window, sampling, periods })
+    }
+
+    /// How messages call the file.
+    pub fn file(&self) -> &str {
+        &self.source.name
+    }
+
+    /// What each channel was called.
+    pub fn columns(&self) -> &[String] {
+        &self.columns
+    }
+
+    /// Levels stated of the columns, in their units, as the held samples have them: in SI units, and
+    /// of the mean of periods.
+    pub fn levels(&self, stated: &[f64]) -> Vec<f64> {
+        let mean = (self.periods as f64).sqrt();
+        let stated = stated.iter().enumerate();
+        stated
+            .map(|(column, level)| level * self.source.units.factor(self.forces + column) / mean)
+            .collect()
+    }
+
+    /// Which columns were in other than SI units, and whether the time may be.
+    pub fn unit_remarks(&self) -> &[String] {
+        &self.source.units.remarks
+    }
+
+    /// All of the window, or its mean period.
+    pub fn hold(&self) -> Result<Held, AnalysisError> {
+        let period = self.sampling.len();
+        let mut mean = DMatrix::zeros(period, self.channels.len());
+        let mut scatters = vec![Sums::default(); self.channels.len()];
+        let mut at = 0;
+        self.blocks(CHUNK_SAMPLES, CHUNK_SAMPLES, &mut |block| {
+            let mut from = 0;
+            while from < block.nrows() {
+                let rows = (period - at).min(block.nrows() - from);
+                let part = block.rows(from, rows);
+                for (sums, column) in scatters.iter_mut().zip(part.column_iter()) {
+                    sums.push(column.iter().copied(), at == 0);
+                }
+                let mut mean = mean.rows_mut(at, rows);
+                mean += part;
+                (from, at) = (from + rows, (at + rows) % period);
+            }
+            Ok(())
+        })?;
+        mean /= self.periods as f64;
+        let scatter = scatters.iter().zip(mean.column_iter());
+        let scatter = scatter.map(|(sums, mean)| sums.about(mean.as_slice(), self.periods));
+        let scatter = (self.periods > 1).then(|| scatter.collect());
+        Ok(Held { motion: self.measurement(mean)?, scatter })
+    }
+
+    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples after
+    /// the one before; the last may be shorter.
+    pub fn chunks(
+        &self,
+        samples: usize,
+        advance: usize,
+        take: &mut dyn FnMut(&Measurement) -> Result<(), AnalysisError>,
+    ) -> Result<(), AnalysisError> {
+        self.blocks(samples, advance, &mut |block| take(&self.measurement(block)?))
+    }
+
+    /// The same, as samples × channels in SI units.
+    fn blocks(
+        &self,
+        samples: usize,
+        advance: usize,
+        take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), AnalysisError>,
+    ) -> Result<(), AnalysisError> {
+        self.source.blocks(self.window.clone(), samples, advance, &mut |block| {
+            take(match self.forces {
+                0 => block,
+                forces => block.columns_range(forces..).into_owned(),
+            })
+        })
+    }
+
+    fn measurement(&self, block: DMatrix<f64>) -> Result<Measurement, AnalysisError> {
+        let record = Record::new(self.source.sampling.with_len(block.nrows())?, block)?;
+        Ok(Measurement::new(record, self.channels.clone())?)
+    }
+}
+
+/// The channels with this quantity of every degree of freedom, if all were measured.
+fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<usize>> {
+    let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
+    (0..dofs).map(find).collect()
+}
+
+/// Whether displacement and velocity of every degree of freedom were measured, and, if asked for,
+/// acceleration.
+pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
+    let mut needed = vec![Quantity::Displacement, Quantity::Velocity];
+    needed.extend(with_acceleration.then_some(Quantity::Acceleration));
+    needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
+}
+
+/// Displacement, velocity and acceleration of every degree of freedom, if all were measured;
+/// without accelerations these are zero.
+pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
+    let record = measured.record();
+    let all = |quantity: Quantity| -> Option<Record> {
+        let columns = of_all(measured.channels(), quantity, dofs)?;
+        let data = DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
+        Record::new(record.sampling(), data).ok()
+    };
+    let (x, v) = (all(Quantity::Displacement)?, all(Quantity::Velocity)?);
+    let a = if with_acceleration {
+        all(Quantity::Acceleration)?
+    } else {
+        Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
+    };
+    Response::new(x, v, a).ok()
+}
+
+/// Returns the quantity of a kind of response, as the force reconstruction calls it.
+pub fn quantity(kind: crate::Motion) -> Quantity {
+    match kind {
+        crate::Motion::Displacement => Quantity::Displacement,
+        crate::Motion::Velocity => Quantity::Velocity,
+        crate::Motion::Acceleration => Quantity::Acceleration,
+    }
+}

@@ -1,0 +1,92 @@
+//! Settings of a force reconstruction, as values that can be saved and repeated.
+
+use mechid_force::Rule;
+use mechid_io::LineSpec;
+use serde::{Deserialize, Serialize};
+
+/// How to reconstruct the force that drove a known machine.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Reconstruct {
+    /// Method.
+    pub method: Method,
+    /// Degrees of freedom on which a force acts, counted from 1; empty: all.
+    pub forced: Vec<usize>,
+    /// Spectral lines with force; `None`: not known.
+    pub lines: Option<LineSpec>,
+    /// Whether an open record begins at rest.
+    pub at_rest: bool,
+    /// Standard deviation of the noise in each measured column, in its unit, before periods are
+    /// averaged; empty: estimated.
+    pub noise: Vec<f64>,
+    /// How to choose the regularisation parameter.
+    pub rule: ParameterRule,
+}
+
+/// Method of a force reconstruction.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// The method that suits the record.
+    #[default]
+    Auto,
+    /// Equation of motion, sample by sample: displacement, velocity and acceleration of every degree
+    /// of freedom.
+    Continuous,
+    /// From each sample to the next, the force linear between them: displacement and velocity.
+    Discretised,
+    /// Dynamic stiffness, line by line: whole periods.
+    FrequencyDomain,
+    /// Empirical-Bayes shrinkage, the posterior mean of the force: whole periods, or a short record.
+    Shrinkage,
+    /// Tikhonov regularisation: whole periods, or a short record.
+    Tikhonov,
+    /// Truncated singular values: whole periods, or a short record.
+    TruncatedSvd,
+    /// Augmented Kalman filter and smoother: an open record of any length.
+    Kalman,
+}
+
+/// How to choose the regularisation parameter.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ParameterRule {
+    /// Nearest to the posterior mean of the force.
+    #[default]
+    Likelihood,
+    /// Generalised cross-validation.
+    Gcv,
+    /// Corner of the L-curve.
+    LCurve,
+    /// This parameter.
+    Given(f64),
+}
+
+impl ParameterRule {
+    pub(crate) fn rule(self) -> Rule {
+        match self {
+            Self::Likelihood => Rule::Likelihood,
+            Self::Gcv => Rule::Gcv,
+            Self::LCurve => Rule::LCurve,
+            Self::Given(lambda) => Rule::Given(lambda),
+        }
+    }
+}
+
+impl Reconstruct {
+    /// Returns the settings for the method that suits the record.
+    pub fn auto() -> Self {
+        Self::default()
+    }
+
+    /// Returns the settings for one method.
+    pub fn by(method: Method) -> Self {
+        Self { method, ..Self::default() }
+    }
+
+    /// Seeks forces on these degrees of freedom only, counted from 1.
+    #[must_use]
+    pub fn forced(self, dofs: impl Into<Vec<usize>>) -> Self {
+        Self { forced: dofs.into(), ..self }
+    }
+}

@@ -1,0 +1,86 @@
+//! Whether the periods of a window are alike.
+
+use mechid_force::Unexplained;
+
+use super::motion::{Held, Recorded};
+use crate::text::significant;
+
+/// How the periods of a channel differ from their mean.
+#[derive(Debug, Clone, Copy)]
+pub struct Scatter {
+    /// Standard deviation, in the SI unit of the channel.
+    pub deviation: f64,
+    /// Correlation of the difference at a sample with that at the next: 0 of white noise.
+    pub correlation: f64,
+}
+
+/// Sums over a channel as its periods go by.
+#[derive(Debug, Clone, Default)]
+pub struct Sums {
+    squares: f64,
+    /// Of each sample and the next of its period.
+    products: f64,
+    last: f64,
+}
+
+impl Sums {
+    /// Takes the samples that follow, all of one period.
+    pub fn push(&mut self, samples: impl Iterator<Item = f64>, begins_period: bool) {
+        if begins_period {
+            self.last = 0.0;
+        }
+        for value in samples {
+            self.squares += value * value;
+            self.products += self.last * value;
+            self.last = value;
+        }
+    }
+
+    /// What of them is not in the mean of so many periods.
+    pub fn about(&self, mean: &[f64], periods: usize) -> Scatter {
+        let all = periods as f64;
+        let in_mean: f64 = mean.iter().map(|m| m * m).sum();
+        let beside: f64 = mean.windows(2).map(|w| w[0] * w[1]).sum();
+        let squares = (self.squares - all * in_mean).max(0.0);
+        let left = ((periods - 1) * mean.len()) as f64;
+        Scatter {
+            deviation: (squares / left).sqrt(),
+            correlation: (self.products - all * beside) / squares,
+        }
+    }
+}
+
+/// Periods that differ less than this share of their mean count as alike.
+const ALIKE: f64 = 0.1;
+
+/// White noise is not as like itself from one sample to the next, and the motion of a machine that
+/// is sampled five times a period or more is.
+const NOT_WHITE: f64 = 0.3;
+
+/// Tells of the channel whose periods differ most from their mean, if they do.
+pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
+    let record = held.motion.record();
+    let samples = record.len();
+    let size = |channel: usize| record.column(channel).norm() / (samples as f64).sqrt();
+    let scatter = held.scatter.iter().flatten().enumerate();
+    let other = scatter.filter(|(_, scatter)| scatter.correlation.abs() > NOT_WHITE);
+    let shares = other.map(|(channel, scatter)| (channel, scatter.deviation / size(channel)));
+    let far = shares.filter(|(_, share)| *share > ALIKE);
+    let (channel, share) = far.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(format!(
+        "the periods of {samples} samples differ from their mean by {} % of it ({}), and not as \
+         white noise does: the motion has another period, or is not steady",
+        significant(100.0 * share, 2),
+        recorded.columns()[channel],
+    ))
+}
+
+/// What differs from period to period is noise that no force and no machine explains: where none is
+/// stated, it says what the mean of the periods may leave.
+pub fn tell_noise(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
+    let (Some(channels), Some(scatter)) = (unexplained, &held.scatter) else { return };
+    for (channel, scatter) in channels.iter_mut().zip(scatter) {
+        let level = scatter.deviation / (recorded.periods as f64).sqrt();
+        channel.noise = channel.noise.or(Some(level));
+    }
+}

@@ -1,0 +1,136 @@
+//! The result of a force reconstruction.
+
+use std::fmt::{self, Write as _};
+
+use mechid_signal::counted;
+use serde::Serialize;
+
+use super::method::told;
+use super::options::Reconstruct;
+use super::unexplained::Measured;
+use crate::text::{compact, significant, text_table};
+
+/// Everything `mechid force` has to say.
+#[derive(Debug, Serialize)]
+pub struct ForceSummary {
+    /// The record.
+    pub file: String,
+    /// The machine.
+    pub machine: String,
+    /// Name of the method.
+    pub method: &'static str,
+    /// Reason for the method.
+    pub why: String,
+    /// Number of samples.
+    pub samples: usize,
+    /// Periods averaged; nothing for an open record.
+    pub periods: Option<usize>,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+    /// Whether the standard errors count the machine's own uncertainty.
+    pub machine_uncertainty: bool,
+    /// Whether they count the noise of the record.
+    pub noise_uncertainty: bool,
+    /// Parameters that the method chose.
+    pub chosen: Vec<Chosen>,
+    /// Channels, one each.
+    pub channels: Vec<Measured>,
+    /// Forces, one per degree of freedom.
+    pub forces: Vec<ForceRow>,
+    /// What to know of the numbers.
+    pub remarks: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: Reconstruct,
+}
+
+/// A parameter that the method chose.
+#[derive(Debug, Serialize)]
+pub struct Chosen {
+    /// Name.
+    pub name: String,
+    /// Value, in its unit.
+    pub value: f64,
+    /// SI unit.
+    pub unit: &'static str,
+}
+
+/// The force on one degree of freedom.
+#[derive(Debug, Serialize)]
+pub struct ForceRow {
+    /// Counted from 1.
+    pub dof: usize,
+    /// Whether a force was sought here.
+    pub sought: bool,
+    /// RMS value, in the unit of the channel.
+    pub rms: f64,
+    /// Largest magnitude, in the unit of the channel.
+    pub peak: f64,
+    /// RMS of the standard error over the record; nothing where it is not known.
+    pub standard_error: Option<f64>,
+    /// Frequency of the strongest line, in Hz.
+    pub strongest_hz: f64,
+    /// Amplitude of the strongest line, in N.
+    pub strongest_amplitude: f64,
+}
+
+impl ForceSummary {
+    fn counts_machine_alone(&self) -> bool {
+        self.machine_uncertainty && !self.noise_uncertainty
+    }
+
+    /// Returns the result as a person reads it.
+    fn text(&self) -> String {
+        let rate = compact(self.sample_rate_hz, 8);
+        let extent = match self.periods {
+            None => "open record".into(),
+            Some(1) => "one period".into(),
+            Some(n) => format!("mean of {n} periods"),
+        };
+        let mut text =
+            format!("{}: {} at {rate} Hz, {extent}\n", self.file, counted(self.samples, "sample"));
+        let _ = writeln!(text, "machine: {}", self.machine);
+        let _ = writeln!(text, "method: {}\n  because: {}", self.method, self.why);
+        for Chosen { name, value, unit } in &self.chosen {
+            let _ = writeln!(text, "  {name}: {}", told(*value, unit));
+        }
+        for channel in self.channels.iter().filter_map(Measured::text) {
+            let _ = writeln!(text, "  {channel}");
+        }
+        let error = if self.counts_machine_alone() {
+            "standard error of machine (N)"
+        } else {
+            "standard error (N)"
+        };
+        let header = ["force", "RMS (N)", error, "peak (N)", "strongest line"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for force in &self.forces {
+            let error = match force.standard_error {
+                Some(error) if force.sought => significant(error, 2),
+                _ => "not known".into(),
+            };
+            let strongest = format!(
+                "{} N at {} Hz",
+                significant(force.strongest_amplitude, 4),
+                compact(force.strongest_hz, 5)
+            );
+            rows.push(if force.sought {
+                let [rms, peak] = [force.rms, force.peak].map(|value| significant(value, 4));
+                vec![format!("{}", force.dof), rms, error, peak, strongest]
+            } else {
+                vec![format!("{}", force.dof), "taken as zero".into()]
+            });
+        }
+        let _ = write!(text, "\n{}", text_table(&rows));
+        let notes: String = self.remarks.iter().map(|r| format!("note: {r}\n")).collect();
+        if !notes.is_empty() {
+            let _ = write!(text, "\n{notes}");
+        }
+        text
+    }
+}
+
+impl fmt::Display for ForceSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}

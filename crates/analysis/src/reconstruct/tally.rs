@@ -1,0 +1,119 @@
+//! Levels of a force that is found some samples at a time.
+
+use std::ops::Range;
+
+use mechid_force::IdentifiedForce;
+use mechid_signal::Sampling;
+
+use super::ForceChunk;
+use super::peak_line::PeakLine;
+use super::summary::ForceRow;
+use crate::AnalysisError;
+
+/// Levels and strongest line of a force whose samples need not be held.
+pub struct Tally<'a> {
+    sampling: Sampling,
+    levels: Vec<Level>,
+    strongest: PeakLine,
+    /// Callback for the samples that are found.
+    take: &'a mut Take<'a>,
+}
+
+/// Callback for some samples of the force.
+pub type Take<'a> = dyn FnMut(&ForceChunk<'_>) -> Result<(), AnalysisError> + 'a;
+
+/// Sums over one channel.
+#[derive(Default)]
+struct Level {
+    squares: f64,
+    peak: f64,
+    /// Squared standard errors; nothing where they are not known.
+    errors: Option<f64>,
+}
+
+impl<'a> Tally<'a> {
+    /// Starts with no sample of a force with this time axis.
+    pub fn new(
+        sampling: Sampling,
+        dofs: usize,
+        periodic: bool,
+        take: &'a mut Take<'a>,
+    ) -> Result<Self, AnalysisError> {
+        let levels = (0..dofs).map(|_| Level::default()).collect();
+        let strongest = PeakLine::new(sampling, dofs, periodic)?;
+        Ok(Self { sampling, levels, strongest, take })
+    }
+
+    /// Takes all samples; `counts_noise` says whether the standard error counts the noise of the record.
+    pub fn push_all(
+        &mut self,
+        force: &IdentifiedForce,
+        counts_noise: bool,
+    ) -> Result<(), AnalysisError> {
+        let all = 0..force.record().len();
+        self.push_samples(force, all.clone(), counts_noise)?;
+        if self.strongest.pieces() == 1 {
+            self.strongest.add(force.spectrum());
+        } else {
+            self.strongest.push(force.record(), all)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the samples `kept` of what was found of a chunk.
+    pub fn push(
+        &mut self,
+        force: &IdentifiedForce,
+        kept: Range<usize>,
+        counts_noise: bool,
+    ) -> Result<(), AnalysisError> {
+        self.push_samples(force, kept.clone(), counts_noise)?;
+        self.strongest.push(force.record(), kept)
+    }
+
+    fn push_samples(
+        &mut self,
+        force: &IdentifiedForce,
+        kept: Range<usize>,
+        counts_noise: bool,
+    ) -> Result<(), AnalysisError> {
+        let (record, error) = (force.record(), force.standard_error());
+        for (dof, level) in self.levels.iter_mut().enumerate() {
+            let values = record.column(dof);
+            let values = values.rows_range(kept.clone());
+            level.squares += values.norm_squared();
+            level.peak = level.peak.max(values.amax());
+            if let Some(error) = error {
+                let squares = error.column(dof).rows_range(kept.clone()).norm_squared();
+                *level.errors.get_or_insert(0.0) += squares;
+            }
+        }
+        (self.take)(&ForceChunk { force, samples: kept, counts_noise })
+    }
+
+    /// Returns the levels on each degree of freedom; `forced` are those where a force was sought.
+    pub fn forces(&self, forced: &[usize]) -> Vec<ForceRow> {
+        let size = (self.sampling.len() as f64).sqrt();
+        let levels = self.levels.iter().enumerate();
+        levels
+            .map(|(dof, level)| {
+                let (strongest_hz, strongest_amplitude) = self.strongest.line(dof);
+                ForceRow {
+                    dof: dof + 1,
+                    // The equations of motion give a force everywhere, asked for or not.
+                    sought: level.peak > 0.0 || forced.contains(&dof),
+                    rms: level.squares.sqrt() / size,
+                    peak: level.peak,
+                    standard_error: level.errors.map(|squares| squares.sqrt() / size),
+                    strongest_hz,
+                    strongest_amplitude,
+                }
+            })
+            .collect()
+    }
+
+    /// Returns how the strongest line was found, where that needs saying.
+    pub fn remark(&self) -> Option<String> {
+        self.strongest.remark()
+    }
+}

@@ -1,0 +1,133 @@
+//! What the forces found leave of the motion that was measured.
+
+use mechid_force::{Rule, Start, Unexplained};
+use serde::Serialize;
+
+use super::method::Request;
+use super::motion::Recorded;
+use crate::text::significant;
+
+/// A measured channel, and how much of it the forces found do not explain.
+#[derive(Debug, Serialize)]
+pub struct Measured {
+    /// Counted from 1.
+    pub channel: usize,
+    /// Column.
+    pub column: String,
+    /// RMS of what is left over that of the motion; nothing where as many forces are sought as
+    /// channels were measured, or where nothing was compared.
+    pub unexplained: Option<f64>,
+    /// What noise and the machine's uncertainty may leave, likewise; nothing where the noise is not
+    /// known apart from the fit.
+    pub expected: Option<f64>,
+}
+
+/// So many times what noise and machine may leave is too much: noise alone leaves three times its
+/// level of one complex line once in e⁹ times, of more lines more rarely.
+const TOO_MUCH: f64 = 3.0;
+
+/// A rest below this share moves no force by more than a machine is ever known to.
+const LITTLE: f64 = 0.01;
+
+/// A share that a sensor's noise seldom has, where nothing is known of it.
+const SELDOM_NOISE: f64 = 0.1;
+
+impl Measured {
+    /// Every channel measured.
+    pub fn all(recorded: &Recorded, unexplained: Option<&[Unexplained]>) -> Vec<Self> {
+        let columns = recorded.columns().iter().enumerate();
+        columns
+            .map(|(at, column)| {
+                let left = unexplained.map(|all| &all[at]);
+                Self {
+                    channel: at + 1,
+                    column: column.clone(),
+                    unexplained: left.map(Unexplained::share),
+                    expected: left.and_then(expected),
+                }
+            })
+            .collect()
+    }
+
+    /// As a line of a report.
+    pub fn text(&self) -> Option<String> {
+        let share = percent(self.unexplained?);
+        let expected = self.expected.map(|share| format!(", expected {}", percent(share)));
+        let expected = expected.unwrap_or_default();
+        Some(format!("channel {} ({}) unexplained: {share}{expected}", self.channel, self.column))
+    }
+}
+
+/// Share of the motion that noise and the machine's uncertainty may leave.
+fn expected(left: &Unexplained) -> Option<f64> {
+    let level = left.noise?.hypot(left.machine.unwrap_or(0.0));
+    (left.motion > 0.0).then_some(level / left.motion)
+}
+
+fn is_too_much(left: &Unexplained) -> bool {
+    let machine = left.machine.unwrap_or(0.0);
+    let known = left.rest > TOO_MUCH * left.noise.unwrap_or(0.0).hypot(machine);
+    known && left.share() > if left.noise.is_some() { LITTLE } else { SELDOM_NOISE }
+}
+
+fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share, 2))
+}
+
+/// What to say where more is left than should be.
+pub fn remark(
+    measured: &[Measured],
+    unexplained: Option<&[Unexplained]>,
+    request: &Request,
+    dofs: usize,
+) -> Option<String> {
+    let all = measured.iter().zip(unexplained?);
+    let told: Vec<&Measured> = all.filter(|(_, left)| is_too_much(left)).map(|m| m.0).collect();
+    if told.is_empty() {
+        return None;
+    }
+    let each = told.iter().map(|m| {
+        let share = percent(m.unexplained.unwrap_or_default());
+        let expected = m.expected.map(|share| format!("; expected {}", percent(share)));
+        let expected = expected.unwrap_or_default();
+        format!("{share} of channel {} ({}{expected})", m.channel, m.column)
+    });
+    let unless = if told.iter().any(|m| m.expected.is_none()) {
+        "unless that is noise (--noise states its level), "
+    } else {
+        ""
+    };
+    Some(format!(
+        "the force found leaves unexplained {}: {unless}{}; do not believe its standard error",
+        listed(&each.collect::<Vec<_>>()),
+        causes(request, dofs).join(", or ")
+    ))
+}
+
+/// What may leave motion unexplained.
+fn causes(request: &Request, dofs: usize) -> Vec<String> {
+    let mut causes = Vec::new();
+    if request.forced.len() < dofs {
+        let forced: Vec<String> = request.forced.iter().map(|dof| (dof + 1).to_string()).collect();
+        let degrees = if forced.len() == 1 { "degree" } else { "degrees" };
+        let forced = listed(&forced);
+        causes.push(format!("another force acts than on {degrees} of freedom {forced} (--forced)"));
+    }
+    if matches!(request.rule, Rule::Given(_)) {
+        causes.push("--parameter holds too much of the force back".into());
+    }
+    if !request.periodic && request.start == Start::FromRest {
+        causes.push("the record does not begin at rest".into());
+    }
+    causes.push("a sensor is dead, exchanged or in another unit".into());
+    causes.push("the machine is not this one".into());
+    causes
+}
+
+fn listed(items: &[String]) -> String {
+    match items {
+        [] => String::new(),
+        [one] => one.clone(),
+        [some @ .., last] => format!("{} and {last}", some.join(", ")),
+    }
+}

@@ -1,0 +1,52 @@
+//! Whether the force drives the machine as an identification needs it.
+
+use mechid_signal::measures::{self, Band};
+use mechid_signal::{Record, Spectrum};
+
+use crate::AnalysisError;
+
+/// A line this far below the strongest, in dB, is no longer driven: a multisine stands far above
+/// the noise between its lines.
+pub const DROP_DB: f64 = 20.0;
+
+/// Numbers of one force that acts.
+pub struct Excitation {
+    /// Counted from 1.
+    pub dof: usize,
+    /// Peak over RMS.
+    pub crest_factor: f64,
+    /// Nothing for a force that does not vary.
+    pub peak_factor: Option<f64>,
+    /// Lines driven.
+    pub lines: usize,
+    /// Band of the lines driven.
+    pub band: Option<Band>,
+    /// Of the lines driven.
+    pub flatness: Option<f64>,
+    /// Order of persistent excitation.
+    pub order: usize,
+}
+
+/// Of every force that is not zero throughout, in one period.
+pub fn excitations(force: &Record) -> Result<Vec<Excitation>, AnalysisError> {
+    let spectrum = Spectrum::of(force);
+    let floor = 10f64.powf(-DROP_DB / 20.0);
+    let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);
+    acting
+        .map(|c| {
+            let amplitude = |n: &usize| spectrum.line(*n, c).norm();
+            let strongest = (1..spectrum.len()).map(|n| amplitude(&n)).fold(0.0, f64::max);
+            let driven = |n: &usize| strongest > 0.0 && amplitude(n) >= floor * strongest;
+            let lines: Vec<usize> = (1..spectrum.len()).filter(driven).collect();
+            Ok(Excitation {
+                dof: c + 1,
+                crest_factor: measures::crest_factor(force, c)?,
+                peak_factor: measures::relative_peak_factor(force, c).ok(),
+                lines: lines.len(),
+                band: measures::effective_band(&spectrum, c, DROP_DB).ok(),
+                flatness: measures::spectral_flatness(&spectrum, c, lines).ok(),
+                order: measures::persistent_excitation_order(&spectrum, c, floor)?,
+            })
+        })
+        .collect()
+}

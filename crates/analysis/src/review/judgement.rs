@@ -1,0 +1,124 @@
+//! What speaks for the numbers, and what against them.
+
+use mechid_estimate::checks::{Subject, Verdict};
+
+use super::Review;
+use crate::identify::checks::CheckRow;
+use crate::identify::summary::of_least_squares;
+use crate::text::significant;
+
+/// Residual power over what the noise explains, below which standard errors are too large by more
+/// than a factor of √2.
+const OVERSTATED: f64 = 0.5;
+
+/// A prediction of another record below this fit, in per cent, leaves as much as it explains.
+const POOR_FIT: f64 = 50.0;
+
+/// What the reader should know before believing the numbers, the worst first.
+pub fn doubts(contents: &Review<'_>) -> Vec<String> {
+    let report = &contents.found.summary();
+    let mut doubts = found_out(&report.checks, Verdict::Bad);
+    doubts.extend(report.doubts());
+    // Of too large a residual the checks tell.
+    if let Some(misfit) = contents.found.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
+    {
+        let why = "the noise was taken as larger than it is, and so were the standard errors";
+        doubts.push(format!("{misfit}: {why}"));
+    }
+    doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
+    doubts.extend(found_out(&report.checks, Verdict::Doubtful));
+    doubts.extend(of_least_squares(contents.found.fitted(), &report.checks));
+    doubts
+}
+
+/// The checks with this verdict, a sentence for each subject.
+fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
+    let verdict = verdict.to_string();
+    let mut sentences: Vec<(&str, String)> = Vec::new();
+    for check in checks.iter().filter(|check| check.verdict == verdict) {
+        let subject = check.subject.as_str();
+        if sentences.iter().any(|(told, _)| *told == subject) {
+            continue;
+        }
+        let of_subject = || checks.iter().filter(|check| check.subject == subject);
+        let alike = of_subject().filter(|check| check.verdict == verdict).count();
+        let all = of_subject().count();
+        sentences.push((
+            subject,
+            match alike {
+                1 => format!("{subject}: {}", check.sentence()),
+                _ => format!("{subject}: {alike} of {all} checks, such as {}", check.sentence()),
+            },
+        ));
+    }
+    sentences.into_iter().map(|(_, sentence)| sentence).collect()
+}
+
+/// What gives cause to believe them.
+pub fn merits(contents: &Review<'_>) -> Vec<String> {
+    let report = &contents.found.summary();
+    let good = report.checks.iter().filter(|check| !check.is_conspicuous());
+    let mut subjects: Vec<&str> = Vec::new();
+    for check in good.clone() {
+        if !subjects.contains(&check.subject.as_str()) {
+            subjects.push(&check.subject);
+        }
+    }
+    let mut merits = Vec::new();
+    if !subjects.is_empty() {
+        merits.push(format!(
+            "{} of {} checks of data and fit are good: {}",
+            good.clone().count(),
+            report.checks.len(),
+            subjects.join(", ")
+        ));
+    }
+    let subject = Subject::Misfit.to_string();
+    let explained = good.clone().any(|check| check.subject == subject);
+    let misfit = contents.found.fitted().misfit.filter(|misfit| misfit.ratio >= OVERSTATED);
+    if let Some(misfit) = misfit.filter(|_| explained) {
+        merits.push(format!("{misfit}; 1 is expected"));
+    }
+    if !was_fitted(contents) {
+        merits.extend(
+            predicted(contents).filter(|(fit, _)| is_predicted(*fit)).map(|(_, text)| text),
+        );
+    }
+    merits
+}
+
+fn is_predicted(fit_percent: f64) -> bool {
+    fit_percent >= POOR_FIT
+}
+
+/// Whether samples that were predicted had been fitted: then the prediction proves little.
+pub fn was_fitted(contents: &Review<'_>) -> bool {
+    let report = &contents.found.summary();
+    report.validation.iter().any(|predicted| {
+        let overlaps = |first: usize, last: usize| {
+            first <= predicted.last_sample && predicted.first_sample <= last
+        };
+        report.records.iter().any(|record| {
+            let window = &record.window;
+            record.file == predicted.file && overlaps(window.first_sample, window.last_sample)
+        })
+    })
+}
+
+/// How well another record is predicted: the poorest channel, in per cent and in words.
+fn predicted(contents: &Review<'_>) -> impl Iterator<Item = (f64, String)> {
+    let validation = contents.found.summary().validation.iter();
+    validation.filter_map(|validation| {
+        let fits = validation.channels.iter().map(|share| share.fit_percent);
+        let least = fits.min_by(f64::total_cmp)?;
+        let (first, last) = (validation.first_sample, validation.last_sample);
+        Some((
+            least,
+            format!(
+                "{}, samples {first} to {last}: at least {} % of every motion is predicted",
+                validation.file,
+                significant(least, 3)
+            ),
+        ))
+    })
+}

@@ -1,0 +1,130 @@
+//! Everything that a report page shows of an identification, computed.
+
+pub mod channels;
+pub mod excitation;
+pub mod judgement;
+pub mod receptance;
+pub mod reconstruction;
+pub mod residual;
+pub mod whole;
+
+use self::channels::Channel;
+use self::excitation::Excitation;
+use self::receptance::Receptance;
+use self::reconstruction::Reconstruction;
+use self::residual::Residual;
+use self::whole::Whole;
+use crate::AnalysisError;
+use crate::identify::Identified;
+use crate::identify::lines::choose_lines;
+use crate::identify::prediction::{Compared, Prediction};
+use crate::measurement::{Block, Windowed};
+
+/// Everything that a page shows.
+pub struct Review<'a> {
+    /// The identification.
+    pub found: &'a Identified,
+    /// The records fitted, one by one.
+    pub records: Vec<RecordReview<'a>>,
+    /// The receptance that the records show, or why there is none.
+    pub receptance: Result<Receptance, String>,
+    /// Measured and predicted responses of a record that was not fitted.
+    pub validation: Vec<Compared>,
+}
+
+/// What a page shows of one record.
+pub struct RecordReview<'a> {
+    /// The record.
+    pub recorded: &'a Windowed,
+    /// Levels, histories and mean period of all samples.
+    pub whole: Whole,
+    /// Name of the record, where there are several.
+    pub name: Option<&'a str>,
+    /// Index of the record, counted from 0.
+    pub index: usize,
+    /// Lines of a period, where such were fitted.
+    pub lines: Option<Vec<usize>>,
+    /// Levels of the columns used.
+    pub channels: Vec<Channel>,
+    /// Measures of the forces that act.
+    pub excitations: Vec<Excitation>,
+    /// Measured and predicted responses, or why there are none.
+    pub residual: Result<Residual, String>,
+    /// The force reconstructed with the identified machine.
+    pub reconstruction: Option<Reconstruction>,
+}
+
+impl<'a> Review<'a> {
+    /// Computes what a page shows; `reconstruct_force` adds the force reconstructed with the
+    /// identified machine.
+    ///
+    /// # Errors
+    /// If a file cannot be read again, and if the force cannot be reconstructed.
+    pub fn of(found: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
+        let records = (0..found.records().len())
+            .map(|at| RecordReview::of(found, at, reconstruct_force))
+            .collect::<Result<Vec<_>, _>>()?;
+        let validation = match found.validated() {
+            Some(other) => found.prediction().predict(&found.system()?, other)?,
+            None => Vec::new(),
+        };
+        let receptance = Receptance::of(found, &records).map_err(|reason| reason.to_string());
+        Ok(Self { found, receptance, records, validation })
+    }
+
+    /// Returns the samples held of the record that was not fitted.
+    pub fn validated(&self) -> Option<&'a Block> {
+        self.found.validated()
+    }
+}
+
+impl<'a> RecordReview<'a> {
+    fn of(
+        found: &'a Identified,
+        at: usize,
+        reconstruct_force: bool,
+    ) -> Result<Self, AnalysisError> {
+        let recorded = &found.records()[at];
+        let held = &recorded.held;
+        let lines = match found.spectra() {
+            // Lines of segments are not those of the record.
+            Some(_) if found.prediction() == Prediction::Steady => {
+                let choice = &found.summary().analysis.lines;
+                Some(choose_lines(&held.force, held.period, choice)?)
+            }
+            _ => None,
+        };
+        let whole = Whole::of(recorded)?;
+        let mean = whole.mean.as_ref().filter(|_| lines.is_some());
+        let period = mean.unwrap_or(held);
+        let reconstruction = match reconstruct_force {
+            true => Some(Reconstruction::of(found, period, lines.clone())?),
+            false => None,
+        };
+        Ok(Self {
+            recorded,
+            name: (found.records().len() > 1).then_some(held.file.as_str()),
+            index: at,
+            channels: channels::channels(held, &whole, found.measurements()[at].channels()),
+            excitations: excitation::excitations(&period.force)?,
+            residual: Residual::of(found, at, mean).map_err(|reason| reason.to_string()),
+            reconstruction,
+            lines,
+            whole,
+        })
+    }
+
+    /// Returns the samples of the record that are held in memory.
+    pub fn held(&self) -> &Block {
+        &self.recorded.held
+    }
+
+    /// Returns the samples that spectra are of: the mean period where lines of periods were fitted,
+    /// otherwise what is held.
+    pub fn period(&self) -> &Block {
+        match self.lines {
+            Some(_) => self.whole.period(self.held()),
+            None => self.held(),
+        }
+    }
+}

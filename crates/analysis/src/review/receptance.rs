@@ -1,0 +1,107 @@
+//! The receptance that records show, whatever was fitted.
+
+use mechid_estimate::frequency_domain::{FrequencyData, Lines};
+use mechid_estimate::time_domain::Extent;
+use mechid_estimate::{FrfEstimator, Segments, Window};
+use mechid_signal::lines;
+
+use super::RecordReview;
+use crate::AnalysisError;
+use crate::frf::average;
+use crate::identify::Identified;
+use crate::identify::lines::{LineChoice, choose_lines};
+use crate::identify::prediction::Prediction;
+use crate::identify::spectra::periods;
+use crate::measurement::{Block, IN_MEMORY_SAMPLES, Windowed};
+
+/// Part of an open record that a segment takes; half overlapped, this makes fifteen segments. Of a
+/// record too long to be held there are more of them, not longer ones.
+const SEGMENTS: usize = 8;
+
+/// A line is shown if the force explains at least this part of the power of every motion.
+const EXPLAINED: f64 = 0.5;
+
+/// A measured receptance, and where it comes from.
+pub struct Receptance {
+    /// Receptance, line by line.
+    pub data: FrequencyData,
+    /// Where the receptance comes from.
+    pub origin: String,
+}
+
+impl Receptance {
+    /// What was fitted in the frequency domain; otherwise that of whole periods, or averaged over
+    /// segments of open records.
+    ///
+    /// # Errors
+    /// If the records show none.
+    pub fn of(found: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
+        if let Some((_, data)) = &found.fitted().frequency {
+            let origin = match found.fitted().prediction {
+                Prediction::Steady => "measured on the lines used",
+                Prediction::Sampled { .. } => "averaged over segments, on the lines used",
+            };
+            return Ok(Self { data: data.clone(), origin: origin.into() });
+        }
+        let first = parts[0].held();
+        // The beginning of a period is none.
+        let held = first.periods > 1 || first.held_to().is_none();
+        let period = match found.fitted().prediction {
+            Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => held,
+            Prediction::Sampled { .. } => first.periods > 1,
+        };
+        let each = |part: &RecordReview<'_>| match period {
+            true => of_periods(part),
+            false => of_segments(part.recorded),
+        };
+        let mut data = each(&parts[0])?;
+        for part in &parts[1..] {
+            data = data.and(&each(part)?)?;
+        }
+        let origin = match period {
+            true => "measured on the lines of whole periods that carry force".into(),
+            false => format!(
+                "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
+                 where the force explains at least half of the motion (a resonance narrower than \
+                 the lines looks blunter than it is)",
+                segment(first)
+            ),
+        };
+        // A held or linear force is weaker than its samples there, and the motion with it.
+        let origin =
+            origin + "; towards half the sampling rate the force between the samples shows, too";
+        Ok(Self { data, origin })
+    }
+}
+
+fn of_periods(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {
+    let held = part.held();
+    // Several periods tell their noise; of one that is longer than what is held there is the mean.
+    let force = match held.force.len() < held.period {
+        true => &part.whole.period(held).force,
+        false => &held.force,
+    };
+    let chosen = choose_lines(force, held.period, &LineChoice::Driven)?;
+    let lines = Lines::new(force.sampling().with_len(held.period)?, chosen)?;
+    Ok(periods(part.recorded, &lines)?.mean()?)
+}
+
+fn segment(measured: &Block) -> usize {
+    ((measured.period * measured.periods).min(IN_MEMORY_SAMPLES) / SEGMENTS).max(1)
+}
+
+fn of_segments(recorded: &Windowed) -> Result<FrequencyData, AnalysisError> {
+    let held = &recorded.held;
+    let len = segment(held);
+    let segments = Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann };
+    let sampling = held.force.sampling().with_len(len)?;
+    let all = Lines::new(sampling, lines::full(sampling))?;
+    let responses = average(recorded, &all, segments)?.frf(FrfEstimator::H1)?;
+    let explained =
+        |row: &usize| responses.coherence().row(*row).iter().all(|part| *part >= EXPLAINED);
+    let clear: Vec<usize> = (0..all.as_slice().len()).filter(explained).collect();
+    if clear.is_empty() {
+        return Err(AnalysisError::NoReceptance);
+    }
+    Ok(responses.at(&clear).data(&held.driven)?)
+}

@@ -1,0 +1,94 @@
+//! The force found from the motion with the identified machine, against the measured one.
+
+use mechid_force::{
+    self as force, Channel, IdentifiedForce, Quantity, Rule, Start, channel_errors,
+};
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use crate::AnalysisError;
+use crate::identify::Identified;
+use crate::measurement::Block;
+use crate::reconstruct::Method;
+use crate::reconstruct::method::{KnownMachine, Request, find};
+
+/// A force found, and what it should be.
+pub struct Reconstruction {
+    /// Name of the method.
+    pub method: &'static str,
+    /// Reconstructed force.
+    pub found: IdentifiedForce,
+    /// In the frequency domain its mean period, on the lines used alone.
+    pub measured: Record,
+    /// Degrees of freedom on which a force acts, counted from 0.
+    pub forced: Vec<usize>,
+    /// RMS of the difference over RMS of the measured force, per degree of freedom; nothing where
+    /// none acts.
+    pub errors: Vec<Option<f64>>,
+}
+
+impl Reconstruction {
+    /// Line by line on lines of the mean `period` where there are some, otherwise with
+    /// the method that suits an open record.
+    pub fn of(
+        found: &Identified,
+        period: &Block,
+        lines: Option<Vec<usize>>,
+    ) -> Result<Self, AnalysisError> {
+        let force = &period.force;
+        let forced: Vec<usize> =
+            (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
+        let request = Request {
+            method: if lines.is_some() { Method::FrequencyDomain } else { Method::Auto },
+            forced: forced.clone(),
+            lines: lines.clone(),
+            periodic: lines.is_some(),
+            start: Start::InMotion,
+            rule: Rule::Likelihood,
+            noise: Vec::new(),
+            averaged: 1,
+        };
+        let result = find(&request, &machine(found)?, &motion(period)?)?;
+        let measured = match &lines {
+            Some(lines) => on_lines(force, lines),
+            None => force.clone(),
+        };
+        let errors = channel_errors(result.force.record(), &measured)?;
+        let (method, found) = (result.how.method, result.force);
+        Ok(Self { method, found, measured, forced, errors })
+    }
+}
+
+fn machine(found: &Identified) -> Result<KnownMachine, AnalysisError> {
+    let machine = found.machine()?;
+    Ok(KnownMachine { covariance: machine.covariance()?, system: machine.system })
+}
+
+/// Every motion that was measured.
+fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
+    let groups = [
+        (&source.displacement, ResponseQuantity::Displacement),
+        (&source.velocity, ResponseQuantity::Velocity),
+        (&source.acceleration, ResponseQuantity::Acceleration),
+    ];
+    let (mut columns, mut channels) = (Vec::new(), Vec::new());
+    for (record, quantity) in groups {
+        let Some(record) = record else { continue };
+        for dof in 0..record.channels() {
+            columns.push(record.column(dof).into_owned());
+            channels.push(Channel { dof, quantity });
+        }
+    }
+    let record = Record::new(source.force.sampling(), DMatrix::from_columns(&columns))?;
+    Ok(force::Measurement::new(record, channels)?)
+}
+
+/// What a period has on these lines.
+fn on_lines(period: &Record, lines: &[usize]) -> Record {
+    let all = Spectrum::of(period);
+    let mut kept = DMatrix::from_element(all.len(), all.channels(), Complex::ZERO);
+    for &n in lines {
+        kept.set_row(n, &all.lines().row(n));
+    }
+    Spectrum::from_lines(period.sampling(), kept).to_record()
+}

@@ -1,0 +1,85 @@
+//! What the identified machine leaves of a measured motion.
+
+use mechid_estimate::checks::{Correlation, cross_correlation, whiteness};
+use mechid_signal::{Record, measures};
+
+use crate::AnalysisError;
+use crate::identify::Identified;
+use crate::identify::checks::{LAGS, SAMPLES_PER_LAG};
+use crate::identify::prediction::Compared;
+use crate::identify::spectra;
+use crate::measurement::Block;
+
+/// What is below this share of the motion is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Measured and predicted motion of one record, and whether what the fit leaves is noise.
+pub struct Residual {
+    /// Every kind of motion measured.
+    pub compared: Vec<Compared>,
+    /// Of each channel that the fit leaves; none where it leaves no row of samples.
+    pub correlations: Vec<Correlations>,
+    /// The first kind of motion in the mean period, where there are several.
+    pub mean: Option<Compared>,
+}
+
+/// Correlations of one channel of a residual.
+pub struct Correlations {
+    /// Autocorrelation.
+    pub own: Correlation,
+    /// Lags over which noise on the motion correlates it.
+    pub span: usize,
+    /// With each force that acts, by its degree of freedom counted from 0.
+    pub forces: Vec<(usize, Correlation)>,
+}
+
+impl Residual {
+    /// Of the record at this place, as far as it is held, and of its mean period.
+    ///
+    /// # Errors
+    /// If the machine has no such motion.
+    pub fn of(found: &Identified, at: usize, mean: Option<&Block>) -> Result<Self, AnalysisError> {
+        let system = found.fitted().estimate.system()?;
+        let prediction = found.fitted().prediction;
+        let compared = prediction.predict(&system, &found.records()[at].held)?;
+        let mean = mean.map(|mean| prediction.predict(&system, mean)).transpose()?;
+        let mean = mean.map(|mut motions| motions.swap_remove(0));
+        let correlations = match found.fitted().residuals.get(at) {
+            Some(left) => correlations(left)?,
+            None => Vec::new(),
+        };
+        Ok(Self { compared, correlations, mean })
+    }
+}
+
+/// RMS of the measured motion, and of what the prediction leaves of it, of one channel.
+pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
+    let measured = compared.measured.channel(channel);
+    let apart: Vec<f64> =
+        measured.iter().zip(compared.predicted.channel(channel)).map(|(x, p)| x - p).collect();
+    let (size, left) = (measures::rms(measured), measures::rms(&apart));
+    (size, if left > ROUNDING * size { left } else { 0.0 })
+}
+
+/// At the lags at which `mechid identify` judges the residual.
+fn correlations(residual: &spectra::Residual) -> Result<Vec<Correlations>, AnalysisError> {
+    let span = residual.noise_span;
+    let lags = LAGS.min(residual.left.len().saturating_sub(span) / SAMPLES_PER_LAG);
+    if lags == 0 {
+        return Ok(Vec::new());
+    }
+    let force = &residual.force;
+    let acting = || (0..force.channels()).filter(|c| varies(force, *c));
+    let of = |channel: usize| {
+        let own = residual.left.channel(channel);
+        let with = |c: usize| Ok((c, cross_correlation(own, force.channel(c), lags)?));
+        let forces = acting().map(with).collect::<Result<_, AnalysisError>>()?;
+        Ok(Correlations { own: whiteness(own, lags)?, span, forces })
+    };
+    (0..residual.left.channels()).map(of).collect()
+}
+
+fn varies(force: &Record, channel: usize) -> bool {
+    let values = force.channel(channel);
+    values.iter().any(|value| *value != values[0])
+}

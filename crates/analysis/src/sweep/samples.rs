@@ -1,0 +1,113 @@
+//! Samples to identify from, simulated or measured.
+
+use std::borrow::Cow;
+
+use mechid_estimate::frequency_domain::Motion;
+use mechid_estimate::time_domain::Extent;
+use mechid_model::Response;
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+
+use super::Simulated;
+use crate::AnalysisError;
+use crate::measurement::{Block, joined};
+
+/// Forces and motions on one time axis.
+#[derive(Debug)]
+pub struct Samples<'a> {
+    pub force: Cow<'a, Record>,
+    motions: Vec<(ResponseQuantity, Cow<'a, Record>)>,
+    pub extent: Extent,
+}
+
+impl<'a> Samples<'a> {
+    /// Returns the samples that a simulated experiment gives.
+    pub fn simulated(simulated: Simulated) -> Self {
+        let Simulated { force, response, whole_periods } = simulated;
+        let own = |record: &Record| Cow::Owned(record.clone());
+        Self {
+            force: Cow::Owned(force),
+            motions: vec![
+                (Motion::Displacement, own(response.displacement())),
+                (Motion::Velocity, own(response.velocity())),
+                (Motion::Acceleration, own(response.acceleration())),
+            ],
+            extent: if whole_periods { Extent::WholePeriod } else { Extent::Open },
+        }
+    }
+
+    /// Those of a record, taken as open from sample to sample.
+    pub fn measured(measured: &'a Block) -> Self {
+        let motions = measured.responses().into_iter();
+        Self {
+            force: Cow::Borrowed(&measured.force),
+            motions: motions.map(|(kind, record)| (kind, Cow::Borrowed(record))).collect(),
+            extent: Extent::Open,
+        }
+    }
+
+    /// Every `factor`-th sample, from the `first` on, counted from 0.
+    pub fn every(&self, factor: usize, first: usize) -> Result<Samples<'static>, AnalysisError> {
+        self.map(|record| {
+            let len = (record.len() - first).div_ceil(factor);
+            let sampling = Sampling::new(record.sampling().dt() * factor as f64, len)?;
+            let data = record.data();
+            let every = |k: usize, channel: usize| data[(first + k * factor, channel)];
+            Ok(Record::new(sampling, DMatrix::from_fn(len, data.ncols(), every))?)
+        })
+    }
+
+    /// The last of them.
+    pub fn last(&self) -> Result<Samples<'static>, AnalysisError> {
+        self.map(|record| Ok(record.window(record.len() - 1, 1)?))
+    }
+
+    /// These and then those of a later chunk.
+    pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, AnalysisError> {
+        let join = |own, later| Ok::<_, AnalysisError>(Cow::Owned(joined(own, later)?));
+        let pairs = self.motions.iter().zip(&later.motions);
+        let motions = pairs.map(|((kind, own), (_, later))| Ok((*kind, join(own, later)?)));
+        Ok(Samples {
+            force: join(&self.force, &later.force)?,
+            motions: motions.collect::<Result<_, AnalysisError>>()?,
+            extent: self.extent,
+        })
+    }
+
+    /// One kind of motion.
+    ///
+    /// # Errors
+    /// [`AnalysisError::SweepMotion`] if it was not measured.
+    pub fn motion(&self, wanted: Motion) -> Result<&Record, AnalysisError> {
+        let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
+        found.map(|(_, record)| record.as_ref()).ok_or(AnalysisError::SweepMotion { wanted })
+    }
+
+    /// The first kind of motion there is.
+    pub fn first_motion(&self) -> (ResponseQuantity, &Record) {
+        (self.motions[0].0, &self.motions[0].1)
+    }
+
+    /// All three motions.
+    ///
+    /// # Errors
+    /// As [`Samples::motion`].
+    pub fn response(&self) -> Result<Response, AnalysisError> {
+        let [x, v, a] = [Motion::Displacement, Motion::Velocity, Motion::Acceleration]
+            .map(|kind| self.motion(kind));
+        Ok(Response::new(x?.clone(), v?.clone(), a?.clone())?)
+    }
+
+    fn map(
+        &self,
+        of: impl Fn(&Record) -> Result<Record, AnalysisError>,
+    ) -> Result<Samples<'static>, AnalysisError> {
+        let motions =
+            self.motions.iter().map(|(kind, record)| Ok((*kind, Cow::Owned(of(record)?))));
+        Ok(Samples {
+            force: Cow::Owned(of(&self.force)?),
+            motions: motions.collect::<Result<_, AnalysisError>>()?,
+            extent: self.extent,
+        })
+    }
+}

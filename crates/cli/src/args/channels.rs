@@ -1,0 +1,59 @@
+//! Columns of forces and responses.
+
+use clap::Args;
+use mechid::Channels;
+
+/// Columns of force and response; one column per degree of freedom, in the same order everywhere.
+#[derive(Debug, Clone, Args)]
+pub struct ChannelArgs {
+    /// Force columns, in N, one per degree of freedom; 0 where no force acts
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    pub force: Vec<String>,
+    /// Displacement columns, in m
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    displacement: Vec<String>,
+    /// Velocity columns, in m/s
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    velocity: Vec<String>,
+    /// Acceleration columns, in m/s²
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    acceleration: Vec<String>,
+}
+
+impl ChannelArgs {
+    /// Returns the columns.
+    pub fn channels(&self) -> Channels {
+        Channels {
+            force: self.force.clone(),
+            displacement: self.displacement.clone(),
+            velocity: self.velocity.clone(),
+            acceleration: self.acceleration.clone(),
+        }
+    }
+}
+
+/// Columns of responses; one entry per degree of freedom, in the order of the machine.
+#[derive(Debug, Args)]
+pub struct ResponseArgs {
+    /// Displacement columns, in m, one per degree of freedom; 0 where it was not measured
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    displacement: Vec<String>,
+    /// Velocity columns, in m/s, likewise
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    velocity: Vec<String>,
+    /// Acceleration columns, in m/s², likewise
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    acceleration: Vec<String>,
+}
+
+impl ResponseArgs {
+    /// Returns the columns.
+    pub fn channels(&self) -> Channels {
+        Channels {
+            force: Vec::new(),
+            displacement: self.displacement.clone(),
+            velocity: self.velocity.clone(),
+            acceleration: self.acceleration.clone(),
+        }
+    }
+}

@@ -1,0 +1,258 @@
+//! Arguments of `mechid identify` and `mechid report`: which records, what in them, and how to identify
+//! the machine.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use mechid::analysis::identify::{
+    Band, Derivatives, Fit, Identified, Identify, KnownMass, LineChoice, Method, Refinement,
+    ResponseFit, SampleFit, ValidationWindow,
+};
+use mechid::analysis::{Segmentation, Window};
+use mechid::io::LineSpec;
+
+use super::choices::{
+    BetweenSamplesChoice, EstimatorChoice, ExtentChoice, InterpolationChoice, MethodChoice,
+    WeightChoice,
+};
+use super::{ChannelArgs, RecordArgs, at_least_one};
+use crate::error::CliError;
+
+/// Records, what in them, and how to identify the machine.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    /// More records of the same machine, with the same columns and window: all are fitted together
+    #[arg(value_name = "RECORD")]
+    more: Vec<PathBuf>,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    /// Domain of the fit
+    #[arg(long, value_name = "DOMAIN", value_enum, default_value_t = Domain::Frequency)]
+    domain: Domain,
+    #[command(flatten)]
+    lines: LineArgs,
+    /// Estimator of the parameters from the spectra [default: least-squares, or maximum-likelihood
+    /// with --from-frf]
+    #[arg(long, value_name = "METHOD", value_enum)]
+    method: Option<MethodChoice>,
+    /// Assumption on the force between samples, in the time domain [default: the equation of motion
+    /// at the samples if there is an acceleration, else linear]
+    #[arg(long, value_name = "ASSUMPTION", value_enum)]
+    between_samples: Option<BetweenSamplesChoice>,
+    /// Masses, in kg, one per degree of freedom (or all n×n entries row by row), each a number or
+    /// unknown
+    #[arg(
+        long,
+        value_name = "KG|unknown,…",
+        default_value = "unknown",
+        allow_hyphen_values = true
+    )]
+    mass: KnownMass,
+    #[command(flatten)]
+    time: TimeArgs,
+    /// Fit frequency responses, averaged over segments, with their coherence as weights
+    #[arg(long, value_name = "ESTIMATOR", value_enum, help_heading = "Frequency responses")]
+    from_frf: Option<EstimatorChoice>,
+    #[command(flatten)]
+    segments: SegmentArgs,
+    #[command(flatten)]
+    validation: ValidationArgs,
+}
+
+/// Domain of the fit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Domain {
+    /// Spectral lines of whole periods
+    Frequency,
+    /// Sample by sample, any record
+    Time,
+}
+
+/// Spectral lines.
+#[derive(Debug, Args)]
+pub struct LineArgs {
+    /// Spectral lines: all, odd, even, or numbers and ranges first:step:last such as 1:2:335
+    /// [default: every line at which the force exceeds its noise]
+    #[arg(long, value_name = "LINES", conflicts_with = "band_hz")]
+    lines: Option<LineSpec>,
+    /// Use the lines with force between two frequencies, in Hz
+    #[arg(long, value_name = "LOW:HIGH")]
+    band_hz: Option<Band>,
+}
+
+/// Fits in the time domain.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Time domain")]
+struct TimeArgs {
+    /// Extent of the window [default: open, or period with spectral derivatives]
+    #[arg(long, value_name = "EXTENT", value_enum)]
+    extent: Option<ExtentChoice>,
+    /// How to find the velocity and the acceleration where only the displacement was measured, or
+    /// only the acceleration: by the spectrum of whole periods, or by a polynomial of an ORDER
+    /// through a sliding WINDOW of samples (odd)
+    #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
+    derivatives: Option<Derivatives>,
+    /// Put this many steps into every interval, which makes the error of --between-samples smaller
+    #[arg(long, value_name = "FACTOR", value_parser = at_least_one,
+          requires_all = ["interpolation", "between_samples"])]
+    refine: Option<usize>,
+    /// Interpolation between the samples
+    #[arg(long, value_name = "WAY", value_enum, requires = "refine")]
+    interpolation: Option<InterpolationChoice>,
+}
+
+/// Segments of a record to average over.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Frequency responses")]
+pub struct SegmentArgs {
+    /// Samples of a segment, for a random excitation [default: the periods are the segments]
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    segment: Option<usize>,
+    /// Window that weights the samples of a segment [default: hann]
+    #[arg(long, value_name = "WINDOW", value_enum, requires = "segment")]
+    segment_window: Option<WeightChoice>,
+    /// Part of a segment that the next one repeats, in per cent [default: 50]
+    #[arg(long, value_name = "PERCENT", value_parser = share, requires = "segment",
+          allow_negative_numbers = true)]
+    segment_overlap: Option<f64>,
+}
+
+/// A record to predict.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Validation")]
+struct ValidationArgs {
+    /// Validation record (same columns): report the percentage of its response that the identified
+    /// system predicts
+    #[arg(long, value_name = "RECORD")]
+    validate: Option<PathBuf>,
+    /// First sample to predict, counted from 1; without --validate, of the record itself
+    /// [default: 1]
+    #[arg(long, value_name = "SAMPLE", value_parser = at_least_one)]
+    validate_start: Option<usize>,
+    /// Samples to predict [default: all from --validate-start on]
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    validate_samples: Option<usize>,
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let percent: f64 = text.parse().map_err(|_| format!("\"{text}\" is not a number"))?;
+    match (0.0..100.0).contains(&percent) {
+        true => Ok(percent),
+        false => Err(format!("an overlap lies from 0 to below 100 %, got {percent}")),
+    }
+}
+
+impl LineArgs {
+    /// Returns the choice of lines.
+    pub fn choice(&self) -> LineChoice {
+        match (&self.lines, self.band_hz) {
+            (Some(lines), _) => LineChoice::Lines(lines.clone()),
+            (None, Some(band)) => LineChoice::Band(band),
+            (None, None) => LineChoice::Driven,
+        }
+    }
+
+    /// Returns the first of these options that was given.
+    fn given(&self) -> Option<&'static str> {
+        let lines = self.lines.as_ref().map(|_| "--lines");
+        lines.or(self.band_hz.map(|_| "--band-hz"))
+    }
+}
+
+impl SegmentArgs {
+    /// Returns the segments.
+    pub fn segmentation(&self) -> Segmentation {
+        let usual = Segmentation::default();
+        Segmentation {
+            segment: self.segment,
+            window: self.segment_window.map_or(usual.window, Into::into),
+            overlap_percent: self.segment_overlap.unwrap_or(usual.overlap_percent),
+        }
+    }
+}
+
+impl TimeArgs {
+    /// Returns the first of these options that was given.
+    fn given(&self) -> Option<&'static str> {
+        [
+            (self.extent.is_some(), "--extent"),
+            (self.derivatives.is_some(), "--derivatives"),
+            (self.refine.is_some(), "--refine"),
+        ]
+        .into_iter()
+        .find_map(|(given, name)| given.then_some(name))
+    }
+}
+
+impl FitArgs {
+    /// Reads the records, identifies the machine, and predicts the validation record.
+    pub fn identify(&self) -> Result<Identified, CliError> {
+        self.check_options()?;
+        let channels = self.channels.channels();
+        channels.check_pairs()?;
+        let mut records = vec![self.input.open(&channels)?];
+        for record in &self.more {
+            records.push(self.input.open_other(record, &channels, self.input.window())?);
+        }
+        let mut found = mechid::identify(&records, &self.settings())?;
+        let predicted = &self.validation;
+        let (start, samples) = (predicted.validate_start, predicted.validate_samples);
+        let other = match (&predicted.validate, start, samples) {
+            (None, None, None) => return Ok(found),
+            (None, None, Some(samples)) => return Err(CliError::ValidationStart { samples }),
+            (Some(record), _, _) => self.input.open_other(record, &channels, Window::default())?,
+            (None, _, _) => records.swap_remove(0),
+        };
+        let other = found.validation_window(other, &ValidationWindow { start, samples })?;
+        found.add_validation(&other)?;
+        Ok(found)
+    }
+
+    /// Returns the settings of the identification.
+    fn settings(&self) -> Identify {
+        let method = self.method.map(Method::from);
+        let fit = match (self.domain, self.from_frf) {
+            (Domain::Time, _) => Fit::Samples(SampleFit {
+                between_samples: self.between_samples.map(Into::into),
+                extent: self.time.extent.map(Into::into),
+                derivatives: self.time.derivatives,
+                refine: self.time.refine.zip(self.time.interpolation).map(
+                    |(factor, interpolation)| Refinement {
+                        factor,
+                        interpolation: interpolation.into(),
+                    },
+                ),
+            }),
+            (Domain::Frequency, Some(estimator)) => Fit::Responses(ResponseFit {
+                estimator: estimator.into(),
+                segments: self.segments.segmentation(),
+                method,
+            }),
+            (Domain::Frequency, None) => Fit::Spectra { method: method.unwrap_or_default() },
+        };
+        Identify { fit, lines: self.lines.choice(), mass: self.mass.clone() }
+    }
+
+    /// Refuses options that the domain does not use.
+    fn check_options(&self) -> Result<(), CliError> {
+        let of_time = [self.between_samples.map(|_| "--between-samples"), self.time.given()];
+        let of_frequency = [
+            self.lines.given(),
+            self.method.map(|_| "--method"),
+            self.from_frf.map(|_| "--from-frf"),
+        ];
+        let first = |options: &[Option<&'static str>]| options.iter().flatten().next().copied();
+        let (misplaced, why) = match self.domain {
+            Domain::Frequency => (first(&of_time), "belongs to --domain time"),
+            Domain::Time => (first(&of_frequency), "belongs to --domain frequency"),
+        };
+        let alone =
+            (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
+        match misplaced.map(|o| (o, why)).or(alone.map(|o| (o, "belongs to --from-frf"))) {
+            Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
+            None => Ok(()),
+        }
+    }
+}

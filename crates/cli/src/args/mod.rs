@@ -1,0 +1,129 @@
+//! Arguments that several subcommands share, and what they mean to the analysis.
+
+pub mod channels;
+pub mod choices;
+pub mod fit;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
+
+pub use self::channels::{ChannelArgs, ResponseArgs};
+use self::choices::DetrendChoice;
+use crate::error::CliError;
+
+/// How to print the result.
+#[derive(Debug, Default, Args)]
+pub struct ReportArgs {
+    /// Print the report as JSON, for programs
+    #[arg(long, help_heading = "Output")]
+    pub json: bool,
+    /// Print nothing on success
+    #[arg(long, short, help_heading = "Output", conflicts_with = "json")]
+    pub quiet: bool,
+}
+
+/// File to draw the result into.
+#[derive(Debug, Default, Args)]
+pub struct PlotArgs {
+    /// Draw the result into this file; its ending, .svg or .png, says how
+    #[arg(long, value_name = "FILE.svg|.png", value_parser = plot_file, help_heading = "Output")]
+    pub plot: Option<PathBuf>,
+}
+
+fn plot_file(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("svg" | "png") => Ok(path),
+        _ => Err("the file name must end in .svg or .png".into()),
+    }
+}
+
+/// A record, and the window of it to use.
+#[allow(rustdoc::broken_intra_doc_links, reason = "brackets of a help text")]
+#[derive(Debug, Clone, Args)]
+pub struct RecordArgs {
+    /// The record: text with one row per sample, MATLAB .mat (up to -v7), or universal file (dataset
+    /// 58); also in gzip; - is standard input
+    ///
+    /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
+    /// found too; lines starting with # are left out. MATLAB: a vector is a column, of a matrix
+    /// those called name[1], name[2] …, of a struct name.field. Universal file: a function of time
+    /// is a column called after its node and direction, such as 12+Z, and brings its time axis.
+    #[arg(value_name = "RECORD")]
+    pub record: PathBuf,
+    /// Number of header lines to skip above the table
+    #[arg(long, value_name = "COUNT", default_value_t = 0)]
+    pub skip_lines: u64,
+    /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
+    /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
+    /// column called time or t]
+    #[arg(long, value_name = "COLUMN", help_heading = "Time and window")]
+    pub time: Option<String>,
+    /// Samples per second, in Hz, where there is no time column
+    #[arg(
+        long,
+        value_name = "HZ",
+        conflicts_with = "time",
+        allow_negative_numbers = true,
+        help_heading = "Time and window"
+    )]
+    pub sample_rate: Option<f64>,
+    /// First sample of the window, counted from 1
+    #[arg(long, value_name = "SAMPLE", default_value_t = 1, value_parser = at_least_one,
+          help_heading = "Time and window")]
+    pub start: usize,
+    /// Samples in one period [default: all samples from --start on]
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one, help_heading = "Time and window")]
+    pub period: Option<usize>,
+    /// Whole periods in the window [default: as many as there are]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "period",
+          help_heading = "Time and window")]
+    pub periods: Option<usize>,
+    /// Constant to subtract from every channel: the mean of the whole record, not only of the window
+    #[arg(long, value_name = "WHAT", value_enum, help_heading = "Time and window")]
+    pub detrend: Option<DetrendChoice>,
+}
+
+/// Parses a count of at least one.
+pub fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("counted from 1".into()),
+        Ok(n) => Ok(n),
+        Err(e) => Err(format!("a whole number is needed: {e}")),
+    }
+}
+
+impl RecordArgs {
+    /// Returns how to read the file.
+    pub fn reading(&self) -> Reading {
+        Reading {
+            skip_lines: self.skip_lines,
+            time: self.time.clone(),
+            sample_rate_hz: self.sample_rate,
+            detrend: self.detrend.map_or(Detrend::None, Detrend::from),
+        }
+    }
+
+    /// Returns the window.
+    pub fn window(&self) -> Window {
+        Window { start: self.start, period: self.period, periods: self.periods }
+    }
+
+    /// Opens the record with these columns.
+    pub fn open(&self, channels: &mechid::Channels) -> Result<Measurement, CliError> {
+        self.open_other(&self.record, channels, self.window())
+    }
+
+    /// Opens another record, read in the same way.
+    pub fn open_other(
+        &self,
+        record: &std::path::Path,
+        channels: &mechid::Channels,
+        window: Window,
+    ) -> Result<Measurement, CliError> {
+        let (path, channels, reading) = (record.to_owned(), channels.clone(), self.reading());
+        Ok(RecordPlan { path, channels, reading, window }.open()?)
+    }
+}

@@ -1,0 +1,146 @@
+//! `mechid force`: the force that drove a known machine.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mechid::Reconstruct;
+use mechid::analysis::reconstruct::{
+    ForceChunk, ParameterRule, reconstruct_in_chunks, reconstruct_with,
+};
+use mechid::analysis::{AnalysisError, Machine};
+use mechid::io::{BegunFile, CsvFile, LineSpec};
+use mechid::report::{ToFigure as _, spectrum_csv};
+
+use crate::args::choices::{ForceMethodChoice, RuleChoice};
+use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Find the force that drove a known machine from its measured motion
+///
+/// The window is one or more whole periods if --period or --lines is given (they are averaged), an
+/// open record otherwise. Where the machine comes from `mechid identify --json`, its uncertainty
+/// counts in the standard error of the force.
+///
+/// A long text is read a stretch at a time. The methods continuous and discretised hold no open
+/// record either; any other method, --spectrum and --plot hold all of it, of the columns used alone.
+/// Of whole periods only their mean is held.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid identify record.csv --force force --displacement displacement --json > machine.json
+  mechid force run.csv --system machine.json --displacement displacement --output force.csv
+  mechid force run.csv --system rotor.json --displacement x,0 --forced 2 --period 256 \\
+      --lines 1:40 --output force.csv --spectrum lines.csv --plot force.svg")]
+pub struct ForceArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    /// The machine: a report of `mechid identify --json`, or a description with a system
+    #[arg(long, value_name = "IDENTIFIED.json")]
+    system: PathBuf,
+    #[command(flatten)]
+    responses: ResponseArgs,
+    /// Degrees of freedom on which a force acts, counted from 1 [default: all]
+    #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
+    forced: Vec<usize>,
+    /// Method of the reconstruction
+    #[arg(long, value_name = "METHOD", value_enum, default_value_t = ForceMethodChoice::Auto)]
+    method: ForceMethodChoice,
+    /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
+    #[arg(long, value_name = "LINES")]
+    lines: Option<LineSpec>,
+    /// An open record begins at rest
+    #[arg(long)]
+    at_rest: bool,
+    /// Standard deviation of the noise in each measured column, in its unit, before periods are
+    /// averaged [default: estimated]
+    #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
+    noise: Vec<f64>,
+    /// How to choose the regularisation parameter
+    #[arg(long, value_name = "RULE", value_enum, default_value_t = RuleChoice::Likelihood)]
+    rule: RuleChoice,
+    /// The regularisation parameter, instead of a rule
+    #[arg(long, value_name = "LAMBDA", allow_negative_numbers = true, conflicts_with = "rule")]
+    parameter: Option<f64>,
+    /// Where the force goes: time, force and standard error, in s and N
+    #[arg(long, short, value_name = "FORCE.csv", help_heading = "Output")]
+    output: Option<PathBuf>,
+    /// Where its spectrum goes, on the lines of --lines or on all: frequency in Hz, amplitude in N,
+    /// phase in degrees
+    #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
+    spectrum: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl ForceArgs {
+    /// Reads, reconstructs, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let machine = Machine::read(&self.system)?;
+        let run = self.input.open(&self.responses.channels())?;
+        let how = self.settings();
+        let mut rows = ForceRows { path: self.output.as_deref(), rows: None };
+        let mut take = |chunk: &ForceChunk<'_>| rows.append(chunk);
+        if self.spectrum.is_none() && self.plot.plot.is_none() {
+            let summary = reconstruct_in_chunks(&run, &machine, &how, &mut take)?;
+            return rows.deliver(Outcome::new(summary.to_string(), &summary)?);
+        }
+        let found = reconstruct_with(&run, &machine, &how, &mut take)?;
+        let mut outcome = rows.deliver(Outcome::new(found.to_string(), &found)?)?;
+        if let Some(path) = &self.spectrum {
+            let mut file = BegunFile::begin(path)?;
+            for text in spectrum_csv(found.force(), found.lines()) {
+                file.append(&text)?;
+            }
+            outcome = outcome.with_begun(file);
+        }
+        outcome.with_plot(&self.plot, || Ok(found.figure()?))
+    }
+
+    /// Returns the settings of the reconstruction.
+    fn settings(&self) -> Reconstruct {
+        Reconstruct {
+            method: self.method.into(),
+            forced: self.forced.clone(),
+            lines: self.lines.clone(),
+            at_rest: self.at_rest,
+            noise: self.noise.clone(),
+            rule: match self.parameter {
+                Some(lambda) => ParameterRule::Given(lambda),
+                None => self.rule.into(),
+            },
+        }
+    }
+}
+
+/// The table of the force, written as its samples are found.
+struct ForceRows<'a> {
+    path: Option<&'a Path>,
+    rows: Option<CsvFile>,
+}
+
+impl ForceRows<'_> {
+    fn append(&mut self, chunk: &ForceChunk<'_>) -> Result<(), AnalysisError> {
+        let Some(path) = self.path else { return Ok(()) };
+        let columns = chunk.columns();
+        let mut rows = match self.rows.take() {
+            Some(rows) => rows,
+            None => {
+                let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+                CsvFile::begin(path, chunk.force.record().sampling(), &names)?
+            }
+        };
+        let values: Vec<&[f64]> = columns.iter().map(|(_, column)| *column).collect();
+        rows.append(&values)?;
+        self.rows = Some(rows);
+        Ok(())
+    }
+
+    fn deliver(self, outcome: Outcome) -> Result<Outcome, CliError> {
+        Ok(match self.rows {
+            Some(rows) => outcome.with_begun(rows.finish()?),
+            None => outcome,
+        })
+    }
+}

@@ -1,0 +1,66 @@
+//! `mechid frf`: response per unit force, frequency by frequency.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::FrfSettings;
+use mechid::report::ToFigure as _;
+
+use crate::args::choices::EstimatorChoice;
+use crate::args::fit::{LineArgs, SegmentArgs};
+use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Estimate frequency responses and coherence from measured forces and motions
+///
+/// With a periodic excitation the periods are the segments that are averaged (--period says how long
+/// one is). With a random excitation say --segment: segments overlap under a window. A long text is
+/// read a stretch at a time and not held.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
+  mechid frf random.csv --force f --acceleration a --segment 1024 --segment-overlap 66 \\
+      --estimator hv --band-hz 5:400 --output frf.csv
+  mechid frf rotor.csv --force fx,fy --displacement x,y --period 512 --json")]
+pub struct FrfArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    /// Frequency response estimator
+    #[arg(long, value_enum, default_value_t = EstimatorChoice::H1)]
+    estimator: EstimatorChoice,
+    #[command(flatten)]
+    lines: LineArgs,
+    #[command(flatten)]
+    segments: SegmentArgs,
+    /// Write the responses into this file (-: to standard output), as a table with one row per
+    /// frequency
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl FrfArgs {
+    /// Reads, averages, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let channels = self.channels.channels();
+        channels.check_pairs()?;
+        let how = FrfSettings {
+            estimator: self.estimator.into(),
+            lines: self.lines.choice(),
+            segments: self.segments.segmentation(),
+        };
+        let found = mechid::frf(&self.input.open(&channels)?, &how)?;
+        let mut outcome = Outcome::new(found.to_string(), &found)?
+            .with_plot(&self.plot, || Ok(found.figure()?))?;
+        if let Some(path) = &self.output {
+            outcome = outcome.with_file(path, found.csv());
+        }
+        Ok(outcome)
+    }
+}

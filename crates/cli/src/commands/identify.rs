@@ -1,0 +1,50 @@
+//! `mechid identify`: the machine behind a record.
+
+use clap::Args;
+use mechid::report::ToFigure as _;
+
+use crate::args::fit::FitArgs;
+use crate::args::{PlotArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Find mass, damping and stiffness from a measured force and response
+///
+/// In the frequency domain (the default) the window must hold whole periods of a periodic
+/// excitation, and one kind of motion is enough; the periods are averaged. A random excitation is
+/// cut into segments with --from-frf. In the time domain any record will do: displacement, velocity
+/// and acceleration for the equation of motion itself, or displacement and velocity with an
+/// assumption on the force between the samples; what was not measured, --derivatives finds.
+///
+/// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
+/// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
+/// are windows for spectral --derivatives, and for --interpolation by a spline or band-limited, one
+/// long period, and what --validate predicts as a steady state.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid identify record.csv --force force --displacement displacement
+  mechid identify rig.csv --sample-rate 610.35 --force V1 --displacement V2 \\
+      --start 10585 --period 1024 --periods 1 --lines 1:2:335 --detrend mean --plot receptance.svg
+  mechid identify rotor.csv --force fx,fy --displacement x,y --mass 14.8,unknown --band-hz 20:90 --json
+  mechid identify a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
+      --validate c.csv
+  mechid identify random.csv --force f --acceleration a --from-frf h1 --segment 1024
+  mechid identify t.csv --force f --displacement x --velocity v --domain time \\
+      --between-samples euler --extent period --refine 8 --interpolation band-limited --plot t.svg
+  mechid identify t.csv --force f --acceleration a --domain time --derivatives savitzky-golay:11:4")]
+pub struct IdentifyArgs {
+    #[command(flatten)]
+    fit: FitArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl IdentifyArgs {
+    /// Reads, identifies, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let found = self.fit.identify()?;
+        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+    }
+}

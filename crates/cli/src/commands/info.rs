@@ -1,0 +1,49 @@
+//! `mechid info`: what is in a record.
+
+use clap::Args;
+use mechid::analysis::InspectSettings;
+use mechid::report::ToFigure as _;
+
+use crate::args::{PlotArgs, RecordArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Show what is in a record: format, columns, sampling, levels, strongest lines, period
+///
+/// For every channel: mean, RMS and peak value in its own unit, the crest factor, the strongest
+/// lines of its spectrum with their amplitudes, and the period, in samples, if it repeats. The
+/// spectrum is that of whole periods where the channel repeats or --period says so, otherwise of the
+/// window weighted by a Hann window. Of a text of more than 262144 rows, only the levels are those
+/// of all samples of the window: lines and period are those of its first 262144 samples.
+///
+/// The picture shows columns over time, all of the window, beside their spectra, of the mean period
+/// where there is one: the first eight. The column of time has a spectrum only if --columns asks for
+/// it.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid info record.csv
+  mechid info examples/machine.csv --plot record.svg
+  mechid info rig.csv --sample-rate 610.35 --columns V1,V2 --start 10585 --period 1024
+  mechid info rig.mat --columns force,acceleration[2] --json")]
+pub struct InfoArgs {
+    #[command(flatten)]
+    pub input: RecordArgs,
+    /// Columns to show, by name or number [default: every column that holds numbers only]
+    #[arg(long, value_name = "COLUMN,…", value_delimiter = ',')]
+    columns: Vec<String>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl InfoArgs {
+    /// Reads the record and measures each of its columns.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let how =
+            InspectSettings { columns: self.columns.clone(), curves: self.plot.plot.is_some() };
+        let (reading, window) = (self.input.reading(), self.input.window());
+        let found = mechid::inspect(&self.input.record, &reading, &window, &how)?;
+        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+    }
+}

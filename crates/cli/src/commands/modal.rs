@@ -1,0 +1,44 @@
+//! `mechid modal`: frequencies, damping ratios and shapes of a machine.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::{Machine, ModalSummary};
+use mechid::report::ToFigure as _;
+
+use crate::args::{PlotArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Natural frequencies, damping ratios and complex mode shapes of a machine
+///
+/// The file is the description of a machine, or what `mechid identify --json` printed: then every
+/// frequency, ratio and shape comes with the standard error that the uncertainty of mass, damping and
+/// stiffness gives it. Shapes are scaled so that their largest entry is 1. The picture shows the
+/// receptance of the machine around its natural frequencies: of one or two degrees of freedom for
+/// every pair of motion and force, of more where motion and force share their place, up to six of
+/// them.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
+  mechid modal found.json
+  mechid identify rotor.csv --force fx,fy --displacement x,y --json | mechid modal -
+  mechid modal examples/machine.json --plot modes.svg")]
+pub struct ModalArgs {
+    /// JSON with a `system`: mass, damping and stiffness in kg, N·s/m and N/m (-: on standard input)
+    #[arg(value_name = "SYSTEM.json")]
+    system: PathBuf,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl ModalArgs {
+    /// Reads the machine and finds its modes.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let machine = Machine::read(&self.system)?;
+        let found = ModalSummary::of(&machine)?;
+        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(machine.figure()?))
+    }
+}

@@ -1,0 +1,159 @@
+//! `mechid sweep`: how an estimator does over a range of sampling steps.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::ProgressBar;
+use mechid::analysis::identify::KnownMass;
+use mechid::analysis::sweep::{Kind, Settings, SweepSettings, SweepSummary, sweep_record};
+use mechid::io::{Experiment, read_system};
+use mechid::report::ToFigure as _;
+
+use crate::args::choices::SweepEstimatorChoice;
+use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::Outcome;
+
+/// Identify a machine at many sampling steps, and find the step that suits the estimator best
+///
+/// From the description of an experiment (SYSTEM.json, as "mechid simulate" takes it) each setting is
+/// simulated: NPI or a rate replaces the sampling rate and the number of samples in a period stays.
+/// With NPI a period holds that many cycles of the natural frequency, so that the step is
+/// 2π NPI / (samples · ωn). The machine described is the truth that errors are measured against.
+///
+/// Of a measured record every n-th sample is taken, with nothing filtered; columns and window are
+/// chosen as in "mechid identify". Without --reference the standard errors are compared, which know
+/// nothing of bias. A long text is gone through once for all settings, a stretch at a time, and not
+/// held; of spectra one long period is, and the lines that are driven are found in the first 262144
+/// samples.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid sweep examples/machine.json --npi 2,4,8 --estimator euler
+  mechid sweep examples/machine.json --npi 1:0.5:16 --estimator linear --plot sweep.svg
+  mechid sweep examples/machine.json --rate-hz 64,128,256 --estimator held --best
+  mechid sweep examples/machine.csv --force force --displacement displacement --velocity velocity \\
+      --decimate 1:1:4 --reference examples/machine.json")]
+pub struct SweepArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    #[command(flatten)]
+    settings: SettingArgs,
+    /// Natural frequency that NPI counts, in Hz [default: the lowest of the machine]
+    #[arg(long, value_name = "HZ")]
+    natural_frequency_hz: Option<f64>,
+    /// Estimator
+    #[arg(long, value_name = "ESTIMATOR", value_enum, default_value_t = SweepEstimatorChoice::Linear)]
+    estimator: SweepEstimatorChoice,
+    /// Find the mass of a described machine, too; without this it is taken from the description
+    #[arg(long)]
+    unknown_mass: bool,
+    /// Masses, in kg, as for "mechid identify" [default: unknown for a record]
+    #[arg(
+        long,
+        value_name = "KG|unknown,…",
+        allow_hyphen_values = true,
+        conflicts_with = "unknown_mass"
+    )]
+    mass: Option<KnownMass>,
+    /// The machine that errors of a record's estimates are measured against
+    #[arg(long, value_name = "SYSTEM.json")]
+    reference: Option<PathBuf>,
+    /// Print only the best setting and its intervals (--json always lists all)
+    #[arg(long)]
+    best: bool,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+/// Quantity that is swept, and its values: one of these.
+#[derive(Debug, Args)]
+#[group(required = true, multiple = false)]
+struct SettingArgs {
+    /// Cycles of the natural frequency in a period: numbers and ranges first:step:last, such as
+    /// 1:0.5:16
+    #[arg(long, value_name = "NPI,…")]
+    npi: Option<Settings>,
+    /// Sampling rates, in Hz; of a record, the own rate divided by whole numbers
+    #[arg(long, value_name = "HZ,…")]
+    rate_hz: Option<Settings>,
+    /// Take every n-th sample; of an experiment, divide its sampling rate by these
+    #[arg(long, value_name = "N,…")]
+    decimate: Option<Settings>,
+}
+
+impl SettingArgs {
+    /// Returns the settings given, of which the parser demands one kind.
+    fn chosen(&self) -> (Kind, Settings) {
+        match (&self.npi, &self.rate_hz, &self.decimate) {
+            (_, Some(rates), _) => (Kind::RateHz, rates.clone()),
+            (_, _, Some(factors)) => (Kind::Decimation, factors.clone()),
+            (npi, None, None) => (Kind::Npi, npi.clone().unwrap_or_default()),
+        }
+    }
+}
+
+impl SweepArgs {
+    /// Runs all settings and reports which was best.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let described = |ending: &std::ffi::OsStr| ending.eq_ignore_ascii_case("json");
+        let (kind, settings) = self.settings.chosen();
+        let bar = match self.report.quiet {
+            true => ProgressBar::hidden(),
+            // Hides itself where nobody watches.
+            false => ProgressBar::new(settings.0.len() as u64),
+        };
+        let mass = match self.unknown_mass {
+            true => Some(KnownMass::default()),
+            false => self.mass.clone(),
+        };
+        let how = SweepSettings {
+            kind,
+            settings,
+            estimator: self.estimator.into(),
+            mass,
+            natural_frequency_hz: self.natural_frequency_hz,
+        };
+        let found = match self.input.record.extension().is_some_and(described) {
+            true => self.over_experiment(&how, &bar),
+            false => self.over_record(&how, &bar),
+        };
+        bar.finish_and_clear();
+        let found = found?;
+        Outcome::new(found.text(self.best), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+    }
+
+    fn over_experiment(
+        &self,
+        how: &SweepSettings,
+        bar: &ProgressBar,
+    ) -> Result<SweepSummary, CliError> {
+        let why = "belongs to a record; the experiment described has its own";
+        for (option, given) in [
+            ("--force", !self.channels.force.is_empty()),
+            ("--period", self.input.period.is_some()),
+            ("--reference", self.reference.is_some()),
+        ] {
+            if given {
+                return Err(CliError::MisplacedOption { option, why });
+            }
+        }
+        let experiment = Experiment::read(&self.input.record)?;
+        Ok(mechid::sweep(&experiment, how, &|| bar.inc(1))?)
+    }
+
+    fn over_record(
+        &self,
+        how: &SweepSettings,
+        bar: &ProgressBar,
+    ) -> Result<SweepSummary, CliError> {
+        let channels = self.channels.channels();
+        channels.check_pairs()?;
+        let record = self.input.open(&channels)?;
+        let reference = self.reference.as_ref().map(read_system).transpose()?;
+        Ok(sweep_record(&record, how, reference.as_ref(), &|| bar.inc(1))?)
+    }
+}

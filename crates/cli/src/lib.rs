@@ -1,0 +1,64 @@
+//! The `mechid` program as a library, so that other packages can carry it: the only argument parsing,
+//! and the only printing, of the workspace.
+//!
+//! A subcommand is one file of `commands`: arguments become settings of an analysis, its result an
+//! `Outcome`. It neither prints nor gives a file its name: that happens in `outcome`, once everything
+//! has succeeded, so that a failure leaves nothing half written. Every failure ends with one message on
+//! the error stream and exit code 2.
+#![allow(clippy::print_stderr, reason = "the program talks to its user")]
+
+mod args;
+mod commands;
+mod error;
+mod options;
+mod outcome;
+mod progress;
+mod repeat;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser as _;
+
+use crate::commands::Cli;
+use crate::error::CliError;
+
+/// Exit code of every failure; the argument parser uses the same one.
+const FAILURE: u8 = 2;
+
+/// Runs the program with these arguments, the first of which is its name, and returns its exit code.
+///
+/// ```
+/// use std::process::ExitCode;
+///
+/// let arguments = ["mechid", "stability", "--quiet"].map(Into::into);
+/// assert_eq!(mechid_cli::run(arguments), ExitCode::SUCCESS);
+/// ```
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(message) => {
+            // Help and version go to standard output and are no failure.
+            let failed = message.use_stderr() || message.print().is_err();
+            if message.use_stderr() {
+                let _ = message.print();
+            }
+            return if failed { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
+        }
+    };
+    match outcome(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", options::spelled(&error.to_string()));
+            ExitCode::from(FAILURE)
+        }
+    }
+}
+
+fn outcome(cli: &Cli) -> Result<(), CliError> {
+    let outcome = match cli.command.waiting() {
+        Some(message) => progress::watched(message, || cli.command.run())?,
+        None => cli.command.run()?,
+    };
+    outcome.deliver(cli.command.report())
+}

@@ -1,0 +1,36 @@
+//! What can go wrong between a result and its figure or page.
+
+/// A failure to draw or to describe a result.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// The records show no receptance.
+    #[error(
+        "nothing to plot: several forces act on every line, so the record shows no single receptance"
+    )]
+    NoReceptance,
+    /// A record without numbers but those of time.
+    #[error("{file}: nothing to plot: no column other than time holds numbers")]
+    NoColumnToDraw {
+        /// The record.
+        file: String,
+    },
+    /// A mass without a spring.
+    #[error("{file}: nothing to plot: the machine has no natural frequency other than zero")]
+    NothingResonates {
+        /// The machine.
+        file: String,
+    },
+    /// Something cannot be computed.
+    #[error(transparent)]
+    Analysis(#[from] mechid_analysis::AnalysisError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] mechid_plot::PlotError),
+    /// A signal cannot be used.
+    #[error(transparent)]
+    Signal(#[from] mechid_signal::SignalError),
+    /// A model cannot be used.
+    #[error(transparent)]
+    Model(#[from] mechid_model::ModelError),
+}

@@ -1,0 +1,78 @@
+//! Figures of the results of an analysis.
+
+mod force;
+mod frf;
+pub mod modal;
+mod motion;
+pub mod receptance;
+mod record;
+mod sweep;
+pub mod trace;
+
+use mechid_analysis::{FrfTable, Identified, Inspected, Machine, Reconstructed, SweepSummary};
+use mechid_plot::Figure;
+
+use crate::ReportError;
+
+/// A result that can be drawn.
+pub trait ToFigure {
+    /// Returns the usual figure of the result.
+    ///
+    /// # Errors
+    /// [`ReportError::NoReceptance`], [`ReportError::NoColumnToDraw`] or
+    /// [`ReportError::NothingResonates`] if the result has nothing to draw,
+    /// [`ReportError::Analysis`] if a curve cannot be computed.
+    fn figure(&self) -> Result<Figure, ReportError>;
+}
+
+impl ToFigure for Identified {
+    /// Draws measured and identified receptance; for a fit in the time domain measured and predicted
+    /// response of the first record.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        let title = self.summary().title();
+        match self.spectra() {
+            Some(data) => receptance::receptance(&title, data, &self.system()?),
+            None => Ok(motion::motion(&title, &self.compared()?[0])),
+        }
+    }
+}
+
+impl ToFigure for FrfTable {
+    /// Draws magnitude, phase and coherence.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(frf::figure(self))
+    }
+}
+
+impl ToFigure for Reconstructed {
+    /// Draws each force over time with twice its standard error, and its spectrum.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(force::figure(self))
+    }
+}
+
+impl ToFigure for SweepSummary {
+    /// Draws the error over the settings.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(sweep::figure(self))
+    }
+}
+
+impl ToFigure for Inspected {
+    /// Draws columns over time beside their spectra.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        record::figure(self)
+    }
+}
+
+impl ToFigure for Machine {
+    /// Draws the receptance around the natural frequencies.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        let modes = self.modes()?;
+        let resonances: Vec<modal::Resonance> = modes
+            .iter()
+            .map(|mode| (mode.natural_frequency_hz.value, mode.damping_ratio.value))
+            .collect();
+        modal::figure(&self.name, &self.system, &resonances)
+    }
+}

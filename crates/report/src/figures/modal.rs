@@ -1,0 +1,134 @@
+//! The receptance of a machine around its modes.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::text::compact;
+use mechid_model::SecondOrderSystem;
+use mechid_plot::charts::{Quantity, bode};
+use mechid_plot::{Axis, Figure};
+
+use super::trace::Trace;
+use crate::ReportError;
+
+/// Up to so many degrees of freedom every pair of motion and force is drawn, of more the driving
+/// points.
+const PAIRS: usize = 2;
+
+/// Driving points drawn at most: curves have so many colours.
+const DRIVING_POINTS: usize = 6;
+
+/// The picture reaches from the lowest natural frequency over this to the highest times this.
+const BEYOND: f64 = 5.0;
+
+/// Points on the whole axis.
+const COARSE: usize = 600;
+
+/// Points on either side of a mode.
+const BESIDE: u32 = 40;
+
+/// Widths of a resonance from its middle that the points beside it begin and end at. At the middle
+/// itself a machine without damping has no receptance.
+const BESIDE_WIDTHS: (f64, f64) = (0.05, 20.0);
+
+/// Damping ratio that a resonance counts as having at least: one still sharper is cut off at 1e5
+/// times what it would be without resonance.
+const SHARPEST: f64 = 1e-4;
+
+/// A natural frequency below this part of the highest is zero.
+const ROUNDING: f64 = 1e-7;
+
+/// Natural frequencies that a legend tells of by their values.
+const TOLD: usize = 3;
+
+/// A natural frequency, in Hz, with its damping ratio.
+pub type Resonance = (f64, f64);
+
+/// Magnitude above phase, a curve for each pair of motion and force, with the natural frequencies.
+///
+/// # Errors
+/// [`ReportError::NothingResonates`] if the machine has no natural frequency other than zero, and what
+/// makes a receptance impossible.
+pub fn figure(
+    file: &str,
+    system: &SecondOrderSystem,
+    modes: &[Resonance],
+) -> Result<Figure, ReportError> {
+    // A free machine moves at 0 Hz, too, to rounding, where no logarithmic axis reaches.
+    let highest = modes.iter().map(|(hz, _)| *hz).fold(0.0, f64::max);
+    let resonates = |(hz, _): &Resonance| *hz > ROUNDING * highest;
+    let modes: Vec<Resonance> = modes.iter().copied().filter(resonates).collect();
+    if modes.is_empty() {
+        return Err(ReportError::NothingResonates { file: file.into() });
+    }
+    let frequency_hz = grid(&modes);
+    let omega: Vec<f64> = frequency_hz.iter().map(|hz| TAU * hz).collect();
+    let receptances = system.receptances(&omega)?;
+    let pairs = pairs(system);
+    let alone = pairs.len() == 1;
+    let traces = pairs.into_iter().map(|(i, j, name)| {
+        let name = if alone { String::new() } else { name };
+        Trace::continuous(name, omega.iter().zip(&receptances).map(|(w, h)| (*w, h[(i, j)])))
+    });
+    // What no force moves has nothing that a logarithmic axis could show.
+    let traces: Vec<Trace> = traces.filter(|trace| !trace.is_empty()).collect();
+    let curves: Vec<_> = traces.iter().map(Trace::as_response).collect();
+    let title = match system.dof() {
+        dof if dof > DRIVING_POINTS => {
+            format!("{file}, driving points 1 to {DRIVING_POINTS} of {dof}")
+        }
+        _ => file.to_owned(),
+    };
+    let natural: Vec<f64> = modes.iter().map(|(hz, _)| *hz).collect();
+    let axis = Axis::log10("Frequency", "Hz");
+    let drawn = bode(&title, axis, Quantity::new("Receptance", "m/N"), &[], &curves);
+    Ok(drawn.mark_x(&label(&natural), &natural))
+}
+
+/// Motion, force, and the name of each curve.
+fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
+    let dof = system.dof();
+    let name = |i: usize, j: usize| format!("x{}/F{}", i + 1, j + 1);
+    if dof > PAIRS {
+        return (0..dof.min(DRIVING_POINTS)).map(|i| (i, i, name(i, i))).collect();
+    }
+    // By reciprocity motion and place of the force can be exchanged.
+    let reciprocal = [system.mass(), system.damping(), system.stiffness()]
+        .into_iter()
+        .all(|matrix| *matrix == matrix.transpose());
+    let all = (0..dof).flat_map(|i| (0..dof).map(move |j| (i, j)));
+    all.filter(|(i, j)| !reciprocal || i <= j)
+        .map(|(i, j)| match reciprocal && i != j {
+            true => (i, j, format!("{} = {}", name(i, j), name(j, i))),
+            false => (i, j, name(i, j)),
+        })
+        .collect()
+}
+
+fn label(natural: &[f64]) -> String {
+    let told: Vec<String> = natural.iter().map(|hz| compact(*hz, 5)).collect();
+    match told.len() {
+        1 => format!("natural frequency, {} Hz", told[0]),
+        len if len <= TOLD => format!("natural frequencies, {} Hz", told.join(", ")),
+        _ => "natural frequencies".into(),
+    }
+}
+
+/// Frequencies, in Hz, from below the modes to above them, closer together at a resonance.
+fn grid(modes: &[Resonance]) -> Vec<f64> {
+    let lowest = modes.iter().map(|(hz, _)| *hz).fold(f64::INFINITY, f64::min) / BEYOND;
+    let highest = modes.iter().map(|(hz, _)| *hz).fold(0.0, f64::max) * BEYOND;
+    let step = (highest / lowest).ln() / COARSE as f64;
+    let mut grid: Vec<f64> = (0..=COARSE).map(|k| lowest * (step * k as f64).exp()).collect();
+    let width = |ratio: f64| ratio.abs().max(SHARPEST);
+    let (nearest, farthest) = BESIDE_WIDTHS;
+    let growth = (farthest / nearest).powf(1.0 / f64::from(BESIDE));
+    for (hz, ratio) in modes {
+        let apart = (0..=BESIDE).map(|k| width(*ratio) * nearest * growth.powf(f64::from(k)));
+        grid.extend(apart.flat_map(|apart| [hz * (1.0 - apart), hz * (1.0 + apart)]));
+    }
+    let clear =
+        |f: f64| modes.iter().all(|(hz, _)| (f / hz - 1.0).abs() > 0.99 * nearest * SHARPEST);
+    grid.retain(|f| (lowest..=highest).contains(f) && clear(*f));
+    grid.sort_by(f64::total_cmp);
+    grid
+}

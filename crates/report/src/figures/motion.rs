@@ -1,0 +1,47 @@
+//! Measured and predicted motion over time, and what is left.
+
+use mechid_analysis::identify::prediction::Compared;
+use mechid_plot::{Axis, Color, Curve, Figure, Panel};
+
+/// Samples that a picture shows at most: more than it has dots.
+const SHOWN: usize = 4000;
+
+/// The first kind of motion, measured and predicted, above the residual, for every degree of
+/// freedom.
+pub fn motion(title: &str, compared: &Compared) -> Figure {
+    let (measured, predicted) = (&compared.measured, &compared.predicted);
+    let shown = measured.len().min(SHOWN);
+    let time: Vec<f64> = measured.sampling().times().take(shown).collect();
+    let unit = match compared.kind {
+        mechid_estimate::frequency_domain::Motion::Displacement => "m",
+        mechid_estimate::frequency_domain::Motion::Velocity => "m/s",
+        mechid_estimate::frequency_domain::Motion::Acceleration => "m/s²",
+    };
+    let mut name = compared.kind.to_string();
+    name[..1].make_ascii_uppercase();
+    let mut figure = Figure::new(match shown < measured.len() {
+        true => format!("{title}; the first {shown} samples"),
+        false => title.to_owned(),
+    });
+    for channel in 0..measured.channels() {
+        let number = match measured.channels() {
+            1 => String::new(),
+            _ => format!(" {}", channel + 1),
+        };
+        let (x, model) =
+            (&measured.channel(channel)[..shown], &predicted.channel(channel)[..shown]);
+        let left: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
+        let axis = || Axis::linear("Time", "s");
+        figure = figure
+            .panel(
+                Panel::new(axis(), Axis::linear(format!("{name}{number}"), unit))
+                    .curve(Curve::line("measured", &time, x).color(Color::GREY).width(2.4))
+                    .curve(Curve::line("predicted", &time, model).color(Color::VERMILION)),
+            )
+            .panel(
+                Panel::new(axis(), Axis::linear(format!("Residual{number}"), unit))
+                    .curve(Curve::line("", &time, &left)),
+            );
+    }
+    figure.share_x()
+}

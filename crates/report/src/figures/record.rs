@@ -1,0 +1,103 @@
+//! Columns over time beside their spectra.
+
+use mechid_analysis::Inspected;
+use mechid_analysis::inspect::Drawn;
+use mechid_plot::{Axis, Color, Curve, Figure, Panel};
+use mechid_signal::counted;
+
+use crate::ReportError;
+
+/// The axis of the amplitudes reaches down to no less than this part of the strongest: below it is
+/// rounding.
+const FAINTEST: f64 = 1e-5;
+
+/// It reaches down to at least this part.
+const REACH: f64 = 1e-2;
+
+/// Characters of a title that have room above a panel.
+const ROOM: usize = 40;
+
+/// Returns a row of panels for each column: all of the window on the left, amplitudes on the right.
+///
+/// # Errors
+/// [`ReportError::NoColumnToDraw`].
+pub fn figure(inspected: &Inspected) -> Result<Figure, ReportError> {
+    let file = &inspected.summary().file;
+    if inspected.drawn().is_empty() {
+        return Err(ReportError::NoColumnToDraw { file: file.clone() });
+    }
+    let title = match inspected.spectral_samples() {
+        Some((first, last)) => format!("{file}; spectra of samples {first} to {last}"),
+        None => file.clone(),
+    };
+    let dt = inspected.dt();
+    let columns = inspected.drawn().iter();
+    let rows = columns.flat_map(|column| [history(column, dt), spectrum(column, dt)]);
+    Ok(rows.fold(Figure::new(title), Figure::panel).columns(2).share_x())
+}
+
+fn history(column: &Drawn, dt: Option<f64>) -> Panel {
+    let points = column.extremes.points();
+    let (axis, (x, y)): (_, (Vec<f64>, Vec<f64>)) = match dt {
+        Some(dt) => (
+            Axis::linear("Time in the window", "s"),
+            points.map(|(k, value)| (k as f64 * dt, value)).unzip(),
+        ),
+        None => (
+            Axis::linear("Sample", ""),
+            points.map(|(k, value)| ((column.start + k + 1) as f64, value)).unzip(),
+        ),
+    };
+    Panel::new(axis, Axis::linear("Value", unit(column)))
+        .title(shortened(&column.name))
+        .curve(Curve::line("", &x, &y).width(1.0))
+}
+
+fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
+    let per_second = |cycles: f64| dt.map_or(cycles, |dt| cycles / dt);
+    let unit_of_frequency = if dt.is_some() { "Hz" } else { "cycles/sample" };
+    let half = per_second(0.5);
+    let frequency = Axis::linear("Frequency", unit_of_frequency).range(0.0, half);
+    let points = column.lines.points().filter(|(_, amplitude)| *amplitude > 0.0);
+    let mut points: Vec<(f64, f64)> = points.map(|(cycles, a)| (per_second(cycles), a)).collect();
+    let panel = |y: Axis, title: String, curve: Curve| {
+        Panel::new(frequency, y).title(title).curve(curve.color(Color::VERMILION))
+    };
+    let Some((low, high)) = reach(&points) else {
+        let nothing = Curve::line("", &[0.0, half], &[0.0, 0.0]);
+        return panel(Axis::linear("Amplitude", unit(column)), "constant".into(), nothing);
+    };
+    let period = column.lines.period();
+    if period.is_some() {
+        // A stem of rounding has no length; a line goes on below the axis.
+        points.retain(|(_, amplitude)| *amplitude > low);
+    }
+    let (hz, amplitude): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
+    let (title, curve) = match period {
+        Some(period) => {
+            (format!("period of {}", counted(period, "sample")), Curve::stems("", &hz, &amplitude))
+        }
+        None => ("Hann window, no period".into(), Curve::line("", &hz, &amplitude).width(1.0)),
+    };
+    panel(Axis::log10("Amplitude", unit(column)).range(low, high), title, curve)
+}
+
+/// What an axis of these amplitudes shows; nothing without any.
+fn reach(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let amplitudes = points.iter().map(|(_, amplitude)| *amplitude);
+    let strongest = amplitudes.clone().reduce(f64::max)?;
+    let faintest =
+        amplitudes.filter(|a| *a > FAINTEST * strongest).fold(REACH * strongest, f64::min);
+    Some((faintest / 1.5, strongest * 1.5))
+}
+
+fn unit(column: &Drawn) -> &'static str {
+    column.unit.map_or("", |unit| unit.name)
+}
+
+fn shortened(name: &str) -> String {
+    match name.chars().count() <= ROOM {
+        true => name.to_owned(),
+        false => name.chars().take(ROOM - 1).chain(['…']).collect(),
+    }
+}

@@ -1,0 +1,23 @@
+//! Error of a sweep over its settings.
+
+use mechid_analysis::SweepSummary;
+use mechid_plot::charts::{self, Quantity, Series};
+use mechid_plot::{Axis, Figure};
+
+/// Returns the error over the settings.
+pub fn figure(swept: &SweepSummary) -> Figure {
+    let found = || swept.points.iter().filter_map(|p| Some((p.setting, 100.0 * p.error?)));
+    let (x, y): (Vec<f64>, Vec<f64>) = found().unzip();
+    let (name, unit) = swept.setting.label();
+    let error = match swept.has_reference() {
+        true => "Worst error",
+        false => "Worst standard error",
+    };
+    charts::sweep(
+        &format!("Error over {name}: {}", swept.estimator),
+        Axis::linear(name, unit),
+        Quantity::new(error, "%"),
+        &[Series::new(swept.estimator, &x, &y)],
+        None,
+    )
+}

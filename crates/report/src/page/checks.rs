@@ -1,0 +1,21 @@
+//! Lists of checks with their verdicts.
+
+use maud::{Markup, html};
+use mechid_analysis::identify::checks::CheckRow;
+
+use super::Contents;
+
+/// Checks before or after the fit, with their verdicts.
+pub fn list(contents: &Contents<'_>, when: &str) -> Markup {
+    let checks: Vec<&CheckRow> =
+        contents.review.found.summary().checks.iter().filter(|check| check.when == when).collect();
+    html! {
+        @if !checks.is_empty() {
+            ul.checks {
+                @for check in checks {
+                    li { strong class={ "verdict " (check.verdict) } { (check.verdict) } " " (check.subject) ": " (check.sentence()) }
+                }
+            }
+        }
+    }
+}

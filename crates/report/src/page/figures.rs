@@ -1,0 +1,305 @@
+//! The pictures of the report.
+
+use mechid_analysis::Motion;
+use mechid_analysis::identify::Identified;
+use mechid_analysis::identify::prediction::Compared;
+use mechid_analysis::measurement::Block;
+use mechid_analysis::review::RecordReview;
+use mechid_analysis::review::receptance::Receptance;
+use mechid_analysis::review::reconstruction::Reconstruction;
+use mechid_analysis::review::residual::{Correlations, Residual};
+use mechid_analysis::review::whole::Gathered;
+use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
+use mechid_signal::{Record, Spectrum};
+
+use super::Captions as _;
+use crate::ReportError;
+use crate::figures::receptance as picture;
+
+/// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
+/// one can still be read.
+const WIDTH: f64 = 480.0;
+
+/// Height of a panel with its labels, px.
+const PANEL: f64 = 210.0;
+
+/// A picture with its words.
+pub struct Drawn {
+    pub id: String,
+    pub svg: String,
+    pub caption: String,
+}
+
+fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, ReportError> {
+    let panels = figure.panels();
+    // Many curves have a legend of several rows.
+    let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
+    let height = PANEL * (panels.len() as f64).max(1.5) + 12.0 * curves as f64;
+    let figure = figure.size(WIDTH, height);
+    let svg = figure.to_inline_svg(&id, &caption)?;
+    Ok(Drawn { id, svg, caption })
+}
+
+/// Symbol and unit of a kind of motion.
+pub fn symbol(kind: ResponseQuantity) -> (&'static str, &'static str) {
+    match kind {
+        ResponseQuantity::Displacement => ("Displacement", "m"),
+        ResponseQuantity::Velocity => ("Velocity", "m/s"),
+        ResponseQuantity::Acceleration => ("Acceleration", "m/s²"),
+    }
+}
+
+/// `name`, numbered where there are several.
+fn numbered(name: &str, dof: usize, dofs: usize) -> String {
+    if dofs == 1 { name.into() } else { format!("{name} {}", dof + 1) }
+}
+
+fn times(record: &Record) -> Vec<f64> {
+    record.sampling().times().collect()
+}
+
+/// Time history of the window above the amplitudes of its mean period, of each channel; `held` are
+/// the samples to draw where these are all.
+fn history(
+    name: (&str, &str),
+    (held, whole): (&Record, &Gathered),
+    period: &Record,
+    channels: &[usize],
+) -> Figure {
+    let spectrum = Spectrum::of(period);
+    let hz: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
+    let mut figure = Figure::new("");
+    for &c in channels {
+        let label = numbered(name.0, c, held.channels());
+        let (t, values) = whole.history(held, c);
+        let time =
+            Panel::new(Axis::linear("Time in the window", "s"), Axis::linear(&label, name.1));
+        figure = figure.panel(time.curve(Curve::line("", &t, &values).width(1.0)));
+        let amplitude: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.line(n, c).norm()).collect();
+        let axis = Axis::linear(numbered("Amplitude", c, held.channels()), name.1);
+        let stems = Curve::stems("", &hz, &amplitude).color(Color::VERMILION);
+        figure = figure.panel(Panel::new(Axis::linear("Frequency", "Hz"), axis).curve(stems));
+    }
+    figure
+}
+
+/// A thin line over the thick one that it should hide.
+fn overlay(t: &[f64], measured: &[f64], name: &str, own: &[f64]) -> [Curve; 2] {
+    [
+        Curve::line("measured", t, measured).color(Color::GREY).width(2.6),
+        Curve::line(name, t, own).color(Color::BLUE).width(1.1).dash(Dash::Solid),
+    ]
+}
+
+/// Time histories and spectra of force and motion.
+pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
+    let (held, period) = (part.held(), part.period());
+    let (motion, kind) = held.response();
+    let of = match (&part.lines, held.periods) {
+        (Some(_), 1) => "the period".into(),
+        (Some(_), _) => "the mean period".into(),
+        (None, _) => match held.held_to() {
+            None => "the window taken as one period".into(),
+            Some(last) => {
+                format!("samples {} to {last} taken as one period", held.first_sample)
+            }
+        },
+    };
+    let all: Vec<usize> = (0..motion.channels()).collect();
+    let of_force = (&held.force, &part.whole.force);
+    let of_motion = (motion, &part.whole.motions[0]);
+    Ok(vec![
+        drawn(
+            part.id("force"),
+            history(("Force", "N"), of_force, &period.force, &held.driven),
+            format!("Measured force: time history of the window, and line amplitudes of {of}."),
+        )?,
+        drawn(
+            part.id("motion"),
+            history(symbol(kind), of_motion, period.response().0, &all),
+            format!("Measured {kind}: time history of the window, and line amplitudes of {of}."),
+        )?,
+    ])
+}
+
+/// Measured and identified receptance.
+///
+/// # Errors
+/// [`ReportError::NothingToDraw`].
+pub fn receptance(found: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
+    let figure = picture::receptance("", &measured.data, &found.system()?)?;
+    let origin = &measured.origin;
+    let caption = format!(
+        "Receptance, motion over force: that of the identified machine, and that of the record, {origin}."
+    );
+    drawn("receptance".into(), figure, caption)
+}
+
+/// Measured and modelled motion with what is left, over one period or the whole open record.
+pub fn fit(part: &RecordReview<'_>, compared: &Compared) -> Result<Drawn, ReportError> {
+    let held = part.held();
+    let extent = extent(held);
+    let caption = format!(
+        "Measured {} and that of the identified machine under the measured force {extent}; below, their difference.",
+        compared.kind
+    );
+    over_time(part.id("fit"), compared, shown(held), caption)
+}
+
+/// The same of a record that was not fitted.
+pub fn validation(source: &Block, compared: &Compared) -> Result<Drawn, ReportError> {
+    let extent = extent(source);
+    let caption = format!(
+        "{}: measured {} and the one predicted {extent}; below, their difference.",
+        source.file, compared.kind
+    );
+    over_time("validation".into(), compared, shown(source), caption)
+}
+
+/// Samples of a motion in time that are drawn.
+fn shown(source: &Block) -> usize {
+    source.period.min(source.force.len())
+}
+
+fn extent(source: &Block) -> String {
+    let (first, shown) = (source.first_sample, shown(source));
+    match source.periods {
+        _ if shown < source.period => format!("over samples {first} to {}", first + shown - 1),
+        1 => "over the window".into(),
+        _ => "over the first period".into(),
+    }
+}
+
+/// The first samples of a motion, measured and modelled, above their difference.
+fn over_time(
+    id: String,
+    compared: &Compared,
+    samples: usize,
+    caption: String,
+) -> Result<Drawn, ReportError> {
+    let (label, unit) = symbol(compared.kind);
+    let measured = compared.measured.window(0, samples)?;
+    let modelled = compared.predicted.window(0, samples)?;
+    let t = times(&measured);
+    let mut figure = Figure::new("").share_x();
+    for c in 0..measured.channels() {
+        let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), unit);
+        let time = || Axis::linear("Time in the window", "s");
+        let (x, own) = (measured.channel(c), modelled.channel(c));
+        let left: Vec<f64> = x.iter().zip(own).map(|(x, own)| x - own).collect();
+        let both = Panel::new(time(), axis(label))
+            .curves(overlay(&t, x, "modelled", own))
+            .legend(Legend::Above);
+        let rest = Curve::line("", &t, &left).color(Color::VERMILION).width(1.0);
+        figure = figure.panel(both).panel(Panel::new(time(), axis("Residual")).curve(rest));
+    }
+    drawn(id, figure, caption)
+}
+
+/// Amplitudes of motion and residual, on the lines used or all.
+pub fn residual_spectrum(
+    part: &RecordReview<'_>,
+    residual: &Residual,
+) -> Result<Drawn, ReportError> {
+    let compared = residual.mean.as_ref().unwrap_or(&residual.compared[0]);
+    let motion = &compared.measured;
+    let left = Record::new(motion.sampling(), motion.data() - compared.predicted.data())?;
+    let (motion, left) = (Spectrum::of(motion), Spectrum::of(&left));
+    let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
+    shown.sort_unstable();
+    let (_, unit) = symbol(compared.kind);
+    let mut figure = Figure::new("");
+    for c in 0..motion.channels() {
+        let points = |spectrum: &Spectrum| -> (Vec<f64>, Vec<f64>) {
+            let point = |n: &usize| (spectrum.frequency_hz(*n), spectrum.line(*n, c).norm());
+            // A logarithmic axis has no place for nothing.
+            shown.iter().map(point).filter(|(_, amplitude)| *amplitude > 0.0).unzip()
+        };
+        let axis = Axis::log10(numbered("Amplitude", c, motion.channels()), unit);
+        let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), axis).legend(Legend::Above);
+        for (name, spectrum, slot) in [("measured", &motion, 0), ("residual", &left, 1)] {
+            let (hz, amplitude) = points(spectrum);
+            if !hz.is_empty() {
+                panel = panel.curve(Curve::points(name, &hz, &amplitude).slot(slot));
+            }
+        }
+        figure = figure.panel(panel);
+    }
+    drawn(
+        part.id("residual-spectrum"),
+        figure,
+        format!(
+            "{}: noise lies flat, what the model misses has the shape of a resonance or of the force.",
+            part.of_period(&format!(
+                "Spectra of the measured {} and of the residual",
+                compared.kind
+            ))
+        ),
+    )
+}
+
+/// Correlation of what the fit leaves with itself and with the forces.
+pub fn correlations(part: &RecordReview<'_>, found: &[Correlations]) -> Result<Drawn, ReportError> {
+    let dofs = found.len();
+    let mut figure = Figure::new("");
+    for (c, channel) in found.iter().enumerate() {
+        let own = (1, "Autocorrelation".to_owned(), &channel.own);
+        let forces = channel.forces.iter().map(|(force, found)| {
+            let first = -((found.coefficients.len() / 2) as i32);
+            (first, numbered("With the force", *force, dofs), found)
+        });
+        for (first, name, found) in std::iter::once(own).chain(forces) {
+            let lags: Vec<f64> = (first..).take(found.coefficients.len()).map(f64::from).collect();
+            let label = numbered(&name, c, dofs);
+            let panel = Panel::new(Axis::linear("Lag", "samples"), Axis::linear(label, ""))
+                .curve(Curve::stems("", &lags, &found.coefficients).color(Color::BLUE))
+                .reference(Reference::horizontal("95 % of white noise", found.bound))
+                .reference(Reference::horizontal("", -found.bound))
+                .legend(Legend::Above);
+            figure = figure.panel(panel);
+        }
+    }
+    let spanned = match found.iter().map(|channel| channel.span).max() {
+        None | Some(0) => String::new(),
+        Some(span) => format!(" Noise on the motion correlates it over {span} lags by itself."),
+    };
+    let caption = format!(
+        "{}; 95 % of the stems of white noise stay between the dashed lines.{spanned}",
+        part.of_held("Autocorrelation of what the fit leaves, and its correlation with the force")
+    );
+    drawn(part.id("correlations"), figure, caption)
+}
+
+/// The force found and the one measured.
+pub fn force(
+    part: &RecordReview<'_>,
+    reconstruction: &Reconstruction,
+) -> Result<Drawn, ReportError> {
+    let (found, measured) = (reconstruction.found.record(), &reconstruction.measured);
+    let t = times(measured);
+    let mut figure = Figure::new("").share_x();
+    for &c in &reconstruction.forced {
+        let (own, truth) = (found.channel(c), measured.channel(c));
+        let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), "N");
+        let time = || Axis::linear("Time in the window", "s");
+        let both = Panel::new(time(), axis("Force"))
+            .curves(overlay(&t, truth, "found from the motion", own))
+            .legend(Legend::Above);
+        let apart: Vec<f64> = own.iter().zip(truth).map(|(f, m)| f - m).collect();
+        let mut below = Panel::new(time(), axis("Difference"));
+        if let Some(error) = reconstruction.found.standard_error() {
+            let upper: Vec<f64> = error.channel(c).iter().map(|e| 2.0 * e).collect();
+            let lower: Vec<f64> = upper.iter().map(|e| -e).collect();
+            below = below
+                .curve(Curve::band("± 2 standard errors", &t, &lower, &upper))
+                .legend(Legend::Above);
+        }
+        let difference = Curve::line("", &t, &apart).color(Color::VERMILION).width(1.0);
+        figure = figure.panel(both).panel(below.curve(difference));
+    }
+    drawn(
+        part.id("reconstructed-force"),
+        figure,
+        part.of_period("Force found from the motion with the identified machine, and the measured one; below, their difference") + ".",
+    )
+}

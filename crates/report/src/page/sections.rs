@@ -1,0 +1,364 @@
+//! The sections of the report.
+
+use maud::{Markup, html};
+use mechid_analysis::identify::summary::{IdentificationSummary, Uncertain};
+use mechid_analysis::identify::validation::Share;
+use mechid_analysis::review::channels::Channel;
+use mechid_analysis::review::excitation::{DROP_DB, Excitation};
+use mechid_analysis::review::reconstruction::Reconstruction;
+use mechid_analysis::review::residual::{Residual, sizes};
+use mechid_analysis::review::{RecordReview, judgement};
+use mechid_analysis::text::{compact, significant};
+use mechid_signal::counted;
+
+use super::tables::Table;
+use super::{Captions as _, Contents, checks, figure, figures};
+use crate::ReportError;
+
+pub fn percent(share: f64) -> String {
+    format!("{} %", significant(100.0 * share, 3))
+}
+
+fn or_dash(value: Option<String>) -> String {
+    value.unwrap_or_else(|| "–".into())
+}
+
+fn pair(name: &str, value: impl Into<String>) -> Vec<String> {
+    vec![name.into(), value.into()]
+}
+
+/// Something of every record, below its name where there are several.
+fn of_each(
+    contents: &Contents<'_>,
+    show: impl Fn(&RecordReview<'_>) -> Result<Markup, ReportError>,
+) -> Result<Markup, ReportError> {
+    let shown: Vec<Markup> = contents.review.records.iter().map(show).collect::<Result<_, _>>()?;
+    Ok(html! {
+        @for (part, shown) in contents.review.records.iter().zip(&shown) {
+            @if let Some(name) = part.name { h3 { (name) } }
+            (shown)
+        }
+    })
+}
+
+/// What is in the records.
+pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
+    let records = of_each(contents, |part| {
+        let header =
+            ["column", "what it is", "unit", "mean", "RMS", "peak", "crest factor", "not repeated"];
+        let rows = part.channels.iter().map(channel_row).collect();
+        let drawn = figures::data(part)?;
+        Ok(html! {
+            div.tables {
+                (Table { caption: "The record", header: &[], numbers_from: 9, rows: facts(contents, part) }.html())
+                (Table { caption: "Channels over the window", header: &header, numbers_from: 3, rows }.html())
+            }
+            @for remark in &part.held().unit_remarks { p.note { (remark) "." } }
+            @if let Some(note) = part_held(part) { p.note { (note) } }
+            div.figures { @for drawn in &drawn { (figure(drawn)) } }
+        })
+    })?;
+    Ok(html! {
+        (records)
+        p.note { "Crest factor: peak over RMS. Not repeated: RMS of what differs from period to period over RMS of what repeats." }
+    })
+}
+
+/// What the page says of all samples and what of a part, where the record is long.
+fn part_held(part: &RecordReview<'_>) -> Option<String> {
+    let (first, last) = (part.held().first_sample, part.held().held_to()?);
+    Some(format!(
+        "The record is long: levels, time histories and what is averaged over periods or segments are those of all \
+         samples used. What is told of single samples (the residual in time, its correlations, checks of it) \
+         is that of samples {first} to {last}; captions say where else."
+    ))
+}
+
+fn facts(contents: &Contents<'_>, part: &RecordReview<'_>) -> Vec<Vec<String>> {
+    let measured = part.held();
+    let (first, last) = (measured.first_sample, measured.last_sample());
+    let (samples, rate) = (last + 1 - first, measured.force.sampling().rate_hz());
+    let mut facts = vec![
+        pair("File", &measured.file),
+        pair("Samples used", format!("{first} to {last}")),
+        pair("Sample rate", format!("{} Hz", compact(rate, 8))),
+        pair("Duration", format!("{} s", compact(samples as f64 / rate, 6))),
+    ];
+    if let Some((lines, _)) = &contents.review.found.fitted().frequency {
+        let len = lines.sampling().len();
+        facts.push(match part.lines {
+            Some(_) => {
+                pair("Periods", format!("{} of {}", measured.periods, counted(len, "sample")))
+            }
+            None => pair("Segments", format!("of {}", counted(len, "sample"))),
+        });
+        let spacing = lines.sampling().line_spacing_hz();
+        facts.push(pair("Line spacing", format!("{} Hz", compact(spacing, 6))));
+    }
+    facts
+}
+
+fn channel_row(channel: &Channel) -> Vec<String> {
+    let mut row = vec![
+        channel.column.clone(),
+        match channel.dof {
+            Some(dof) => format!("{} {dof}", channel.quantity),
+            None => channel.quantity.into(),
+        },
+        channel.unit.into(),
+    ];
+    row.extend([channel.mean, channel.rms, channel.peak].map(|value| significant(value, 4)));
+    row.push(or_dash(channel.crest_factor.map(|factor| significant(factor, 3))));
+    row.push(or_dash(channel.scatter.map(percent)));
+    row
+}
+
+/// Whether the force suits.
+pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
+    let header = [
+        "force",
+        "crest factor",
+        "peak factor",
+        "excited lines",
+        "from … to (Hz)",
+        "flatness",
+        "persistence (order)",
+    ];
+    let records = of_each(contents, |part| {
+        let rows = part.excitations.iter().map(excitation_row).collect();
+        let caption = part.of_period("Quality of the excitation");
+        Ok(Table { caption: &caption, header: &header, numbers_from: 1, rows }.html())
+    })?;
+    Ok(html! {
+        (records)
+        p.note {
+            "Peak factor: half the range over √2 times the RMS, 1 for a sine. Excited lines are those within "
+            (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
+             excitation is the number of parameters that they can tell apart."
+        }
+        (checks::list(contents, "before"))
+    })
+}
+
+fn excitation_row(e: &Excitation) -> Vec<String> {
+    let band = e.band.map(|b| format!("{} to {}", compact(b.low_hz, 5), compact(b.high_hz, 5)));
+    vec![
+        e.dof.to_string(),
+        significant(e.crest_factor, 3),
+        or_dash(e.peak_factor.map(|factor| significant(factor, 3))),
+        e.lines.to_string(),
+        or_dash(band),
+        or_dash(e.flatness.map(|flatness| significant(flatness, 3))),
+        e.order.to_string(),
+    ]
+}
+
+fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
+    let mut row = vec![name];
+    row.extend(value.cells());
+    row.push(unit.into());
+    row
+}
+
+/// Parameters and modes.
+pub fn machine(contents: &Contents<'_>) -> Markup {
+    let report = contents.review.found.summary();
+    let interval = format!("{} % interval", compact(100.0 * report.confidence, 3));
+    let header = |what| [what, "value", "standard error", &interval, "unit"];
+    let parameters =
+        report.parameters.iter().map(|p| uncertain(p.name.clone(), &p.estimate, p.unit)).collect();
+    let mut modes = Vec::new();
+    for (number, mode) in (1..).zip(&report.modes) {
+        let name = |what: &str| format!("{number} {what}");
+        modes.push(uncertain(name("natural frequency"), &mode.natural_frequency_hz, "Hz"));
+        modes.push(uncertain(name("damped frequency"), &mode.damped_frequency_hz, "Hz"));
+        modes.push(uncertain(name("damping ratio"), &mode.damping_ratio, "–"));
+    }
+    html! {
+        div.tables {
+            (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
+            (Table { caption: "Modes", header: &header("mode"), numbers_from: 1, rows: modes }.html())
+            (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
+        }
+        @for remark in &contents.review.found.fitted().remarks { p.note { "How it was done: " (remark) "." } }
+    }
+}
+
+fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
+    let report: &IdentificationSummary = contents.review.found.summary();
+    let fit = &report.fit;
+    let mut rows = vec![pair("Estimator", report.estimator)];
+    if let Some(lines) = &report.lines {
+        let [low, high] = [lines.first_hz, lines.last_hz].map(|hz| compact(hz, 5));
+        let (count, first, last) = (lines.count, lines.first, lines.last);
+        let text = format!("{count}, between {first} and {last} ({low} to {high} Hz)");
+        rows.push(pair("Lines", text));
+    }
+    rows.push(pair("Residual of the fit (NRMSE)", percent(fit.nrmse)));
+    if let Some(part) = fit.unexplained_motion {
+        rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
+    }
+    if let Some(misfit) = &contents.review.found.fitted().misfit {
+        let what = format!("Power of the residual over what {} explains", misfit.noise);
+        rows.push(pair(&what, significant(misfit.ratio, 4)));
+    }
+    rows.push(pair("Condition number", significant(fit.condition_number, 3)));
+    let equations = format!("{} for {} unknowns", fit.equations, fit.unknowns);
+    rows.push(pair("Equations for each degree of freedom", equations));
+    rows
+}
+
+/// The frequency response, and the motion in time.
+pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
+    let several = "on every line several forces act, so the record shows no single one";
+    let receptance = match &contents.review.receptance {
+        Err(reason) => Err(reason.as_str()),
+        Ok(measured) => match figures::receptance(contents.review.found, measured) {
+            Err(ReportError::NoReceptance) => Err(several),
+            drawn => Ok(drawn?),
+        },
+    };
+    let mut fits = Vec::new();
+    for part in &contents.review.records {
+        if let Ok(residual) = &part.residual {
+            fits.push(figures::fit(part, &residual.compared[0])?);
+        }
+    }
+    Ok(html! {
+        @if let Err(reason) = &receptance { p.note { "No receptance: " (reason) "." } }
+        div.figures {
+            @if let Ok(drawn) = &receptance { (figure(drawn)) }
+            @for drawn in &fits { (figure(drawn)) }
+        }
+    })
+}
+
+/// Whether what is left is noise.
+pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
+    let records = of_each(contents, |part| match &part.residual {
+        Ok(residual) => residual_of(part, residual),
+        Err(reason) => Ok(html! { p.note { "There is no residual to judge: " (reason) } }),
+    })?;
+    Ok(html! {
+        p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
+        (records)
+        (checks::list(contents, "after"))
+        @if contents.review.found.summary().checks.iter().any(|check| check.when == "after") {
+            p.note {
+                "p is the share of experiments with nothing but noise left that look as bad. The test \
+                 against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."
+            }
+        }
+    })
+}
+
+fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, ReportError> {
+    let mut drawn = vec![figures::residual_spectrum(part, residual)?];
+    if !residual.correlations.is_empty() {
+        drawn.push(figures::correlations(part, &residual.correlations)?);
+    }
+    let header = ["motion", "unit", "RMS", "residual, RMS", "residual / motion"];
+    let mut rows = Vec::new();
+    for compared in &residual.compared {
+        let channels = compared.measured.channels();
+        for channel in 0..channels {
+            let (size, left) = sizes(compared, channel);
+            let number = if channels > 1 { format!(" {}", channel + 1) } else { String::new() };
+            rows.push(vec![
+                format!("{}{number}", compared.kind),
+                figures::symbol(compared.kind).1.into(),
+                significant(size, 4),
+                significant(left, 4),
+                or_dash((size > 0.0).then(|| percent(left / size))),
+            ]);
+        }
+    }
+    Ok(html! {
+        (Table { caption: &part.of_held("What is left of the motion"), header: &header, numbers_from: 2, rows }.html())
+        div.figures { @for drawn in &drawn { (figure(drawn)) } }
+    })
+}
+
+/// A record that was not fitted.
+pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
+    let found = contents.review.found;
+    let (Some(validation), Some(source), Some(first)) = (
+        &found.summary().validation,
+        contents.review.validated(),
+        contents.review.validation.first(),
+    ) else {
+        return Ok(None);
+    };
+    let drawn = figures::validation(source, first)?;
+    let several = source.force.channels() > 1;
+    let row = |share: &Share| {
+        let number = if several { format!(" {}", share.degree_of_freedom) } else { String::new() };
+        pair(
+            &format!("{}{number}", share.quantity),
+            format!("{} %", significant(share.fit_percent, 4)),
+        )
+    };
+    let rows = validation.channels.iter().map(row).collect();
+    let (first_sample, last_sample) = (validation.first_sample, validation.last_sample);
+    Ok(Some(html! {
+        p {
+            "The identified machine under the force of " (validation.file) ", samples " (first_sample) " to " (last_sample)
+            ", against the motion measured there."
+            @if judgement::was_fitted(contents.review) { " Some of these samples were fitted, so agreement proves little." }
+        }
+        (Table { caption: "What is predicted", header: &["motion", "fit"], numbers_from: 1, rows }.html())
+        p.note { "Fit: 100 % less the size of the difference over that of the motion about its mean; 0 % is no better than the mean." }
+        div.figures { (figure(&drawn)) }
+    }))
+}
+
+/// The force found from the motion.
+pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
+    if contents.review.records.iter().all(|part| part.reconstruction.is_none()) {
+        return Ok(None);
+    }
+    let records = of_each(contents, |part| match &part.reconstruction {
+        Some(found) => reconstruction_of(part, found),
+        None => Ok(html! {}),
+    })?;
+    Ok(Some(html! {
+        (records)
+        p.note {
+            "The machine was fitted to the same record, so agreement says that the fit is consistent, not that \
+             another record would do as well."
+        }
+    }))
+}
+
+fn reconstruction_of(
+    part: &RecordReview<'_>,
+    found: &Reconstruction,
+) -> Result<Markup, ReportError> {
+    let drawn = figures::force(part, found)?;
+    let rms = |record: &mechid_signal::Record, dof: usize| {
+        significant(mechid_signal::measures::rms(record.channel(dof)), 4)
+    };
+    let row = |&dof: &usize| {
+        vec![
+            (dof + 1).to_string(),
+            rms(&found.measured, dof),
+            rms(found.found.record(), dof),
+            or_dash(
+                found
+                    .found
+                    .standard_error()
+                    .map(|error| significant(mechid_signal::measures::rms(error.channel(dof)), 2)),
+            ),
+            or_dash(found.errors[dof].map(percent)),
+        ]
+    };
+    let rows = found.forced.iter().map(row).collect();
+    let header =
+        ["force", "measured, RMS (N)", "found, RMS (N)", "standard error (N)", "difference"];
+    let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
+    Ok(html! {
+        p { "Found from the measured motion with the identified machine: " (found.method) (lines) "." }
+        (Table { caption: &part.of_period("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
+        div.figures { (figure(&drawn)) }
+    })
+}
