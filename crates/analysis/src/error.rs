@@ -1,7 +1,7 @@
 //! What can go wrong between a record and the result.
 
 use mechid_estimate::EstimateError;
-use mechid_estimate::frequency_domain::Motion;
+use mechid_model::ResponseQuantity;
 use mechid_signal::{counted, ordinal, told, told_to};
 
 use crate::text::significant;
@@ -81,7 +81,7 @@ pub enum AnalysisError {
     )]
     ColumnCount {
         /// Kind of response with the wrong number of columns.
-        response: Motion,
+        response: ResponseQuantity,
         /// Number of columns that it names.
         got: usize,
         /// Number of force columns.
@@ -125,7 +125,7 @@ pub enum AnalysisError {
     )]
     MotionCount {
         /// Kind of response with the wrong number of columns.
-        response: Motion,
+        response: ResponseQuantity,
         /// Number of columns that it names.
         got: usize,
         /// Degrees of freedom of the system.
@@ -328,7 +328,7 @@ pub enum AnalysisError {
     #[error("this `estimator` needs the {wanted}: name its columns with `{wanted}`")]
     SweepMotion {
         /// The response that is missing.
-        wanted: Motion,
+        wanted: ResponseQuantity,
     },
     /// A sweep has no settings.
     #[error("a sweep needs one setting at least")]

@@ -19,7 +19,7 @@ pub use identify::{Identified, Identify, identify};
 pub use inspect::{InspectSettings, Inspected, inspect};
 pub use machine::Machine;
 pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Window};
-pub use mechid_estimate::frequency_domain::Motion;
+pub use mechid_model::ResponseQuantity;
 pub use modal::ModalSummary;
 pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};
 pub use sweep::{SweepSettings, SweepSummary, sweep_experiment, sweep_record};

@@ -2,40 +2,28 @@
 
 use std::path::Path;
 
-use mechid_estimate::{Estimate, IdentifiedMode, Parameter, Unknowns, identified_modes};
-use mechid_force::{Entry, SystemCovariance};
+use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, identified_modes};
 use mechid_io::{ParameterCovariance, input_name, read_covariance, read_system};
-use mechid_model::SecondOrderSystem;
-use nalgebra::DMatrix;
+use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
 
 use crate::AnalysisError;
 
-/// A system, and the covariance of its parameters where it was identified.
-#[derive(Debug, Clone)]
+/// A system with the covariance of its parameters, where it was identified.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     /// Name for messages: the file it was read from.
     pub name: String,
-    /// M, C and K.
-    pub system: SecondOrderSystem,
-    /// Uncertainty of its parameters; `None` for a system that is taken as exactly known.
-    pub uncertainty: Option<Uncertainty>,
-}
-
-/// Covariance of some of the parameters of a machine.
-#[derive(Debug, Clone)]
-pub struct Uncertainty {
-    /// The uncertain parameters.
-    pub parameters: Vec<Parameter>,
-    /// Their covariance, one row and one column each, in products of their SI units.
-    pub covariance: DMatrix<f64>,
-    /// Degrees of freedom of the variance behind it.
+    /// M, C and K, and the covariance of those of their entries that are uncertain.
+    pub uncertain: UncertainSystem,
+    /// Degrees of freedom of the variance behind the covariance.
     pub degrees_of_freedom: usize,
 }
 
 impl Machine {
     /// Takes a system as exactly known.
     pub fn known(system: SecondOrderSystem) -> Self {
-        Self { name: "the system".into(), system, uncertainty: None }
+        let uncertain = UncertainSystem::exact(system);
+        Self { name: "the system".into(), uncertain, degrees_of_freedom: 0 }
     }
 
     /// Takes what was identified, with the covariance of its parameters.
@@ -43,13 +31,11 @@ impl Machine {
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
     pub fn of_estimate(estimate: &Estimate) -> Result<Self, AnalysisError> {
-        let uncertainty = Uncertainty {
-            parameters: estimate.parameters().map(|p| p.parameter).collect(),
-            covariance: estimate.covariance().clone(),
+        Ok(Self {
+            name: "the identified system".into(),
+            uncertain: estimate.uncertain_system()?,
             degrees_of_freedom: estimate.degrees_of_freedom(),
-        };
-        let name = "the identified system".into();
-        Ok(Self { name, system: estimate.system()?, uncertainty: Some(uncertainty) })
+        })
     }
 
     /// Reads the `system` of a JSON file (`-`: of standard input) and, if it is there, its
@@ -61,15 +47,23 @@ impl Machine {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
         let (name, system) = (input_name(path), read_system(path)?);
-        let uncertainty = match read_covariance(path)? {
-            Some(found) => Some(Uncertainty {
-                parameters: parameters(&name, &system, &found)?,
-                covariance: found.matrix(),
-                degrees_of_freedom: found.degrees_of_freedom,
-            }),
-            None => None,
+        let Some(found) = read_covariance(path)? else {
+            return Ok(Self { name, ..Self::known(system) });
         };
-        Ok(Self { name, system, uncertainty })
+        let parameters = parameters(&name, &system, &found)?;
+        let degrees_of_freedom = found.degrees_of_freedom;
+        let uncertain = UncertainSystem::new(system, parameters, found.matrix())?;
+        Ok(Self { name, uncertain, degrees_of_freedom })
+    }
+
+    /// Returns M, C and K.
+    pub fn system(&self) -> &SecondOrderSystem {
+        self.uncertain.system()
+    }
+
+    /// Whether the system is taken as exactly known.
+    pub fn is_exact(&self) -> bool {
+        self.uncertain.parameters().is_empty()
     }
 
     /// Returns natural frequencies, damping ratios and mode shapes with their standard errors, which
@@ -78,22 +72,7 @@ impl Machine {
     /// # Errors
     /// [`AnalysisError::Estimate`] if the system has no modes.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, AnalysisError> {
-        Ok(match &self.uncertainty {
-            Some(Uncertainty { parameters, covariance, degrees_of_freedom }) => {
-                identified_modes(&self.system, parameters, covariance, *degrees_of_freedom)?
-            }
-            None => identified_modes(&self.system, &[], &DMatrix::zeros(0, 0), 0)?,
-        })
-    }
-
-    /// Returns the covariance as the force reconstruction takes it.
-    pub(crate) fn covariance(&self) -> Result<Option<SystemCovariance>, AnalysisError> {
-        let Some(Uncertainty { parameters, covariance, .. }) = &self.uncertainty else {
-            return Ok(None);
-        };
-        let entry = |p: &Parameter| Entry { matrix: p.matrix(), row: p.row(), column: p.column() };
-        let entries = parameters.iter().map(entry).collect();
-        Ok(Some(SystemCovariance::new(entries, covariance.clone())?))
+        Ok(identified_modes(&self.uncertain, self.degrees_of_freedom)?)
     }
 }
 

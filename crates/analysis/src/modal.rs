@@ -58,15 +58,15 @@ impl ModalSummary {
     /// # Errors
     /// As [`Machine::modes`].
     pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
-        let known = machine.uncertainty.is_none();
+        let known = machine.is_exact();
         let modes = machine.modes()?;
         let rows = modes.iter().map(|mode| ModeRow::of(mode, known));
         Ok(Self {
             file: machine.name.clone(),
-            degrees_of_freedom: machine.system.dof(),
+            degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
             modes: rows.collect::<Result<_, _>>()?,
-            system: SystemMatrices::from(&machine.system),
+            system: SystemMatrices::from(machine.system()),
         })
     }
 }

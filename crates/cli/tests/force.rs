@@ -154,7 +154,7 @@ fn bad_requests_say_what_to_change() {
     let folder = folder.path();
     let displacement = "--displacement displacement";
     for (arguments, words) in [
-        ("", "the motion is missing"),
+        ("", "the response is missing"),
         ("--displacement displacement,velocity", "the machine has 1 degree of freedom"),
         ("--displacement displacement --forced 2", "degree of freedom 2 (counted from 1)"),
         ("--displacement displacement --method continuous", "velocity and acceleration"),

@@ -57,17 +57,18 @@ mod book {
 }
 
 pub use mechid_analysis as analysis;
-pub use mechid_analysis::identify::{LineChoice, Method};
+pub use mechid_analysis::identify::LineChoice;
+pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, MaximumLikelihood};
 pub use mechid_analysis::{
     Channels, Detrend, FrfSettings, Identified, Identify, InspectSettings, Machine, Measurement,
-    Motion, Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify, inspect,
-    reconstruct,
+    Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify, inspect, reconstruct,
 };
 pub use mechid_estimate as estimate;
 pub use mechid_force as force;
 pub use mechid_integrate as integrate;
 pub use mechid_io as io;
 pub use mechid_model as model;
+pub use mechid_model::ResponseQuantity::{self, Acceleration, Displacement, Velocity};
 #[cfg(feature = "report")]
 pub use mechid_plot as plot;
 #[cfg(feature = "report")]

@@ -1,10 +1,9 @@
 //! Frequency responses for people and for programs.
 
-use mechid::model::ResponseQuantity;
+use mechid_model::ResponseQuantity;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
-use mechid_estimate::frequency_domain::Motion;
 use mechid_estimate::{Segments, Window};
 use mechid_signal::counted;
 use serde::Serialize;

@@ -1,7 +1,7 @@
 //! What was looked at before and after the fit, for people and for programs.
 
 use mechid_estimate::checks::{Check, Verdict, after_fit, kinematics, power, range, still};
-use mechid_estimate::frequency_domain::Motion;
+use mechid_model::ResponseQuantity;
 use serde::Serialize;
 
 use super::spectra::{Fitted, Residual};
@@ -61,7 +61,7 @@ pub fn of_channels(measured: &Block) -> Result<Vec<Check>, AnalysisError> {
     checks.extend(kinematics(&measured.responses())?);
     // A velocity tells the power without its neighbours in time.
     let (motion, kind) = match &measured.velocity {
-        Some(velocity) => (velocity, Motion::Velocity),
+        Some(velocity) => (velocity, ResponseQuantity::Velocity),
         None => measured.response(),
     };
     checks.extend(power(&measured.force, motion, kind)?);

@@ -33,8 +33,7 @@ use self::checks::CheckRow;
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
 pub use self::options::{
-    Between, BetweenSamples, Derivatives, Fit, Identify, Method, Refinement, ResponseFit,
-    SampleFit, WindowExtent,
+    Between, Derivatives, Fit, Identify, Method, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Prediction};
 use self::spectra::Fitted;

@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use mechid_estimate::derivatives::SavitzkyGolay;
-use mechid_estimate::time_domain::{Discretisation, Extent};
-use mechid_signal::Interpolation;
+use mechid_model::Discretisation;
+use mechid_signal::{Extent, Interpolation};
 use serde::{Deserialize, Serialize};
 
 use super::lines::LineChoice;
@@ -87,63 +87,16 @@ pub struct ResponseFit {
 pub struct SampleFit {
     /// Assumption on the force between samples; `None`: the equation of motion at the samples if
     /// there is an acceleration, otherwise linear.
-    pub between_samples: Option<BetweenSamples>,
+    pub between_samples: Option<Discretisation>,
     /// Extent of the window; `None`: open, or whole periods with spectral derivatives.
-    pub extent: Option<WindowExtent>,
+    pub extent: Option<Extent>,
     /// How to find the velocity and acceleration that were not measured.
     pub derivatives: Option<Derivatives>,
     /// Steps between the samples.
     pub refine: Option<Refinement>,
 }
 
-/// Assumption on the force between samples.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum BetweenSamples {
-    /// Euler's rule, the dissertation's; biased in proportion to the step.
-    Euler,
-    /// The force is held, as a digital converter drives a shaker; then exact.
-    Held,
-    /// The force is linear; then exact.
-    Linear,
-}
-
-impl BetweenSamples {
-    /// Returns the discretisation of the equation of motion that is exact under this assumption.
-    pub fn discretisation(self) -> Discretisation {
-        match self {
-            BetweenSamples::Euler => Discretisation::Euler,
-            BetweenSamples::Held => Discretisation::ZeroOrderHold,
-            BetweenSamples::Linear => Discretisation::FirstOrderHold,
-        }
-    }
-
-    /// Returns the name of the estimator.
-    pub fn estimator(self) -> &'static str {
-        match self {
-            BetweenSamples::Euler => "least squares from sample to sample, Euler's rule",
-            BetweenSamples::Held => {
-                "least squares from sample to sample, the force held between them"
-            }
-            BetweenSamples::Linear => {
-                "least squares from sample to sample, the force linear between them"
-            }
-        }
-    }
-}
-
-/// Extent of a window in the time domain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum WindowExtent {
-    /// Any part of a response.
-    Open,
-    /// Whole periods: the first sample follows the last again.
-    Period,
-}
-
-/// Additional steps in every sampling interval, which make the error of a [`BetweenSamples`]
-/// assumption smaller.
+/// Additional steps in every sampling interval, which make the error of a [`Discretisation`] smaller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Refinement {
@@ -287,7 +240,7 @@ impl Identify {
 impl SampleFit {
     pub(crate) fn extent(&self) -> Extent {
         match (self.extent, self.derivatives) {
-            (Some(WindowExtent::Period), _) | (None, Some(Derivatives::Spectral)) => {
+            (Some(Extent::WholePeriod), _) | (None, Some(Derivatives::Spectral)) => {
                 Extent::WholePeriod
             }
             _ => Extent::Open,
@@ -328,8 +281,8 @@ mod tests {
     #[test]
     fn settings_survive_json() {
         let samples = SampleFit {
-            between_samples: Some(BetweenSamples::Held),
-            extent: Some(WindowExtent::Period),
+            between_samples: Some(Discretisation::ZeroOrderHold),
+            extent: Some(Extent::WholePeriod),
             derivatives: Some(Derivatives::SavitzkyGolay { window: 11, order: 4 }),
             refine: Some(Refinement { factor: 8, interpolation: Between::BandLimited }),
         };

@@ -1,9 +1,10 @@
 //! What the machine found does under a measured force.
 
-use mechid_estimate::frequency_domain::Motion;
-use mechid_estimate::time_domain::{Discretisation, Extent};
 use mechid_estimate::{EstimateError, fitted_start, predict, predict_periodic};
+use mechid_model::Discretisation;
+use mechid_model::ResponseQuantity;
 use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_signal::Extent;
 use mechid_signal::Record;
 
 use crate::AnalysisError;
@@ -27,7 +28,7 @@ pub enum Prediction {
 #[derive(Debug)]
 pub struct Compared {
     /// Kind of response.
-    pub kind: Motion,
+    pub kind: ResponseQuantity,
     /// Measured response, samples × degrees of freedom.
     pub measured: Record,
     /// Predicted response, samples × degrees of freedom.

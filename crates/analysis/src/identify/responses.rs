@@ -4,8 +4,9 @@ use mechid_estimate::checks::{
     Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
 };
 use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
-use mechid_estimate::time_domain::{Discretisation, Extent};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_model::Discretisation;
+use mechid_signal::Extent;
 
 use super::lines::LineChoice;
 use super::options::{Method, ResponseFit};

@@ -4,13 +4,14 @@ use mechid_estimate::checks::{
     Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
     noise_on_motion, periodicity_across,
 };
-use mechid_estimate::time_domain::{Discretisation, Extent, TimeDomain, Transitions};
+use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
-use mechid_signal::{Interpolation, Record, counted};
+use mechid_model::Discretisation;
+use mechid_signal::{Extent, Interpolation, Record, counted};
 
 use super::CONSPICUOUS;
 use super::derivatives::Prepared;
-use super::options::{Between, BetweenSamples, Derivatives, SampleFit};
+use super::options::{Between, Derivatives, SampleFit};
 use super::prediction::Prediction;
 use super::spectra::{Fitted, Residual};
 use crate::AnalysisError;
@@ -193,10 +194,9 @@ impl SampleFit {
         records: &[Windowed],
         prepared: &[Prepared],
         unknowns: &Unknowns,
-        between: Option<BetweenSamples>,
+        between: Option<Discretisation>,
     ) -> Result<Fitted, AnalysisError> {
-        let between = between.unwrap_or(BetweenSamples::Linear);
-        let discretisation = between.discretisation();
+        let discretisation = between.unwrap_or(Discretisation::FirstOrderHold);
         let dt = prepared[0].force.sampling().dt();
         let steps = self.refine.map_or(1, |refine| refine.factor.max(1)) as f64;
         let mut rows = Transitions::new(unknowns.dof(), dt / steps)?;
@@ -226,7 +226,7 @@ impl SampleFit {
         };
         Ok(Fitted {
             domain: "time",
-            estimator: between.estimator(),
+            estimator: estimator(discretisation),
             least_squares: false,
             equations: rows.rows(),
             frequency: None,
@@ -308,4 +308,17 @@ fn left_of_equation(
         Ok(Residual { left, fitted, force: p.force.clone(), noise_span })
     };
     Some(residual())
+}
+
+/// Returns the name of the estimator from sample to sample.
+fn estimator(discretisation: Discretisation) -> &'static str {
+    match discretisation {
+        Discretisation::Euler => "least squares from sample to sample, Euler's rule",
+        Discretisation::ZeroOrderHold => {
+            "least squares from sample to sample, the force held between them"
+        }
+        Discretisation::FirstOrderHold => {
+            "least squares from sample to sample, the force linear between them"
+        }
+    }
 }

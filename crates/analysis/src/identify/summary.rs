@@ -3,10 +3,9 @@
 use std::fmt;
 use std::path::Path;
 
-use mechid_estimate::{
-    self as estimate, Estimate, IdentifiedMode, Parameter, Unknowns, frequency_domain,
-};
+use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
+use mechid_model::Parameter;
 use mechid_signal::counted;
 use serde::Serialize;
 

@@ -1,9 +1,10 @@
 //! How much of a record the identified system predicts.
 
-use mechid_estimate::frequency_domain::Motion;
-use mechid_estimate::time_domain::{Discretisation, Extent};
 use mechid_estimate::{StartFit, fit_percent, predict};
+use mechid_model::Discretisation;
+use mechid_model::ResponseQuantity;
 use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_signal::Extent;
 use serde::{Deserialize, Serialize};
 
 use super::prediction::{Prediction, channels, failed};
@@ -136,7 +137,7 @@ fn in_stretches(
     recorded: &Windowed,
     system: &SecondOrderSystem,
     discretisation: Discretisation,
-) -> Result<Vec<(Motion, Vec<f64>)>, AnalysisError> {
+) -> Result<Vec<(ResponseQuantity, Vec<f64>)>, AnalysisError> {
     let held = &recorded.held;
     let told = |reason| failed(reason, system, held);
     let mut start = StartFit::new(system, discretisation)?;
@@ -159,7 +160,10 @@ fn in_stretches(
             }
         }
         let row = |kind| channels(&response, kind).data().row(chunk.force.len() - 1).transpose();
-        state = InitialState::new(row(Motion::Displacement), row(Motion::Velocity))?;
+        state = InitialState::new(
+            row(ResponseQuantity::Displacement),
+            row(ResponseQuantity::Velocity),
+        )?;
         Ok(())
     })?;
     let fits = |levels: Vec<Level>| levels.iter().map(Level::fit_percent).collect();

@@ -1,7 +1,7 @@
 //! Which columns of a record hold the forces and responses of a machine.
 
-use mechid_estimate::frequency_domain::Motion;
 use mechid_io::Quantity;
+use mechid_model::ResponseQuantity;
 use serde::{Deserialize, Serialize};
 
 use super::units::Role;
@@ -16,10 +16,10 @@ pub const ABSENT: &str = "0";
 /// does not act.
 ///
 /// ```
-/// use mechid_analysis::{Channels, Motion};
+/// use mechid_analysis::{Channels, ResponseQuantity};
 ///
-/// let one = Channels::new("force", Motion::Displacement, "x");
-/// let two = Channels::new("fx,fy", Motion::Displacement, "x,y").and(Motion::Velocity, "vx,vy");
+/// let one = Channels::new("force", ResponseQuantity::Displacement, "x");
+/// let two = Channels::new("fx,fy", ResponseQuantity::Displacement, "x,y").and(ResponseQuantity::Velocity, "vx,vy");
 /// assert_eq!((one.force.len(), two.velocity.len()), (1, 2));
 /// ```
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,32 +38,32 @@ pub struct Channels {
 impl Channels {
     /// Returns the channels of one kind of response under forces; several degrees of freedom are
     /// separated by commas.
-    pub fn new(force: &str, response: Motion, columns: &str) -> Self {
+    pub fn new(force: &str, response: ResponseQuantity, columns: &str) -> Self {
         Self { force: split(force), ..Self::default() }.and(response, columns)
     }
 
     /// Returns the channels of responses alone, for the reconstruction of an unknown force.
-    pub fn of_responses(response: Motion, columns: &str) -> Self {
+    pub fn of_responses(response: ResponseQuantity, columns: &str) -> Self {
         Self::default().and(response, columns)
     }
 
     /// Adds (or replaces) the columns of one kind of response.
     #[must_use]
-    pub fn and(mut self, response: Motion, columns: &str) -> Self {
+    pub fn and(mut self, response: ResponseQuantity, columns: &str) -> Self {
         *match response {
-            Motion::Displacement => &mut self.displacement,
-            Motion::Velocity => &mut self.velocity,
-            Motion::Acceleration => &mut self.acceleration,
+            ResponseQuantity::Displacement => &mut self.displacement,
+            ResponseQuantity::Velocity => &mut self.velocity,
+            ResponseQuantity::Acceleration => &mut self.acceleration,
         } = split(columns);
         self
     }
 
     /// Returns the columns of one kind of response.
-    pub fn response(&self, kind: Motion) -> &[String] {
+    pub fn response(&self, kind: ResponseQuantity) -> &[String] {
         match kind {
-            Motion::Displacement => &self.displacement,
-            Motion::Velocity => &self.velocity,
-            Motion::Acceleration => &self.acceleration,
+            ResponseQuantity::Displacement => &self.displacement,
+            ResponseQuantity::Velocity => &self.velocity,
+            ResponseQuantity::Acceleration => &self.acceleration,
         }
     }
 
@@ -71,9 +71,9 @@ impl Channels {
     pub(crate) fn roles(&self) -> Vec<Role<'_>> {
         let groups = [
             (&self.force, Quantity::Force, "force"),
-            (&self.displacement, Quantity::Displacement, "displacement"),
-            (&self.velocity, Quantity::Velocity, "velocity"),
-            (&self.acceleration, Quantity::Acceleration, "acceleration"),
+            (&self.displacement, ResponseQuantity::Displacement.into(), "displacement"),
+            (&self.velocity, ResponseQuantity::Velocity.into(), "velocity"),
+            (&self.acceleration, ResponseQuantity::Acceleration.into(), "acceleration"),
         ];
         let groups = groups.into_iter().flat_map(|(columns, quantity, setting)| {
             columns.iter().map(move |column| Role { column, quantity, setting })
@@ -95,11 +95,11 @@ impl Channels {
         if self.force.is_empty() {
             return Err(AnalysisError::NoForce);
         }
-        if KINDS.iter().all(|kind| self.response(*kind).is_empty()) {
+        if ResponseQuantity::ALL.iter().all(|kind| self.response(*kind).is_empty()) {
             return Err(AnalysisError::NoMotion);
         }
         let forces = self.force.len();
-        for kind in KINDS {
+        for kind in ResponseQuantity::ALL {
             let got = self.response(kind).len();
             if got != 0 && got != forces {
                 return Err(AnalysisError::ColumnCount { response: kind, got, forces });
@@ -108,10 +108,6 @@ impl Channels {
         Ok(())
     }
 }
-
-/// The kinds of response in the order of their columns.
-pub(crate) const KINDS: [Motion; 3] =
-    [Motion::Displacement, Motion::Velocity, Motion::Acceleration];
 
 fn split(columns: &str) -> Vec<String> {
     columns.split(',').map(|column| column.trim().to_owned()).collect()

@@ -7,14 +7,14 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_estimate::frequency_domain::Motion;
 use mechid_io::{RecordFile, Table, TimeAxis, Unit};
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
+use self::channels::ABSENT;
 pub use self::channels::Channels;
-use self::channels::{ABSENT, KINDS};
 use self::units::ToSi;
 pub(crate) use self::window::Hold;
 pub use self::window::{Window, Windowed};
@@ -103,12 +103,12 @@ impl RecordPlan {
 /// Columns in other units are converted to SI units, wherever they come from.
 ///
 /// ```
-/// use mechid_analysis::{Channels, Measurement, Motion};
+/// use mechid_analysis::{Channels, Measurement, ResponseQuantity};
 /// use mechid_signal::Sampling;
 ///
 /// let (force, x) = (vec![1.0, 2.0, 1.0, 2.0], vec![10.0, 20.0, 10.0, 20.0]);
 /// let columns = [("force", force.as_slice()), ("x [um]", x.as_slice())];
-/// let channels = Channels::new("force", Motion::Displacement, "x [um]");
+/// let channels = Channels::new("force", ResponseQuantity::Displacement, "x [um]");
 /// let test = Measurement::from_columns(Sampling::new(0.01, 4)?, &columns, &channels)?.period(2)?;
 /// assert_eq!(test.responses()?[0].1.channel(0)[1], 20e-6);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -226,14 +226,14 @@ impl Measurement {
     /// degrees of freedom.
     pub fn from_records(
         force: &Record,
-        responses: &[(Motion, &Record)],
+        responses: &[(ResponseQuantity, &Record)],
     ) -> Result<Self, AnalysisError> {
         let name = |group: &str, dof: usize| format!("{group} {}", dof + 1);
         let names = |group: &str| (0..force.channels()).map(|dof| name(group, dof)).collect();
         let mut channels = Channels { force: names("force"), ..Channels::default() };
         let mut columns: Vec<&[f64]> =
             (0..force.channels()).map(|dof| force.channel(dof)).collect();
-        for kind in KINDS {
+        for kind in ResponseQuantity::ALL {
             let Some((_, record)) = responses.iter().find(|(given, _)| *given == kind) else {
                 continue;
             };
@@ -356,7 +356,7 @@ impl Measurement {
     ///
     /// # Errors
     /// If the file cannot be read again.
-    pub fn responses(&self) -> Result<Vec<(Motion, Record)>, AnalysisError> {
+    pub fn responses(&self) -> Result<Vec<(ResponseQuantity, Record)>, AnalysisError> {
         let held = self.hold(Hold::Whole)?.held;
         Ok(held.responses().into_iter().map(|(kind, record)| (kind, record.clone())).collect())
     }
@@ -473,17 +473,17 @@ impl Source {
 
 impl Block {
     /// Returns the first kind of response measured.
-    pub fn response(&self) -> (&Record, Motion) {
+    pub fn response(&self) -> (&Record, ResponseQuantity) {
         let (kind, record) = self.responses()[0];
         (record, kind)
     }
 
     /// Returns every kind of response measured.
-    pub fn responses(&self) -> Vec<(Motion, &Record)> {
+    pub fn responses(&self) -> Vec<(ResponseQuantity, &Record)> {
         let candidates = [
-            (Motion::Displacement, &self.displacement),
-            (Motion::Velocity, &self.velocity),
-            (Motion::Acceleration, &self.acceleration),
+            (ResponseQuantity::Displacement, &self.displacement),
+            (ResponseQuantity::Velocity, &self.velocity),
+            (ResponseQuantity::Acceleration, &self.acceleration),
         ];
         let measured = candidates.into_iter();
         measured.filter_map(|(kind, record)| Some((kind, record.as_ref()?))).collect()

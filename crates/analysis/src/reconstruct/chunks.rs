@@ -3,9 +3,10 @@
 use std::ops::Range;
 
 use mechid_force::{ForceError, IdentifiedForce, Measurement};
+use mechid_model::UncertainSystem;
 use mechid_signal::SignalError;
 
-use super::method::{KnownMachine, Request, equation};
+use super::method::{Request, equation};
 use super::motion::{Recorded, complete};
 use super::options::Method;
 use crate::AnalysisError;
@@ -23,13 +24,13 @@ pub type Take<'a> =
 /// Finds the force by such a method, one chunk after the other.
 pub fn find(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     recorded: &Recorded,
     method: Method,
     take: &mut Take<'_>,
 ) -> Result<(), AnalysisError> {
     let with_acceleration = method == Method::Continuous;
-    if !complete(&recorded.channels, machine.system.dof(), with_acceleration) {
+    if !complete(&recorded.channels, machine.system().dof(), with_acceleration) {
         return Err(AnalysisError::ForceMotions { with_acceleration });
     }
     // From sample to sample the force at a sample is the mean of what the steps before and after

@@ -1,6 +1,7 @@
 //! Whether a velocity is the rate of its displacement, and an acceleration that of its velocity.
 
-use mechid_force::{Channel, Measurement, Quantity};
+use mechid_force::{Channel, Measurement};
+use mechid_model::ResponseQuantity;
 
 use crate::text::significant;
 

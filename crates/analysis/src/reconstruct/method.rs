@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 
 use mechid_force::{
-    Channel, Discretisation, Ends, Extent, Filter, ForceError, IdentifiedForce, Measurement,
-    MotionNoise, Noise, OPEN_UNKNOWNS, Quantity, Rule, Start, SystemCovariance, Tuning,
-    Unexplained, continuous, continuous_with_noise, discretised, discretised_with_noise,
-    frequency_domain, inner_lines, kalman, regularised, with_uncertain_system,
+    Channel, Filter, ForceError, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
+    OPEN_UNKNOWNS, Rule, Start, Tuning, Unexplained, continuous, continuous_with_noise,
+    discretised, discretised_with_noise, frequency_domain, inner_lines, kalman, regularised,
+    with_uncertain_system,
 };
-use mechid_model::SecondOrderSystem;
-use mechid_signal::Spectrum;
+use mechid_model::{Discretisation, ResponseQuantity, SecondOrderSystem, UncertainSystem};
+use mechid_signal::{Extent, Spectrum};
 
 use super::motion::{complete, response};
 use super::options::Method;
@@ -30,13 +30,6 @@ pub struct Request {
     pub noise: Vec<f64>,
     /// Periods in that mean.
     pub averaged: usize,
-}
-
-/// The machine, as the methods take it.
-pub struct KnownMachine {
-    pub system: SecondOrderSystem,
-    /// `None` for a machine that is taken as exactly known.
-    pub covariance: Option<SystemCovariance>,
 }
 
 /// A force and how it was found.
@@ -94,11 +87,11 @@ pub fn choose(
 /// Finds the force, with the uncertainty of the machine if that is known.
 pub fn find(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     motion: &Measurement,
 ) -> Result<Found, AnalysisError> {
     let samples = motion.sampling().len();
-    let (method, why) = choose(request, motion.channels(), samples, machine.system.dof());
+    let (method, why) = choose(request, motion.channels(), samples, machine.system().dof());
     match method {
         Method::Continuous | Method::Discretised => {
             let force = equation(request, machine, motion, method)?;
@@ -119,12 +112,12 @@ pub fn find(
 type Finder<'a> = dyn Fn(&SecondOrderSystem) -> Result<IdentifiedForce, ForceError> + 'a;
 
 fn with_machine(
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     find: &Finder<'_>,
 ) -> Result<IdentifiedForce, AnalysisError> {
-    Ok(match &machine.covariance {
-        Some(covariance) => with_uncertain_system(&machine.system, covariance, find)?,
-        None => find(&machine.system)?,
+    Ok(match machine.parameters().is_empty() {
+        true => find(machine.system())?,
+        false => with_uncertain_system(machine, find)?,
     })
 }
 
@@ -135,16 +128,16 @@ fn noise(request: &Request, unknown: Noise) -> Noise {
 /// The force by the equation of motion, sample by sample or from each to the next.
 pub fn equation(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     motion: &Measurement,
     method: Method,
 ) -> Result<IdentifiedForce, AnalysisError> {
     let with_acceleration = method == Method::Continuous;
-    let response = response(motion, machine.system.dof(), with_acceleration)
+    let response = response(motion, machine.system().dof(), with_acceleration)
         .ok_or(AnalysisError::ForceMotions { with_acceleration })?;
-    let ends = if request.periodic { Ends::Periodic } else { Ends::Open };
-    let linear = Discretisation::ExactLinear;
-    let noise = motion_noise(request, motion, machine.system.dof())?;
+    let ends = if request.periodic { Extent::WholePeriod } else { Extent::Open };
+    let linear = Discretisation::FirstOrderHold;
+    let noise = motion_noise(request, motion, machine.system().dof())?;
     with_machine(machine, &|system| match (with_acceleration, &noise) {
         (true, None) => continuous(system, &response),
         (true, Some(noise)) => continuous_with_noise(system, &response, noise),
@@ -197,7 +190,7 @@ impl How {
 
 fn lines(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     motion: &Measurement,
     why: String,
 ) -> Result<Found, AnalysisError> {
@@ -223,7 +216,7 @@ fn lines(
 
 fn filtered(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     motion: &Measurement,
     filter: Filter,
     why: String,
@@ -235,7 +228,7 @@ fn filtered(
         (_, false) => ForceUnknowns::Samples(request.start),
     };
     let noise = noise(request, Noise::Unknown);
-    let found = regularised(&machine.system, motion, forced, &extent, filter, &noise)?;
+    let found = regularised(machine.system(), motion, forced, &extent, filter, &noise)?;
     // The machine is moved with the parameter that was chosen, not with another choice.
     let fixed = match (filter, found.parameter) {
         (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
@@ -245,9 +238,9 @@ fn filtered(
     let find = |system: &SecondOrderSystem| {
         regularised(system, motion, forced, &extent, fixed, &noise).map(|found| found.force)
     };
-    let force = match machine.uncertain {
-        Some(_) => with_machine(machine, &find)?,
-        None => found.force,
+    let force = match machine.parameters().is_empty() {
+        true => found.force,
+        false => with_machine(machine, &find)?,
     };
     let mut chosen = Vec::new();
     if let Some(lambda) = found.parameter {
@@ -311,7 +304,7 @@ fn noise_levels<'a>(
 
 fn smoothed(
     request: &Request,
-    machine: &KnownMachine,
+    machine: &UncertainSystem,
     motion: &Measurement,
     why: String,
 ) -> Result<Found, AnalysisError> {
@@ -323,14 +316,14 @@ fn smoothed(
         [] => Tuning::Likelihood,
         level => Tuning::NoiseKnown(level.to_vec()),
     };
-    let found = kalman(&machine.system, motion, forced, request.start, &tuning)?;
+    let found = kalman(machine.system(), motion, forced, request.start, &tuning)?;
     let fixed = Tuning::Given { noise_std: found.noise_std.clone(), walk: found.walk.clone() };
     let find = |system: &SecondOrderSystem| {
         kalman(system, motion, forced, request.start, &fixed).map(|found| found.force)
     };
-    let force = match machine.uncertain {
-        Some(_) => with_machine(machine, &find)?,
-        None => found.force,
+    let force = match machine.parameters().is_empty() {
+        true => found.force,
+        false => with_machine(machine, &find)?,
     };
     let mut chosen = Vec::new();
     for (dof, walk) in forced.iter().zip(&found.walk) {

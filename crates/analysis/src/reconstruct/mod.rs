@@ -25,10 +25,12 @@ use std::fmt;
 use std::ops::Range;
 
 use mechid_force::{IdentifiedForce, Start};
+use mechid_model::UncertainSystem;
+use mechid_signal::Sampling;
 use serde::{Serialize, Serializer};
 
 use self::kinematics::KinematicConsistency;
-use self::method::{Found, How, KnownMachine, Request};
+use self::method::{Found, How, Request};
 use self::motion::Recorded;
 pub use self::options::{Method, ParameterRule, Reconstruct};
 use self::summary::{Chosen, ForceSummary};
@@ -52,6 +54,8 @@ pub struct Reconstructed {
 /// Some samples of a force, as they are found.
 #[derive(Debug)]
 pub struct ForceChunk<'a> {
+    /// Time axis of the whole force.
+    pub sampling: Sampling,
     /// The force, of which `samples` are new.
     pub force: &'a IdentifiedForce,
     /// Samples of `force` that follow those of the chunk before.
@@ -174,17 +178,15 @@ impl Serialize for Reconstructed {
 struct Task {
     recorded: Recorded,
     request: Request,
-    known: KnownMachine,
+    known: UncertainSystem,
 }
 
 impl Task {
     fn new(run: &Measurement, machine: &Machine, how: &Reconstruct) -> Result<Self, AnalysisError> {
         let periodic = run.window_settings().period.is_some() || how.lines.is_some();
-        let recorded = Recorded::new(run, machine.system.dof(), periodic)?;
-        let request = Request::new(how, &recorded, machine.system.dof(), periodic)?;
-        let known =
-            KnownMachine { system: machine.system.clone(), covariance: machine.covariance()? };
-        Ok(Self { recorded, request, known })
+        let recorded = Recorded::new(run, machine.system().dof(), periodic)?;
+        let request = Request::new(how, &recorded, machine.system().dof(), periodic)?;
+        Ok(Self { recorded, request, known: machine.uncertain.clone() })
     }
 
     /// Finds the force, chunk by chunk where that will do and all of it is not asked for; only
@@ -197,7 +199,7 @@ impl Task {
         take: &mut Take<'_>,
     ) -> Result<(ForceSummary, Option<IdentifiedForce>), AnalysisError> {
         let Self { recorded, request, known } = self;
-        let (dofs, samples) = (known.system.dof(), recorded.sampling.len());
+        let (dofs, samples) = (known.system().dof(), recorded.sampling.len());
         let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
         let (method, why) = method::choose(request, &recorded.channels, samples, dofs);
         let mut rates = KinematicConsistency::of(&recorded.channels);
@@ -233,16 +235,16 @@ impl Task {
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();
         let channels = Measured::all(recorded, unexplained);
-        let dofs = known.system.dof();
+        let dofs = known.system().dof();
         remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
-        if known.covariance.is_some() && !how.counts_noise {
+        if !known.parameters().is_empty() && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
                  record: state that with `noise`"
                     .to_owned(),
             );
         }
-        if known.covariance.is_none() {
+        if known.parameters().is_empty() {
             remarks.push(
                 "the machine is taken as exactly known: its file has no covariance".to_owned(),
             );
@@ -255,7 +257,7 @@ impl Task {
             samples: recorded.sampling.len(),
             periods: request.periodic.then_some(recorded.periods),
             sample_rate_hz: recorded.sampling.rate_hz(),
-            machine_uncertainty: known.covariance.is_some(),
+            machine_uncertainty: !known.parameters().is_empty(),
             noise_uncertainty: how.counts_noise,
             chosen: how
                 .chosen

@@ -3,14 +3,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use mechid_force::{Channel, Measurement, Quantity};
-use mechid_model::Response;
+use mechid_force::{Channel, Measurement};
+use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
 use super::periods::{Scatter, Sums};
 use crate::AnalysisError;
-use crate::measurement::channels::{ABSENT, KINDS};
+use crate::measurement::channels::ABSENT;
 use crate::measurement::{self, CHUNK_SAMPLES, Source};
 
 /// The responses in a record, of which no more is held in memory than is asked for.
@@ -46,7 +46,7 @@ impl Recorded {
     ) -> Result<Self, AnalysisError> {
         let source = Arc::clone(measured.source());
         let (mut columns, mut channels) = (Vec::new(), Vec::new());
-        for kind in KINDS {
+        for kind in ResponseQuantity::ALL {
             let named = source.channels.response(kind);
             if !named.is_empty() && named.len() != dofs {
                 let got = named.len();
@@ -54,7 +54,7 @@ impl Recorded {
             }
             for (dof, column) in named.iter().enumerate().filter(|(_, c)| *c != ABSENT) {
                 columns.push(column.clone());
-                channels.push(Channel { dof, quantity: quantity(kind) });
+                channels.push(Channel { dof, quantity: kind });
             }
         }
         if channels.is_empty() {
@@ -153,7 +153,7 @@ impl Recorded {
 }
 
 /// The channels with this quantity of every degree of freedom, if all were measured.
-fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<usize>> {
+fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Option<Vec<usize>> {
     let find = |dof: usize| channels.iter().position(|c| *c == Channel { dof, quantity });
     (0..dofs).map(find).collect()
 }
@@ -161,8 +161,8 @@ fn of_all(channels: &[Channel], quantity: Quantity, dofs: usize) -> Option<Vec<u
 /// Whether displacement and velocity of every degree of freedom were measured, and, if asked for,
 /// acceleration.
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
-    let mut needed = vec![Quantity::Displacement, Quantity::Velocity];
-    needed.extend(with_acceleration.then_some(Quantity::Acceleration));
+    let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];
+    needed.extend(with_acceleration.then_some(ResponseQuantity::Acceleration));
     needed.into_iter().all(|quantity| of_all(channels, quantity, dofs).is_some())
 }
 
@@ -170,25 +170,16 @@ pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> b
 /// without accelerations these are zero.
 pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) -> Option<Response> {
     let record = measured.record();
-    let all = |quantity: Quantity| -> Option<Record> {
+    let all = |quantity: ResponseQuantity| -> Option<Record> {
         let columns = of_all(measured.channels(), quantity, dofs)?;
         let data = DMatrix::from_fn(record.len(), dofs, |k, dof| record.data()[(k, columns[dof])]);
         Record::new(record.sampling(), data).ok()
     };
-    let (x, v) = (all(Quantity::Displacement)?, all(Quantity::Velocity)?);
+    let (x, v) = (all(ResponseQuantity::Displacement)?, all(ResponseQuantity::Velocity)?);
     let a = if with_acceleration {
-        all(Quantity::Acceleration)?
+        all(ResponseQuantity::Acceleration)?
     } else {
         Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
     };
     Response::new(x, v, a).ok()
-}
-
-/// Returns the quantity of a kind of response, as the force reconstruction calls it.
-pub fn quantity(kind: crate::Motion) -> Quantity {
-    match kind {
-        crate::Motion::Displacement => Quantity::Displacement,
-        crate::Motion::Velocity => Quantity::Velocity,
-        crate::Motion::Acceleration => Quantity::Acceleration,
-    }
 }

@@ -88,7 +88,7 @@ impl<'a> Tally<'a> {
                 *level.errors.get_or_insert(0.0) += squares;
             }
         }
-        (self.take)(&ForceChunk { force, samples: kept, counts_noise })
+        (self.take)(&ForceChunk { sampling: self.sampling, force, samples: kept, counts_noise })
     }
 
     /// Returns the levels on each degree of freedom; `forced` are those where a force was sought.

@@ -1,8 +1,8 @@
 //! The receptance that records show, whatever was fitted.
 
 use mechid_estimate::frequency_domain::{FrequencyData, Lines};
-use mechid_estimate::time_domain::Extent;
 use mechid_estimate::{FrfEstimator, Segments, Window};
+use mechid_signal::Extent;
 use mechid_signal::lines;
 
 use super::RecordReview;

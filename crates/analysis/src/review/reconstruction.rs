@@ -1,8 +1,7 @@
 //! The force found from the motion with the identified machine, against the measured one.
 
-use mechid_force::{
-    self as force, Channel, IdentifiedForce, Quantity, Rule, Start, channel_errors,
-};
+use mechid_force::{self as force, Channel, IdentifiedForce, Rule, Start, channel_errors};
+use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -10,7 +9,7 @@ use crate::AnalysisError;
 use crate::identify::Identified;
 use crate::measurement::Block;
 use crate::reconstruct::Method;
-use crate::reconstruct::method::{KnownMachine, Request, find};
+use crate::reconstruct::method::{Request, find};
 
 /// A force found, and what it should be.
 pub struct Reconstruction {
@@ -48,7 +47,7 @@ impl Reconstruction {
             noise: Vec::new(),
             averaged: 1,
         };
-        let result = find(&request, &machine(found)?, &motion(period)?)?;
+        let result = find(&request, &found.machine()?.uncertain, &motion(period)?)?;
         let measured = match &lines {
             Some(lines) => on_lines(force, lines),
             None => force.clone(),
@@ -57,11 +56,6 @@ impl Reconstruction {
         let (method, found) = (result.how.method, result.force);
         Ok(Self { method, found, measured, forced, errors })
     }
-}
-
-fn machine(found: &Identified) -> Result<KnownMachine, AnalysisError> {
-    let machine = found.machine()?;
-    Ok(KnownMachine { covariance: machine.covariance()?, system: machine.system })
 }
 
 /// Every motion that was measured.

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
-use mechid_estimate::frequency_domain::Motion;
-use mechid_estimate::time_domain::Extent;
 use mechid_model::Response;
+use mechid_model::ResponseQuantity;
+use mechid_signal::Extent;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
@@ -28,9 +28,9 @@ impl<'a> Samples<'a> {
         Self {
             force: Cow::Owned(force),
             motions: vec![
-                (Motion::Displacement, own(response.displacement())),
-                (Motion::Velocity, own(response.velocity())),
-                (Motion::Acceleration, own(response.acceleration())),
+                (ResponseQuantity::Displacement, own(response.displacement())),
+                (ResponseQuantity::Velocity, own(response.velocity())),
+                (ResponseQuantity::Acceleration, own(response.acceleration())),
             ],
             extent: if whole_periods { Extent::WholePeriod } else { Extent::Open },
         }
@@ -78,7 +78,7 @@ impl<'a> Samples<'a> {
     ///
     /// # Errors
     /// [`AnalysisError::SweepMotion`] if it was not measured.
-    pub fn motion(&self, wanted: Motion) -> Result<&Record, AnalysisError> {
+    pub fn motion(&self, wanted: ResponseQuantity) -> Result<&Record, AnalysisError> {
         let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
         found.map(|(_, record)| record.as_ref()).ok_or(AnalysisError::SweepMotion { wanted })
     }
@@ -93,8 +93,12 @@ impl<'a> Samples<'a> {
     /// # Errors
     /// As [`Samples::motion`].
     pub fn response(&self) -> Result<Response, AnalysisError> {
-        let [x, v, a] = [Motion::Displacement, Motion::Velocity, Motion::Acceleration]
-            .map(|kind| self.motion(kind));
+        let [x, v, a] = [
+            ResponseQuantity::Displacement,
+            ResponseQuantity::Velocity,
+            ResponseQuantity::Acceleration,
+        ]
+        .map(|kind| self.motion(kind));
         Ok(Response::new(x?.clone(), v?.clone(), a?.clone())?)
     }
 

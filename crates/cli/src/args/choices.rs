@@ -2,6 +2,8 @@
 
 use clap::ValueEnum;
 use mechid::analysis::{Detrend, frf, identify, reconstruct, sweep};
+use mechid::model::Discretisation;
+use mechid::signal::Extent;
 
 /// Defines a choice of the command line, which stands for an enum of the analysis with the same
 /// variants.
@@ -43,25 +45,42 @@ choice! {
     }
 }
 
-choice! {
-    /// Assumption on the force between samples.
-    BetweenSamplesChoice => identify::BetweenSamples {
-        /// Euler's rule, the dissertation's; biased in proportion to the step
-        Euler,
-        /// The force is held, as a digital converter drives a shaker; then exact
-        Held,
-        /// The force is linear; then exact
-        Linear,
+/// Assumption on the force between samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum BetweenSamplesChoice {
+    /// Euler's rule, the dissertation's; biased in proportion to the step
+    Euler,
+    /// The force is held, as a digital converter drives a shaker; then exact
+    Held,
+    /// The force is linear; then exact
+    Linear,
+}
+
+impl From<BetweenSamplesChoice> for Discretisation {
+    fn from(choice: BetweenSamplesChoice) -> Self {
+        match choice {
+            BetweenSamplesChoice::Euler => Self::Euler,
+            BetweenSamplesChoice::Held => Self::ZeroOrderHold,
+            BetweenSamplesChoice::Linear => Self::FirstOrderHold,
+        }
     }
 }
 
-choice! {
-    /// Extent of a window in the time domain.
-    ExtentChoice => identify::WindowExtent {
-        /// Any part of a response
-        Open,
-        /// Whole periods: the first sample follows the last again
-        Period,
+/// Extent of a window in the time domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExtentChoice {
+    /// Any part of a response
+    Open,
+    /// Whole periods: the first sample follows the last again
+    Period,
+}
+
+impl From<ExtentChoice> for Extent {
+    fn from(choice: ExtentChoice) -> Self {
+        match choice {
+            ExtentChoice::Open => Self::Open,
+            ExtentChoice::Period => Self::WholePeriod,
+        }
     }
 }
 

@@ -128,7 +128,7 @@ impl ForceRows<'_> {
             Some(rows) => rows,
             None => {
                 let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-                CsvFile::begin(path, chunk.force.record().sampling(), &names)?
+                CsvFile::begin(path, chunk.sampling, &names)?
             }
         };
         let values: Vec<&[f64]> = columns.iter().map(|(_, column)| *column).collect();

@@ -169,8 +169,8 @@ fn an_unstable_machine_is_not_led_through_a_long_record() {
                   --between-samples held";
     mechid(folder, common);
     let told = refused(folder, &format!("{common} --validate long.csv"));
-    assert!(told.starts_with("error: long.csv: the machine found is unstable"), "{told}");
-    assert!(told.contains("by a factor of e in 0.100 s"), "{told}");
+    assert!(told.starts_with("error: long.csv: the identified system is unstable"), "{told}");
+    assert!(told.contains("grows e-fold every 0.100 s"), "{told}");
 }
 
 /// What a wrong channel is told as, whichever way it is fitted.

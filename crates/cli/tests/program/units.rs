@@ -137,21 +137,21 @@ fn milliseconds_that_do_not_say_so_are_asked_about() {
         ),
         format!("report RECORD {roles} --output page.html"),
     ];
-    let asked = "bare.csv: the time in column 1 \"t\" says no unit and is taken as seconds: 0.128 Hz, \
-                 4000 s long; if it is in ms, call it t_ms in the file or give --sample-rate 128, if in \
+    let asked = "bare.csv: the time in column 1 \"t\" has no unit and is taken as seconds: 0.128 Hz, \
+                 4000 s long; if it is in ms, call it t_ms in the file or give --sample-rate 128; if in \
                  s, t_s";
     for call in calls {
         let told = |file: &str| mechid(folder, &call.replace("RECORD", file));
         assert!(told("bare.csv").contains(asked), "{call}: {}", told("bare.csv"));
         let rate = told("bare.csv --sample-rate 128");
         for told in [told("said.csv"), told("si.csv"), rate] {
-            assert!(!told.contains("says no unit"), "{call}: {told}");
+            assert!(!told.contains("has no unit"), "{call}: {told}");
         }
     }
     let page = || fs::read_to_string(folder.join("page.html")).unwrap();
-    assert!(!page().contains("says no unit"));
+    assert!(!page().contains("has no unit"));
     mechid(folder, &format!("report bare.csv {roles} --output page.html"));
-    assert!(page().contains("says no unit"));
+    assert!(page().contains("has no unit"));
 }
 
 /// Slow, or rather slow and long; what a name or a row of units says is not doubted.
@@ -172,7 +172,7 @@ fn slow_records_with_a_unit_and_fast_ones_without_are_not_doubted() {
         let text = format!("{header}\n{}", rows.collect::<String>());
         fs::write(folder.path().join("a.csv"), text).unwrap();
         let told = mechid(folder.path(), "info a.csv");
-        assert_eq!(told.contains("says no unit"), doubted, "{header} {step}: {told}");
+        assert_eq!(told.contains("has no unit"), doubted, "{header} {step}: {told}");
     }
 }
 

@@ -73,6 +73,6 @@ impl ToFigure for Machine {
             .iter()
             .map(|mode| (mode.natural_frequency_hz.value, mode.damping_ratio.value))
             .collect();
-        modal::figure(&self.name, &self.system, &resonances)
+        modal::figure(&self.name, self.system(), &resonances)
     }
 }

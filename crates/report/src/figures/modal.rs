@@ -84,7 +84,7 @@ pub fn figure(
     Ok(drawn.mark_x(&label(&natural), &natural))
 }
 
-/// Motion, force, and the name of each curve.
+/// ResponseQuantity, force, and the name of each curve.
 fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
     let dof = system.dof();
     let name = |i: usize, j: usize| format!("x{}/F{}", i + 1, j + 1);

@@ -12,11 +12,7 @@ pub fn motion(title: &str, compared: &Compared) -> Figure {
     let (measured, predicted) = (&compared.measured, &compared.predicted);
     let shown = measured.len().min(SHOWN);
     let time: Vec<f64> = measured.sampling().times().take(shown).collect();
-    let unit = match compared.kind {
-        mechid_estimate::frequency_domain::Motion::Displacement => "m",
-        mechid_estimate::frequency_domain::Motion::Velocity => "m/s",
-        mechid_estimate::frequency_domain::Motion::Acceleration => "m/s²",
-    };
+    let unit = compared.kind.unit();
     let mut name = compared.kind.to_string();
     name[..1].make_ascii_uppercase();
     let mut figure = Figure::new(match shown < measured.len() {

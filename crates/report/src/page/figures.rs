@@ -1,6 +1,5 @@
 //! The pictures of the report.
 
-use mechid_analysis::Motion;
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::prediction::Compared;
 use mechid_analysis::measurement::Block;
@@ -9,6 +8,7 @@ use mechid_analysis::review::receptance::Receptance;
 use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Correlations, Residual};
 use mechid_analysis::review::whole::Gathered;
+use mechid_model::ResponseQuantity;
 use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid_signal::{Record, Spectrum};
 

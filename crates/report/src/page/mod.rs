@@ -178,7 +178,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
                     div { dt { "Mode " (at + 1) ", damping ratio" } dd { (ratio) small { "± " (ratio_error) } } }
                 }
                 @if let Some(part) = report.fit.unexplained_motion {
-                    div { dt { "Motion left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }
+                    div { dt { "ResponseQuantity left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }
                 }
             }
             @if !report.modes.is_empty() {

@@ -196,7 +196,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
     }
     rows.push(pair("Residual of the fit (NRMSE)", percent(fit.nrmse)));
     if let Some(part) = fit.unexplained_motion {
-        rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
+        rows.push(pair("ResponseQuantity the linear model leaves unexplained", percent(part)));
     }
     if let Some(misfit) = &contents.review.found.fitted().misfit {
         let what = format!("Power of the residual over what {} explains", misfit.noise);
