@@ -133,7 +133,7 @@ pub enum AnalysisError {
     },
     /// A force is to be identified on a degree of freedom that the system does not have.
     #[error(
-        "`forced` names degree of freedom {dof}, the system has {}",
+        "`forced` names degree of freedom {dof} (counted from 1), the system has {}",
         counted(*dofs, "degree of freedom")
     )]
     Forced {

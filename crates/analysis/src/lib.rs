@@ -1,11 +1,48 @@
-//! From a measured record to the machine behind it, or the force that drove it.
-pub mod error;
+//! From a measured record to the machine behind it, or to the force that drove it.
+//!
+//! The numerical crates fit arrays; this one answers the questions that a test engineer asks of a
+//! record. It opens files of any format and length (or takes arrays), converts units, cuts windows,
+//! chooses spectral lines and methods, checks the data before the fit and the residual after it, and
+//! says what speaks against the result. It simulates nothing, draws nothing and prints nothing.
+//!
+//! ```
+//! use mechid_analysis::{Channels, Identify, Machine, Measurement, Reconstruct, ResponseQuantity};
+//! use mechid_analysis::{identify, identify::Method, reconstruct};
+//!
+//! let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+//! let channels = Channels::new("force", ResponseQuantity::Displacement, "displacement");
+//! let test = Measurement::open(rig, &channels)?.period(256)?;
+//! let found = identify(&[test.clone()], &Identify::spectra(Method::MaximumLikelihood))?;
+//! let mass = found.estimate().parameter("m")?;
+//! assert!((mass.value - 25.0).abs() < 3.0 * mass.standard_error);
+//! println!("{found}");
+//!
+//! // The force that drove the machine, from the response alone.
+//! let force = reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
+//! assert!(force.force().standard_error().is_some());
+//! # Ok::<(), mechid_analysis::AnalysisError>(())
+//! ```
+//!
+//! | Question | Function | Settings | Result |
+//! |---|---|---|---|
+//! | What is in this record? | [`inspect()`] | [`InspectSettings`] | [`Inspected`] |
+//! | What is the response per unit force? | [`frf()`] | [`FrfSettings`] | [`FrfTable`] |
+//! | What machine is this? | [`identify()`] | [`Identify`] | [`Identified`] |
+//! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
+//! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
+//! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
+//! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
+//!
+//! Settings are plain structs with defaults, which `serde` saves and reads back; every result carries
+//! those it was made with, and prints itself with [`Display`](std::fmt::Display).
+
+mod error;
 mod extremes;
 pub mod frf;
 pub mod identify;
 pub mod inspect;
 mod levels;
-pub mod machine;
+mod machine;
 pub mod measurement;
 pub mod modal;
 pub mod reconstruct;

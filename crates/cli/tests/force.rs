@@ -155,7 +155,7 @@ fn bad_requests_say_what_to_change() {
     let displacement = "--displacement displacement";
     for (arguments, words) in [
         ("", "the response is missing"),
-        ("--displacement displacement,velocity", "the machine has 1 degree of freedom"),
+        ("--displacement displacement,velocity", "the system has 1 degree of freedom"),
         ("--displacement displacement --forced 2", "degree of freedom 2 (counted from 1)"),
         ("--displacement displacement --method continuous", "velocity and acceleration"),
         ("--displacement displacement --method frequency-domain", "--period"),

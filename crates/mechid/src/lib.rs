@@ -1,31 +1,22 @@
 //! Measure a force and a response, get the machine: the rooms of the workspace under one roof.
 //!
 //! ```
-//! use mechid::estimate::Unknowns;
-//! use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
-//! use mechid::model::{ResponseQuantity, Sdof};
-//! use mechid::signal::{Multisine, Phases, Sampling, lines};
+//! use mechid::{Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct};
 //!
-//! // Excite: ten kilograms on a spring and a damper, driven on every line of a period.
-//! let machine = Sdof::new(10.0, 180.0, 5000.0)?.system();
-//! let sampling = Sampling::new(0.02, 256)?;
-//! let excitation = Multisine::flat(lines::full(sampling), 50.0, Phases::SchroederBinary)?;
-//! let force = excitation.sample(sampling)?;
-//! let response = mechid::exact_periodic(&machine, &force)?;
+//! let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+//! let channels = Channels::new("force", Displacement, "displacement");
+//! let test = Measurement::open(rig, &channels)?.period(256)?;
+//! let found = mechid::identify(&[test.clone()], &Identify::spectra(MaximumLikelihood))?;
+//! println!("{found}");
 //!
-//! // Identify from force and displacement alone.
-//! let lines = lines::full(sampling);
-//! let data =
-//!     FrequencyData::from_records(&force, response.displacement(), ResponseQuantity::Displacement, lines)?;
-//! let found = equation_error(&data, &Unknowns::unknown_mass(1)?)?;
-//! let stiffness = found.parameter("k")?;
-//! assert!((stiffness.value / 5000.0 - 1.0).abs() < 1e-10);
-//!
-//! // Reconstruct the force that drove it.
-//! let again = mechid::force::continuous(&found.system()?, &response)?;
-//! assert!(mechid::force::relative_error(again.record(), &force)? < 1e-10);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! // The same machine under an unknown force.
+//! let force = mechid::reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
+//! println!("{force}");
+//! # Ok::<(), mechid::analysis::AnalysisError>(())
 //! ```
+//!
+//! The functions at the root answer the questions one asks of a record; their settings are plain
+//! structs, and their results print themselves. The rooms behind them are modules:
 //!
 //! | Module | What is in it |
 //! |---|---|
@@ -35,7 +26,9 @@
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |
-//! | [`plot`] | figures as SVG and PNG |
+//! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
+//! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
+//! | `report` | figures and HTML pages of results (the same feature) |
 
 mod simulation;
 

@@ -241,6 +241,27 @@ fn map(
     )
 }
 
+/// Identifies a described experiment at many sampling steps, each simulated; `progress` is called after
+/// each.
+///
+/// # Errors
+/// As [`sweep_experiment`].
+pub fn sweep(
+    experiment: &Experiment,
+    how: &SweepSettings,
+    progress: &(dyn Fn() + Sync),
+) -> Result<SweepSummary, AnalysisError> {
+    let simulated = |at: &Experiment| {
+        let simulation = simulate(at).map_err(|error| error.to_string())?;
+        Ok(Simulated {
+            force: simulation.measured_force,
+            response: simulation.measured_response,
+            whole_periods: matches!(at.response, ResponseKind::Periodic),
+        })
+    };
+    sweep_experiment(experiment, how, &simulated, progress)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -305,25 +326,4 @@ mod tests {
         let periodic = simulated(&given, r#""periodic""#);
         assert!(matches!(periodic, Err(SimulateError::GivenStartPeriodic)));
     }
-}
-
-/// Identifies a described experiment at many sampling steps, each simulated; `progress` is called after
-/// each.
-///
-/// # Errors
-/// As [`sweep_experiment`].
-pub fn sweep(
-    experiment: &Experiment,
-    how: &SweepSettings,
-    progress: &(dyn Fn() + Sync),
-) -> Result<SweepSummary, AnalysisError> {
-    let simulated = |at: &Experiment| {
-        let simulation = simulate(at).map_err(|error| error.to_string())?;
-        Ok(Simulated {
-            force: simulation.measured_force,
-            response: simulation.measured_response,
-            whole_periods: matches!(at.response, ResponseKind::Periodic),
-        })
-    };
-    sweep_experiment(experiment, how, &simulated, progress)
 }

@@ -34,4 +34,7 @@ examples! {
     force_through_noise "../examples/06_force_through_noise.rs",
     choose_the_step "../examples/07_choose_the_step.rs",
     identify_a_bearing "../examples/08_identify_a_bearing.rs",
+    from_a_file "../examples/09_from_a_file.rs",
+    a_long_record "../examples/10_a_long_record.rs",
+    a_force_with_its_band "../examples/11_a_force_with_its_band.rs",
 }

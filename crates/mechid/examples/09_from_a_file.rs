@@ -1,0 +1,38 @@
+//! From a file to a machine with intervals and checks, and on to the force, in four statements.
+#![allow(clippy::print_stdout, reason = "an example talks to its reader")]
+
+use mechid::{
+    Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct, Window,
+};
+
+/// Runs the example.
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+    let channels = Channels::new("force", Displacement, "displacement");
+    // The second of the two periods is kept for validation.
+    let other = Measurement::open(rig, &channels)?.window(Window {
+        start: 257,
+        period: Some(256),
+        periods: None,
+    })?;
+
+    let test = Measurement::open(rig, &channels)?.window(Window {
+        start: 1,
+        period: Some(256),
+        periods: Some(1),
+    })?;
+    let found = mechid::identify(&[test], &Identify::spectra(MaximumLikelihood))?;
+    let fit = found.validate(&other)?;
+    let force = mechid::reconstruct(&other, &found.machine()?, &Reconstruct::auto())?;
+
+    println!("{found}");
+    for channel in &fit.channels {
+        println!("{} predicted: {:.2} %", channel.quantity, channel.fit_percent);
+        assert!(channel.fit_percent > 99.0);
+    }
+    println!("\n{force}");
+    for doubt in found.doubts() {
+        println!("beware: {doubt}");
+    }
+    Ok(())
+}

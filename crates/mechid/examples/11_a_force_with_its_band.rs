@@ -1,0 +1,45 @@
+//! From a test with noise to an uncertain machine, and with it to an unknown force with its band.
+#![allow(clippy::print_stdout, reason = "an example talks to its reader")]
+
+use mechid::model::Sdof;
+use mechid::signal::{Multisine, Phases, Record, Sampling, lines, noise};
+use mechid::{Channels, Displacement, Identify, MaximumLikelihood, Measurement, Reconstruct};
+
+/// Runs the example.
+pub fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let machine = Sdof::from_modal(25.0, 0.05, 75.0)?.system();
+    let period = Sampling::from_rate_hz(128.0, 256)?;
+    let measured = |force: &Record, seed: u64| -> Result<Record, Box<dyn std::error::Error>> {
+        let response = mechid::exact_periodic(&machine, force)?;
+        let noise = noise::white(force.sampling(), 1, 2e-6, seed)?;
+        Ok(Record::new(force.sampling(), response.displacement().data() + noise.data())?)
+    };
+
+    // The test: eight periods under a known force.
+    let known = Multisine::flat(lines::band(period, 2.0, 30.0), 2.0, Phases::Schroeder)?;
+    let known = known.sample(period)?.repeated(8)?;
+    let x = measured(&known, 1)?;
+    let test = Measurement::from_records(&known, &[(Displacement, &x)])?.period(256)?;
+    let found = mechid::identify(&[test], &Identify::spectra(MaximumLikelihood))?;
+
+    // The run: another force, which nobody measured.
+    let truth = Multisine::flat([6, 11, 23], 5.0, Phases::Random { seed: 3 })?.sample(period)?;
+    let x = measured(&truth, 2)?;
+    let columns = [("x", x.channel(0))];
+    let channels = Channels::of_responses(Displacement, "x");
+    let run = Measurement::from_columns(period, &columns, &channels)?.period(256)?;
+    let how = Reconstruct { lines: Some("6,11,23".parse()?), ..Reconstruct::auto() };
+    let force = mechid::reconstruct(&run, &found.machine()?, &how)?;
+
+    println!("{force}");
+    let (value, error) = (force.force().record(), force.force().standard_error().unwrap());
+    let inside = (0..period.len())
+        .filter(|k| {
+            let apart = value.channel(0)[*k] - truth.channel(0)[*k];
+            apart.abs() < 2.0 * error.channel(0)[*k]
+        })
+        .count();
+    println!("{inside} of {} samples lie within two standard errors of the truth", period.len());
+    assert!(inside * 10 > period.len() * 8);
+    Ok(())
+}
