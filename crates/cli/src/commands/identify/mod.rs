@@ -23,7 +23,7 @@ use mechid::io::{LineSpec, ParameterCovariance, SystemMatrices};
 use mechid::plot::Figure;
 use mechid::signal::Record;
 
-use self::checks::CheckRow;
+use self::checks::{CheckRow, When};
 use self::course::Course;
 use self::excited::{Band, choose_lines};
 use self::fit::{BetweenSamples, Fitted, Method};
@@ -256,7 +256,7 @@ impl Identified {
 fn explained(error: CliError, records: &[Recorded]) -> CliError {
     let CliError::Estimate(error) = error else { return error };
     let seen = records.iter().filter_map(|r| checks::of_channels(&r.held).ok()).flatten();
-    let reasons: Vec<String> = seen.map(|check| check.text).collect();
+    let reasons: Vec<String> = seen.map(|finding| finding.to_string()).collect();
     match reasons.is_empty() {
         true => CliError::Estimate(error),
         false => CliError::Unfit { error, reasons: reasons.join("; ") },
@@ -310,7 +310,7 @@ fn report(records: &[Recorded], fitted: &Fitted) -> Result<Report, CliError> {
 pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
-    (fitted.least_squares && warned("after") && !warned("before") && !explained).then(|| {
+    (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
         "least squares takes the measured motion as exact, and noise on it biases the parameters; \
          that alone can be what the warnings after the fit tell of. With --method \
          maximum-likelihood, which allows for noise, they speak of the machine"

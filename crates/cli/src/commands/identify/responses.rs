@@ -1,7 +1,7 @@
 //! Fits frequency responses.
 
 use mechid::estimate::checks::{
-    Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
+    Finding, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
 };
 use mechid::estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid::estimate::{Estimate, EstimateError, Unknowns};
@@ -94,7 +94,7 @@ fn looked_at(
     unknowns: &Unknowns,
     found: &Estimate,
     (rows, periodic): (usize, bool),
-) -> Result<Vec<Check>, CliError> {
+) -> Result<Vec<Finding>, CliError> {
     let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
     let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
     let fitted = own * found.parameters().len() as f64;
@@ -112,7 +112,7 @@ fn of_linearity(
     measured: &Measurement,
     responses: &Responses,
     found: &Estimate,
-) -> Result<Option<Check>, CliError> {
+) -> Result<Option<Finding>, CliError> {
     let (motion, kind) = measured.motion();
     let used = Lines::of(&responses.lines);
     match linearity(found, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {

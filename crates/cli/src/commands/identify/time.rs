@@ -2,8 +2,8 @@
 
 use clap::{Args, ValueEnum};
 use mechid::estimate::checks::{
-    Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
-    noise_on_motion, periodicity_across,
+    Finding, Subject, before_equation_of_motion, before_fit, delay_at_samples,
+    delay_between_samples, noise_on_response, periodicity_across,
 };
 use mechid::estimate::time_domain::{TimeDomain, Transitions};
 use mechid::estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
@@ -152,14 +152,14 @@ impl TimeArgs {
     /// samples.
     fn with_seam(
         &self,
-        mut seen: Vec<Check>,
+        mut seen: Vec<Finding>,
         recorded: &Recorded,
         p: &Prepared,
         end: Option<Record>,
-    ) -> Vec<Check> {
+    ) -> Vec<Finding> {
         let long = self.extent() == Extent::WholePeriod && recorded.held.held_to().is_some();
         if let Some(end) = end.filter(|_| long) {
-            let step = seen.iter().position(|check| check.subject == Subject::Step);
+            let step = seen.iter().position(|finding| finding.subject() == Subject::Step);
             seen.insert(step.unwrap_or(seen.len()), periodicity_across(&p.displacement, &end));
         }
         seen
@@ -247,12 +247,16 @@ impl TimeArgs {
     }
 
     /// What is looked at beside the residual.
-    fn at_samples_after(&self, p: &Prepared, estimate: &Estimate) -> Result<Vec<Check>, CliError> {
+    fn at_samples_after(
+        &self,
+        p: &Prepared,
+        estimate: &Estimate,
+    ) -> Result<Vec<Finding>, CliError> {
         let Some(response) = p.response()? else { return Ok(Vec::new()) };
         let mut checks = Vec::from_iter(delay_at_samples(&response, &p.force, estimate.unknowns()));
         // What was differentiated has noise in common from sample to sample.
         if self.derivatives.is_none() {
-            checks.extend(noise_on_motion(&response, &p.force, estimate)?);
+            checks.extend(noise_on_response(&response, &p.force, estimate)?);
         }
         Ok(checks)
     }

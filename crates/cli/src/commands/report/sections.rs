@@ -10,6 +10,7 @@ use super::reconstruction::Reconstruction;
 use super::residual::{Residual, sizes};
 use super::tables::Table;
 use super::{Contents, Excitation, Part, figures, judgement};
+use crate::commands::identify::checks::When;
 use crate::commands::identify::report::{Report, Uncertain};
 use crate::error::CliError;
 use crate::text_table::{compact, significant};
@@ -135,7 +136,7 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, CliError> {
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
              excitation is the number of parameters that they can tell apart."
         }
-        (judgement::list(contents, "before"))
+        (judgement::list(contents, When::Before))
     })
 }
 
@@ -241,8 +242,8 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, CliError> {
     Ok(html! {
         p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
         (records)
-        (judgement::list(contents, "after"))
-        @if contents.found.report.checks.iter().any(|check| check.when == "after") {
+        (judgement::list(contents, When::After))
+        @if contents.found.report.checks.iter().any(|check| check.when == When::After) {
             p.note {
                 "p is the share of experiments with nothing but noise left that look as bad. The test \
                  against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."
