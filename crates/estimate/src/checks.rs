@@ -1,11 +1,14 @@
-//! Before a fit: will these data do? After it: is what is left over noise?
+//! Checks of the data before a fit and of the residual after it.
 //!
-//! Every [`Check`] says in words and numbers what was looked at and what it means.
+//! Every check returns [`Finding`]s: values with named numbers, a [`Verdict`], a [`Subject`] and, from
+//! a statistical test, a p-value. Their [`Display`](std::fmt::Display) is one sentence. The limits
+//! that decide a verdict are in [`thresholds`].
 
 mod after;
 mod before;
 mod correlation;
 mod delay;
+mod finding;
 mod kinematics;
 mod linearity;
 mod misfit;
@@ -13,126 +16,73 @@ mod period;
 mod power;
 mod range;
 mod regressors;
+mod sentences;
 mod spectral;
-
-use std::fmt;
+pub mod thresholds;
 
 pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
 pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
 pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines};
+pub use finding::{
+    Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
+    Power, Quantity, Residual,
+};
 pub use kinematics::kinematics;
 pub use linearity::linearity;
 pub use misfit::{after_response_fit, after_spectral_fit};
 pub use period::claimed_period;
 pub use power::power;
-pub use range::{range, still};
-pub use regressors::noise_on_motion;
+pub use range::{clipped_channels, constant_channels};
+pub use regressors::noise_on_response;
 pub use spectral::{before_response_fit, before_spectral_fit};
 
-/// Samples that are looked at, at most, where each takes much time or memory.
-const LOOKED_AT: usize = 1 << 15;
+/// Maximum number of samples used by a check that takes much time or memory per sample.
+const MAX_SAMPLES: usize = 1 << 15;
 
-/// How a check came out.
+/// How far a finding speaks against the data or the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Verdict {
-    /// Nothing to worry about.
+    /// Nothing speaks against them.
     Good,
-    /// The fit can be done; the number says how far to trust it.
+    /// The fit can be done; the numbers tell how far to trust it.
     Doubtful,
     /// The fit will fail or mislead.
     Bad,
 }
 
-/// What a check looked at.
+/// Subject of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Subject {
-    /// Whether the force excites enough for the unknowns.
+    /// Excitation of enough lines for the unknowns.
     Excitation,
-    /// Whether the data tell the unknowns apart.
+    /// Conditioning of the regressors.
     Conditioning,
-    /// Whether a channel was cut off at the end of its range, or is dead.
+    /// Channels that are clipped or constant.
     Range,
-    /// Whether the motions measured are those of one motion.
+    /// Consistency of displacement, velocity and acceleration.
     Kinematics,
-    /// Whether the force puts power into the machine.
+    /// Power that the forces put into the machine.
     Power,
-    /// Whether the record is the period it is said to be.
+    /// Whole periods of a steady state.
     Periodicity,
-    /// Whether the step suits the fastest mode and the discretisation.
+    /// Sampling step against the highest mode and the discretisation.
     Step,
-    /// Whether motion and force belong together.
+    /// Coherence of force and response.
     Coherence,
-    /// Whether force and motion are apart in time.
+    /// Delay between force and response.
     Delay,
-    /// Whether noise on the motion biases the fit.
-    NoiseOnMotion,
-    /// Whether the residual is as large as the noise.
+    /// Noise on the response that biases the fit.
+    NoiseOnResponse,
+    /// Residual power against the noise.
     Misfit,
-    /// Whether the residual goes with a power of the motion.
+    /// Residual against powers of the displacement.
     Linearity,
-    /// Whether the residual is white.
+    /// Whiteness of the residual.
     Whiteness,
-    /// Whether the residual has anything in common with the force.
+    /// Correlation of the residual with the force.
     CrossCorrelation,
-}
-
-/// One thing looked at, in words with numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Check {
-    /// What was looked at.
-    pub subject: Subject,
-    /// How it came out.
-    pub verdict: Verdict,
-    /// The number behind the verdict; the text says of what, and in which unit.
-    pub value: f64,
-    /// One sentence.
-    pub text: String,
-}
-
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Verdict::Good => "good",
-            Verdict::Doubtful => "doubtful",
-            Verdict::Bad => "bad",
-        })
-    }
-}
-
-impl fmt::Display for Subject {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Subject::Excitation => "excitation",
-            Subject::Conditioning => "conditioning",
-            Subject::Range => "range",
-            Subject::Kinematics => "kinematics",
-            Subject::Power => "power",
-            Subject::Periodicity => "periodicity",
-            Subject::Step => "step",
-            Subject::Coherence => "coherence",
-            Subject::Delay => "delay",
-            Subject::NoiseOnMotion => "noise on motion",
-            Subject::Misfit => "misfit",
-            Subject::Linearity => "linearity",
-            Subject::Whiteness => "whiteness",
-            Subject::CrossCorrelation => "cross-correlation",
-        })
-    }
-}
-
-impl fmt::Display for Check {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.verdict, self.text)
-    }
-}
-
-/// A number to six digits, as a person writes it.
-fn six_digits(value: f64) -> String {
-    let exponent = value.abs().log10().floor();
-    match exponent {
-        e if (-4.0..6.0).contains(&e) => format!("{value:.0$}", (5.0 - e) as usize),
-        _ => format!("{value:.5e}"),
-    }
 }

@@ -1,6 +1,9 @@
-//! What was looked at before and after the fit, for people and for programs.
+//! Checks before and after the fit, record by record.
 
-use mechid_estimate::checks::{Check, Verdict, after_fit, kinematics, power, range, still};
+use mechid_estimate::checks::{
+    Finding, Quantity, Subject, Verdict, after_fit, clipped_channels, constant_channels,
+    kinematics, power,
+};
 use mechid_model::ResponseQuantity;
 use serde::Serialize;
 
@@ -14,62 +17,75 @@ pub const LAGS: usize = 25;
 /// Samples that a lag takes at least.
 pub const SAMPLES_PER_LAG: usize = 4;
 
-/// One thing looked at.
+/// One finding, with the record it belongs to.
 #[derive(Debug, Serialize)]
 pub struct CheckRow {
-    /// Before or after the fit.
-    pub when: &'static str,
-    /// Which record, where there are several.
+    /// Time of the check.
+    pub when: When,
+    /// Name of the record, where there are several.
     pub record: Option<String>,
     /// Subject of the check.
-    pub subject: String,
+    #[serde(serialize_with = "as_text")]
+    pub subject: Subject,
     /// Good, doubtful or bad.
-    pub verdict: String,
-    /// The number behind the verdict; nothing where it is infinite.
+    pub verdict: Verdict,
+    /// The number that decides the verdict; `None` where it is infinite.
     pub value: Option<f64>,
     /// The finding, in a sentence.
     pub text: String,
+    /// All numbers of the finding.
+    pub finding: Finding,
 }
 
-/// Everything looked at.
-pub fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>, AnalysisError> {
+/// Time of a check.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum When {
+    /// Before the fit.
+    Before,
+    /// After the fit.
+    After,
+}
+
+/// All findings before and after a fit.
+pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>, AnalysisError> {
     let mut rows = Vec::new();
-    let mut add = |when, at: usize, checks: &[Check]| {
+    let mut add = |when, at: usize, findings: &[Finding]| {
         let name = (records.len() > 1).then(|| records[at].file.clone());
-        rows.extend(checks.iter().map(|check| CheckRow::new(when, name.clone(), check)));
+        rows.extend(findings.iter().map(|finding| CheckRow::new(when, name.clone(), finding)));
     };
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
-        add("before", at, checks);
-        add("before", at, &of_channels(record)?);
+        add(When::Before, at, checks);
+        add(When::Before, at, &of_channels(record)?);
     }
     for (at, checks) in fitted.after.iter().enumerate() {
-        add("after", at, checks);
+        add(When::After, at, checks);
     }
     for (at, residual) in fitted.residuals.iter().enumerate() {
-        add("after", at, &of_residual(residual)?);
+        add(When::After, at, &of_residual(residual)?);
     }
     Ok(rows)
 }
 
-/// What is wrong with the channels themselves, whatever is fitted to them.
-pub fn of_channels(measured: &Block) -> Result<Vec<Check>, AnalysisError> {
-    let mut checks = range("force", &measured.force);
+/// Faults of the channels themselves, whatever is fitted to them.
+pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
+    let mut findings = clipped_channels(Quantity::Force, &measured.force);
     for (kind, motion) in measured.responses() {
-        checks.extend(range(&kind.to_string(), motion));
-        checks.extend(still(&kind.to_string(), motion));
+        findings.extend(clipped_channels(Quantity::Response(kind), motion));
+        findings.extend(constant_channels(Quantity::Response(kind), motion));
     }
-    checks.extend(kinematics(&measured.responses())?);
-    // A velocity tells the power without its neighbours in time.
+    findings.extend(kinematics(&measured.responses())?);
+    // A velocity gives the power without differentiation.
     let (motion, kind) = match &measured.velocity {
         Some(velocity) => (velocity, ResponseQuantity::Velocity),
         None => measured.response(),
     };
-    checks.extend(power(&measured.force, motion, kind)?);
-    Ok(checks)
+    findings.extend(power(&measured.force, motion, kind)?);
+    Ok(findings)
 }
 
-/// Nothing if there are too few samples to tell.
-fn of_residual(residual: &Residual) -> Result<Vec<Check>, AnalysisError> {
+/// Tests of a residual; none if it has too few samples.
+fn of_residual(residual: &Residual) -> Result<Vec<Finding>, AnalysisError> {
     let Residual { left, fitted, force, noise_span } = residual;
     match LAGS.min(left.len().saturating_sub(*noise_span) / SAMPLES_PER_LAG) {
         0 => Ok(Vec::new()),
@@ -78,25 +94,26 @@ fn of_residual(residual: &Residual) -> Result<Vec<Check>, AnalysisError> {
 }
 
 impl CheckRow {
-    fn new(when: &'static str, record: Option<String>, check: &Check) -> Self {
+    fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
         Self {
             when,
             record,
-            subject: check.subject.to_string(),
-            verdict: check.verdict.to_string(),
-            value: check.value.is_finite().then_some(check.value),
-            text: check.text.clone(),
+            subject: finding.subject(),
+            verdict: finding.verdict(),
+            value: Some(finding.value()).filter(|value| value.is_finite()),
+            text: finding.to_string(),
+            finding: finding.clone(),
         }
     }
 
     /// Whether the user must be warned.
     pub fn is_conspicuous(&self) -> bool {
-        self.verdict != Verdict::Good.to_string()
+        self.verdict > Verdict::Good
     }
 
-    /// Whether it says what is wrong.
+    /// Whether the finding names a fault.
     pub fn is_bad(&self) -> bool {
-        self.verdict == Verdict::Bad.to_string()
+        self.verdict == Verdict::Bad
     }
 
     /// The sentence, with the record it is about.
@@ -106,4 +123,12 @@ impl CheckRow {
             None => self.text.clone(),
         }
     }
+}
+
+/// Serialises a value as its display.
+fn as_text<T: std::fmt::Display, S: serde::Serializer>(
+    value: &T,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
 }

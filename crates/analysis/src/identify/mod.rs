@@ -254,7 +254,7 @@ impl Serialize for Identified {
 fn explained(error: AnalysisError, records: &[Windowed]) -> AnalysisError {
     let AnalysisError::Estimate(error) = error else { return error };
     let seen = records.iter().filter_map(|r| checks::of_channels(&r.held).ok()).flatten();
-    let reasons: Vec<String> = seen.map(|check| check.text).collect();
+    let reasons: Vec<String> = seen.map(|finding| finding.to_string()).collect();
     match reasons.is_empty() {
         true => AnalysisError::Estimate(error),
         false => AnalysisError::Unfit { error, reasons: reasons.join("; ") },

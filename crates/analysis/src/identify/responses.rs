@@ -1,7 +1,7 @@
 //! Fits frequency responses.
 
 use mechid_estimate::checks::{
-    Check, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
+    Finding, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
 };
 use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -96,7 +96,7 @@ fn looked_at(
     unknowns: &Unknowns,
     found: &Estimate,
     (rows, periodic): (usize, bool),
-) -> Result<Vec<Check>, AnalysisError> {
+) -> Result<Vec<Finding>, AnalysisError> {
     let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
     let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
     let fitted = own * found.parameters().len() as f64;
@@ -114,7 +114,7 @@ fn of_linearity(
     measured: &Block,
     responses: &Responses,
     found: &Estimate,
-) -> Result<Option<Check>, AnalysisError> {
+) -> Result<Option<Finding>, AnalysisError> {
     let (motion, kind) = measured.response();
     let used = LinesUsed::of(&responses.lines);
     match linearity(found, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {

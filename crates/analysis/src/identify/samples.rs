@@ -1,8 +1,8 @@
 //! Fits sample by sample.
 
 use mechid_estimate::checks::{
-    Check, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
-    noise_on_motion, periodicity_across,
+    Finding, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
+    noise_on_response, periodicity_across,
 };
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
@@ -76,14 +76,14 @@ impl SampleFit {
     /// samples.
     fn with_seam(
         &self,
-        mut seen: Vec<Check>,
+        mut seen: Vec<Finding>,
         recorded: &Windowed,
         p: &Prepared,
         end: Option<Record>,
-    ) -> Vec<Check> {
+    ) -> Vec<Finding> {
         let long = self.extent() == Extent::WholePeriod && recorded.held.held_to().is_some();
         if let Some(end) = end.filter(|_| long) {
-            let step = seen.iter().position(|check| check.subject == Subject::Step);
+            let step = seen.iter().position(|check| check.subject() == Subject::Step);
             seen.insert(step.unwrap_or(seen.len()), periodicity_across(&p.displacement, &end));
         }
         seen
@@ -179,12 +179,12 @@ impl SampleFit {
         &self,
         p: &Prepared,
         estimate: &Estimate,
-    ) -> Result<Vec<Check>, AnalysisError> {
+    ) -> Result<Vec<Finding>, AnalysisError> {
         let Some(response) = p.response()? else { return Ok(Vec::new()) };
         let mut checks = Vec::from_iter(delay_at_samples(&response, &p.force, estimate.unknowns()));
         // What was differentiated has noise in common from sample to sample.
         if self.derivatives.is_none() {
-            checks.extend(noise_on_motion(&response, &p.force, estimate)?);
+            checks.extend(noise_on_response(&response, &p.force, estimate)?);
         }
         Ok(checks)
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mechid_estimate::checks::{Check, after_spectral_fit, before_spectral_fit, delay_of_lines};
+use mechid_estimate::checks::{Finding, after_spectral_fit, before_spectral_fit, delay_of_lines};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
@@ -33,9 +33,9 @@ pub struct Fitted {
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
     /// What was looked at before the fit, record by record.
-    pub before: Vec<Vec<Check>>,
+    pub before: Vec<Vec<Finding>>,
     /// What was looked at after the fit beside the residuals, record by record.
-    pub after: Vec<Vec<Check>>,
+    pub after: Vec<Vec<Finding>>,
     /// What the fit leaves of each record; empty where that is not a row of samples.
     pub residuals: Vec<Residual>,
     /// How the machine found is made to move under a measured force.
@@ -197,7 +197,7 @@ fn of_noise(
     periods: &RepeatedPeriods,
     estimate: &Estimate,
     fitted: f64,
-) -> Result<Option<Check>, AnalysisError> {
+) -> Result<Option<Finding>, AnalysisError> {
     let Some(pooling) = pooling(periods.count()) else { return Ok(None) };
     Ok(after_spectral_fit(&periods.mean_with_noise(pooling)?, estimate, fitted))
 }

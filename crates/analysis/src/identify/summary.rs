@@ -10,7 +10,7 @@ use mechid_signal::counted;
 use serde::Serialize;
 
 use super::CONSPICUOUS;
-use super::checks::{self, CheckRow};
+use super::checks::{self, CheckRow, When};
 use super::options::Identify;
 use super::prediction::Prediction;
 use super::spectra::Fitted;
@@ -422,7 +422,7 @@ fn digits(value: f64, error: f64) -> usize {
 pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
-    (fitted.least_squares && warned("after") && !warned("before") && !explained).then(|| {
+    (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {
         "least squares takes the measured motion as exact, and noise on it biases the parameters; \
          that alone can be what the warnings after the fit tell of. With --method \
          maximum-likelihood, which allows for noise, they speak of the machine"

@@ -33,11 +33,10 @@ pub fn doubts(contents: &Review<'_>) -> Vec<String> {
 
 /// The checks with this verdict, a sentence for each subject.
 fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
-    let verdict = verdict.to_string();
-    let mut sentences: Vec<(&str, String)> = Vec::new();
+    let mut sentences: Vec<(Subject, String)> = Vec::new();
     for check in checks.iter().filter(|check| check.verdict == verdict) {
-        let subject = check.subject.as_str();
-        if sentences.iter().any(|(told, _)| *told == subject) {
+        let subject = check.subject;
+        if sentences.iter().any(|(reported, _)| *reported == subject) {
             continue;
         }
         let of_subject = || checks.iter().filter(|check| check.subject == subject);
@@ -58,10 +57,10 @@ fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
 pub fn merits(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.found.summary();
     let good = report.checks.iter().filter(|check| !check.is_conspicuous());
-    let mut subjects: Vec<&str> = Vec::new();
+    let mut subjects: Vec<Subject> = Vec::new();
     for check in good.clone() {
-        if !subjects.contains(&check.subject.as_str()) {
-            subjects.push(&check.subject);
+        if !subjects.contains(&check.subject) {
+            subjects.push(check.subject);
         }
     }
     let mut merits = Vec::new();
@@ -70,11 +69,10 @@ pub fn merits(contents: &Review<'_>) -> Vec<String> {
             "{} of {} checks of data and fit are good: {}",
             good.clone().count(),
             report.checks.len(),
-            subjects.join(", ")
+            subjects.iter().map(Subject::to_string).collect::<Vec<_>>().join(", ")
         ));
     }
-    let subject = Subject::Misfit.to_string();
-    let explained = good.clone().any(|check| check.subject == subject);
+    let explained = good.clone().any(|check| check.subject == Subject::Misfit);
     let misfit = contents.found.fitted().misfit.filter(|misfit| misfit.ratio >= OVERSTATED);
     if let Some(misfit) = misfit.filter(|_| explained) {
         merits.push(format!("{misfit}; 1 is expected"));

@@ -1,25 +1,25 @@
-//! Correlations over lags, and how likely noise alone has as much of them.
+//! Correlations over lags, and their p-values.
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use crate::EstimateError;
 
-/// Correlations at a number of lags, and how likely pure noise has as much of them.
+/// Correlations at a number of lags, with their p-value for noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Correlation {
     /// Coefficient at each lag, a pure number; see the function that made it for which lags.
     pub coefficients: Vec<f64>,
-    /// 95 % of the coefficients of noise are smaller than this; 1.96/√N for white noise.
+    /// Bound that 95 % of the coefficients of noise keep; 1.96/√N for white noise.
     pub bound: f64,
     /// Sum of squared coefficients, each over its variance for noise; dimensionless.
     pub statistic: f64,
-    /// The share of records of noise with a larger statistic. Below 0.01 or so the residual is
-    /// hardly noise: the model misses something.
+    /// Probability that noise has a larger statistic. Below 0.01 or so the residual is hardly noise:
+    /// the model is incomplete.
     pub p_value: f64,
 }
 
 impl Correlation {
-    /// How many coefficients exceed the 95 % bound.
+    /// Number of coefficients beyond the 95 % bound.
     pub fn outside(&self) -> usize {
         self.coefficients.iter().filter(|c| c.abs() > self.bound).count()
     }
@@ -57,13 +57,13 @@ pub fn whiteness_beyond(
     lags: usize,
 ) -> Result<Correlation, EstimateError> {
     let e = centred(residual, lags, span)?;
-    let own = autocorrelation(&e, span + lags);
+    let all = autocorrelation(&e, span + lags);
     let count = e.len() as f64;
-    let coefficients = own[span + 1..].to_vec();
-    let together = correlated(&own[..=span], &own[..=span], lags);
+    let coefficients = all[span + 1..].to_vec();
+    let covariance = correlated(&all[..=span], &all[..=span], lags);
     let weight = |lag: usize| count * (count + 2.0) / (count - lag as f64);
     let squares = (span + 1..).zip(&coefficients).map(|(lag, c)| c * c * weight(lag));
-    Ok(Correlation::judged(squares.sum(), &together, coefficients, count))
+    Ok(Correlation::tested(squares.sum(), &covariance, coefficients, count))
 }
 
 /// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
@@ -87,8 +87,8 @@ pub fn cross_correlation(
     cross_correlation_of_coloured(residual, input, lags, &[1.0])
 }
 
-/// The same of a residual that is correlated itself: `colour` has its coefficients at the lags 0,
-/// 1 … as far as they count.
+/// Correlation with an input of a residual that is correlated itself: `colour` has its coefficients at
+/// the lags 0, 1 … as far as they count.
 pub(super) fn cross_correlation_of_coloured(
     residual: &[f64],
     input: &[f64],
@@ -102,39 +102,39 @@ pub(super) fn cross_correlation_of_coloured(
     let after = (0..=lags).map(|lag| products(&e[lag..], &u));
     let coefficients: Vec<f64> = before.chain(after).map(|c| ratio(c, power)).collect();
     let count = e.len() as f64;
-    let own = autocorrelation(&u, (2 * lags + colour.len()).min(u.len() - 1));
-    let together = correlated(colour, &own, coefficients.len());
+    let input = autocorrelation(&u, (2 * lags + colour.len()).min(u.len() - 1));
+    let covariance = correlated(colour, &input, coefficients.len());
     let weight = |at: usize| count * count / (count - at.abs_diff(lags) as f64);
     let squares = coefficients.iter().enumerate().map(|(at, c)| c * c * weight(at));
-    Ok(Correlation::judged(squares.sum(), &together, coefficients, count))
+    Ok(Correlation::tested(squares.sum(), &covariance, coefficients, count))
 }
 
 impl Correlation {
-    /// A sum of squares of coefficients whose covariance, times the number of samples, depends on
-    /// the lag between them alone: `together` at the lags 0, 1 …
-    fn judged(sum: f64, together: &[f64], coefficients: Vec<f64>, count: f64) -> Self {
-        // An input that is nearly all in phase with the residual's colour has next to no scatter.
-        let variance = together[0].max(f64::EPSILON);
-        let p_value = share_above(sum, coefficients.len(), together);
+    /// Test of a sum of squares of coefficients whose covariance, times the number of samples, depends
+    /// on the lag between them alone: `covariance` at the lags 0, 1 …
+    fn tested(sum: f64, covariance: &[f64], coefficients: Vec<f64>, count: f64) -> Self {
+        // Coefficients hardly scatter where the spectra of input and residual hardly overlap.
+        let variance = covariance[0].max(f64::EPSILON);
+        let p_value = share_above(sum, coefficients.len(), covariance);
         let bound = 1.96 * (variance / count).sqrt();
         Self { coefficients, bound, statistic: sum / variance, p_value }
     }
 }
 
-/// The probability that the sum of squares of `terms` normal numbers of mean zero is above `sum`,
-/// where the covariance of two depends on their distance alone: `together` at 0, 1 …, zero beyond.
+/// Probability that the sum of squares of `terms` normal numbers of mean zero is above `sum`, where
+/// the covariance of two depends on their distance alone: `covariance` at 0, 1 …, zero beyond.
 ///
 /// The sum has nearly the distribution of g χ²(h) with its own mean and variance.
-fn share_above(sum: f64, terms: usize, together: &[f64]) -> f64 {
-    let squares = together.iter().enumerate().take(terms).map(|(apart, c)| {
-        let pairs = if apart == 0 { terms } else { 2 * (terms - apart) };
+fn share_above(sum: f64, terms: usize, covariance: &[f64]) -> f64 {
+    let squares = covariance.iter().enumerate().take(terms).map(|(distance, c)| {
+        let pairs = if distance == 0 { terms } else { 2 * (terms - distance) };
         pairs as f64 * c * c
     });
-    share_above_of(sum, terms as f64 * together[0], squares.sum())
+    share_above_of(sum, terms as f64 * covariance[0], squares.sum())
 }
 
-/// The probability that a sum of squares is above `sum`, where the covariance of what is squared has
-/// the trace `mean` and its square the trace `square`.
+/// Probability that a sum of squares of normal numbers is above `sum`, where their covariance has the
+/// trace `mean` and its square the trace `square`.
 pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     if mean <= 0.0 {
         return if sum > 0.0 { 0.0 } else { 1.0 };

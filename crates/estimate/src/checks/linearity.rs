@@ -1,25 +1,25 @@
-//! Whether what a fit leaves goes with the square or the cube of the motion.
+//! Correlation of a residual with powers of the displacement.
 
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ContinuousCDF, Normal};
 
-use super::after::{SIGNIFICANT, p_told};
-use super::{Check, Subject, Verdict};
+use super::finding::{Finding, PValue, Power};
 use crate::{Estimate, EstimateError, predict_periodic};
 
-/// The powers of the displacement that are looked for, and what they are called.
-const POWERS: [(i32, &str); 2] = [(2, "square"), (3, "cube")];
+/// Powers of the displacement that are tested.
+const POWERS: [Power; 2] = [Power::Square, Power::Cube];
 
-/// Whether the motion (samples × degrees of freedom) that a machine leaves unexplained under a random
-/// force (N) goes with the square or the cube of its displacement, between two frequencies in Hz.
+/// Tests whether the response (samples × degrees of freedom) that a machine does not explain under a
+/// random force (N) is correlated with the square or the cube of its displacement, between two
+/// frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
 ///
-/// Frequency responses do not show that: under a random force a spring that hardens looks like a
-/// stiffer one with more noise. So the displacement is predicted over the whole record, and its square
-/// and its cube, less what is proportional to it, are taken as forces at each degree of freedom in
-/// turn. What they would do must have nothing in common with the residual. In the noise of a linear
-/// machine it has not; a random force that is Gaussian keeps errors of the linear model out of it, too.
+/// Frequency responses do not show that: under a random force a hardening spring looks like a stiffer
+/// one with more noise. So the displacement is predicted over the whole record, and its square and its
+/// cube, less their linear parts, are applied as forces at each degree of freedom in turn. The
+/// responses to them must be uncorrelated with the residual, as they are with the noise of a linear
+/// machine; a Gaussian force keeps errors of the linear model out, too.
 ///
 /// # Errors
 /// As [`predict_periodic`], and [`EstimateError::Undetermined`] if the estimate is no machine.
@@ -31,86 +31,57 @@ const POWERS: [(i32, &str); 2] = [(2, "square"), (3, "cube")];
 pub fn linearity(
     estimate: &Estimate,
     force: &Record,
-    motion: &Record,
+    response: &Record,
     measured: ResponseQuantity,
     band_hz: [f64; 2],
-) -> Result<Check, EstimateError> {
-    force.check_same_sampling(motion)?;
+) -> Result<Finding, EstimateError> {
+    force.check_same_sampling(response)?;
     let system = estimate.system()?;
     let (n, predicted) = (system.dof(), predict_periodic(&system, force)?);
-    let spectra = [force, motion].map(Spectrum::of);
+    let spectra = [force, response].map(Spectrum::of);
     let inside = |line: &usize| {
         let hz = *line as f64 * force.sampling().line_spacing_hz();
         band_hz[0] <= hz && hz <= band_hz[1] && 2 * line < force.len()
     };
     let lines: Vec<usize> = (1..spectra[0].len()).filter(inside).collect();
-    let mut responses = Vec::with_capacity(lines.len());
-    let mut left = DMatrix::zeros(n, lines.len());
+    let mut receptances = Vec::with_capacity(lines.len());
+    let mut residual = DMatrix::zeros(n, lines.len());
     for (at, line) in lines.iter().enumerate() {
         let omega = spectra[0].omega(*line);
-        let response = system.receptance(omega)? * measured.per_displacement(omega);
+        let receptance = system.receptance(omega)? * measured.per_displacement(omega);
         let [f, x] = [0, 1].map(|s| spectra[s].lines().row(*line).transpose());
-        left.set_column(at, &(x - &response * f));
-        responses.push(response);
+        residual.set_column(at, &(x - &receptance * f));
+        receptances.push(receptance);
     }
-    let mut strongest = Common { p_value: 1.0, power: POWERS[0].1, dof: 0 };
+    let mut least = (1.0, POWERS[0], 0);
     for dof in 0..n {
-        for (power, name) in POWERS {
+        for power in POWERS {
             let forces = without_linear_part(predicted.displacement(), dof, power)?;
             let forces = Spectrum::of(&forces);
-            let did = |at: usize| responses[at].column(dof) * forces.line(lines[at], 0);
-            let effects = DMatrix::from_columns(&(0..lines.len()).map(did).collect::<Vec<_>>());
-            let p_value = in_common(&left, &effects);
-            if p_value < strongest.p_value {
-                strongest = Common { p_value, power: name, dof };
+            let response = |at: usize| receptances[at].column(dof) * forces.line(lines[at], 0);
+            let responses: Vec<_> = (0..lines.len()).map(response).collect();
+            let p_value = p_value(&residual, &DMatrix::from_columns(&responses));
+            if p_value < least.0 {
+                least = (p_value, power, dof);
             }
         }
     }
-    Ok(strongest.check(n * POWERS.len()))
+    // Bonferroni: the least of so many.
+    let (p_value, power, dof) = least;
+    let p_value = PValue::of(((n * POWERS.len()) as f64 * p_value).min(1.0));
+    Ok(Finding::Linearity { power, dof, p_value })
 }
 
-/// A power of a displacement, and how likely noise has as much in common with it.
-struct Common {
-    p_value: f64,
-    power: &'static str,
-    dof: usize,
-}
-
-impl Common {
-    /// The most conspicuous of so many.
-    fn check(self, of: usize) -> Check {
-        // Each of them may be so by chance.
-        let value = (of as f64 * self.p_value).min(1.0);
-        let (power, number) = (self.power, self.dof + 1);
-        let (verdict, text) = match value < SIGNIFICANT {
-            false => (
-                Verdict::Good,
-                format!(
-                    "the residual has nothing in common with what the square and the cube of the \
-                     displacement would do as forces, {}",
-                    p_told(value)
-                ),
-            ),
-            true => (
-                Verdict::Doubtful,
-                format!(
-                    "the residual goes with what the {power} of displacement {number} would do as a \
-                     force, {}: the machine is not linear at this level of the force; its parameters \
-                     belong to it",
-                    p_told(value)
-                ),
-            ),
-        };
-        Check { subject: Subject::Linearity, verdict, value, text }
-    }
-}
-
-/// A power of a channel, its mean and what is proportional to the channel taken away.
+/// A power of a channel less its mean and its linear part.
 fn without_linear_part(
     displacement: &Record,
     dof: usize,
-    power: i32,
+    power: Power,
 ) -> Result<Record, EstimateError> {
+    let power = match power {
+        Power::Square => 2,
+        Power::Cube => 3,
+    };
     let x = displacement.without_mean().channel(dof).to_vec();
     let size = (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     let x: Vec<f64> = x.iter().map(|x| if size > 0.0 { x / size } else { 0.0 }).collect();
@@ -119,11 +90,11 @@ fn without_linear_part(
     Ok(Record::from_channel(displacement.sampling(), values)?.without_mean())
 }
 
-/// The probability that noise of the spectrum of `left` (channels × lines) has as much in common with
-/// the effects, each channel relative to its size.
-fn in_common(left: &DMatrix<Complex<f64>>, effects: &DMatrix<Complex<f64>>) -> f64 {
+/// Probability that noise with the spectrum of the residual (channels × lines) is correlated as much
+/// with the responses, each channel relative to its size.
+fn p_value(residual: &DMatrix<Complex<f64>>, responses: &DMatrix<Complex<f64>>) -> f64 {
     let (mut product, mut variance) = (0.0, 0.0);
-    for (e, g) in left.row_iter().zip(effects.row_iter()) {
+    for (e, g) in residual.row_iter().zip(responses.row_iter()) {
         let size = e.norm_squared();
         if size > 0.0 {
             product += e.dotc(&g).re / size;

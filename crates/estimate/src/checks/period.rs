@@ -1,92 +1,45 @@
-//! Whether the force repeats after the period that is claimed.
+//! Claimed period against the force.
 
 use mechid_signal::Record;
 use mechid_signal::measures::aperiodic_autocorrelation;
 
-use super::{Check, Subject, Verdict};
+use super::finding::{Finding, PeriodFault};
 
-/// A force that differs by more than this part of its RMS value is not said to repeat.
+/// Mismatch, over the RMS of the force, beyond which it does not repeat.
 const WORST: f64 = 0.1;
 
-/// Lags of the same quality differ by this factor at most in the square of the mismatch.
+/// Factor between squared mismatches of lags after which the force repeats equally well.
 const ALIKE: f64 = 2.0;
 
-/// Squared mismatch that rounding in the Fourier transforms leaves of one that is zero.
+/// Squared mismatch that the rounding of Fourier transforms leaves.
 const ROUNDING: f64 = 1e-12;
 
-/// A period claimed is compared with those that are up to so many samples longer or shorter.
+/// Maximum number of samples by which a neighbouring period is longer or shorter.
 const NEIGHBOURS: usize = 2;
 
-/// Another period fits better if the gain in squares is this many times its own scatter.
+/// Reduction of the squared mismatch, in its own scatter, from which a neighbouring period is better.
 const CLEARLY: f64 = 4.0;
 
-/// What is wrong with a claimed period (in samples) by the force (N), the samples of which are one or
-/// several such periods; nothing if nothing speaks against it.
+/// Finds out by the force (N), the samples of which are one or several such periods, what is wrong with
+/// a claimed period (in samples); `None` if nothing speaks against it.
 ///
-/// Three things are looked at: whether the force returns to itself better after one or two samples
-/// more or less; whether it returns after the claimed period but in one place, where samples are
-/// missing or too many; and whether it repeats after another number of samples altogether, of which
-/// the claimed one is no multiple. The last shows in a single claimed period, too, if it holds four
-/// thirds of the true one or more; what is said is then said of the samples compared. The verdict is
-/// bad, and its value the period found, in samples.
-pub fn claimed_period(force: &Record, period: usize) -> Option<Check> {
+/// Three faults are looked for ([`PeriodFault`]): the force returns to itself better after one or two
+/// samples more or less; it returns after the claimed period except in one place, where samples are
+/// missing or too many; or it repeats after another number of samples altogether, of which the claimed
+/// one is no multiple. The last shows in a single claimed period, too, if it holds four thirds of the
+/// true one or more; the sentence then names the samples compared.
+pub fn claimed_period(force: &Record, period: usize) -> Option<Finding> {
     let channels: Vec<Vec<f64>> = (0..force.channels()).filter_map(|c| unit(force, c)).collect();
     if channels.is_empty() || period == 0 || period > force.len() {
         return None;
     }
-    let (found, text) = match neighbour(&channels, period) {
-        Some((found, [claimed, better])) => (
-            found,
-            format!(
-                "the force differs from one period of {period} samples to the next by {} of its RMS \
-                 value, after {found} samples by {} only: the period is {found} samples",
-                percent(claimed),
-                percent(better),
-            ),
-        ),
-        None => match interruption(&channels, period) {
-            Some((at, mismatch)) => (
-                period,
-                format!(
-                    "the force repeats every {period} samples, to {} of its RMS value, but not across \
-                     sample {} of the window, as if samples were missing there or too many: keep to \
-                     one side of it",
-                    percent(mismatch),
-                    at + 1
-                ),
-            ),
-            None => {
-                let (found, mismatch) = another(&channels, period)?;
-                (found, other_period(found, mismatch, period, force.len()))
-            }
-        },
-    };
-    let (subject, verdict) = (Subject::Periodicity, Verdict::Bad);
-    Some(Check { subject, verdict, value: found as f64, text })
+    let fault = neighbour(&channels, period)
+        .or_else(|| interruption(&channels, period))
+        .or_else(|| another(&channels, period))?;
+    Some(Finding::WrongPeriod { claimed: period, fault })
 }
 
-/// What is said of another period than the claimed one: of all samples, if each was compared with one
-/// a period away, otherwise of those that were.
-fn other_period(found: usize, mismatch: f64, period: usize, len: usize) -> String {
-    let mismatch = percent(mismatch);
-    let repeats = match len.checked_sub(found) {
-        Some(compared) if compared < found => format!(
-            "the first {compared} of {len} samples of the force come again {found} samples later, to \
-             {mismatch} of its RMS value"
-        ),
-        _ => format!("the force repeats every {found} samples, to {mismatch} of its RMS value"),
-    };
-    format!(
-        "{repeats}, and {period} samples are no whole number of that: the lines used are not those of \
-         the force"
-    )
-}
-
-fn percent(share: f64) -> String {
-    format!("{:.2} %", 100.0 * share)
-}
-
-/// A channel about its mean, of RMS value 1; nothing if it does not vary.
+/// A channel less its mean, with an RMS of 1; `None` if it does not vary.
 fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     let x = force.channel(channel);
     let mean = x.iter().sum::<f64>() / x.len() as f64;
@@ -95,9 +48,9 @@ fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     (rms > ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
 }
 
-/// A period close by that fits clearly better, and the differences after the claimed one and it, as
-/// shares of √2 times the RMS value.
-fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<(usize, [f64; 2])> {
+/// A period close by after which the force repeats clearly better. Mismatches are RMS differences over
+/// √2 times the RMS of the force.
+fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let longest = period + NEIGHBOURS;
     let pairs = channels[0].len().checked_sub(longest)?;
     if period <= NEIGHBOURS || pairs < period / 2 {
@@ -118,17 +71,20 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<(usize, [f64; 2])> 
     let scatter = gain.iter().map(|g| g * g).sum::<f64>().sqrt();
     let share = |squares: &[f64]| (0.5 * sum(squares) / squares.len() as f64).sqrt();
     let clear = share(&claimed) > ROUNDING.sqrt() && sum(&gain) > CLEARLY * scatter;
-    clear.then(|| (found, [share(&claimed), share(&best)]))
+    clear.then(|| PeriodFault::Neighbour {
+        period: found,
+        mismatch: share(&best),
+        claimed_mismatch: share(&claimed),
+    })
 }
 
-/// Beyond the stretch in which they differ, samples one period apart differ less than in it by this
-/// factor at least, in the square.
+/// Minimum factor between the squared mismatch across an interruption and elsewhere.
 const INTERRUPTED: f64 = 10.0;
 
-/// The first sample, counted from 0, that does not follow from the one a claimed period before, if
-/// that holds of one stretch of a period at most and of no other; and by how much the others differ,
-/// as a share of √2 times the RMS value.
-fn interruption(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
+/// The first sample that does not follow from the one a claimed period before, if that holds of one
+/// stretch of a period at most and of no other. The mismatch is the RMS difference of the others over
+/// √2 times the RMS of the force.
+fn interruption(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let pairs = channels[0].len().checked_sub(period)?;
     // On both sides together there must be a period at least that meets the next one.
     if pairs < 2 * period {
@@ -147,7 +103,7 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
     let within = |first: usize| (sums[first + period] - sums[first]) / period as f64;
     let stretches = 0..=pairs - period;
     let worst = stretches.max_by(|a, b| within(*a).total_cmp(&within(*b)))?;
-    // Summed anew, for what is left of a large sum is rounding.
+    // Summed anew: the difference of large sums is rounding.
     let others: f64 = squares[..worst].iter().chain(&squares[worst + period..]).sum();
     let others = others / (pairs - period) as f64;
     if within(worst) <= WORST * WORST || others > (WORST * WORST).min(within(worst) / INTERRUPTED) {
@@ -156,12 +112,12 @@ fn interruption(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
     // A single sample may be like the one a period before by chance, or unlike it by noise.
     let off = others.max(within(worst) / INTERRUPTED);
     let first = (worst..worst + period).find(|k| squares[*k] > off)?;
-    Some((first + period, others.sqrt()))
+    Some(PeriodFault::Interruption { sample: first + period, mismatch: others.sqrt() })
 }
 
 /// The shortest number of samples after which all channels repeat, if the claimed period is no
-/// multiple of it and does not repeat as well, and how well it does.
-fn another(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
+/// multiple of it and does not repeat as well.
+fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let squares = squared_mismatches(channels);
     // Behind the lags at which a slow force resembles itself.
     let apart = (1..squares.len()).find(|lag| squares[*lag] > WORST * WORST)?;
@@ -176,11 +132,15 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<(usize, f64)> {
     // Each of so many may be half a sample longer or shorter.
     let times = (period as f64 / found as f64).round();
     let off = (period as f64 - times * found as f64).abs();
-    (off > 0.5 * times + 0.5).then(|| (found, squares[found].max(0.0).sqrt()))
+    (off > 0.5 * times + 0.5).then(|| PeriodFault::Other {
+        period: found,
+        mismatch: squares[found].max(0.0).sqrt(),
+        samples: channels[0].len(),
+    })
 }
 
 /// Squared differences of samples a lag apart over the squares of both, for the lags up to three
-/// quarters of the record; 1 where what overlaps is nearly still.
+/// quarters of the record; 1 where the overlapping samples hardly vary.
 fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
     let len = channels[0].len();
     let mut all = vec![(0.0, 0.0); 3 * len / 4 + 1];

@@ -1,30 +1,30 @@
-//! Whether noise on the measured motion biases least squares where its residual does not show it.
+//! Noise on the response that biases least squares while its residual stays white.
 
 use mechid_model::{Matrix, Parameter, Response};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::after::{ROUNDING, SIGNIFICANT, p_told};
+use super::MAX_SAMPLES;
 use super::correlation::whiteness;
-use super::{Check, LOOKED_AT, Subject, Verdict, six_digits};
+use super::finding::{Finding, PValue};
+use super::thresholds::{ROUNDING, SIGNIFICANCE};
 use crate::{Estimate, EstimateError, LeastSquares};
 
-/// Lags up to which the residual must be white for the test to hold.
+/// Number of lags at which the residual must be white for the test to hold.
 const LAGS: usize = 25;
 
-/// Samples in a row of which one estimate takes as many as it has unknowns, and some to spare.
-const SPARE: usize = 4;
+/// Minimum number of samples per unknown.
+const SAMPLES_PER_UNKNOWN: usize = 4;
 
-/// Whether the motion one sample before and after explains what the equation of motion, fitted sample
-/// by sample to displacement, velocity, acceleration and force (N), has left: white noise on the
-/// motion makes it do so, noise on the force does not. Nothing if it does not, if no parameter is
-/// moved by more than its standard error, if the residual is not white (then that is what to look at),
-/// or if there is no noise. Of a long record the first 32768 samples are looked at.
+/// Tests whether the response one sample before and after explains the residual of the equation of
+/// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
+/// ([`Finding::NoiseOnResponse`]): it does with white noise on the response, it does not with noise on
+/// the force. `None` if it does not, if no parameter changes by more than its standard error with those
+/// neighbours as instruments, if the residual is not white (then that is the finding), or if there is no
+/// noise. The first 32,768 samples of a long record are used.
 ///
-/// The value is the probability that noise on the force alone would explain as much. The text names
-/// the parameter that moves most, in standard errors of `estimate`, when those neighbours are taken
-/// as instruments.
+/// The finding names the parameter that changes most, in standard errors of `estimate`.
 ///
 /// # Errors
 /// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together, and
@@ -34,50 +34,57 @@ const SPARE: usize = 4;
 /// Hausman (1978), Econometrica 46, 1251–1271, as a regression: Davidson & MacKinnon, *Estimation and
 /// Inference in Econometrics* (1993), section 7.9; Söderström & Stoica, *System Identification*
 /// (1989), chapter 8 (instruments).
-pub fn noise_on_motion(
+pub fn noise_on_response(
     response: &Response,
     force: &Record,
     estimate: &Estimate,
-) -> Result<Option<Check>, EstimateError> {
+) -> Result<Option<Finding>, EstimateError> {
     response.displacement().check_same_sampling(force)?;
     crate::least_squares::size("channels of the force", response.dof(), force.channels())?;
     let equations = estimate.unknowns().dof();
-    let mut found: Option<Moved> = None;
+    let mut least: Option<Change> = None;
     for dof in 0..equations {
         let free = estimate.unknowns().free();
         let own: Vec<Parameter> = free.into_iter().filter(|p| p.row() == dof).collect();
-        let enough = LAGS.max(SPARE * own.len()) + 2 < force.len();
+        let enough = LAGS.max(SAMPLES_PER_UNKNOWN * own.len()) + 2 < force.len();
         if own.is_empty() || !enough {
             continue;
         }
         let equation = Equation::of(response, force, estimate, dof, &own);
-        let moved = equation.moved(estimate, &own)?;
-        found = match (found, moved) {
+        let change = equation.change(estimate, &own)?;
+        least = match (least, change) {
             (Some(a), Some(b)) => Some(if b.p_value < a.p_value { b } else { a }),
             (a, b) => a.or(b),
         };
     }
-    // Each equation may be so by chance.
-    let found = found.filter(|moved| moved.p_value * (equations as f64) < SIGNIFICANT);
-    // A smaller bias than that is seen in a long record, but the interval still holds.
-    let found = found.filter(|moved| moved.errors() > 1.0);
-    Ok(found.map(|moved| moved.check(equations)))
+    // Bonferroni: the least of all equations.
+    let p_value = |change: &Change| (change.p_value * equations as f64).min(1.0);
+    let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
+    // A long record shows a smaller bias than that, but the interval still holds.
+    let relevant = significant.filter(|change| change.standard_errors() > 1.0);
+    Ok(relevant.map(|change| Finding::NoiseOnResponse {
+        p_value: PValue::of(p_value(&change)),
+        parameter: change.parameter,
+        estimate: change.estimate,
+        instrumental: change.instrumental,
+        standard_error: change.standard_error,
+    }))
 }
 
 /// One equation of motion at all samples but the first and the last.
 struct Equation {
     regressors: DMatrix<f64>,
-    /// The mean of what the regressors are one sample before and after.
+    /// Mean of the regressors one sample before and after.
     neighbours: DMatrix<f64>,
     target: DMatrix<f64>,
 }
 
-/// How far a parameter moves with the neighbours as instruments.
-struct Moved {
+/// Change of a parameter with the neighbours as instruments.
+struct Change {
     p_value: f64,
     parameter: Parameter,
-    from: f64,
-    to: f64,
+    estimate: f64,
+    instrumental: f64,
     standard_error: f64,
 }
 
@@ -89,16 +96,16 @@ impl Equation {
         dof: usize,
         own: &[Parameter],
     ) -> Self {
-        let motions = [response.acceleration(), response.velocity(), response.displacement()];
-        let motions = motions.map(Record::data);
-        let rows = force.len().min(LOOKED_AT) - 2;
-        let at = |p: &Parameter, k: usize| motions[p.matrix() as usize][(k, p.column())];
+        let quantities = [response.acceleration(), response.velocity(), response.displacement()];
+        let quantities = quantities.map(Record::data);
+        let rows = force.len().min(MAX_SAMPLES) - 2;
+        let at = |p: &Parameter, k: usize| quantities[p.matrix() as usize][(k, p.column())];
         let mut target = force.data().column(dof).rows(1, rows).into_owned();
         for matrix in Matrix::ALL {
             for column in 0..response.dof() {
                 if let Some(value) = estimate.unknowns().fixed(matrix, dof, column) {
-                    let motion = motions[matrix as usize].column(column);
-                    target.axpy(-value, &motion.rows(1, rows), 1.0);
+                    let known = quantities[matrix as usize].column(column);
+                    target.axpy(-value, &known.rows(1, rows), 1.0);
                 }
             }
         }
@@ -111,49 +118,56 @@ impl Equation {
         }
     }
 
-    fn moved(
+    fn change(
         &self,
         estimate: &Estimate,
         own: &[Parameter],
-    ) -> Result<Option<Moved>, EstimateError> {
+    ) -> Result<Option<Change>, EstimateError> {
         let count = own.len();
         let alone = fit(&self.regressors, &self.target)?;
         if alone.residual_nrmse[0] <= ROUNDING || !alone.undetermined.is_empty() {
             return Ok(None);
         }
-        let left = &self.target - &self.regressors * &alone.coefficients;
-        if whiteness(left.as_slice(), LAGS)?.p_value < SIGNIFICANT {
+        let residual = &self.target - &self.regressors * &alone.coefficients;
+        if whiteness(residual.as_slice(), LAGS)?.p_value < SIGNIFICANCE {
             return Ok(None);
         }
         let mut side_by_side = self.regressors.clone().resize_horizontally(2 * count, 0.0);
         side_by_side.columns_mut(count, count).copy_from(&self.neighbours);
         let both = fit(&side_by_side, &self.target)?;
-        let more = alone.degrees_of_freedom - both.degrees_of_freedom;
-        if more < count {
+        let added = alone.degrees_of_freedom - both.degrees_of_freedom;
+        if added < count {
             return Ok(None);
         }
-        let [before, after] = [&alone, &both].map(|solution| solution.residual_covariance[(0, 0)]);
-        let (spare, all) = (both.degrees_of_freedom as f64, alone.degrees_of_freedom as f64);
-        let gained = (before * all - after * spare).max(0.0) / more as f64;
-        let distribution = FisherSnedecor::new(more as f64, spare).expect("positive numbers");
-        let p_value = distribution.sf(gained / after);
-        // y = Φa + Zb and Φ = ZΠ + noise: what Z moves by Φ has the coefficients a + Π⁻¹b.
-        let first = fit(&self.neighbours, &self.regressors)?;
+        let [variance, reduced] =
+            [&alone, &both].map(|solution| solution.residual_covariance[(0, 0)]);
+        let (freedom, all) = (both.degrees_of_freedom as f64, alone.degrees_of_freedom as f64);
+        let explained = (variance * all - reduced * freedom).max(0.0) / added as f64;
+        let distribution = FisherSnedecor::new(added as f64, freedom).expect("positive numbers");
+        let p_value = distribution.sf(explained / reduced);
+        // y = Φa + Zb and Φ = ZΠ + noise: instruments Z give a + Π⁻¹b.
+        let projection = fit(&self.neighbours, &self.regressors)?;
         let b = both.coefficients.rows(count, count).column(0).into_owned();
-        let Some(through) = self.scaled_solve(first.coefficients, b) else { return Ok(None) };
-        let values = both.coefficients.rows(0, count).column(0) + through;
-        Ok(farthest(estimate, own, &values, p_value))
+        let Some(indirect) = self.scaled_solve(projection.coefficients, b) else {
+            return Ok(None);
+        };
+        let values = both.coefficients.rows(0, count).column(0) + indirect;
+        Ok(largest_change(estimate, own, &values, p_value))
     }
 
     /// Π⁻¹b, with both in units of the regressors.
-    fn scaled_solve(&self, mut first: DMatrix<f64>, mut b: DVector<f64>) -> Option<DVector<f64>> {
+    fn scaled_solve(
+        &self,
+        mut projection: DMatrix<f64>,
+        mut b: DVector<f64>,
+    ) -> Option<DVector<f64>> {
         let sizes: Vec<f64> = self.regressors.column_iter().map(|c| c.norm()).collect();
         for (j, size) in sizes.iter().enumerate() {
-            first.row_mut(j).scale_mut(*size);
-            first.column_mut(j).unscale_mut(*size);
+            projection.row_mut(j).scale_mut(*size);
+            projection.column_mut(j).unscale_mut(*size);
             b[j] *= size;
         }
-        let mut solved = first.lu().solve(&b)?;
+        let mut solved = projection.lu().solve(&b)?;
         solved.iter_mut().zip(&sizes).for_each(|(value, size)| *value /= size);
         Some(solved)
     }
@@ -168,40 +182,29 @@ fn fit(
     rows.solve()
 }
 
-/// The parameter that moves most in its standard errors.
-fn farthest(
+/// Change of the parameter that changes most, in its standard errors.
+fn largest_change(
     estimate: &Estimate,
     own: &[Parameter],
     values: &DVector<f64>,
     p_value: f64,
-) -> Option<Moved> {
-    let one = |(parameter, to): (&Parameter, &f64)| {
-        let now = estimate.parameters().find(|found| found.parameter == *parameter)?;
-        let (from, standard_error) = (now.value, now.standard_error);
-        Some(Moved { p_value, parameter: *parameter, from, to: *to, standard_error })
+) -> Option<Change> {
+    let one = |(parameter, instrumental): (&Parameter, &f64)| {
+        let fitted = estimate.parameters().find(|fitted| fitted.parameter == *parameter)?;
+        Some(Change {
+            p_value,
+            parameter: *parameter,
+            estimate: fitted.value,
+            instrumental: *instrumental,
+            standard_error: fitted.standard_error,
+        })
     };
     let all = own.iter().zip(values.iter()).filter_map(one);
-    all.max_by(|a, b| a.errors().total_cmp(&b.errors()))
+    all.max_by(|a, b| a.standard_errors().total_cmp(&b.standard_errors()))
 }
 
-impl Moved {
-    fn errors(&self) -> f64 {
-        (self.to - self.from).abs() / self.standard_error
-    }
-
-    fn check(&self, equations: usize) -> Check {
-        let value = (self.p_value * equations as f64).min(1.0);
-        let text = format!(
-            "the motion one sample before and after explains part of the residual, {}, as noise on \
-             the measured motion makes it do, which least squares takes as exact: the parameters are \
-             biased by it, more than their standard errors show. With those neighbours as \
-             instruments {} is {} instead of {}, {:.1} standard errors away",
-            p_told(value),
-            self.parameter,
-            six_digits(self.to),
-            six_digits(self.from),
-            self.errors()
-        );
-        Check { subject: Subject::NoiseOnMotion, verdict: Verdict::Doubtful, value, text }
+impl Change {
+    fn standard_errors(&self) -> f64 {
+        (self.instrumental - self.estimate).abs() / self.standard_error
     }
 }

@@ -164,7 +164,7 @@ fn checked([x, v, force]: [&Record; 3], mass: Option<f64>, way: Interpolation) -
         missing_force(fit.estimate(), records, linear, extent, Some((8, way))).unwrap();
     let force = force.window(0, missing.len()).unwrap();
     let checks = after_fit(&missing, &inertia, &force, 25, 1).unwrap();
-    [0, 1].map(|at| checks[at].verdict == Verdict::Good)
+    [0, 1].map(|at| checks[at].verdict() == Verdict::Good)
 }
 
 /// The share of `runs` experiments that checks of whiteness and of cross-correlation find at fault.

@@ -2,7 +2,7 @@
 
 use crate::common::oscillator;
 use mechid_estimate::checks::{
-    Check, Subject, Verdict, after_response_fit, after_spectral_fit, linearity,
+    Finding, Subject, Verdict, after_response_fit, after_spectral_fit, linearity,
 };
 use mechid_estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
 use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns, Window};
@@ -14,11 +14,11 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Of misfit, of whiteness from line to line and of linearity, true for good.
-fn verdicts(checks: &[Check]) -> [bool; 3] {
+fn verdicts(checks: &[Finding]) -> [bool; 3] {
     [Subject::Misfit, Subject::Whiteness, Subject::Linearity].map(|subject| {
-        let mut of = checks.iter().filter(|c| c.subject == subject).peekable();
+        let mut of = checks.iter().filter(|c| c.subject() == subject).peekable();
         assert!(of.peek().is_some(), "no {subject}: {checks:?}");
-        of.all(|c| c.verdict == Verdict::Good)
+        of.all(|c| c.verdict() == Verdict::Good)
     })
 }
 
@@ -41,7 +41,7 @@ struct Random {
 }
 
 impl Random {
-    fn checks(&self, seed: u64, course: impl Fn(&Record) -> Record) -> Vec<Check> {
+    fn checks(&self, seed: u64, course: impl Fn(&Record) -> Record) -> Vec<Finding> {
         let sampling = Sampling::new(0.02, LONG).unwrap();
         let force = noise::white(sampling, 1, 100.0, 2 * seed).unwrap();
         let add = |record: &Record, level: f64, seed| match level {
@@ -175,7 +175,7 @@ fn the_misfit_of_spectra_is_judged_with_the_noise_of_the_periods() {
             let data = all.mean_with_noise(pooling).unwrap();
             let estimate = output_error(&data, unknowns).unwrap().estimate;
             let fitted = estimate.parameters().len() as f64;
-            after_spectral_fit(&data, &estimate, fitted).unwrap().verdict == Verdict::Good
+            after_spectral_fit(&data, &estimate, fitted).unwrap().verdict() == Verdict::Good
         };
         let [right] = faulted(1000, |seed| [good(seed, &Unknowns::unknown_mass(1).unwrap())]);
         let heavy = Unknowns::known_mass(&DMatrix::from_element(1, 1, 11.0)).unwrap();

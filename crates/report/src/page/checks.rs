@@ -1,12 +1,12 @@
 //! Lists of checks with their verdicts.
 
 use maud::{Markup, html};
-use mechid_analysis::identify::checks::CheckRow;
+use mechid_analysis::identify::checks::{CheckRow, When};
 
 use super::Contents;
 
 /// Checks before or after the fit, with their verdicts.
-pub fn list(contents: &Contents<'_>, when: &str) -> Markup {
+pub fn list(contents: &Contents<'_>, when: When) -> Markup {
     let checks: Vec<&CheckRow> =
         contents.review.found.summary().checks.iter().filter(|check| check.when == when).collect();
     html! {

@@ -1,6 +1,7 @@
 //! The sections of the report.
 
 use maud::{Markup, html};
+use mechid_analysis::identify::checks::When;
 use mechid_analysis::identify::summary::{IdentificationSummary, Uncertain};
 use mechid_analysis::identify::validation::Share;
 use mechid_analysis::review::channels::Channel;
@@ -136,7 +137,7 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
             (DROP_DB) " dB of the strongest; their flatness is 1 if all are equal. The order of persistent \
              excitation is the number of parameters that they can tell apart."
         }
-        (checks::list(contents, "before"))
+        (checks::list(contents, When::Before))
     })
 }
 
@@ -242,8 +243,8 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     Ok(html! {
         p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
         (records)
-        (checks::list(contents, "after"))
-        @if contents.review.found.summary().checks.iter().any(|check| check.when == "after") {
+        (checks::list(contents, When::After))
+        @if contents.review.found.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
                 "p is the share of experiments with nothing but noise left that look as bad. The test \
                  against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."

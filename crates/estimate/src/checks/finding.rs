@@ -1,0 +1,529 @@
+//! Results of the checks as values.
+
+use mechid_model::{Parameter, ResponseQuantity};
+
+use super::thresholds::*;
+use super::{Subject, Verdict};
+
+/// Result of one check, with its numbers; [`Display`](std::fmt::Display) gives one sentence.
+///
+/// Channels, forces and degrees of freedom are counted from 0; in sentences and serialised from 1.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "kind", rename_all = "snake_case")
+)]
+#[non_exhaustive]
+pub enum Finding {
+    /// Order of persistent excitation of a force, against the order that the unknowns need.
+    PersistentExcitation {
+        /// Channel of the force.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        force: usize,
+        /// Order of persistent excitation; 0 for a channel of zeros.
+        order: usize,
+        /// Order needed.
+        needed: usize,
+    },
+    /// Number of lines that carry force, against the unknowns of an equation of motion.
+    ExcitedLines {
+        /// Number of lines with force; each makes two real equations.
+        lines: usize,
+        /// Number of unknowns in the equation of motion that has most.
+        unknowns: usize,
+    },
+    /// Condition number of the regressors.
+    Conditioning {
+        /// Condition number with columns scaled to unit length.
+        condition_number: f64,
+        /// Number of combinations of regressors that do not vary.
+        undetermined: usize,
+    },
+    /// Curvature of the response from the last sample of a period to the first.
+    Seam {
+        /// Curvature there over the RMS curvature inside, largest channel.
+        ratio: f64,
+    },
+    /// Deviation of single periods of the response from their mean.
+    PeriodScatter {
+        /// Largest RMS deviation of a period over the RMS of the response.
+        fraction: f64,
+    },
+    /// The force does not repeat after the claimed period.
+    WrongPeriod {
+        /// Period claimed, in samples.
+        claimed: usize,
+        /// How the force contradicts it.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        fault: PeriodFault,
+    },
+    /// Samples per period of the highest mode that least squares finds.
+    HighestMode {
+        /// Natural frequency, in Hz.
+        frequency_hz: f64,
+        /// Samples per period of that mode.
+        samples_per_period: f64,
+        /// What the step or the band must suit.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        limit: ModeLimit,
+    },
+    /// The transition from sample to sample has no real logarithm: the step is too long for a mode.
+    NoLogarithm {
+        /// Eigenvalue of the transition matrix, zero or negative.
+        eigenvalue: f64,
+    },
+    /// Multiple coherence of the responses over the lines.
+    Coherence {
+        /// Median over lines and responses.
+        median: f64,
+        /// Minimum.
+        minimum: f64,
+        /// Number of independent averages.
+        averages: f64,
+    },
+    /// A channel was cut off by an amplifier or a converter.
+    Clipping {
+        /// The channel.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        channel: Channel,
+        /// Level at which it is cut off, in the unit of the channel.
+        level: f64,
+        /// Number of samples at that level.
+        samples: usize,
+    },
+    /// A channel has the same value in all samples.
+    ConstantChannel {
+        /// The channel.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        channel: Channel,
+        /// The value, in the unit of the channel.
+        level: f64,
+        /// Number of samples.
+        samples: usize,
+    },
+    /// Two measured response quantities of one degree of freedom are not derivatives of each other.
+    Kinematics {
+        /// Degree of freedom.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        dof: usize,
+        /// The lower derivative.
+        quantity: ResponseQuantity,
+        /// The higher derivative.
+        derivative: ResponseQuantity,
+        /// Change of `quantity` over the change that `derivative` predicts; 1 if they agree.
+        gain: f64,
+    },
+    /// The forces take power out of the machine.
+    PowerFlow {
+        /// Mean power into the machine over the apparent power, negative.
+        fraction: f64,
+    },
+    /// Force and response are shifted in time.
+    Delay {
+        /// Delay of the response, in samples.
+        samples: f64,
+        /// Delay of the response, in s.
+        seconds: f64,
+        /// Fraction of the residual's power that is left when the delay is removed.
+        remaining: f64,
+    },
+    /// Noise on the response biases least squares sample by sample.
+    NoiseOnResponse {
+        /// Probability that noise on the force alone explains as much.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+        /// The parameter that changes most, in standard errors.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
+        parameter: Parameter,
+        /// Its value by least squares, in the unit of the parameter.
+        estimate: f64,
+        /// Its value with neighbouring samples as instruments.
+        instrumental: f64,
+        /// Standard error of `estimate`.
+        standard_error: f64,
+    },
+    /// Residual power against the power of the noise.
+    Misfit {
+        /// Residual power over its expectation for noise alone.
+        ratio: f64,
+        /// Probability that noise alone leaves more.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+        /// Source of the noise power.
+        source: NoiseSource,
+    },
+    /// Correlation of a residual with the square or the cube of a displacement as a force.
+    Linearity {
+        /// The power that correlates most.
+        power: Power,
+        /// Degree of freedom of the displacement.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        dof: usize,
+        /// Probability that the noise of a linear machine correlates as much.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+    },
+    /// Autocorrelation of a residual.
+    Whiteness {
+        /// The residual.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        residual: Residual,
+        /// Numbers of the test.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        test: CorrelationTest,
+        /// The residual is correlated as far as noise on the response does it, and no further.
+        span: Option<NoiseSpan>,
+    },
+    /// Correlation of a residual with a force.
+    CrossCorrelation {
+        /// Channel of the residual.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        residual: usize,
+        /// Channel of the force.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        force: usize,
+        /// Numbers of the test.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        test: CorrelationTest,
+    },
+}
+
+/// Probability that noise alone gives a statistic at least as large as the one found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct PValue {
+    /// Of this test alone.
+    #[cfg_attr(feature = "serde", serde(rename = "p_value"))]
+    pub raw: f64,
+    /// Adjusted for the number of tests made on the same fit; as `raw` before that.
+    #[cfg_attr(feature = "serde", serde(rename = "adjusted_p_value"))]
+    pub adjusted: f64,
+}
+
+/// How a force contradicts a claimed period.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "fault", rename_all = "snake_case")
+)]
+pub enum PeriodFault {
+    /// It returns to itself better after one or two samples more or less.
+    Neighbour {
+        /// Number of samples after which it repeats best.
+        period: usize,
+        /// RMS difference from one such period to the next, over the RMS of the force.
+        mismatch: f64,
+        /// The same after the claimed period.
+        claimed_mismatch: f64,
+    },
+    /// It returns after the claimed period except in one place: samples are missing or too many.
+    Interruption {
+        /// The sample that does not follow, counted from 0 in the window.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        sample: usize,
+        /// RMS difference elsewhere, over the RMS of the force.
+        mismatch: f64,
+    },
+    /// It repeats after a number of samples of which the claimed one is no multiple.
+    Other {
+        /// Number of samples after which it repeats.
+        period: usize,
+        /// RMS difference from one such period to the next, over the RMS of the force.
+        mismatch: f64,
+        /// Number of samples of the force.
+        samples: usize,
+    },
+}
+
+/// What the sampling step or the band fitted must suit in the highest mode.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "limit", rename_all = "snake_case")
+)]
+pub enum ModeLimit {
+    /// The equation of motion holds at each sample.
+    AtSamples,
+    /// Exact transition from sample to sample, with an assumption on the force between them.
+    BetweenSamples,
+    /// Transition by Euler's rule.
+    Euler {
+        /// Relative error of the state matrix by that rule.
+        bias: f64,
+    },
+    /// Lines of the spectrum.
+    Lines {
+        /// Frequency of the highest line fitted, in Hz.
+        last_hz: f64,
+    },
+}
+
+/// A measured channel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Channel {
+    /// Quantity measured.
+    #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
+    pub quantity: Quantity,
+    /// Number among the channels of that quantity.
+    #[cfg_attr(feature = "serde", serde(rename = "channel", serialize_with = "from_one"))]
+    pub index: usize,
+}
+
+/// Quantity that a channel measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Force, in N.
+    Force,
+    /// A response quantity.
+    Response(ResponseQuantity),
+}
+
+/// Source of the noise power that a residual is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum NoiseSource {
+    /// Scatter of repeated periods.
+    Periods,
+    /// Coherence of averaged frequency responses.
+    Coherence,
+}
+
+/// Power of the displacement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Power {
+    /// x².
+    Square,
+    /// x³.
+    Cube,
+}
+
+/// A residual that is tested for whiteness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(tag = "residual_of", rename_all = "snake_case")
+)]
+pub enum Residual {
+    /// Samples of a channel.
+    Samples {
+        /// Channel of the residual.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        residual: usize,
+    },
+    /// Lines of a frequency response.
+    FrequencyResponse {
+        /// Degree of freedom of the response.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        response: usize,
+        /// Degree of freedom of the force.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        force: usize,
+        /// Smallest distance of the lines correlated.
+        distance: usize,
+    },
+}
+
+/// Numbers of a test for correlation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct CorrelationTest {
+    /// Number of coefficients.
+    pub coefficients: usize,
+    /// Number of coefficients beyond the bound.
+    pub outside: usize,
+    /// Bound that 95 % of the coefficients of noise keep.
+    pub bound: f64,
+    /// Probability that noise alone is correlated as much.
+    #[cfg_attr(feature = "serde", serde(flatten))]
+    pub p_value: PValue,
+    /// Whether the residual is rounding, of which correlations mean nothing.
+    pub rounding: bool,
+}
+
+/// Lags over which noise on the response correlates a residual.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct NoiseSpan {
+    /// Number of lags.
+    pub lags: usize,
+    /// Autocorrelation at lag 1.
+    pub first_coefficient: f64,
+    /// Numbers of the test beyond those lags.
+    pub beyond: CorrelationTest,
+}
+
+impl PValue {
+    /// The p-value of a single test.
+    pub fn of(raw: f64) -> Self {
+        Self { raw, adjusted: raw }
+    }
+
+    /// Whether noise alone hardly gives such a statistic.
+    pub fn is_significant(self) -> bool {
+        self.adjusted < SIGNIFICANCE
+    }
+}
+
+impl CorrelationTest {
+    /// Whether the residual is more than rounding, and correlated more than noise is.
+    pub fn is_significant(&self) -> bool {
+        !self.rounding && self.p_value.is_significant()
+    }
+}
+
+impl Finding {
+    /// What was checked.
+    pub fn subject(&self) -> Subject {
+        match self {
+            Finding::PersistentExcitation { .. } | Finding::ExcitedLines { .. } => {
+                Subject::Excitation
+            }
+            Finding::Conditioning { .. } => Subject::Conditioning,
+            Finding::Seam { .. } | Finding::PeriodScatter { .. } | Finding::WrongPeriod { .. } => {
+                Subject::Periodicity
+            }
+            Finding::HighestMode { .. } | Finding::NoLogarithm { .. } => Subject::Step,
+            Finding::Coherence { .. } => Subject::Coherence,
+            Finding::Clipping { .. } | Finding::ConstantChannel { .. } => Subject::Range,
+            Finding::Kinematics { .. } => Subject::Kinematics,
+            Finding::PowerFlow { .. } => Subject::Power,
+            Finding::Delay { .. } => Subject::Delay,
+            Finding::NoiseOnResponse { .. } => Subject::NoiseOnResponse,
+            Finding::Misfit { .. } => Subject::Misfit,
+            Finding::Linearity { .. } => Subject::Linearity,
+            Finding::Whiteness { .. } => Subject::Whiteness,
+            Finding::CrossCorrelation { .. } => Subject::CrossCorrelation,
+        }
+    }
+
+    /// How far the finding speaks against the data or the fit.
+    pub fn verdict(&self) -> Verdict {
+        if let Some(p_value) = self.p_value() {
+            return if p_value.is_significant() { Verdict::Doubtful } else { Verdict::Good };
+        }
+        match *self {
+            Finding::PersistentExcitation { order: 0, .. } => Verdict::Doubtful,
+            Finding::PersistentExcitation { order, needed, .. } if order < needed => Verdict::Bad,
+            Finding::ExcitedLines { lines, unknowns } => match 2 * lines {
+                few if few < unknowns => Verdict::Bad,
+                few if few == unknowns => Verdict::Doubtful,
+                _ => Verdict::Good,
+            },
+            Finding::Conditioning { undetermined: 1.., .. } => Verdict::Bad,
+            Finding::Conditioning { condition_number, .. }
+                if condition_number > CONDITION_NUMBER =>
+            {
+                Verdict::Doubtful
+            }
+            Finding::Seam { ratio } => grade(ratio, SEAM_DOUBTFUL, SEAM_BAD),
+            Finding::PeriodScatter { fraction } => {
+                grade(fraction, PERIOD_SCATTER_DOUBTFUL, PERIOD_SCATTER_BAD)
+            }
+            Finding::HighestMode { frequency_hz, samples_per_period, limit } => {
+                limit.verdict(frequency_hz, samples_per_period)
+            }
+            Finding::Coherence { median, .. } => {
+                grade(1.0 - median, INCOHERENCE_DOUBTFUL, INCOHERENCE_BAD)
+            }
+            Finding::WrongPeriod { .. }
+            | Finding::NoLogarithm { .. }
+            | Finding::Clipping { .. }
+            | Finding::ConstantChannel { .. }
+            | Finding::Kinematics { .. }
+            | Finding::PowerFlow { .. }
+            | Finding::Delay { .. } => Verdict::Bad,
+            _ => Verdict::Good,
+        }
+    }
+
+    /// The number that decides the verdict, in the unit of its field.
+    pub fn value(&self) -> f64 {
+        match *self {
+            Finding::PersistentExcitation { order, .. } => order as f64,
+            Finding::ExcitedLines { lines, .. } => lines as f64,
+            Finding::Conditioning { condition_number, .. } => condition_number,
+            Finding::Seam { ratio } | Finding::Misfit { ratio, .. } => ratio,
+            Finding::PeriodScatter { fraction } | Finding::PowerFlow { fraction } => fraction,
+            Finding::WrongPeriod { claimed, fault } => match fault {
+                PeriodFault::Neighbour { period, .. } | PeriodFault::Other { period, .. } => {
+                    period as f64
+                }
+                PeriodFault::Interruption { .. } => claimed as f64,
+            },
+            Finding::HighestMode { limit: ModeLimit::Euler { bias }, .. } => bias,
+            Finding::HighestMode { samples_per_period, .. } => samples_per_period,
+            Finding::NoLogarithm { eigenvalue } => eigenvalue,
+            Finding::Coherence { median, .. } => median,
+            Finding::Clipping { samples, .. } => samples as f64,
+            Finding::ConstantChannel { level, .. } => level,
+            Finding::Kinematics { gain, .. } => gain,
+            Finding::Delay { samples, .. } => samples,
+            Finding::NoiseOnResponse { p_value, .. } | Finding::Linearity { p_value, .. } => {
+                p_value.raw
+            }
+            Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
+                test.p_value.raw
+            }
+        }
+    }
+
+    /// The p-value of a statistical test; `None` for other checks, and where only rounding is left.
+    pub fn p_value(&self) -> Option<PValue> {
+        match self {
+            Finding::NoiseOnResponse { p_value, .. }
+            | Finding::Misfit { p_value, .. }
+            | Finding::Linearity { p_value, .. } => Some(*p_value),
+            Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
+                (!test.rounding).then_some(test.p_value)
+            }
+            _ => None,
+        }
+    }
+}
+
+impl ModeLimit {
+    fn verdict(self, frequency_hz: f64, samples_per_period: f64) -> Verdict {
+        let few = |doubtful: f64, bad: f64| match samples_per_period {
+            samples if samples > doubtful => Verdict::Good,
+            samples if samples > bad => Verdict::Doubtful,
+            _ => Verdict::Bad,
+        };
+        match self {
+            ModeLimit::AtSamples => few(SAMPLES_PER_PERIOD_AT_SAMPLES, SAMPLES_PER_PERIOD_NYQUIST),
+            ModeLimit::BetweenSamples => few(SAMPLES_PER_PERIOD_DOUBTFUL, SAMPLES_PER_PERIOD_BAD),
+            ModeLimit::Euler { bias } => grade(bias, EULER_BIAS_DOUBTFUL, EULER_BIAS_BAD),
+            ModeLimit::Lines { last_hz } => match samples_per_period {
+                samples if samples <= SAMPLES_PER_PERIOD_NYQUIST => Verdict::Bad,
+                _ if frequency_hz > last_hz => Verdict::Doubtful,
+                _ => Verdict::Good,
+            },
+        }
+    }
+}
+
+fn grade(value: f64, doubtful: f64, bad: f64) -> Verdict {
+    match value {
+        v if v < doubtful => Verdict::Good,
+        v if v < bad => Verdict::Doubtful,
+        _ => Verdict::Bad,
+    }
+}
+
+#[cfg(feature = "serde")]
+fn from_one<S: serde::Serializer>(index: &usize, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_u64(*index as u64 + 1)
+}
+
+#[cfg(feature = "serde")]
+fn as_text<T: std::fmt::Display, S: serde::Serializer>(
+    value: &T,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
+}

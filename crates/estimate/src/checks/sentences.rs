@@ -1,0 +1,449 @@
+//! Findings in plain English.
+
+use std::fmt::{self, Display, Formatter};
+
+use mechid_signal::{counted, told};
+
+use super::finding::{
+    Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
+    Power, Quantity, Residual,
+};
+use super::{Subject, Verdict};
+
+impl Display for Finding {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Finding::PersistentExcitation { force, order, needed } => {
+                persistent_excitation(f, force + 1, *order, *needed)
+            }
+            Finding::ExcitedLines { lines, unknowns } => {
+                write!(
+                    f,
+                    "{} with force: {} for {} in each equation of motion",
+                    counted(*lines, "line"),
+                    counted(2 * lines, "equation"),
+                    counted(*unknowns, "unknown")
+                )?;
+                f.write_str(match self.verdict() {
+                    Verdict::Good => "",
+                    Verdict::Doubtful => "; no redundancy to estimate the noise",
+                    Verdict::Bad => "; excite more lines",
+                })
+            }
+            Finding::Conditioning { condition_number, undetermined } => {
+                conditioning(f, *condition_number, *undetermined, self.verdict())
+            }
+            Finding::Seam { ratio } => {
+                write!(
+                    f,
+                    "from the last sample back to the first the response bends {ratio:.1} times as \
+                     much as elsewhere: "
+                )?;
+                f.write_str(match self.verdict() {
+                    Verdict::Good => "consistent with a whole period",
+                    Verdict::Doubtful => "hardly a steady state over one whole period",
+                    Verdict::Bad => "not a whole period; fit it as an open record",
+                })
+            }
+            Finding::PeriodScatter { fraction } => {
+                write!(
+                    f,
+                    "single periods of the response differ from their mean by up to {:.2} %",
+                    100.0 * fraction
+                )?;
+                f.write_str(match self.verdict() {
+                    Verdict::Good => "",
+                    Verdict::Doubtful => ": noise, drift, or a transient that has not decayed",
+                    Verdict::Bad => ": hardly a steady response of this period",
+                })
+            }
+            Finding::WrongPeriod { claimed, fault } => fault.sentence(*claimed, f),
+            Finding::HighestMode { frequency_hz, samples_per_period, limit } => {
+                write!(
+                    f,
+                    "the highest mode ({frequency_hz:.4} Hz) has {samples_per_period:.1} samples per \
+                     period{}",
+                    limit.clause(self.verdict(), *samples_per_period)
+                )
+            }
+            Finding::NoLogarithm { eigenvalue } => write!(
+                f,
+                "the transition from sample to sample has the eigenvalue {eigenvalue:.3e}, zero or \
+                 negative: the sampling interval is too long for a mode, or the data hold mostly noise"
+            ),
+            Finding::Coherence { median, minimum, averages } => write!(
+                f,
+                "median coherence {median:.4}, minimum {minimum:.4}, from {averages:.1} independent \
+                 averages"
+            ),
+            Finding::Clipping { channel, level, samples } => write!(
+                f,
+                "{channel} is clipped at {}: {} at that level, three or more in a row; choose a wider \
+                 range of the amplifier or converter and measure again",
+                six_digits(*level),
+                counted(*samples, "sample")
+            ),
+            Finding::ConstantChannel { channel, level, samples } => write!(
+                f,
+                "{channel} is {} in all {samples} samples: no response there, or a dead channel",
+                told(*level)
+            ),
+            Finding::Kinematics { dof, quantity, derivative, gain } => {
+                let number = dof + 1;
+                write!(
+                    f,
+                    "{quantity} {number} changes {} times as much as {derivative} {number} predicts: \
+                     their units, columns or signs are inconsistent",
+                    six_digits(*gain)
+                )
+            }
+            Finding::PowerFlow { fraction } => write!(
+                f,
+                "the forces take power out of the machine ({:.1} % of the apparent power): force and \
+                 response are interchanged, one of them has the wrong sign or a delay, or something \
+                 else drives the machine",
+                -100.0 * fraction
+            ),
+            Finding::Delay { samples, seconds, remaining } => {
+                delay(f, *samples, *seconds, *remaining)
+            }
+            Finding::NoiseOnResponse {
+                p_value,
+                parameter,
+                estimate,
+                instrumental,
+                standard_error,
+            } => {
+                write!(
+                    f,
+                    "noise on the response biases least squares ({p_value}): with neighbouring \
+                     samples as instruments, {parameter} is {} instead of {}, {:.1} standard errors \
+                     away",
+                    six_digits(*instrumental),
+                    six_digits(*estimate),
+                    (instrumental - estimate).abs() / standard_error
+                )
+            }
+            Finding::Misfit { ratio, p_value, source } => {
+                misfit(f, *ratio, p_value, *source, self.verdict())
+            }
+            Finding::Linearity { power, dof, p_value } => {
+                linearity(f, *power, dof + 1, p_value, self.verdict())
+            }
+            Finding::Whiteness { residual, test, span } => {
+                whiteness(f, residual, test, span.as_ref())
+            }
+            Finding::CrossCorrelation { residual, force, test } => {
+                write!(f, "residual {} with force {}: {test}", residual + 1, force + 1)?;
+                f.write_str(match (test.rounding, test.is_significant()) {
+                    (true, _) => "",
+                    (_, false) => "; uncorrelated",
+                    (_, true) => {
+                        "; the residual is correlated with the force: the model misses part of the \
+                         response"
+                    }
+                })
+            }
+        }
+    }
+}
+
+fn persistent_excitation(
+    f: &mut Formatter<'_>,
+    force: usize,
+    order: usize,
+    needed: usize,
+) -> fmt::Result {
+    match order {
+        0 => write!(f, "force {force} is zero: it is left out, and determines no mass"),
+        _ => {
+            let more = if order < needed { "; excite more lines" } else { "" };
+            write!(
+                f,
+                "force {force} is persistently exciting of order {order}, {needed} needed{more}"
+            )
+        }
+    }
+}
+
+fn conditioning(
+    f: &mut Formatter<'_>,
+    condition_number: f64,
+    undetermined: usize,
+    verdict: Verdict,
+) -> fmt::Result {
+    if undetermined > 0 {
+        let does = if undetermined == 1 { "does" } else { "do" };
+        let combinations = counted(undetermined, "combination");
+        return write!(
+            f,
+            "{combinations} of displacements, velocities and forces {does} not vary in the data: some \
+             parameters stay undetermined"
+        );
+    }
+    match condition_number {
+        short if short < 1e4 => write!(f, "condition number of the regressors {short:.1}")?,
+        long => write!(f, "condition number of the regressors {long:.1e}")?,
+    }
+    f.write_str(match verdict {
+        Verdict::Good => "",
+        _ => ": relative noise is amplified up to that much in the worst combination of parameters",
+    })
+}
+
+impl PeriodFault {
+    fn sentence(&self, claimed: usize, f: &mut Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        match *self {
+            PeriodFault::Neighbour { period, mismatch, claimed_mismatch } => write!(
+                f,
+                "the period is {period} samples: from one to the next the force differs by {} of its \
+                 RMS, after {claimed} samples by {}",
+                percent(mismatch),
+                percent(claimed_mismatch)
+            ),
+            PeriodFault::Interruption { sample, mismatch } => write!(
+                f,
+                "the force repeats every {claimed} samples, to {} of its RMS, but not across sample {} \
+                 of the window, as if samples were missing there or too many: keep to one side of it",
+                percent(mismatch),
+                sample + 1
+            ),
+            PeriodFault::Other { period, mismatch, samples } => {
+                let mismatch = percent(mismatch);
+                match samples.checked_sub(period) {
+                    Some(compared) if compared < period => write!(
+                        f,
+                        "the first {compared} of {samples} samples of the force repeat {period} samples \
+                         later, to {mismatch} of its RMS"
+                    )?,
+                    _ => write!(
+                        f,
+                        "the force repeats every {period} samples, to {mismatch} of its RMS"
+                    )?,
+                }
+                write!(
+                    f,
+                    ", and {claimed} samples are no whole number of such periods: the lines used are \
+                     not those of the force"
+                )
+            }
+        }
+    }
+}
+
+impl ModeLimit {
+    fn clause(&self, verdict: Verdict, samples_per_period: f64) -> String {
+        match (self, verdict) {
+            (ModeLimit::AtSamples, Verdict::Good) => {
+                "; the equation of motion holds at each sample".into()
+            }
+            (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
+            (ModeLimit::BetweenSamples, Verdict::Doubtful) => {
+                ", so few that the force between samples matters".into()
+            }
+            (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {
+                ", so few that it may be the alias of a mode above the Nyquist frequency".into()
+            }
+            (ModeLimit::Euler { bias }, _) => {
+                format!("; the bias of Euler's rule is about {:.1} %", 100.0 * bias)
+            }
+            (ModeLimit::Lines { .. }, Verdict::Good) => " and lies within the fitted band".into(),
+            (ModeLimit::Lines { .. }, _) if samples_per_period <= 2.0 => {
+                " and lies above the Nyquist frequency: sample faster".into()
+            }
+            (ModeLimit::Lines { last_hz }, _) => {
+                format!(" and lies above the fitted band, which ends at {last_hz:.4} Hz")
+            }
+        }
+    }
+}
+
+fn delay(f: &mut Formatter<'_>, samples: f64, seconds: f64, remaining: f64) -> fmt::Result {
+    let (direction, size) = if samples > 0.0 { ("late", samples) } else { ("early", -samples) };
+    let seconds = seconds.abs();
+    let size = if size.fract() == 0.0 { format!("{size}") } else { format!("{size:.2}") };
+    let percent = 100.0 * remaining;
+    let percent = if percent < 0.01 { "less than 0.01".into() } else { format!("{percent:.2}") };
+    write!(
+        f,
+        "the response is {size} samples ({seconds:.3e} s) {direction}: without that delay {percent} % \
+         of the residual power remains. Possible causes: a filter, a scanning converter, a trigger; \
+         shift one of the channels"
+    )
+}
+
+fn misfit(
+    f: &mut Formatter<'_>,
+    ratio: f64,
+    p_value: &PValue,
+    source: NoiseSource,
+    verdict: Verdict,
+) -> fmt::Result {
+    let times = if ratio < 1e4 { format!("{ratio:.3}") } else { format!("{ratio:.1e}") };
+    write!(f, "residual power is {times} × the noise power {source} ({p_value}): ")?;
+    f.write_str(match verdict {
+        Verdict::Good => "consistent with noise",
+        _ => {
+            "exceeds the noise: biased estimate, wrong model (nonlinearity, missing degree of freedom, \
+             wrong known mass) or spectral leakage"
+        }
+    })
+}
+
+fn linearity(
+    f: &mut Formatter<'_>,
+    power: Power,
+    dof: usize,
+    p_value: &PValue,
+    verdict: Verdict,
+) -> fmt::Result {
+    match verdict {
+        Verdict::Good => write!(
+            f,
+            "the residual is uncorrelated with the square and the cube of the displacement as forces \
+             ({p_value})"
+        ),
+        _ => write!(
+            f,
+            "the residual is correlated with the {power} of displacement {dof} as a force ({p_value}): \
+             the machine is nonlinear at this level of the force, to which its parameters belong"
+        ),
+    }
+}
+
+fn whiteness(
+    f: &mut Formatter<'_>,
+    residual: &Residual,
+    test: &CorrelationTest,
+    span: Option<&NoiseSpan>,
+) -> fmt::Result {
+    match residual {
+        Residual::Samples { residual } => write!(f, "residual {}: ", residual + 1)?,
+        Residual::FrequencyResponse { response, force, distance } => {
+            let (response, force) = (response + 1, force + 1);
+            write!(
+                f,
+                "residual of response {response} to force {force}, lines {distance} or more apart: "
+            )?;
+        }
+    }
+    if test.rounding {
+        return write!(f, "{test}");
+    }
+    if let Some(NoiseSpan { lags, first_coefficient, beyond }) = span {
+        return write!(
+            f,
+            "correlated up to lag {lags} ({first_coefficient:.2} at lag 1) and no further ({beyond}), \
+             as noise on the response does, which least squares takes as exact: the parameters are \
+             biased by more than their standard errors"
+        );
+    }
+    write!(f, "{test}; ")?;
+    f.write_str(match (residual, test.is_significant()) {
+        (Residual::Samples { .. }, false) => "white",
+        (Residual::Samples { .. }, true) => "not white: coloured noise, or an incomplete model",
+        (Residual::FrequencyResponse { .. }, false) => "uncorrelated from line to line",
+        (Residual::FrequencyResponse { .. }, true) => {
+            "correlated from line to line: a missing mode, another error of the model, or segments too \
+             short for the damping"
+        }
+    })
+}
+
+impl Display for CorrelationTest {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { coefficients, outside, bound, p_value, rounding } = self;
+        if *rounding {
+            return f.write_str("rounding");
+        }
+        write!(
+            f,
+            "{outside} of {coefficients} correlations beyond the 95 % bound of {bound:.3} ({p_value})"
+        )
+    }
+}
+
+impl Display for PValue {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        // A distribution function does not resolve the rest.
+        match self.raw {
+            p if p < 1e-15 => f.write_str("p < 1e-15"),
+            p if p < 1e-3 => write!(f, "p = {p:.1e}"),
+            p => write!(f, "p = {p:.3}"),
+        }
+    }
+}
+
+impl Display for NoiseSource {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            NoiseSource::Periods => "estimated from the periods",
+            NoiseSource::Coherence => "that follows from the coherence",
+        })
+    }
+}
+
+impl Display for Power {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Power::Square => "square",
+            Power::Cube => "cube",
+        })
+    }
+}
+
+impl Display for Quantity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Quantity::Force => f.write_str("force"),
+            Quantity::Response(motion) => motion.fmt(f),
+        }
+    }
+}
+
+impl Display for Channel {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{} {}", self.quantity, self.index + 1)
+    }
+}
+
+impl Display for Verdict {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Verdict::Good => "good",
+            Verdict::Doubtful => "doubtful",
+            Verdict::Bad => "bad",
+        })
+    }
+}
+
+impl Display for Subject {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Subject::Excitation => "excitation",
+            Subject::Conditioning => "conditioning",
+            Subject::Range => "range",
+            Subject::Kinematics => "kinematics",
+            Subject::Power => "power",
+            Subject::Periodicity => "periodicity",
+            Subject::Step => "step",
+            Subject::Coherence => "coherence",
+            Subject::Delay => "delay",
+            Subject::NoiseOnResponse => "noise on response",
+            Subject::Misfit => "misfit",
+            Subject::Linearity => "linearity",
+            Subject::Whiteness => "whiteness",
+            Subject::CrossCorrelation => "cross-correlation",
+        })
+    }
+}
+
+/// A number with six significant digits.
+fn six_digits(value: f64) -> String {
+    let exponent = value.abs().log10().floor();
+    match exponent {
+        e if (-4.0..6.0).contains(&e) => format!("{value:.0$}", (5.0 - e) as usize),
+        _ => format!("{value:.5e}"),
+    }
+}

@@ -1,0 +1,67 @@
+//! Limits at which a finding becomes a warning. Those without a named source are ours.
+
+/// Probability below which a statistic is not attributed to noise.
+pub const SIGNIFICANCE: f64 = 0.01;
+
+/// Amplitude relative to that of the strongest line of a force, below which a line does not count as
+/// excited.
+pub const EXCITED_LINE: f64 = 1e-4;
+
+/// Condition number beyond which relative noise of 1 % hides some combination of parameters.
+pub const CONDITION_NUMBER: f64 = 1e4;
+
+/// Curvature from the last sample of a period to its first, over the RMS curvature inside, beyond
+/// which the record is hardly one period of a steady state.
+pub const SEAM_DOUBTFUL: f64 = 5.0;
+
+/// The same, beyond which the record is no period.
+pub const SEAM_BAD: f64 = 20.0;
+
+/// RMS deviation of a period from the mean of all, over the RMS of the response, beyond which the
+/// response is hardly steady.
+pub const PERIOD_SCATTER_DOUBTFUL: f64 = 0.1;
+
+/// The same, beyond which the response does not repeat.
+pub const PERIOD_SCATTER_BAD: f64 = 0.5;
+
+/// Fraction of the power of a response that the forces do not explain (1 − coherence, median over the
+/// lines), beyond which frequency responses are uncertain.
+pub const INCOHERENCE_DOUBTFUL: f64 = 0.1;
+
+/// The same, beyond which they are mostly noise.
+pub const INCOHERENCE_BAD: f64 = 0.5;
+
+/// Samples per period of the highest mode, below which a transition from sample to sample depends on
+/// what the force does between them: 2π/1.
+pub const SAMPLES_PER_PERIOD_DOUBTFUL: f64 = std::f64::consts::TAU;
+
+/// The same, below which the mode is near the Nyquist frequency: 2π/2.5.
+pub const SAMPLES_PER_PERIOD_BAD: f64 = std::f64::consts::TAU / 2.5;
+
+/// Samples per period of the highest mode, below which the equation of motion at the samples is
+/// doubtful.
+pub const SAMPLES_PER_PERIOD_AT_SAMPLES: f64 = 2.5;
+
+/// Samples per period at the Nyquist frequency.
+pub const SAMPLES_PER_PERIOD_NYQUIST: f64 = 2.0;
+
+/// Relative error of the state matrix by Euler's rule, beyond which the estimate is doubtful.
+pub const EULER_BIAS_DOUBTFUL: f64 = 0.01;
+
+/// The same, beyond which it is bad.
+pub const EULER_BIAS_BAD: f64 = 0.1;
+
+/// Fraction of the residual's power that a delayed model may leave, for the delay to be reported.
+pub const DELAY_REMAINING: f64 = 0.25;
+
+/// Factor between the derivative measured and the one that follows from another channel, beyond which
+/// units, columns or signs are wrong. Sensors do not err that much, nor does the rule between two
+/// samples, which reaches it at four tenths of the sampling rate.
+pub const KINEMATIC_GAIN: f64 = 3.0;
+
+/// Power that forces take out of a machine, over the apparent power, beyond which it is neither noise
+/// nor leakage.
+pub const POWER_TAKEN_OUT: f64 = 0.05;
+
+/// Residual, relative to the signal fitted (RMS), below which it is rounding.
+pub const ROUNDING: f64 = 1e-9;
