@@ -68,7 +68,6 @@ mod rule;
 mod smoother;
 mod state_space;
 mod transfer;
-mod transition;
 mod uncertainty;
 mod unexplained;
 
