@@ -87,11 +87,6 @@ pub(crate) struct Solution {
     input: LU<f64, Dyn, Dyn>,
 }
 
-/// The exact step with the input q = Δt² M⁻¹ F.
-pub(crate) fn exact(system: &SecondOrderSystem, dt: f64) -> StateTransition {
-    StateTransition::exact(system, dt, &DMatrix::identity(system.dof(), system.dof()))
-}
-
 /// Below this a sample of 16 digits leaves fewer than four for the force.
 const NO_TRACE: f64 = 1e-12;
 
@@ -102,10 +97,12 @@ impl Solution {
         dt: f64,
         discretisation: Discretisation,
     ) -> Result<Self, ForceError> {
+        let n = system.dof();
+        let exact = || StateTransition::exact(system, dt, &DMatrix::identity(n, n));
         match discretisation {
             Discretisation::Euler => Self::new(StateTransition::taylor(system, dt, 1), dt, true),
-            Discretisation::ZeroOrderHold => Self::new(exact(system, dt), dt, true),
-            Discretisation::FirstOrderHold => Self::new(exact(system, dt), dt, false),
+            Discretisation::ZeroOrderHold => Self::new(exact(), dt, true),
+            Discretisation::FirstOrderHold => Self::new(exact(), dt, false),
         }
     }
 

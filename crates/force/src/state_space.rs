@@ -4,7 +4,6 @@ use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use nalgebra::{DMatrix, DVector};
 
 use crate::Measurement;
-use crate::discretised::exact;
 
 /// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
 pub(crate) struct Machine {
@@ -25,7 +24,7 @@ impl Machine {
         scale: &[f64],
     ) -> Self {
         let (n, dt) = (system.dof(), measured.sampling().dt());
-        let transition = exact(system, dt);
+        let transition = StateTransition::exact(system, dt, &DMatrix::identity(n, n));
         let unit =
             DMatrix::from_fn(n, forced.len(), |i, j| if i == forced[j] { dt * dt } else { 0.0 });
         let input = system.mass().clone().lu().solve(&unit).expect("M is invertible");
