@@ -8,7 +8,7 @@ pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
 pub use self::start::{StartFit, fitted_start};
 
-use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem};
+use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem, StateTransition};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
@@ -85,33 +85,16 @@ struct Step {
 }
 
 impl Step {
-    /// By the exponential of \[AΔt BΔt 0; 0 0 I; 0 0 0\], whose upper row holds Φ, ∫ exp and ∫∫ exp.
-    ///
-    /// # Source
-    /// Van Loan (1978), IEEE Trans. Automatic Control 23, 395–404.
     fn new(system: &SecondOrderSystem, dt: f64, discretisation: Discretisation) -> Self {
-        let n = system.dof();
-        let mut all = DMatrix::zeros(4 * n, 4 * n);
-        all.view_mut((0, n), (n, n)).fill_with_identity();
-        let lower = [
-            solve_mass(system, system.stiffness()) * -(dt * dt),
-            solve_mass(system, system.damping()) * -dt,
-            solve_mass(system, &DMatrix::identity(n, n)) * (dt * dt),
-        ];
-        for (at, block) in lower.iter().enumerate() {
-            all.view_mut((n, at * n), (n, n)).copy_from(block);
-        }
-        all.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
-        let exponential = all.exp();
-        let integral = exponential.view((0, 2 * n), (2 * n, n)).into_owned();
-        let ramp = exponential.view((0, 3 * n), (2 * n, n)).into_owned();
-        let transition = exponential.view((0, 0), (2 * n, 2 * n)).into_owned();
+        let input = StateTransition::force_input(system, dt);
+        let StateTransition { state: transition, held, ramp } =
+            StateTransition::exact(system, dt, &input);
         match discretisation {
             Discretisation::FirstOrderHold => {
-                Self { dt, transition, now: integral - &ramp, next: ramp }
+                Self { dt, transition, now: held - &ramp, next: ramp }
             }
             Discretisation::Euler | Discretisation::ZeroOrderHold => {
-                Self { dt, transition, now: integral, next: ramp * 0.0 }
+                Self { dt, transition, now: held, next: ramp * 0.0 }
             }
         }
     }

@@ -1,5 +1,7 @@
 //! The least-squares problem seen through its singular vectors: one number per unknown.
 
+use nalgebra::DMatrix;
+
 /// One unknown each, by falling singular value: y_i = s_i f_i + noise.
 ///
 /// A component of a complex line stands for two real unknowns and has weight 2, so that white
@@ -15,6 +17,15 @@ pub(crate) struct Components {
     pub outside_energy: f64,
     /// Real data in it.
     pub outside_weight: f64,
+}
+
+/// A measurement in its singular vectors, and the way back to the force.
+pub(crate) trait Operator {
+    fn components(&self) -> &Components;
+    /// Samples × forces of the components times these factors (f̂_i = φ_i y_i / s_i).
+    fn force(&self, factors: &[f64]) -> DMatrix<f64>;
+    /// Samples × forces: variance, given that of each component per real unknown.
+    fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }
 
 /// What a choice of filter factors does to the measurement at hand.

@@ -1,11 +1,10 @@
 //! The discretised equation of motion, solved for the force of each step.
 
-use mechid_model::{Discretisation, Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, SecondOrderSystem, StateTransition};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::continuous::check_dof;
-use crate::transition::Transition;
 use crate::{ForceError, IdentifiedForce};
 
 /// The force that carries the response from each sample to the next.
@@ -56,7 +55,7 @@ pub fn discretised_by_taylor(
     extent: Extent,
 ) -> Result<IdentifiedForce, ForceError> {
     let solution = |dt| match order {
-        1..=8 => Solution::new(Transition::taylor(system, dt, order), dt, true),
+        1..=8 => Solution::new(StateTransition::taylor(system, dt, order), dt, true),
         _ => Err(ForceError::TaylorOrder { order }),
     };
     force_of_steps(system, response, extent, solution)
@@ -98,15 +97,17 @@ impl Solution {
         dt: f64,
         discretisation: Discretisation,
     ) -> Result<Self, ForceError> {
+        let n = system.dof();
+        let exact = || StateTransition::exact(system, dt, &DMatrix::identity(n, n));
         match discretisation {
-            Discretisation::Euler => Self::new(Transition::taylor(system, dt, 1), dt, true),
-            Discretisation::ZeroOrderHold => Self::new(Transition::exact(system, dt), dt, true),
-            Discretisation::FirstOrderHold => Self::new(Transition::exact(system, dt), dt, false),
+            Discretisation::Euler => Self::new(StateTransition::taylor(system, dt, 1), dt, true),
+            Discretisation::ZeroOrderHold => Self::new(exact(), dt, true),
+            Discretisation::FirstOrderHold => Self::new(exact(), dt, false),
         }
     }
 
-    fn new(transition: Transition, dt: f64, is_held: bool) -> Result<Self, ForceError> {
-        let Transition { state, held, ramp } = transition;
+    fn new(transition: StateTransition, dt: f64, is_held: bool) -> Result<Self, ForceError> {
+        let StateTransition { state, held, ramp } = transition;
         let n = held.ncols();
         let input = if is_held {
             // Γ₀ᵥ q = (z(k+1) − Φ z(k))ᵥ.

@@ -4,28 +4,11 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use crate::measurement::first_repeated;
+use crate::lines::{check_lines, noise_weight};
+use crate::noise::{Noise, channel_sizes};
 use crate::transfer::Transfer;
 use crate::unexplained::Rest;
 use crate::{ForceError, IdentifiedForce, Measurement};
-
-/// What is known of the noise in the measured channels, taken as white.
-#[derive(Debug, Clone, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Noise {
-    /// Nothing: no standard error, and channels count by their size.
-    Unknown,
-    /// One standard deviation per channel, in the channel's unit.
-    PerChannel(Vec<f64>),
-    /// Measured on the lines that were not chosen (DC and Nyquist apart): there the force is
-    /// taken as zero and what is seen is noise. Needs at least [`MIN_OUTSIDE_LINES`] of them.
-    OutsideLines,
-}
-
-/// Fewest lines that [`Noise::OutsideLines`] measures a noise level on: each gives two
-/// degrees of freedom, so the level is known to about 20 % or better.
-pub const MIN_OUTSIDE_LINES: usize = 8;
 
 /// F_n = (K − ω²M + iωC) X_n at the chosen lines of a whole period, zero at all others.
 ///
@@ -59,7 +42,7 @@ pub fn frequency_domain(
     let spectrum = Spectrum::of(measured.record());
     check_lines(&spectrum, lines)?;
     let level = noise.resolve(measured, &spectrum, lines)?;
-    let scale = level.clone().unwrap_or_else(|| sizes(measured.record()));
+    let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let transfer = Transfer { system, channels: measured.channels(), forced, scale: &scale };
 
     let sampling = measured.sampling();
@@ -87,90 +70,4 @@ pub fn frequency_domain(
     Ok(IdentifiedForce::of(force.to_record())
         .with_standard_error(standard_error.transpose()?)
         .with_rest(rest.transpose()?))
-}
-
-/// Every line of the record that holds a whole complex amplitude: 1 up to, not at, Nyquist.
-pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
-    (1..measured.sampling().len().div_ceil(2)).collect()
-}
-
-/// Variance that white noise of unit variance has in each part of a line's amplitude.
-pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
-    if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
-}
-
-impl Noise {
-    /// Standard deviation per channel, if it is known.
-    pub(crate) fn resolve(
-        &self,
-        measured: &Measurement,
-        spectrum: &Spectrum,
-        lines: &[usize],
-    ) -> Result<Option<Vec<f64>>, ForceError> {
-        match self {
-            Noise::Unknown => Ok(None),
-            Noise::PerChannel(level) => {
-                if level.len() != measured.channels().len() {
-                    return Err(ForceError::ChannelCount {
-                        record: measured.channels().len(),
-                        described: level.len(),
-                    });
-                }
-                match level.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
-                    Some(&value) => Err(ForceError::NotPositive { what: "noise level", value }),
-                    None => Ok(Some(level.clone())),
-                }
-            }
-            Noise::OutsideLines => outside_level(measured, spectrum, lines).map(Some),
-        }
-    }
-}
-
-/// σ² = N/4 · mean |X_n|² over the lines that were not chosen.
-fn outside_level(
-    measured: &Measurement,
-    spectrum: &Spectrum,
-    lines: &[usize],
-) -> Result<Vec<f64>, ForceError> {
-    let chosen: std::collections::HashSet<usize> = lines.iter().copied().collect();
-    let outside: Vec<usize> =
-        inner_lines(measured).into_iter().filter(|n| !chosen.contains(n)).collect();
-    if outside.len() < MIN_OUTSIDE_LINES {
-        return Err(ForceError::TooFewOutsideLines {
-            outside: outside.len(),
-            needed: MIN_OUTSIDE_LINES,
-        });
-    }
-    let per_line = measured.sampling().len() as f64 / (4.0 * outside.len() as f64);
-    (0..spectrum.channels())
-        .map(|c| {
-            let power: f64 = outside.iter().map(|n| spectrum.line(*n, c).norm_sqr()).sum();
-            let value = (per_line * power).sqrt();
-            if value > 0.0 { Ok(value) } else { Err(ForceError::NoNoise { channel: c + 1 }) }
-        })
-        .collect()
-}
-
-/// Root mean square of each channel, 1 for a channel that is zero.
-pub(crate) fn sizes(record: &Record) -> Vec<f64> {
-    let rms = |norm: f64| norm / (record.len() as f64).sqrt();
-    record
-        .data()
-        .column_iter()
-        .map(|column| Some(rms(column.norm())).filter(|size| *size > 0.0).unwrap_or(1.0))
-        .collect()
-}
-
-pub(crate) fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), ForceError> {
-    if lines.is_empty() {
-        return Err(ForceError::NoLines);
-    }
-    let last = spectrum.len() - 1;
-    if let Some(&line) = lines.iter().find(|line| **line > last) {
-        return Err(ForceError::NoSuchLine { line, last });
-    }
-    match first_repeated(lines) {
-        Some(line) => Err(ForceError::RepeatedLine { line }),
-        None => Ok(()),
-    }
 }

@@ -4,8 +4,8 @@ use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
 
-use crate::frequency_domain::sizes;
 use crate::nelder_mead::minimise;
+use crate::noise::channel_sizes;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
@@ -94,7 +94,7 @@ pub fn kalman(
         return Err(ForceError::Silent);
     }
     let scale = match tuning {
-        Tuning::Likelihood => sizes(measured.record()),
+        Tuning::Likelihood => channel_sizes(measured.record()),
         Tuning::NoiseKnown(noise) => known(measured, noise)?,
         Tuning::Given { noise_std, walk } => {
             check_walks(forced, walk)?;

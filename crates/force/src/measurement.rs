@@ -17,6 +17,17 @@ pub struct Channel {
     pub quantity: ResponseQuantity,
 }
 
+/// State of the machine at the first sample of an open record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Start {
+    /// At rest: neither displaced nor moving.
+    FromRest,
+    /// Unknown: displacement and velocity are estimated with the force.
+    InMotion,
+}
+
 /// A measured record and what each of its channels is.
 ///
 /// Any mixture will do: displacement of one degree of freedom only, accelerations of all, both.

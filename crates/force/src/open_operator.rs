@@ -3,8 +3,7 @@
 use mechid_model::SecondOrderSystem;
 use nalgebra::{DMatrix, DVector};
 
-use crate::components::Components;
-use crate::regularised::Operator;
+use crate::components::{Components, Operator};
 use crate::state_space::Machine;
 use crate::{ForceError, Measurement, Start};
 

@@ -4,9 +4,8 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::{Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::components::Components;
-use crate::frequency_domain::{check_lines, noise_weight};
-use crate::regularised::Operator;
+use crate::components::{Components, Operator};
+use crate::lines::{check_lines, noise_weight};
 use crate::transfer::Transfer;
 use crate::{ForceError, Measurement};
 

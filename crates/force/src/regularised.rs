@@ -4,14 +4,14 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
 
-use crate::components::Components;
+use crate::components::Operator;
 use crate::evidence::Evidence;
-use crate::frequency_domain::sizes;
+use crate::noise::channel_sizes;
 use crate::open_operator::OpenOperator;
 use crate::period_operator::PeriodOperator;
 use crate::rule::{choose, factor};
 use crate::unexplained::Rest;
-use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise};
+use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise, Start};
 
 /// Unknowns of a force: its lines in a whole period, or its samples in an open record.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,17 +25,6 @@ pub enum ForceUnknowns {
     Lines(Vec<usize>),
     /// Every sample, the force linear between them; the record is open.
     Samples(Start),
-}
-
-/// State of the machine at the first sample of an open record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Start {
-    /// At rest: neither displaced nor moving.
-    FromRest,
-    /// Unknown: displacement and velocity are estimated with the force.
-    InMotion,
 }
 
 /// A regularised force and how it was chosen.
@@ -87,7 +76,7 @@ pub fn regularised(
         ForceUnknowns::Samples(_) => Vec::new(),
     };
     let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
-    let scale = level.clone().unwrap_or_else(|| sizes(measured.record()));
+    let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let level = level.as_deref();
     let found = if let ForceUnknowns::Samples(start) = unknowns {
         let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
@@ -105,15 +94,6 @@ pub fn regularised(
         _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
     });
     Ok(RegularisedForce { force: force.with_rest(rest.transpose()?), ..found })
-}
-
-/// The problem in its singular vectors.
-pub(crate) trait Operator {
-    fn components(&self) -> &Components;
-    /// Samples × forces of the components times these factors (f̂_i = φ_i y_i / s_i).
-    fn force(&self, factors: &[f64]) -> DMatrix<f64>;
-    /// Samples × forces: variance, given that of each component per real unknown.
-    fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }
 
 fn solve(

@@ -1,14 +1,13 @@
 //! The machine between unknown forces and measured channels, sample by sample.
 
-use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use nalgebra::{DMatrix, DVector};
 
 use crate::Measurement;
-use crate::transition::Transition;
 
 /// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
 pub(crate) struct Machine {
-    pub transition: Transition,
+    pub transition: StateTransition,
     /// Channels × 2n, divided by the channel's scale.
     pub out: DMatrix<f64>,
     /// Channels × forces.
@@ -25,11 +24,11 @@ impl Machine {
         scale: &[f64],
     ) -> Self {
         let (n, dt) = (system.dof(), measured.sampling().dt());
-        let transition = Transition::exact(system, dt);
+        let transition = StateTransition::exact(system, dt, &DMatrix::identity(n, n));
         let unit =
             DMatrix::from_fn(n, forced.len(), |i, j| if i == forced[j] { dt * dt } else { 0.0 });
         let input = system.mass().clone().lu().solve(&unit).expect("M is invertible");
-        let rate = Transition::rate(system, dt);
+        let rate = StateTransition::rate(system, dt);
         let channels = measured.channels();
         let mut out = DMatrix::zeros(channels.len(), 2 * n);
         let mut through = DMatrix::zeros(channels.len(), forced.len());

@@ -7,7 +7,7 @@ use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use crate::frequency_domain::noise_weight;
+use crate::lines::noise_weight;
 use crate::state_space::Machine;
 use crate::transfer::Transfer;
 use crate::{ForceError, Measurement, Start};

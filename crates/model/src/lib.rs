@@ -27,6 +27,7 @@
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
+//! | the exact step from one sample to the next | [`StateTransition`] |
 //! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
 //! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
@@ -50,6 +51,7 @@ mod sdof;
 mod second_order;
 #[cfg(feature = "serde")]
 mod serde_forms;
+mod state_transition;
 mod uncertain_system;
 
 pub use discretisation::Discretisation;
@@ -64,4 +66,5 @@ pub use response_quantity::ResponseQuantity;
 pub use sampling_rule::npi_sampling;
 pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};
+pub use state_transition::StateTransition;
 pub use uncertain_system::UncertainSystem;

@@ -2,11 +2,11 @@
 
 use crate::axis::{Mapping, TINY};
 use crate::canvas::Point;
-use crate::draw::{LABEL_SIZE, TICK_SIZE};
 use crate::error::PlotError;
 use crate::figure::Figure;
 use crate::legend::{self, Entry};
 use crate::panel::{Legend, Panel};
+use crate::style::{LABEL_SIZE, TICK_SIZE};
 use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
 use crate::trace::{self, Mappings, Segment};

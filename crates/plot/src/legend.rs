@@ -2,9 +2,9 @@
 
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Kind, Reference};
-use crate::draw::{self, LABEL_SIZE};
+use crate::marks;
 use crate::panel::Panel;
-use crate::style::{Color, Resolved};
+use crate::style::{Color, LABEL_SIZE, Resolved};
 use crate::text::{Weight, text_width};
 use crate::trace::{Segment, meets};
 
@@ -48,7 +48,7 @@ impl Entry {
         let length = self.sample_length();
         let start = x + (indent - length) / 2.0;
         match self.sample {
-            Sample::Curve(kind, style) => draw::sample(sheet, kind, style, (start, y), length),
+            Sample::Curve(kind, style) => marks::sample(sheet, kind, style, (start, y), length),
             Sample::Line(stroke) => sheet.line((start, y), (start + length, y), stroke),
         }
         let style = TextStyle::new(TEXT).anchored(Anchor::Start);

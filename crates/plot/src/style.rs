@@ -1,5 +1,14 @@
 //! Colours, dashes and markers that stay apart for colour-blind readers and in grey print.
 
+/// Font size of captions and legends, px.
+pub(crate) const LABEL_SIZE: f64 = 13.0;
+/// Font size of tick labels, px.
+pub(crate) const TICK_SIZE: f64 = 11.5;
+/// Font size of the title of a figure, px.
+pub(crate) const TITLE_SIZE: f64 = 15.0;
+/// Font size of the title of a panel, px.
+pub(crate) const PANEL_TITLE_SIZE: f64 = 13.0;
+
 /// A colour of the drawing, written the way SVG writes it (`#rrggbb`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Color(pub &'static str);

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use crate::axis::{Mapping, Scale};
 use crate::canvas::Point;
 use crate::curve::{Curve, Kind};
-use crate::draw::LEAST_RADIUS;
+use crate::marks::LEAST_RADIUS;
 
 /// The two mappings of a panel.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,31 @@
+//! Spectral lines of a measured period.
+
+use mechid_signal::Spectrum;
+
+use crate::measurement::first_repeated;
+use crate::{ForceError, Measurement};
+
+/// Every line of the record that holds a whole complex amplitude: 1 up to, not at, Nyquist.
+pub fn inner_lines(measured: &Measurement) -> Vec<usize> {
+    (1..measured.sampling().len().div_ceil(2)).collect()
+}
+
+/// Variance that white noise of unit variance has in each part of a line's amplitude.
+pub(crate) fn noise_weight(len: usize, line: usize) -> f64 {
+    if line == 0 || 2 * line == len { 1.0 / len as f64 } else { 2.0 / len as f64 }
+}
+
+/// Checks that these lines are some lines of the spectrum, each named once.
+pub(crate) fn check_lines(spectrum: &Spectrum, lines: &[usize]) -> Result<(), ForceError> {
+    if lines.is_empty() {
+        return Err(ForceError::NoLines);
+    }
+    let last = spectrum.len() - 1;
+    if let Some(&line) = lines.iter().find(|line| **line > last) {
+        return Err(ForceError::NoSuchLine { line, last });
+    }
+    match first_repeated(lines) {
+        Some(line) => Err(ForceError::RepeatedLine { line }),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,58 @@
+//! From the description of a figure to documents and files.
+
+use std::path::Path;
+
+use crate::bitmap;
+use crate::canvas::Canvas;
+use crate::draw;
+use crate::error::PlotError;
+use crate::figure::Figure;
+use crate::layout::Layout;
+use crate::save;
+
+impl Figure {
+    /// The figure as an SVG document.
+    ///
+    /// # Errors
+    /// A panel or a curve without points, coordinates an axis cannot show, or a size without room to draw in.
+    pub fn to_svg(&self) -> Result<String, PlotError> {
+        self.svg("", &self.title)
+    }
+
+    /// The figure as an SVG element to stand in an HTML document beside others: its ids begin with `ids`,
+    /// different for each, and `label` is its name for readers who do not see it.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`].
+    pub fn to_inline_svg(&self, ids: &str, label: &str) -> Result<String, PlotError> {
+        self.svg(ids, label)
+    }
+
+    fn svg(&self, ids: &str, label: &str) -> Result<String, PlotError> {
+        self.validate()?;
+        let layout = Layout::new(self)?;
+        let mut sheet = Canvas::new(layout.size.0, layout.size.1).with_ids(ids);
+        draw::figure(self, &layout, &mut sheet);
+        Ok(sheet.finish(label))
+    }
+
+    /// The figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`], and a scale that leads to an empty or an overlarge bitmap.
+    pub fn to_png(&self, scale: f64) -> Result<Vec<u8>, PlotError> {
+        bitmap::svg_to_png(&self.to_svg()?, scale)
+    }
+
+    /// Saves the figure as SVG or, at two pixels per px, as PNG, as the ending of `path` says.
+    ///
+    /// The file appears whole or not at all: it is written beside its place and then renamed.
+    ///
+    /// # Errors
+    /// As [`Figure::to_svg`], another ending than `.svg` or `.png`, and what the file system refuses.
+    pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
+        // The ending is judged before the work of drawing.
+        let format = save::Format::of(path.as_ref())?;
+        save::write(path.as_ref(), format, &self.to_svg()?)
+    }
+}
