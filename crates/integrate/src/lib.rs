@@ -34,9 +34,10 @@
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
 //! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
-//! fail nor allocate. [`integrate()`] and [`integrate_periodic`] run it over a sampled force,
-//! [`integrate_function`] and [`integrate_periodic_function`] over a function of time.
-//! [`spectral_radius`], [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
+//! fail nor allocate; a [`System`] is dense or sparse. [`integrate()`] and [`integrate_periodic`] run
+//! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
+//! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
+//! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
 mod accuracy;
 mod central_difference;

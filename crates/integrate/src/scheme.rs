@@ -54,11 +54,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// # Errors
     /// Those of [`prepare_unchecked`](Self::prepare_unchecked), and
     /// [`IntegrateError::Unstable`] with the largest stable step.
-    fn prepare(
-        &self,
-        system: &dyn System,
-        dt: f64,
-    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+    fn prepare(&self, system: &dyn System, dt: f64) -> Result<Box<dyn Stepper>, IntegrateError> {
         let mut stepper = self.prepare_unchecked(system, dt)?;
         let scheme = stability::Examined {
             name: &|| self.name(),
@@ -132,11 +128,7 @@ impl Scheme for AllowUnstable<'_> {
         self.0.prepare_unchecked(system, dt)
     }
 
-    fn prepare(
-        &self,
-        system: &dyn System,
-        dt: f64,
-    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+    fn prepare(&self, system: &dyn System, dt: f64) -> Result<Box<dyn Stepper>, IntegrateError> {
         self.0.prepare_unchecked(system, dt)
     }
 }

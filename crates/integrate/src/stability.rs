@@ -240,7 +240,8 @@ impl Examined<'_> {
         if self.stable_steps != StableSteps::All {
             for which in [Matrix::Stiffness, Matrix::Damping] {
                 let top = passive::top(&equations, which)?;
-                let limit = self.small_limit(&reduced(&equations, &top.vector.map(Complex::from))?)?;
+                let limit =
+                    self.small_limit(&reduced(&equations, &top.vector.map(Complex::from))?)?;
                 // What the search has not reached of the largest eigenvalue.
                 let limit = limit.map(|limit| limit * top.share);
                 least = limit.into_iter().chain(least).reduce(f64::min);
@@ -376,8 +377,7 @@ fn reduced(
         let (real, imaginary) = (re.dot(&a_re) + im.dot(&a_im), re.dot(&a_im) - im.dot(&a_re));
         DMatrix::from_row_slice(2, 2, &[real, -imaginary, imaginary, real])
     };
-    let [mass, damping, stiffness] =
-        [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(form);
+    let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(form);
     Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
 }
 

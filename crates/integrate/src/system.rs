@@ -63,9 +63,9 @@ impl<'a> Matrices<'a> {
             return Some(system);
         }
         let most = (SPARSE_BELOW * (n * n) as f64) as usize;
-        let full = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].iter().any(|which| {
-            system.matrix(*which).iter().filter(|v| **v != 0.0).count() > most
-        });
+        let full = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
+            .iter()
+            .any(|which| system.matrix(*which).iter().filter(|v| **v != 0.0).count() > most);
         full.then_some(system)
     }
 }

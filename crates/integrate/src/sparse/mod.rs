@@ -46,7 +46,7 @@ pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, 
     let mut row_columns = Vec::new();
     let mut sums = vec![0.0; n];
     offsets.push(0);
-    for i in 0..n {
+    for (i, size) in sizes.iter_mut().enumerate() {
         row_columns.clear();
         for (scale, matrix) in terms.iter().filter(|(scale, _)| *scale != 0.0) {
             let row = matrix.row(i);
@@ -57,7 +57,7 @@ pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, 
                     row_columns.push(j);
                 }
                 sums[j] += scale * value;
-                sizes[i] += (scale * value).abs();
+                *size += (scale * value).abs();
             }
         }
         row_columns.sort_unstable();

@@ -21,8 +21,8 @@ const LANCZOS_STEPS: usize = 100;
 /// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
 /// as far as diagonal dominance or factorisations without exchanges can prove it.
 pub(super) fn is_passive(system: &dyn System) -> bool {
-    let symmetric =
-        [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(|which| Symmetric::of(system, which));
+    let symmetric = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
+        .map(|which| Symmetric::of(system, which));
     let [Some(mass), Some(damping), Some(stiffness)] = symmetric else { return false };
     mass.is_definite() && damping.is_semidefinite() && stiffness.is_semidefinite()
 }
@@ -64,9 +64,10 @@ impl Symmetric {
                 let transposed = matrix.transpose();
                 let difference = combination(&[(1.0, &matrix), (-1.0, &transposed)]);
                 // The sizes of the terms row by row are what the difference is measured by.
-                let symmetric = difference.0.row_iter().zip(&difference.1).all(|(row, size)| {
-                    row.values().iter().all(|v| v.abs() <= ASYMMETRY * size)
-                });
+                let symmetric =
+                    difference.0.row_iter().zip(&difference.1).all(|(row, size)| {
+                        row.values().iter().all(|v| v.abs() <= ASYMMETRY * size)
+                    });
                 symmetric.then(|| Self::Sparse(matrix.into_owned()))
             }
         }
@@ -86,8 +87,7 @@ impl Symmetric {
         }
         let sizes = self.row_sums();
         let largest = sizes.iter().fold(0.0, |most, v| f64::max(most, *v));
-        let shift: Vec<f64> =
-            sizes.iter().map(|size| NEGATIVE * (size + 1e-3 * largest)).collect();
+        let shift: Vec<f64> = sizes.iter().map(|size| NEGATIVE * (size + 1e-3 * largest)).collect();
         let shifted = match self {
             Self::Dense(matrix) => {
                 let mut matrix = matrix.clone();

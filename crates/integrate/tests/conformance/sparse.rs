@@ -76,9 +76,8 @@ fn sparse_and_dense_agree() {
 
 /// Non-zero x(0) and ẋ(0) of a size with the response.
 fn small(n: usize) -> InitialState {
-    let wave = |phase: f64| {
-        nalgebra::DVector::from_fn(n, |i, _| 1e-2 * (phase + 0.3 * i as f64).sin())
-    };
+    let wave =
+        |phase: f64| nalgebra::DVector::from_fn(n, |i, _| 1e-2 * (phase + 0.3 * i as f64).sin());
     InitialState::new(wave(0.0), 10.0 * wave(1.0)).unwrap()
 }
 
@@ -122,7 +121,8 @@ fn selections_that_do_not_fit_are_refused() {
     let refused = |forced: &[usize], observed: &[usize]| {
         let dofs = SelectedDofs { forced, observed };
         let rest = InitialState::rest(40);
-        integrate_selected(&Newmark::AVERAGE_ACCELERATION, &system, dofs, &force, &rest).unwrap_err()
+        integrate_selected(&Newmark::AVERAGE_ACCELERATION, &system, dofs, &force, &rest)
+            .unwrap_err()
     };
     assert_eq!(refused(&[0, 40], &[1]), IntegrateError::DofOutside { index: 40, dof: 40 });
     assert_eq!(refused(&[0, 1], &[41]), IntegrateError::DofOutside { index: 41, dof: 40 });

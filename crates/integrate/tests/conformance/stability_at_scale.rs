@@ -23,7 +23,8 @@ fn known_limits_are_those_of_one_degree_of_freedom() {
         for ratio in [0.0, 1e-3, 0.1, 0.7, 1.5, 20.0] {
             let system = Sdof::new(1.0, 2.0 * ratio, 1.0).unwrap().system();
             let limit = critical_step(scheme, &system).unwrap();
-            let fastest = system.eigenvalues().unwrap().iter().map(|l| l.norm()).fold(0.0, f64::max);
+            let fastest =
+                system.eigenvalues().unwrap().iter().map(|l| l.norm()).fold(0.0, f64::max);
             match scheme.stable_steps() {
                 StableSteps::All => assert_eq!(limit, None, "{name} ζ {ratio}"),
                 // Damping can but help.
