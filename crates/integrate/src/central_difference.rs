@@ -1,9 +1,11 @@
 //! Central difference.
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
+use crate::effective::Equations;
 use crate::newmark::{Newmark, NewmarkStepper, motion_mut};
-use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+use crate::scheme::check_step;
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// How central difference gets the displacement before t = 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -53,13 +55,18 @@ impl Scheme for CentralDifference {
         ]
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        StableSteps::Frequencies(2.0)
+    }
+
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
-        let inner =
-            NewmarkStepper::new("central difference", Newmark::CENTRAL_DIFFERENCE, system, dt)?;
+        let (dt, equations) = (check_step(dt)?, Equations::of(system));
+        let family = Newmark::CENTRAL_DIFFERENCE;
+        let inner = NewmarkStepper::new("central difference", family, &equations, dt)?;
         Ok(Box::new(CentralDifferenceStepper { inner, start: self.start }))
     }
 }

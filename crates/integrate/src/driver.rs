@@ -1,13 +1,13 @@
 //! Integration from given initial values.
 
-use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_model::{InitialState, Response};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
 use crate::force::ForceTable;
 use crate::run::{Motion, Run};
 use crate::scheme::check_finite;
-use crate::{IntegrateError, SampledForce, Scheme};
+use crate::{IntegrateError, SampledForce, Scheme, System};
 
 /// The motion of `system` from `initial` under a sampled force (samples × n, in N).
 ///
@@ -20,12 +20,77 @@ use crate::{IntegrateError, SampledForce, Scheme};
 /// [`IntegrateError::Overflow`].
 pub fn integrate<'a>(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     force: impl Into<SampledForce<'a>>,
     initial: &InitialState,
 ) -> Result<Response, IntegrateError> {
     let table = ForceTable::ending(scheme, system.dof(), force.into())?;
-    run(scheme, system, &table, initial)
+    let motion = Motion::zeros(table.sampling().len(), system.dof());
+    run(scheme, system, &table, initial, motion)
+}
+
+/// Degrees of freedom, counted from 0, at which forces act and responses are kept.
+///
+/// With these an integration needs no memory that grows with degrees of freedom times samples.
+#[derive(Debug, Clone, Copy)]
+pub struct SelectedDofs<'a> {
+    /// One for each channel of the force, none twice; no force acts on the others.
+    pub forced: &'a [usize],
+    /// One for each channel of the response.
+    pub observed: &'a [usize],
+}
+
+impl SelectedDofs<'_> {
+    fn check(&self, dof: usize) -> Result<(), IntegrateError> {
+        let mut forced = vec![false; dof];
+        for &at in self.forced {
+            match forced.get_mut(at) {
+                None => return Err(IntegrateError::DofOutside { index: at, dof }),
+                Some(forced) if *forced => return Err(IntegrateError::ForcedTwice { index: at }),
+                Some(forced) => *forced = true,
+            }
+        }
+        match self.observed.iter().find(|at| **at >= dof) {
+            Some(&at) => Err(IntegrateError::DofOutside { index: at, dof }),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The motion of some degrees of freedom of `system` from `initial` under a sampled force (in N)
+/// on some: samples × `dofs.forced` in, samples × `dofs.observed` out.
+///
+/// ```
+/// use mechid_integrate::{Newmark, SelectedDofs, integrate_selected};
+/// use mechid_model::{InitialState, SparseSystem, band};
+/// use mechid_signal::{Record, Sampling};
+///
+/// // A step of 1 N at one end of a chain of 1000; the wave has not reached the middle after 2 s.
+/// let n = 1000;
+/// let stiffness = band(n, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
+/// let chain = SparseSystem::new(band(n, &[(0, 1.0)]), band(n, &[(0, 0.1)]), stiffness)?;
+/// let force = Record::from_channel(Sampling::new(1e-2, 200)?, vec![1.0; 200])?;
+/// let dofs = SelectedDofs { forced: &[0], observed: &[0, 500] };
+/// let rest = InitialState::rest(n);
+/// let response = integrate_selected(&Newmark::AVERAGE_ACCELERATION, &chain, dofs, &force, &rest)?;
+/// let [near, far] = [0, 1].map(|channel| response.displacement().channel(channel)[199]);
+/// assert!(near > 1e-4 && far.abs() < 1e-20);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Those of [`integrate`]; [`IntegrateError::DofOutside`] and [`IntegrateError::ForcedTwice`].
+pub fn integrate_selected<'a>(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    dofs: SelectedDofs<'a>,
+    force: impl Into<SampledForce<'a>>,
+    initial: &InitialState,
+) -> Result<Response, IntegrateError> {
+    dofs.check(system.dof())?;
+    let table = ForceTable::acting_on(scheme, system.dof(), dofs.forced, force.into())?;
+    let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
+    run(scheme, system, &table, initial, motion)
 }
 
 /// The motion of `system` from `initial` under a force given as a function of time:
@@ -37,7 +102,7 @@ pub fn integrate<'a>(
 /// Those of [`integrate`]; [`IntegrateError::NotFinite`] if the function yields a NaN or infinity.
 pub fn integrate_function(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     sampling: Sampling,
     initial: &InitialState,
     mut force: impl FnMut(f64, &mut [f64]),
@@ -48,7 +113,7 @@ pub fn integrate_function(
     force(end, &mut next);
     check_finite("the force", &next, end)?;
     let table = ForceTable::ending(scheme, system.dof(), sampled.force())?.continued(next);
-    run(scheme, system, &table, initial)
+    run(scheme, system, &table, initial, Motion::zeros(sampling.len(), system.dof()))
 }
 
 /// A function of time sampled where a scheme needs it.
@@ -101,9 +166,10 @@ fn sample(
 
 fn run(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     table: &ForceTable<'_>,
     initial: &InitialState,
+    mut motion: Motion<'_>,
 ) -> Result<Response, IntegrateError> {
     let dof = system.dof();
     initial.check_dof(dof)?;
@@ -112,7 +178,6 @@ fn run(
     let first = run.stepper().first();
     let mut motions = vec![vec![0.0; 3 * dof]; first + 1];
     run.start(initial, &table.early(first), &mut motions)?;
-    let mut motion = Motion::zeros(sampling.len(), dof);
     for (k, values) in motions.iter().enumerate().take(sampling.len()) {
         motion.set(k, values);
     }

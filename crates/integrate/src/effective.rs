@@ -1,9 +1,110 @@
 //! The one linear solve behind every implicit scheme: M̂ a = F − C v̂ − K x̂.
 
-use mechid_model::SecondOrderSystem;
-use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut, Dyn, LU};
+use std::sync::Arc;
 
-use crate::IntegrateError;
+use mechid_model::{Matrix, SecondOrderSystem};
+use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut, Dyn, LU};
+use nalgebra_sparse::csr::CsrMatrix;
+
+use crate::sparse::{Product, SparseLu, combination};
+use crate::{IntegrateError, System};
+
+/// The matrices of a system, in the form in which a step uses them.
+#[derive(Debug, Clone)]
+pub(crate) enum Equations {
+    Dense(Arc<SecondOrderSystem>),
+    Sparse(Arc<SparseEquations>),
+}
+
+#[derive(Debug)]
+pub(crate) struct SparseEquations {
+    mass: CsrMatrix<f64>,
+    damping: CsrMatrix<f64>,
+    stiffness: CsrMatrix<f64>,
+    /// C and K for products with vectors.
+    products: [Product; 2],
+}
+
+impl Equations {
+    pub(crate) fn of(system: &dyn System) -> Self {
+        let matrices = system.matrices();
+        if let Some(dense) = matrices.dense() {
+            return Self::Dense(Arc::new(dense.clone()));
+        }
+        let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
+            .map(|which| matrices.sparse(which).into_owned());
+        let products = [&damping, &stiffness].map(Product::of);
+        Self::Sparse(Arc::new(SparseEquations { mass, damping, stiffness, products }))
+    }
+
+    pub(crate) fn dof(&self) -> usize {
+        match self {
+            Self::Dense(system) => system.dof(),
+            Self::Sparse(system) => system.mass.nrows(),
+        }
+    }
+
+    /// Factors M + `gamma_hat` C + `beta_hat` K for a step of `dt` seconds.
+    pub(crate) fn effective(
+        &self,
+        scheme: &'static str,
+        dt: f64,
+        gamma_hat: f64,
+        beta_hat: f64,
+    ) -> Result<Effective, IntegrateError> {
+        let factored = match self {
+            Self::Dense(system) => factor_dense(system, gamma_hat, beta_hat),
+            Self::Sparse(system) => {
+                let terms = [
+                    (1.0, &system.mass),
+                    (gamma_hat, &system.damping),
+                    (beta_hat, &system.stiffness),
+                ];
+                let (matrix, sizes) = combination(&terms);
+                SparseLu::new(&matrix, &sizes).map(Factored::Sparse)
+            }
+        };
+        match factored {
+            Ok(factored) => Ok(Effective { equations: self.clone(), factored }),
+            Err(smallest) => Err(IntegrateError::SingularEffectiveMass { scheme, dt, smallest }),
+        }
+    }
+
+    /// Factors M alone: the equation of motion solved for the acceleration.
+    pub(crate) fn mass_only(
+        &self,
+        scheme: &'static str,
+        dt: f64,
+    ) -> Result<Effective, IntegrateError> {
+        self.effective(scheme, dt, 0.0, 0.0)
+    }
+
+    /// One of M, C, K times `x`.
+    pub(crate) fn times(&self, which: Matrix, x: &DVector<f64>) -> DVector<f64> {
+        match (self, which) {
+            (Self::Dense(system), _) => system.matrix(which) * x,
+            (Self::Sparse(system), Matrix::Mass) => &system.mass * x,
+            (Self::Sparse(system), Matrix::Damping) => &system.damping * x,
+            (Self::Sparse(system), Matrix::Stiffness) => &system.stiffness * x,
+        }
+    }
+
+    /// `load` ← `load` − C v̂ − K x̂.
+    fn subtract_forces(&self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
+        match self {
+            Self::Dense(system) => {
+                let n = load.len();
+                let mut rhs = DVectorViewMut::from_slice(load, n);
+                rhs.gemv(-1.0, system.damping(), &DVectorView::from_slice(v_hat, n), 1.0);
+                rhs.gemv(-1.0, system.stiffness(), &DVectorView::from_slice(x_hat, n), 1.0);
+            }
+            Self::Sparse(system) => {
+                system.products[0].subtract(v_hat, load);
+                system.products[1].subtract(x_hat, load);
+            }
+        }
+    }
+}
 
 /// M̂ = M + γ̂ C + β̂ K, factored once, with C and K for the right-hand side.
 ///
@@ -11,59 +112,51 @@ use crate::IntegrateError;
 /// x̂ + β̂ a and v̂ + γ̂ a, known part plus unknown acceleration, and asks for equilibrium there.
 #[derive(Debug)]
 pub(crate) struct Effective {
-    factored: LU<f64, Dyn, Dyn>,
-    damping: DMatrix<f64>,
-    stiffness: DMatrix<f64>,
+    equations: Equations,
+    factored: Factored,
+}
+
+#[derive(Debug)]
+enum Factored {
+    Dense(LU<f64, Dyn, Dyn>),
+    Sparse(SparseLu),
 }
 
 impl Effective {
-    /// Factors M + `gamma_hat` C + `beta_hat` K.
-    pub(crate) fn new(
-        scheme: &'static str,
-        system: &SecondOrderSystem,
-        dt: f64,
-        gamma_hat: f64,
-        beta_hat: f64,
-    ) -> Result<Self, IntegrateError> {
-        let terms =
-            [(1.0, system.mass()), (gamma_hat, system.damping()), (beta_hat, system.stiffness())];
-        let n = system.dof();
-        let matrix = DMatrix::from_fn(n, n, |i, j| terms.iter().map(|(s, t)| s * t[(i, j)]).sum());
-        // Rows divided by the size of the terms they are sums of: a pivot of ε is rounding of a
-        // zero, however far apart the masses and stiffnesses lie.
-        let sizes = DVector::from_fn(n, |i, _| {
-            terms.iter().map(|(s, t)| s * t.row(i).abs().sum()).sum::<f64>()
-        });
-        let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / sizes[i]);
-        let smallest = scaled.lu().u().diagonal().abs().min();
-        // NaN (from overflow) fails the test too.
-        if !(smallest > f64::EPSILON && sizes.iter().all(|s| s.is_finite())) {
-            return Err(IntegrateError::SingularEffectiveMass { scheme, dt, smallest });
-        }
-        let factored = matrix.lu();
-        Ok(Self {
-            factored,
-            damping: system.damping().clone(),
-            stiffness: system.stiffness().clone(),
-        })
-    }
-
-    /// M alone: the equation of motion solved for the acceleration.
-    pub(crate) fn mass_only(
-        scheme: &'static str,
-        system: &SecondOrderSystem,
-        dt: f64,
-    ) -> Result<Self, IntegrateError> {
-        Self::new(scheme, system, dt, 0.0, 0.0)
-    }
-
     /// a = M̂⁻¹ (`load` − C v̂ − K x̂), in place of `load`.
-    pub(crate) fn solve(&self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
-        let n = load.len();
-        let mut rhs = DVectorViewMut::from_slice(load, n);
-        rhs.gemv(-1.0, &self.damping, &DVectorView::from_slice(v_hat, n), 1.0);
-        rhs.gemv(-1.0, &self.stiffness, &DVectorView::from_slice(x_hat, n), 1.0);
-        // Cannot fail: the pivots were checked when M̂ was factored.
-        self.factored.solve_mut(&mut rhs);
+    pub(crate) fn solve(&mut self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
+        self.equations.subtract_forces(v_hat, x_hat, load);
+        match &mut self.factored {
+            // Cannot fail: the pivots were checked when M̂ was factored.
+            Factored::Dense(factored) => {
+                let n = load.len();
+                factored.solve_mut(&mut DVectorViewMut::from_slice(load, n));
+            }
+            Factored::Sparse(factored) => factored.solve(load),
+        }
     }
+}
+
+/// The factors of M + `gamma_hat` C + `beta_hat` K, or its smallest pivot if that is but rounding.
+fn factor_dense(
+    system: &SecondOrderSystem,
+    gamma_hat: f64,
+    beta_hat: f64,
+) -> Result<Factored, f64> {
+    let terms =
+        [(1.0, system.mass()), (gamma_hat, system.damping()), (beta_hat, system.stiffness())];
+    let n = system.dof();
+    let matrix = DMatrix::from_fn(n, n, |i, j| terms.iter().map(|(s, t)| s * t[(i, j)]).sum());
+    // Rows divided by the size of the terms they are sums of: a pivot of ε is rounding of a
+    // zero, however far apart the masses and stiffnesses lie.
+    let sizes = DVector::from_fn(n, |i, _| {
+        terms.iter().map(|(s, t)| s * t.row(i).abs().sum()).sum::<f64>()
+    });
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] / sizes[i]);
+    let smallest = scaled.lu().u().diagonal().abs().min();
+    // NaN (from overflow) fails the test too.
+    if !(smallest > f64::EPSILON && sizes.iter().all(|s| s.is_finite())) {
+        return Err(smallest);
+    }
+    Ok(Factored::Dense(matrix.lu()))
 }

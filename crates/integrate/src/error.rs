@@ -39,6 +39,23 @@ pub enum IntegrateError {
         /// Degrees of freedom of the system.
         dof: usize,
     },
+    /// A degree of freedom was selected that the system does not have.
+    #[error(
+        "degree of freedom {index} (counted from 0) was selected, the system has {}",
+        counted(*dof, "degree of freedom")
+    )]
+    DofOutside {
+        /// The degree of freedom selected, counted from 0.
+        index: usize,
+        /// Degrees of freedom of the system.
+        dof: usize,
+    },
+    /// Two channels of the force act on one degree of freedom.
+    #[error("two forces act on degree of freedom {index} (counted from 0): add them first")]
+    ForcedTwice {
+        /// The degree of freedom, counted from 0.
+        index: usize,
+    },
     /// The forces in the middle of the steps do not lie on the time axis of the force.
     #[error(
         "the mid-step forces have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),

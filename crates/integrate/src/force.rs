@@ -35,6 +35,9 @@ pub(crate) struct ForceTable<'a> {
     mid_step: Option<&'a Record>,
     /// The two rows that follow the last sample.
     after: [Vec<f64>; 2],
+    /// The degree of freedom that each channel acts on, if not all in their order.
+    forced: Option<&'a [usize]>,
+    dof: usize,
 }
 
 impl<'a> ForceTable<'a> {
@@ -47,7 +50,7 @@ impl<'a> ForceTable<'a> {
         check(scheme, dof, force)?;
         let len = force.samples.len();
         let after = [0, 1].map(|k| row(force.samples, k % len));
-        Ok(Self { samples: force.samples, mid_step: force.mid_step, after })
+        Ok(Self { samples: force.samples, mid_step: force.mid_step, after, forced: None, dof })
     }
 
     /// A force that ends with its last sample; the row behind it lies on the line through the last
@@ -61,7 +64,20 @@ impl<'a> ForceTable<'a> {
         let last = row(force.samples, force.samples.len() - 1);
         let before = row(force.samples, force.samples.len().saturating_sub(2));
         let line = last.iter().zip(&before).map(|(l, b)| 2.0 * l - b).collect();
-        Ok(Self { samples: force.samples, mid_step: force.mid_step, after: [line, last] })
+        let (samples, mid_step, after) = (force.samples, force.mid_step, [line, last]);
+        Ok(Self { samples, mid_step, after, forced: None, dof })
+    }
+
+    /// A force that acts on the degrees of freedom `forced` of `dof`, one for each channel, and ends
+    /// with its last sample.
+    pub(crate) fn acting_on(
+        scheme: &dyn Scheme,
+        dof: usize,
+        forced: &'a [usize],
+        force: SampledForce<'a>,
+    ) -> Result<Self, IntegrateError> {
+        let table = Self::ending(scheme, forced.len(), force)?;
+        Ok(Self { forced: Some(forced), dof, ..table })
     }
 
     /// The same with the row behind the last sample known.
@@ -75,10 +91,16 @@ impl<'a> ForceTable<'a> {
     }
 
     pub(crate) fn dof(&self) -> usize {
-        self.samples.channels()
+        self.dof
     }
 
-    /// Copies the force at `instant` of step `k` into `out`.
+    /// Whether every degree of freedom has its channel.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.forced.is_none()
+    }
+
+    /// Writes the force at `instant` of step `k` into `out`, at the degrees of freedom that it acts
+    /// on.
     pub(crate) fn load(&self, instant: Instant, k: usize, out: &mut [f64]) {
         let (record, k) = match instant {
             Instant::Now => (Some(self.samples), k),
@@ -87,12 +109,13 @@ impl<'a> ForceTable<'a> {
             Instant::Beyond => (Some(self.samples), k + 2),
         };
         let Some(record) = record else { return };
-        if k >= record.len() {
-            out.copy_from_slice(&self.after[k - record.len()]);
-            return;
-        }
-        for (c, out) in out.iter_mut().enumerate() {
-            *out = record.data()[(k, c)];
+        let value = |c: usize| match k.checked_sub(record.len()) {
+            None => record.data()[(k, c)],
+            Some(after) => self.after[after][c],
+        };
+        match self.forced {
+            None => out.iter_mut().enumerate().for_each(|(c, out)| *out = value(c)),
+            Some(forced) => forced.iter().enumerate().for_each(|(c, &at)| out[at] = value(c)),
         }
     }
 
@@ -111,7 +134,12 @@ impl<'a> ForceTable<'a> {
     /// The forces at samples 0 ..= `last`.
     pub(crate) fn early(&self, last: usize) -> Vec<Vec<f64>> {
         let end = self.samples.len() - 1;
-        (0..=last).map(|k| row(self.samples, k.min(end))).collect()
+        let full = |k: usize| {
+            let mut full = vec![0.0; self.dof];
+            self.load(Instant::Now, k.min(end), &mut full);
+            full
+        };
+        (0..=last).map(full).collect()
     }
 }
 

@@ -1,11 +1,11 @@
 //! Houbolt.
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
-use crate::effective::Effective;
+use crate::effective::{Effective, Equations};
 use crate::newmark::{Newmark, NewmarkStepper, motion, motion_mut};
 use crate::scheme::{check_finite, check_step};
-use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// Where Houbolt's scheme gets the motion at Δt and 2Δt from.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -60,9 +60,13 @@ impl Scheme for Houbolt {
         ]
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        StableSteps::All
+    }
+
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
         const NAME: &str = "Houbolt";
@@ -81,9 +85,10 @@ impl Scheme for Houbolt {
             HouboltStart::CentralDifference => Newmark::CENTRAL_DIFFERENCE,
             _ => Newmark::AVERAGE_ACCELERATION,
         };
+        let equations = Equations::of(system);
         Ok(Box::new(HouboltStepper {
-            effective: Effective::new(NAME, system, dt, 11.0 / 12.0 * dt, 0.5 * dt * dt)?,
-            starter: NewmarkStepper::new(NAME, family, system, dt)?,
+            effective: equations.effective(NAME, dt, 11.0 / 12.0 * dt, 0.5 * dt * dt)?,
+            starter: NewmarkStepper::new(NAME, family, &equations, dt)?,
             start: self.start.clone(),
             dt,
             x_hat: vec![0.0; n],

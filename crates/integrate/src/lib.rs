@@ -34,9 +34,10 @@
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
 //! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
-//! fail nor allocate. [`integrate()`] and [`integrate_periodic`] run it over a sampled force,
-//! [`integrate_function`] and [`integrate_periodic_function`] over a function of time.
-//! [`spectral_radius`], [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
+//! fail nor allocate; a [`System`] is dense or sparse. [`integrate()`] and [`integrate_periodic`] run
+//! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
+//! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
+//! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
 mod accuracy;
 mod central_difference;
@@ -51,20 +52,23 @@ mod periodic;
 mod run;
 mod runge_kutta;
 mod scheme;
+mod sparse;
 mod stability;
+mod system;
 mod transition;
 mod wilson_theta;
 
 pub use accuracy::{Accuracy, accuracy};
 pub use central_difference::{CentralDifference, CentralDifferenceStart};
-pub use driver::{integrate, integrate_function};
+pub use driver::{SelectedDofs, integrate, integrate_function, integrate_selected};
 pub use error::IntegrateError;
 pub use force::SampledForce;
 pub use houbolt::{Houbolt, HouboltStart};
 pub use newmark::Newmark;
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
-pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, Stepper};
+pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};
 pub use stability::{critical_step, spectral_radius};
+pub use system::{Matrices, System};
 pub use transition::Transition;
 pub use wilson_theta::{WilsonLoad, WilsonTheta};

@@ -1,10 +1,10 @@
 //! Newmark's family, central difference as its explicit member among them.
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
-use crate::effective::Effective;
+use crate::effective::{Effective, Equations};
 use crate::scheme::check_step;
-use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// Newmark's scheme: equilibrium at t + Δt with
 ///
@@ -87,12 +87,24 @@ impl Scheme for Newmark {
         ]
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        let Self { beta, gamma } = *self;
+        if gamma < 0.5 {
+            StableSteps::Unknown
+        } else if 2.0 * beta >= gamma {
+            StableSteps::All
+        } else {
+            StableSteps::Frequencies((0.5 * gamma - beta).sqrt().recip())
+        }
+    }
+
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
-        Ok(Box::new(NewmarkStepper::new("Newmark", *self, system, dt)?))
+        let dt = check_step(dt)?;
+        Ok(Box::new(NewmarkStepper::new("Newmark", *self, &Equations::of(system), dt)?))
     }
 }
 
@@ -111,15 +123,14 @@ impl NewmarkStepper {
     pub(crate) fn new(
         name: &'static str,
         scheme: Newmark,
-        system: &SecondOrderSystem,
+        equations: &Equations,
         dt: f64,
     ) -> Result<Self, IntegrateError> {
-        let dt = check_step(dt)?;
-        let n = system.dof();
+        let n = equations.dof();
         let (gamma_hat, beta_hat) = (scheme.gamma * dt, scheme.beta * dt * dt);
         Ok(Self {
-            effective: Effective::new(name, system, dt, gamma_hat, beta_hat)?,
-            mass: Effective::mass_only(name, system, dt)?,
+            effective: equations.effective(name, dt, gamma_hat, beta_hat)?,
+            mass: equations.mass_only(name, dt)?,
             dt,
             scheme,
             x_hat: vec![0.0; n],
@@ -168,7 +179,7 @@ impl Stepper for NewmarkStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state);
         motions[0].copy_from_slice(&state[..3 * self.dof()]);
         Ok(())
     }
@@ -176,7 +187,7 @@ impl Stepper for NewmarkStepper {
 
 /// `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, M ẍ = F − C ẋ − K x, into `state`.
 pub(crate) fn start_consistently(
-    mass: &Effective,
+    mass: &mut Effective,
     initial: &InitialState,
     force: &[f64],
     state: &mut [f64],

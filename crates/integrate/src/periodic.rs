@@ -1,6 +1,6 @@
 //! The periodic steady state, solved for instead of waited for.
 
-use mechid_model::{Response, SecondOrderSystem};
+use mechid_model::Response;
 use mechid_signal::Sampling;
 
 use crate::driver::Sampled;
@@ -8,7 +8,7 @@ use crate::force::ForceTable;
 use crate::period::Period;
 use crate::run::{Motion, Run};
 use crate::transition::Transition;
-use crate::{IntegrateError, SampledForce, Scheme};
+use crate::{IntegrateError, SampledForce, Scheme, System};
 
 /// The response is kept when its first state repeats to this part of itself: a tenth of what is
 /// promised.
@@ -31,7 +31,7 @@ const CLOSED: f64 = 1e-13;
 /// of a linear system the first step of it is exact.
 pub fn integrate_periodic<'a>(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     force: impl Into<SampledForce<'a>>,
 ) -> Result<Response, IntegrateError> {
     let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
@@ -70,7 +70,7 @@ pub fn integrate_periodic<'a>(
 /// infinity.
 pub fn integrate_periodic_function(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     sampling: Sampling,
     mut force: impl FnMut(f64, &mut [f64]),
 ) -> Result<Response, IntegrateError> {

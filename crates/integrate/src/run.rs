@@ -9,23 +9,33 @@ use crate::force::ForceTable;
 use crate::transition::Transition;
 use crate::{IntegrateError, Loads, Stepper};
 
-/// Displacement, velocity and acceleration, samples × degrees of freedom.
+/// Displacement, velocity and acceleration, samples × observed degrees of freedom.
 #[derive(Debug)]
-pub(crate) struct Motion {
+pub(crate) struct Motion<'a> {
     parts: [DMatrix<f64>; 3],
+    /// The degree of freedom of each column, if not all in their order.
+    observed: Option<&'a [usize]>,
+    dof: usize,
 }
 
-impl Motion {
+impl<'a> Motion<'a> {
     pub(crate) fn zeros(samples: usize, dof: usize) -> Self {
-        Self { parts: [(); 3].map(|()| DMatrix::zeros(samples, dof)) }
+        Self { parts: [(); 3].map(|()| DMatrix::zeros(samples, dof)), observed: None, dof }
     }
 
-    /// Writes the motion `[x, ẋ, ẍ]` at sample `k`.
+    /// The same for some of the `dof` degrees of freedom.
+    pub(crate) fn observed(samples: usize, dof: usize, observed: &'a [usize]) -> Self {
+        Self { observed: Some(observed), dof, ..Self::zeros(samples, observed.len()) }
+    }
+
+    /// Writes the motion `[x, ẋ, ẍ]` of all degrees of freedom at sample `k`.
     pub(crate) fn set(&mut self, k: usize, motion: &[f64]) {
-        let n = self.parts[0].ncols();
-        for (part, values) in self.parts.iter_mut().zip(motion.chunks_exact(n)) {
-            for (c, &value) in values.iter().enumerate() {
-                part[(k, c)] = value;
+        for (part, values) in self.parts.iter_mut().zip(motion.chunks_exact(self.dof)) {
+            match self.observed {
+                None => values.iter().enumerate().for_each(|(c, value)| part[(k, c)] = *value),
+                Some(observed) => {
+                    observed.iter().enumerate().for_each(|(c, &at)| part[(k, c)] = values[at]);
+                }
             }
         }
     }
@@ -39,9 +49,10 @@ impl Motion {
 
     /// The response on the time axis of `table`.
     pub(crate) fn into_response(self, table: &ForceTable<'_>) -> Result<Response, IntegrateError> {
+        let dof = |channel: usize| self.observed.map_or(channel, |observed| observed[channel]);
         let record = |data| match Record::new(table.sampling(), data) {
             Err(SignalError::NotFinite { sample, channel, .. }) => {
-                Err(IntegrateError::Overflow { sample, component: channel + 1 })
+                Err(IntegrateError::Overflow { sample, component: dof(channel) + 1 })
             }
             other => other.map_err(IntegrateError::from),
         };
@@ -103,7 +114,7 @@ impl Run {
         table: &ForceTable<'_>,
         from: usize,
         to: usize,
-        motion: &mut Motion,
+        motion: &mut Motion<'_>,
     ) {
         let done = self.advance_fixed(table, from, to, motion);
         for k in done..to {
@@ -141,9 +152,12 @@ impl Run {
         table: &ForceTable<'_>,
         from: usize,
         to: usize,
-        motion: &mut Motion,
+        motion: &mut Motion<'_>,
     ) -> usize {
         let Some(transition) = &self.transition else { return from };
+        if !table.is_complete() || motion.observed.is_some() {
+            return from;
+        }
         let n = table.dof();
         let mut streams = Vec::with_capacity(4);
         for (instant, _) in &transition.loads {

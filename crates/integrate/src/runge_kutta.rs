@@ -1,11 +1,11 @@
 //! The classical Runge–Kutta scheme of fourth order.
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
-use crate::effective::Effective;
+use crate::effective::{Effective, Equations};
 use crate::newmark::{motion, motion_mut, start_consistently};
 use crate::scheme::check_step;
-use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// What the two middle stages take for the force at t + Δt/2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,6 +40,10 @@ impl RungeKutta4 {
     pub const SUPPLIED: Self = Self { mid_step: MidStepForce::Supplied };
 }
 
+/// Radius of the largest half disc |z| ≤ r, Re z ≤ 0, in the region |1 + z + z²/2 + z³/6 + z⁴/24| ≤ 1
+/// of stability.
+const HALF_DISC: f64 = 2.6;
+
 impl Scheme for RungeKutta4 {
     fn name(&self) -> String {
         "Runge–Kutta 4".to_owned()
@@ -54,19 +58,23 @@ impl Scheme for RungeKutta4 {
         vec![Convention { what: "force at t+Δt/2", choice }]
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        StableSteps::Eigenvalues(HALF_DISC)
+    }
+
     fn needs_mid_step_force(&self) -> bool {
         self.mid_step == MidStepForce::Supplied
     }
 
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
         let dt = check_step(dt)?;
         let n = system.dof();
         Ok(Box::new(RungeKuttaStepper {
-            mass: Effective::mass_only("Runge–Kutta 4", system, dt)?,
+            mass: Equations::of(system).mass_only("Runge–Kutta 4", dt)?,
             dt,
             mid_step: self.mid_step,
             middle: vec![0.0; n],
@@ -166,7 +174,7 @@ impl Stepper for RungeKuttaStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state);
         motions[0].copy_from_slice(state);
         Ok(())
     }

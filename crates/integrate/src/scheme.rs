@@ -2,9 +2,9 @@
 
 use std::fmt;
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
-use crate::{IntegrateError, stability};
+use crate::{IntegrateError, System, stability};
 
 /// A choice on which programs that share a formula still differ; printed with every result.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -30,6 +30,13 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         false
     }
 
+    /// The steps at which the scheme is known to be stable.
+    ///
+    /// [`prepare`](Self::prepare) looks at the amplification matrix where this leaves it open.
+    fn stable_steps(&self) -> StableSteps {
+        StableSteps::Unknown
+    }
+
     /// All the work that is done once for a system and a step of `dt` seconds, stable or not.
     ///
     /// # Errors
@@ -37,7 +44,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// [`IntegrateError::Components`] if starting values do not fit the system.
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError>;
 
@@ -47,16 +54,38 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// # Errors
     /// Those of [`prepare_unchecked`](Self::prepare_unchecked), and
     /// [`IntegrateError::Unstable`] with the largest stable step.
-    fn prepare(
-        &self,
-        system: &SecondOrderSystem,
-        dt: f64,
-    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+    fn prepare(&self, system: &dyn System, dt: f64) -> Result<Box<dyn Stepper>, IntegrateError> {
         let mut stepper = self.prepare_unchecked(system, dt)?;
-        let prepare = |dt| self.prepare_unchecked(system, dt);
-        stability::refuse_unstable(&prepare, &|| self.name(), system, dt, stepper.as_mut())?;
+        let scheme = stability::Examined {
+            name: &|| self.name(),
+            prepare: &|system, dt| self.prepare_unchecked(system, dt),
+            stable_steps: self.stable_steps(),
+        };
+        scheme.refuse_unstable(system, dt, stepper.as_mut())?;
         Ok(stepper)
     }
+}
+
+/// The steps Δt at which a scheme is stable on every passive system: M symmetric and positive
+/// definite, C and K symmetric and positive semidefinite.
+///
+/// If x is an eigenvector of the amplification and m, c, k are the (real) products x*Mx, x*Cx, x*Kx,
+/// its eigenvalue is that of a single degree of freedom m, c, k, whose ω² = k/m and c/m do not
+/// exceed the largest eigenvalues of M⁻¹K and M⁻¹C. So a limit for one degree of freedom is one for
+/// all of them.
+///
+/// # Source
+/// Hughes (1987), sections 9.1 and 9.2.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum StableSteps {
+    /// All steps.
+    All,
+    /// Steps with ωΔt ≤ this pure number for every natural frequency ω without damping.
+    Frequencies(f64),
+    /// Steps with |λ|Δt ≤ this pure number for every eigenvalue λ.
+    Eigenvalues(f64),
+    /// Not known in closed form.
+    Unknown,
 }
 
 /// A scheme that also takes steps at which it is unstable.
@@ -87,19 +116,19 @@ impl Scheme for AllowUnstable<'_> {
         self.0.needs_mid_step_force()
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        self.0.stable_steps()
+    }
+
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
         self.0.prepare_unchecked(system, dt)
     }
 
-    fn prepare(
-        &self,
-        system: &SecondOrderSystem,
-        dt: f64,
-    ) -> Result<Box<dyn Stepper>, IntegrateError> {
+    fn prepare(&self, system: &dyn System, dt: f64) -> Result<Box<dyn Stepper>, IntegrateError> {
         self.0.prepare_unchecked(system, dt)
     }
 }

@@ -4,10 +4,22 @@
 //! does the integrating. There is no second set of formulas that could be right while the code is
 //! wrong.
 
-use mechid_model::{RealSchur, SecondOrderSystem};
-use nalgebra::Complex;
+mod krylov;
+mod passive;
 
-use crate::{IntegrateError, Scheme, Stepper, Transition};
+use mechid_model::{Matrix, RealSchur, SecondOrderSystem};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::effective::Equations;
+use crate::{IntegrateError, Loads, Matrices, Scheme, StableSteps, Stepper, System, Transition};
+use krylov::{dominant, scattered};
+
+/// Number of degrees of freedom up to which the whole amplification matrix is looked at.
+const WHOLE: usize = 20;
+
+/// Number of degrees of freedom up to which all eigenvalues of the amplification matrix are computed
+/// where its spectral radius is asked for.
+const ALL_EIGENVALUES: usize = 200;
 
 /// Growth per step that a refusal tolerates. Rounding makes 1 ± √ε, times a condition, of the
 /// double eigenvalue 1 of a free body, which is no instability; at this rate a motion needs a
@@ -20,6 +32,9 @@ const SHARP: f64 = 1e-9;
 
 /// Spectral radius of the amplification matrix of `scheme` on `system` at a step of `dt` seconds.
 ///
+/// All eigenvalues are computed, which takes the time of a few hundred solves of 3n equations;
+/// beyond 200 degrees of freedom it is the largest that a hundred steps bring to light.
+///
 /// # Errors
 /// Those of [`Scheme::prepare_unchecked`].
 ///
@@ -27,11 +42,23 @@ const SHARP: f64 = 1e-9;
 /// Bathe & Wilson (1973); Hughes (1987), section 9.1.
 pub fn spectral_radius(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
     dt: f64,
 ) -> Result<f64, IntegrateError> {
     let mut stepper = scheme.prepare_unchecked(system, dt)?;
-    Ok(radius(&Transition::of(stepper.as_mut())))
+    if system.dof() <= ALL_EIGENVALUES {
+        return Ok(radius(&Transition::of(stepper.as_mut())));
+    }
+    let fastest = fastest(&Equations::of(system))?;
+    let mut amplification = Amplification::of(stepper.as_mut(), fastest);
+    let mut start = amplification.start();
+    let mut radius = f64::INFINITY;
+    for _ in 0..3 {
+        let Some(found) = dominant(start, |z, next| amplification.apply(z, next)) else { break };
+        radius = found.value.norm();
+        start = found.vector.map(|v| v.re);
+    }
+    Ok(radius)
 }
 
 /// Spectral radius of I + D: from the eigenvalues of D, which keep their digits where two of them
@@ -64,6 +91,10 @@ pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> 
 /// shortest time scale 1/|λ| of the system up to a million times that, in factors of √2, then
 /// bisected to rounding. A system that is unstable itself is allowed twice its own growth.
 ///
+/// Beyond 20 degrees of freedom it is the limit for the single degree of freedom that moves along
+/// the fastest mode, as far as a hundred products with the matrices bring that to light: to
+/// about one part in a thousand.
+///
 /// # Errors
 /// Those of [`Scheme::prepare_unchecked`], and [`IntegrateError::Unstable`] if not even the
 /// smallest step is stable.
@@ -72,83 +103,309 @@ pub(crate) fn eigenvalues(transition: &Transition) -> Option<Vec<Complex<f64>>> 
 /// Hughes (1987), section 9.1.
 pub fn critical_step(
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    system: &dyn System,
 ) -> Result<Option<f64>, IntegrateError> {
-    limit(&|dt| scheme.prepare_unchecked(system, dt), &|| scheme.name(), system)
+    let examined = Examined {
+        name: &|| scheme.name(),
+        prepare: &|system, dt| scheme.prepare_unchecked(system, dt),
+        stable_steps: scheme.stable_steps(),
+    };
+    examined.limit(system)
+}
+
+/// A scheme whose stability is examined.
+pub(crate) struct Examined<'a> {
+    pub(crate) name: &'a dyn Fn() -> String,
+    pub(crate) prepare: &'a Prepare<'a>,
+    pub(crate) stable_steps: StableSteps,
 }
 
 /// How a scheme prepares a step of a given size for a system.
-pub(crate) type Prepare<'a> = dyn Fn(f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
+type Prepare<'a> = dyn Fn(&dyn System, f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
 
-fn limit(
-    prepare: &Prepare<'_>,
-    name: &dyn Fn() -> String,
-    system: &SecondOrderSystem,
-) -> Result<Option<f64>, IntegrateError> {
-    let eigenvalues = system.eigenvalues()?;
-    let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
-    if fastest == 0.0 {
-        return Ok(None);
+/// The system, if it is small enough for its whole amplification matrix.
+fn whole(system: &dyn System) -> Option<&SecondOrderSystem> {
+    match system.matrices() {
+        Matrices::Dense(dense) if dense.dof() <= WHOLE => Some(dense),
+        _ => None,
     }
-    let own_growth = eigenvalues.iter().map(|l| l.re).fold(0.0, f64::max);
-    let excess = |dt: f64, tolerated: f64| -> Result<f64, IntegrateError> {
-        let mut stepper = prepare(dt)?;
-        let allowed = tolerated + 2.0 * own_growth * dt;
-        let transition = Transition::of(stepper.as_mut());
-        let bound = growth(&transition, allowed);
-        Ok(if bound <= allowed { bound } else { radius(&transition).ln() } - allowed)
-    };
-    // A free body has a double eigenvalue 0, found as about √ε of the others.
-    let free = eigenvalues.iter().any(|l| l.norm() < 1e-6 * fastest);
-    let tolerated = if free { TOLERATED } else { SHARP };
-    let smallest = 1e-3 / fastest;
-    let first = excess(smallest, tolerated)?;
-    if first > 0.0 {
-        return Err(IntegrateError::Unstable {
-            scheme: name(),
-            dt: smallest,
-            spectral_radius: (first + tolerated + 2.0 * own_growth * smallest).exp(),
-            critical_step: None,
-        });
-    }
-    let (mut stable, mut unstable) = (smallest, smallest * std::f64::consts::SQRT_2);
-    while excess(unstable, tolerated)? <= 0.0 {
-        (stable, unstable) = (unstable, unstable * std::f64::consts::SQRT_2);
-        if unstable * fastest > 1e6 {
-            return Ok(None);
-        }
-    }
-    while unstable - stable > 4.0 * f64::EPSILON * stable {
-        let middle = 0.5 * (stable + unstable);
-        if excess(middle, tolerated)? <= 0.0 { stable = middle } else { unstable = middle }
-    }
-    Ok(Some(stable))
 }
 
-/// An error if the prepared `stepper` makes a motion grow that does not grow by itself.
-pub(crate) fn refuse_unstable(
-    prepare: &Prepare<'_>,
-    name: &dyn Fn() -> String,
+impl Examined<'_> {
+    /// An error if the prepared `stepper` makes a motion grow that does not grow by itself.
+    pub(crate) fn refuse_unstable(
+        &self,
+        system: &dyn System,
+        dt: f64,
+        stepper: &mut dyn Stepper,
+    ) -> Result<(), IntegrateError> {
+        let known = self.stable_steps != StableSteps::Unknown;
+        // Of one or two degrees of freedom the whole matrix is the least to look at.
+        let passive = known && system.dof() > 2 && passive::is_passive(system);
+        if passive && self.is_known_stable(system, dt) {
+            return Ok(());
+        }
+        let radius = match whole(system) {
+            Some(dense) => small_growth(stepper, dense, dt, TOLERATED)?,
+            None if passive => self.growth_of_fastest(system, dt)?,
+            None => {
+                let equations = Equations::of(system);
+                self.growth_found(&equations, fastest(&equations)?, stepper, dt)?
+            }
+        };
+        let Some(spectral_radius) = radius else { return Ok(()) };
+        let critical_step = match self.limit(system) {
+            Ok(limit) => limit.filter(|limit| *limit < dt),
+            Err(IntegrateError::Unstable { .. }) => None,
+            Err(other) => return Err(other),
+        };
+        Err(IntegrateError::Unstable { scheme: (self.name)(), dt, spectral_radius, critical_step })
+    }
+
+    /// Whether the scheme's limit proves a step of `dt` seconds stable on a passive system.
+    fn is_known_stable(&self, system: &dyn System, dt: f64) -> bool {
+        let below = |which, limit| passive::is_below(system, which, limit);
+        match self.stable_steps {
+            StableSteps::Unknown => false,
+            StableSteps::All => true,
+            StableSteps::Frequencies(limit) => below(Matrix::Stiffness, (limit / dt).powi(2)),
+            // Without oscillation |λ| is at most c/m.
+            StableSteps::Eigenvalues(limit) => {
+                below(Matrix::Stiffness, (limit / dt).powi(2)) && below(Matrix::Damping, limit / dt)
+            }
+        }
+    }
+
+    /// The spectral radius for the stiffest or the most damped motion of a passive system, if it
+    /// grows.
+    fn growth_of_fastest(
+        &self,
+        system: &dyn System,
+        dt: f64,
+    ) -> Result<Option<f64>, IntegrateError> {
+        let equations = Equations::of(system);
+        let mut radius = None;
+        for which in [Matrix::Stiffness, Matrix::Damping] {
+            let top = passive::top(&equations, which)?;
+            let reduced = reduced(&equations, &top.vector.map(Complex::from))?;
+            let mut stepper = (self.prepare)(&reduced, dt)?;
+            let found = small_growth(stepper.as_mut(), &reduced, dt, TOLERATED)?;
+            radius = found.into_iter().chain(radius).reduce(f64::max);
+        }
+        Ok(radius)
+    }
+
+    /// The modulus of an eigenvalue of the amplification matrix with which a motion grows more than
+    /// the system does by itself, if a hundred steps bring one to light.
+    fn growth_found(
+        &self,
+        equations: &Equations,
+        fastest: f64,
+        stepper: &mut dyn Stepper,
+        dt: f64,
+    ) -> Result<Option<f64>, IntegrateError> {
+        let mut amplification = Amplification::of(stepper, fastest);
+        let mut start = amplification.start();
+        for _ in 0..2 {
+            let found = dominant(start, |z, next| amplification.apply(z, next));
+            let Some(found) = found else { return Ok(Some(f64::INFINITY)) };
+            if found.value.norm().ln() <= TOLERATED {
+                return Ok(None);
+            }
+            let reduced = reduced(equations, &found.vector.rows(0, equations.dof()).into_owned())?;
+            let mut stepper = (self.prepare)(&reduced, dt)?;
+            let radius = small_growth(stepper.as_mut(), &reduced, dt, TOLERATED)?;
+            if radius.is_some() {
+                return Ok(radius);
+            }
+            start = found.vector.map(|v| v.re);
+        }
+        Ok(None)
+    }
+
+    fn limit(&self, system: &dyn System) -> Result<Option<f64>, IntegrateError> {
+        if let Some(dense) = whole(system) {
+            return self.small_limit(dense);
+        }
+        let equations = Equations::of(system);
+        if self.stable_steps == StableSteps::Unknown || !passive::is_passive(system) {
+            let fastest = fastest(&equations)?;
+            let radius = |dt: f64| {
+                let mut stepper = (self.prepare)(system, dt)?;
+                self.growth_found(&equations, fastest, stepper.as_mut(), dt)
+            };
+            return self.search(&radius, fastest, 2.0, 1e-3);
+        }
+        let mut least: Option<f64> = None;
+        if self.stable_steps != StableSteps::All {
+            for which in [Matrix::Stiffness, Matrix::Damping] {
+                let top = passive::top(&equations, which)?;
+                let limit =
+                    self.small_limit(&reduced(&equations, &top.vector.map(Complex::from))?)?;
+                // What the search has not reached of the largest eigenvalue.
+                let limit = limit.map(|limit| limit * top.share);
+                least = limit.into_iter().chain(least).reduce(f64::min);
+            }
+        }
+        Ok(least)
+    }
+
+    /// The limit from the whole amplification matrix.
+    fn small_limit(&self, system: &SecondOrderSystem) -> Result<Option<f64>, IntegrateError> {
+        let eigenvalues = system.eigenvalues()?;
+        let fastest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
+        // A free body has a double eigenvalue 0, found as about √ε of the others.
+        let free = eigenvalues.iter().any(|l| l.norm() < 1e-6 * fastest);
+        let tolerated = if free { TOLERATED } else { SHARP };
+        let own_growth = own_growth(&eigenvalues);
+        let radius = |dt: f64| {
+            let mut stepper = (self.prepare)(system, dt)?;
+            let allowed = tolerated + 2.0 * own_growth * dt;
+            let transition = Transition::of(stepper.as_mut());
+            let bound = growth(&transition, allowed);
+            let rate = if bound <= allowed { bound } else { radius(&transition).ln() };
+            Ok((rate > allowed).then(|| rate.exp()))
+        };
+        let factor = std::f64::consts::SQRT_2;
+        self.search(&radius, fastest, factor, 4.0 * f64::EPSILON)
+    }
+
+    /// The step beyond which `radius` is one that is not tolerated, to `precision`.
+    fn search(
+        &self,
+        radius: &dyn Fn(f64) -> Result<Option<f64>, IntegrateError>,
+        fastest: f64,
+        factor: f64,
+        precision: f64,
+    ) -> Result<Option<f64>, IntegrateError> {
+        if fastest == 0.0 {
+            return Ok(None);
+        }
+        let smallest = 1e-3 / fastest;
+        if let Some(spectral_radius) = radius(smallest)? {
+            let scheme = (self.name)();
+            let (dt, critical_step) = (smallest, None);
+            return Err(IntegrateError::Unstable { scheme, dt, spectral_radius, critical_step });
+        }
+        let (mut stable, mut unstable) = (smallest, smallest * factor);
+        while radius(unstable)?.is_none() {
+            (stable, unstable) = (unstable, unstable * factor);
+            if unstable * fastest > 1e6 {
+                return Ok(None);
+            }
+        }
+        while unstable - stable > precision * stable {
+            let middle = 0.5 * (stable + unstable);
+            if radius(middle)?.is_none() { stable = middle } else { unstable = middle }
+        }
+        Ok(Some(stable))
+    }
+}
+
+/// The amplification matrix by its products, in coordinates x, ẋ/ω, ẍ/ω² (and what else a scheme
+/// remembers of accelerations): of the fastest motion, which decides, all are alike in size.
+struct Amplification<'a> {
+    stepper: &'a mut dyn Stepper,
+    /// 1/ω, in s.
+    time: f64,
+    still: Vec<f64>,
+    state: Vec<f64>,
+}
+
+impl<'a> Amplification<'a> {
+    fn of(stepper: &'a mut dyn Stepper, fastest: f64) -> Self {
+        let time = if fastest > 0.0 { fastest.recip() } else { 1.0 };
+        let (still, state) = (vec![0.0; stepper.dof()], vec![0.0; stepper.state_len()]);
+        Self { stepper, time, still, state }
+    }
+
+    /// Displacements and nothing else, of all shapes.
+    fn start(&self) -> DVector<f64> {
+        let (n, len) = (self.still.len(), self.state.len());
+        let mut start = scattered(len);
+        start.rows_mut(n, len - n).fill(0.0);
+        start
+    }
+
+    fn apply(&mut self, scaled: &[f64], next: &mut [f64]) {
+        let (n, time) = (self.still.len(), self.time);
+        let unit = |i: usize| time.powi((i / n).min(2) as i32);
+        let state = self.state.iter_mut().zip(scaled).enumerate();
+        state.for_each(|(i, (z, s))| *z = s / unit(i));
+        let still = &self.still[..];
+        let loads = Loads { now: still, middle: still, next: still, beyond: still };
+        self.stepper.change(&self.state, &loads, next);
+        let both = next.iter_mut().zip(scaled).enumerate();
+        both.for_each(|(i, (dz, s))| *dz = *dz * unit(i) + s);
+    }
+}
+
+/// The spectral radius of the whole amplification matrix, if it is that of a motion that grows and
+/// does not so by itself.
+fn small_growth(
+    stepper: &mut dyn Stepper,
     system: &SecondOrderSystem,
     dt: f64,
-    stepper: &mut dyn Stepper,
-) -> Result<(), IntegrateError> {
+    tolerated: f64,
+) -> Result<Option<f64>, IntegrateError> {
     let transition = Transition::of(stepper);
-    if growth(&transition, TOLERATED) <= TOLERATED {
-        return Ok(());
+    if growth(&transition, tolerated) <= tolerated {
+        return Ok(None);
     }
-    let own_growth = system.eigenvalues()?.iter().map(|l| l.re).fold(0.0, f64::max);
-    let allowed = TOLERATED + 2.0 * own_growth * dt;
+    let allowed = tolerated + 2.0 * own_growth(&system.eigenvalues()?) * dt;
     let rate = growth(&transition, allowed);
-    if rate <= allowed {
-        return Ok(());
-    }
-    let critical_step = match limit(prepare, name, system) {
-        Ok(limit) => limit.filter(|limit| *limit < dt),
-        Err(IntegrateError::Unstable { .. }) => None,
-        Err(other) => return Err(other),
+    Ok((rate > allowed).then(|| rate.exp()))
+}
+
+/// The largest growth rate among the eigenvalues of a system, in 1/s.
+fn own_growth(eigenvalues: &[Complex<f64>]) -> f64 {
+    eigenvalues.iter().map(|l| l.re).fold(0.0, f64::max)
+}
+
+/// The system that moves along `shape` alone, of mass x*Mx, damping x*Cx and stiffness x*Kx; its
+/// two degrees of freedom are the real and imaginary parts of one.
+///
+/// Where `shape` belongs to an eigenvector of the amplification, its eigenvalue is one for this
+/// system, too.
+fn reduced(
+    equations: &Equations,
+    shape: &DVector<Complex<f64>>,
+) -> Result<SecondOrderSystem, IntegrateError> {
+    let (re, im) = (shape.map(|v| v.re), shape.map(|v| v.im));
+    let form = |which| {
+        let (a_re, a_im) = (equations.times(which, &re), equations.times(which, &im));
+        let (real, imaginary) = (re.dot(&a_re) + im.dot(&a_im), re.dot(&a_im) - im.dot(&a_re));
+        DMatrix::from_row_slice(2, 2, &[real, -imaginary, imaginary, real])
     };
-    Err(IntegrateError::Unstable { scheme: name(), dt, spectral_radius: rate.exp(), critical_step })
+    let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(form);
+    Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
+}
+
+/// The largest modulus among the eigenvalues of a system, in 1/s, as far as Arnoldi's iteration finds
+/// it.
+fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
+    let n = equations.dof();
+    let mut mass = equations.mass_only("Arnoldi", 0.0)?;
+    // The unit of time that makes the two halves of the state comparable is found on the way.
+    let mut unit = 1.0;
+    for _ in 0..4 {
+        let found = dominant(scattered(2 * n), |state, rate| {
+            let (x, v) = state.split_at(n);
+            let (dx, dv) = rate.split_at_mut(n);
+            dx.copy_from_slice(v);
+            let v: Vec<f64> = v.iter().map(|v| v / unit).collect();
+            dv.fill(0.0);
+            mass.solve(&v, x, dv);
+            dv.iter_mut().for_each(|a| *a *= unit * unit);
+        });
+        let Some(found) = found else { break };
+        let rate = found.value.norm();
+        if rate == 0.0 || (0.5..2.0).contains(&rate) {
+            return Ok(rate / unit);
+        }
+        unit /= rate;
+    }
+    Ok(1.0 / unit)
 }
 
 /// ln ρ(A), or any bound of it from above that is not greater than `enough`.

@@ -1,11 +1,11 @@
 //! Wilson θ.
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::InitialState;
 
-use crate::effective::Effective;
+use crate::effective::{Effective, Equations};
 use crate::newmark::{motion, motion_mut, start_consistently};
 use crate::scheme::check_step;
-use crate::{Convention, Instant, IntegrateError, Loads, Scheme, Stepper};
+use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// What Wilson's scheme takes for the force at t + θΔt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -83,18 +83,24 @@ impl Scheme for WilsonTheta {
         ]
     }
 
+    fn stable_steps(&self) -> StableSteps {
+        // A root passes −1 at θ = (1 + √3)/2 as Ω → ∞.
+        if self.theta >= 1.366_025_403_8 { StableSteps::All } else { StableSteps::Unknown }
+    }
+
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
         const NAME: &str = "Wilson θ";
         let dt = check_step(dt)?;
         let n = system.dof();
         let long = self.theta * dt;
+        let equations = Equations::of(system);
         Ok(Box::new(WilsonStepper {
-            effective: Effective::new(NAME, system, dt, long / 2.0, long * long / 6.0)?,
-            mass: Effective::mass_only(NAME, system, dt)?,
+            effective: equations.effective(NAME, dt, long / 2.0, long * long / 6.0)?,
+            mass: equations.mass_only(NAME, dt)?,
             dt,
             scheme: *self,
             x_hat: vec![0.0; n],
@@ -159,7 +165,7 @@ impl Stepper for WilsonStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state);
         motions[0].copy_from_slice(state);
         Ok(())
     }

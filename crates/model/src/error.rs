@@ -35,6 +35,16 @@ pub enum ModelError {
         /// The value found, in the unit of the matrix.
         value: f64,
     },
+    /// A matrix entry was given for a degree of freedom that the system does not have.
+    #[error("entry ({row}, {column}) lies outside a {dof}×{dof} matrix")]
+    EntryOutside {
+        /// Row, counted from 1.
+        row: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// Degrees of freedom.
+        dof: usize,
+    },
     /// The mass matrix cannot be inverted.
     #[error("the mass matrix is singular (reciprocal condition about {reciprocal_condition:.1e})")]
     SingularMass {

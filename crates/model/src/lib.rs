@@ -24,6 +24,7 @@
 //! | To get | Use |
 //! |---|---|
 //! | a system | [`SecondOrderSystem::new`], [`Sdof`], [`JournalBearing`] |
+//! | a system of many degrees of freedom | [`SparseSystem`] |
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
@@ -51,7 +52,11 @@ mod sdof;
 mod second_order;
 #[cfg(feature = "serde")]
 mod serde_forms;
+<<<<<<< HEAD
 mod state_transition;
+=======
+mod sparse_system;
+>>>>>>> integrate
 mod uncertain_system;
 
 pub use discretisation::Discretisation;
@@ -66,5 +71,9 @@ pub use response_quantity::ResponseQuantity;
 pub use sampling_rule::npi_sampling;
 pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};
+<<<<<<< HEAD
 pub use state_transition::StateTransition;
+=======
+pub use sparse_system::{SparseSystem, band, lumped, triplets};
+>>>>>>> integrate
 pub use uncertain_system::UncertainSystem;

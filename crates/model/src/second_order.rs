@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::ModelError;
 
@@ -52,6 +52,9 @@ impl fmt::Display for Matrix {
     }
 }
 
+/// Number of degrees of freedom up to which all singular values of M are computed.
+const ALL_SINGULAR_VALUES: usize = 64;
+
 /// M ẍ + C ẋ + K x = F with n degrees of freedom; M invertible, C and K of any symmetry.
 ///
 /// ```text
@@ -79,7 +82,8 @@ impl SecondOrderSystem {
     ///
     /// # Errors
     /// [`ModelError::Shape`], [`ModelError::NotFinite`], [`ModelError::NoDof`], and
-    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades.
+    /// [`ModelError::SingularMass`] if the singular values of M span more than 15 decades (beyond 64
+    /// degrees of freedom their largest and smallest are estimated by iteration).
     pub fn new(
         mass: DMatrix<f64>,
         damping: DMatrix<f64>,
@@ -94,10 +98,10 @@ impl SecondOrderSystem {
         {
             check(matrix, entries, dof)?;
         }
-        let singular_values = mass.singular_values();
-        let reciprocal_condition = singular_values.min() / singular_values.max();
         // Others factor M by LU: what passes here must not meet a vanishing pivot there.
-        let invertible = mass.clone().lu().is_invertible();
+        let factored = mass.clone().lu();
+        let reciprocal_condition = reciprocal_condition(&mass, &factored);
+        let invertible = factored.is_invertible();
         if !invertible || reciprocal_condition.is_nan() || reciprocal_condition < 1e-15 {
             return Err(ModelError::SingularMass { reciprocal_condition });
         }
@@ -134,6 +138,35 @@ impl SecondOrderSystem {
     }
 }
 
+/// Ratio of the smallest to the largest singular value of M.
+fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f64 {
+    let n = mass.nrows();
+    if n <= ALL_SINGULAR_VALUES {
+        let singular_values = mass.singular_values();
+        return singular_values.min() / singular_values.max();
+    }
+    if !factored.is_invertible() {
+        return 0.0;
+    }
+    let (lower, upper) = (factored.l(), factored.u());
+    let mut large = DVector::from_fn(n, |i, _| 1.0 + 0.37 * (i % 5) as f64);
+    let mut small = large.clone();
+    // A handful settles the order of magnitude.
+    for _ in 0..6 {
+        large = mass.tr_mul(&(mass * large.normalize()));
+        small.normalize_mut();
+        // The transposed matrix is Uᵀ Lᵀ P.
+        let solved = upper.tr_solve_upper_triangular_mut(&mut small)
+            && lower.tr_solve_lower_triangular_mut(&mut small);
+        if !solved {
+            return 0.0;
+        }
+        factored.p().inv_permute_rows(&mut small);
+        factored.solve_mut(&mut small);
+    }
+    (large.norm() * small.norm()).sqrt().recip()
+}
+
 fn check(matrix: Matrix, entries: &DMatrix<f64>, dof: usize) -> Result<(), ModelError> {
     let (rows, columns) = entries.shape();
     if (rows, columns) != (dof, dof) {
@@ -155,6 +188,27 @@ mod tests {
     use nalgebra::dmatrix;
 
     use super::*;
+
+    /// Masses from 1 to `least` on the diagonal, turned by a reflection.
+    fn spread(n: usize, least: f64) -> DMatrix<f64> {
+        let v = DVector::from_fn(n, |i, _| (1.0 + i as f64).sin()).normalize();
+        let turn = DMatrix::identity(n, n) - 2.0 * &v * v.transpose();
+        let values = DVector::from_fn(n, |i, _| if i == 3 { least } else { 1.0 });
+        &turn * DMatrix::from_diagonal(&values) * &turn
+    }
+
+    #[test]
+    fn the_condition_of_large_matrices_is_estimated() {
+        for (n, least) in [(40, 1e-5), (65, 1e-5), (90, 1e-12), (80, 1.0)] {
+            let mass = spread(n, least);
+            let found = reciprocal_condition(&mass, &mass.clone().lu());
+            assert!((0.3..3.0).contains(&(found / least)), "{n} {least}: {found}");
+        }
+        let zero = || DMatrix::zeros(80, 80);
+        let refused = SecondOrderSystem::new(spread(80, 1e-17), zero(), zero());
+        assert!(matches!(refused, Err(ModelError::SingularMass { .. })), "{refused:?}");
+        assert!(SecondOrderSystem::new(spread(80, 1e-12), zero(), zero()).is_ok());
+    }
 
     #[test]
     fn bad_matrices_are_refused_with_their_numbers() {

@@ -8,3 +8,5 @@ mod invariances;
 mod order;
 mod periodic;
 mod random_stability;
+mod sparse;
+mod stability_at_scale;

@@ -197,7 +197,7 @@ impl Scheme for Counted<'_> {
 
     fn prepare_unchecked(
         &self,
-        system: &SecondOrderSystem,
+        system: &dyn System,
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError> {
         let stepper = self.0.prepare_unchecked(system, dt)?;

@@ -1,0 +1,118 @@
+//! The eigenvalue of largest modulus of an operator that is known by its products alone.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use mechid_model::RealSchur;
+
+/// Number of products in one round.
+const ROUND: usize = 32;
+
+/// An approximate eigenvalue of largest modulus.
+#[derive(Debug, Clone)]
+pub(super) struct Dominant {
+    pub(super) value: Complex<f64>,
+    /// Its vector, of norm 1.
+    pub(super) vector: DVector<Complex<f64>>,
+}
+
+/// A vector of norm 1 without structure, the same on every run.
+pub(super) fn scattered(len: usize) -> DVector<f64> {
+    let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
+    let vector = DVector::from_fn(len, |_, _| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+    });
+    vector.normalize()
+}
+
+/// Returns what one round of Arnoldi's iteration from `start` finds, `apply` writing A x into its
+/// second argument; nothing if the numbers overflow.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.5.
+pub(super) fn dominant(
+    start: DVector<f64>,
+    mut apply: impl FnMut(&[f64], &mut [f64]),
+) -> Option<Dominant> {
+    let len = start.len();
+    let most = ROUND.min(len);
+    let mut basis = vec![start.normalize()];
+    let mut hessenberg = DMatrix::zeros(most + 1, most);
+    let mut size = most;
+    for j in 0..most {
+        let mut next = DVector::zeros(len);
+        apply(basis[j].as_slice(), next.as_mut_slice());
+        let before = next.norm();
+        for _ in 0..2 {
+            for (i, q) in basis.iter().enumerate() {
+                let part = q.dot(&next);
+                next.axpy(-part, q, 1.0);
+                hessenberg[(i, j)] += part;
+            }
+        }
+        let norm = next.norm();
+        if norm <= 1e-14 * before {
+            size = j + 1;
+            break;
+        }
+        hessenberg[(j + 1, j)] = norm;
+        basis.push(next / norm);
+    }
+    if !hessenberg.iter().all(|v| v.is_finite()) {
+        return None;
+    }
+    let square = hessenberg.view((0, 0), (size, size)).into_owned();
+    let eigenvalues = RealSchur::new(square.clone()).ok()?.eigenvalues();
+    let value = eigenvalues.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+    let coordinates = eigenvector(&square, value)?;
+    let mut vector = DVector::zeros(len);
+    for (q, y) in basis.iter().zip(&coordinates) {
+        vector.zip_apply(q, |v: &mut Complex<f64>, q| *v += y * q);
+    }
+    Some(Dominant { value, vector })
+}
+
+/// The eigenvector of norm 1 of `matrix` to its eigenvalue `value`, by inverse iteration.
+fn eigenvector(matrix: &DMatrix<f64>, value: Complex<f64>) -> Option<DVector<Complex<f64>>> {
+    let size = matrix.nrows();
+    // Off the eigenvalue by rounding, so that the factors exist.
+    let shift = value + Complex::from(f64::EPSILON * matrix.norm().max(f64::MIN_POSITIVE));
+    let shifted = matrix.map(Complex::from) - DMatrix::from_diagonal_element(size, size, shift);
+    let factored = shifted.lu();
+    let mut vector = scattered(size).map(Complex::from);
+    for _ in 0..3 {
+        if !factored.solve_mut(&mut vector) {
+            return None;
+        }
+        vector /= Complex::from(vector.norm());
+    }
+    vector.iter().all(|v| v.re.is_finite() && v.im.is_finite()).then_some(vector)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_of_many_eigenvalues_is_found() {
+        // A block that turns and grows by 1.2 among 200 factors below 1.
+        let apply = |x: &[f64], y: &mut [f64]| {
+            for (i, (y, x)) in y.iter_mut().zip(x).enumerate() {
+                *y = x * (0.9 * (i as f64 * 0.7).cos());
+            }
+            (y[0], y[1]) = (1.2 * (0.6 * x[0] - 0.8 * x[1]), 1.2 * (0.8 * x[0] + 0.6 * x[1]));
+        };
+        let found = dominant(scattered(202), apply).unwrap();
+        assert!((found.value.norm() - 1.2).abs() < 1e-6, "{found:?}");
+        assert!((found.value.im.abs() - 0.96).abs() < 1e-6);
+        let inside: f64 = found.vector.iter().take(2).map(|v| v.norm_sqr()).sum();
+        assert!((inside - 1.0).abs() < 1e-6, "{found:?}");
+    }
+
+    #[test]
+    fn small_operators_are_exact() {
+        let found = dominant(scattered(2), |x, y| (y[0], y[1]) = (3.0 * x[0], -4.0 * x[1]));
+        let found = found.unwrap();
+        assert!((found.value.re + 4.0).abs() < 1e-14, "{found:?}");
+    }
+}

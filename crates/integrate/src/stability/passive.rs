@@ -1,0 +1,206 @@
+//! Systems that can only lose energy, and their highest frequencies.
+
+use mechid_model::Matrix;
+use nalgebra::{DMatrix, DVector};
+use nalgebra_sparse::csr::CsrMatrix;
+
+use crate::effective::Equations;
+use crate::sparse::{combination, is_positive_definite};
+use crate::{IntegrateError, System};
+
+/// Asymmetry of two entries, relative to their size, that counts as rounding.
+const ASYMMETRY: f64 = 1e-12;
+
+/// A negative eigenvalue of C or K that counts as rounding, relative to the size of its rows: of K
+/// it lets the slowest motion grow by 3·10⁻⁷ of the highest frequency.
+const NEGATIVE: f64 = 1e-13;
+
+/// Largest number of Lanczos steps.
+const LANCZOS_STEPS: usize = 100;
+
+/// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
+/// as far as diagonal dominance or factorisations without exchanges can prove it.
+pub(super) fn is_passive(system: &dyn System) -> bool {
+    let symmetric = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
+        .map(|which| Symmetric::of(system, which));
+    let [Some(mass), Some(damping), Some(stiffness)] = symmetric else { return false };
+    mass.is_definite() && damping.is_semidefinite() && stiffness.is_semidefinite()
+}
+
+/// Returns whether all eigenvalues of M⁻¹A lie below `limit`, A being one of the symmetric matrices
+/// of a passive system.
+pub(super) fn is_below(system: &dyn System, which: Matrix, limit: f64) -> bool {
+    let matrices = system.matrices();
+    let difference = match matrices.dense() {
+        Some(dense) => Symmetric::Dense(dense.mass() * limit - dense.matrix(which)),
+        None => {
+            let (mass, matrix) = (matrices.sparse(Matrix::Mass), matrices.sparse(which));
+            Symmetric::Sparse(combination(&[(limit, &mass), (-1.0, &matrix)]).0)
+        }
+    };
+    difference.is_definite()
+}
+
+/// A symmetric matrix.
+enum Symmetric {
+    Dense(DMatrix<f64>),
+    Sparse(CsrMatrix<f64>),
+}
+
+impl Symmetric {
+    fn of(system: &dyn System, which: Matrix) -> Option<Self> {
+        let matrices = system.matrices();
+        let close = |a: f64, b: f64| (a - b).abs() <= ASYMMETRY * (a.abs() + b.abs());
+        match matrices.dense() {
+            Some(dense) => {
+                let matrix = dense.matrix(which);
+                let n = matrix.nrows();
+                let symmetric =
+                    (0..n).all(|j| (0..j).all(|i| close(matrix[(i, j)], matrix[(j, i)])));
+                symmetric.then(|| Self::Dense(matrix.clone()))
+            }
+            None => {
+                let matrix = matrices.sparse(which);
+                let transposed = matrix.transpose();
+                let difference = combination(&[(1.0, &matrix), (-1.0, &transposed)]);
+                // The sizes of the terms row by row are what the difference is measured by.
+                let symmetric =
+                    difference.0.row_iter().zip(&difference.1).all(|(row, size)| {
+                        row.values().iter().all(|v| v.abs() <= ASYMMETRY * size)
+                    });
+                symmetric.then(|| Self::Sparse(matrix.into_owned()))
+            }
+        }
+    }
+
+    fn is_definite(&self) -> bool {
+        self.is_dominant(true)
+            || match self {
+                Self::Dense(matrix) => matrix.clone().cholesky().is_some(),
+                Self::Sparse(matrix) => is_positive_definite(matrix),
+            }
+    }
+
+    fn is_semidefinite(&self) -> bool {
+        if self.is_dominant(false) {
+            return true;
+        }
+        let sizes = self.row_sums();
+        let largest = sizes.iter().fold(0.0, |most, v| f64::max(most, *v));
+        let shift: Vec<f64> = sizes.iter().map(|size| NEGATIVE * (size + 1e-3 * largest)).collect();
+        let shifted = match self {
+            Self::Dense(matrix) => {
+                let mut matrix = matrix.clone();
+                (0..shift.len()).for_each(|i| matrix[(i, i)] += shift[i]);
+                Self::Dense(matrix)
+            }
+            Self::Sparse(matrix) => {
+                let shift = mechid_model::lumped(&shift);
+                Self::Sparse(combination(&[(1.0, matrix), (1.0, &shift)]).0)
+            }
+        };
+        shifted.is_definite()
+    }
+
+    /// Whether the diagonal entries are positive (or zero) and not (or hardly) less than the rest of
+    /// their rows, of which follows that the matrix is positive definite (or semidefinite).
+    fn is_dominant(&self, strictly: bool) -> bool {
+        let sums = self.row_sums();
+        let diagonal = |i: usize| match self {
+            Self::Dense(matrix) => matrix[(i, i)],
+            Self::Sparse(matrix) => matrix.get_entry(i, i).map_or(0.0, |entry| entry.into_value()),
+        };
+        sums.iter().enumerate().all(|(i, &sum)| {
+            let own = diagonal(i);
+            let rest = sum - own.abs();
+            if strictly { own > rest * (1.0 + 1e-9) } else { own >= rest - NEGATIVE * sum }
+        })
+    }
+
+    /// Σ |entries| of each row.
+    fn row_sums(&self) -> Vec<f64> {
+        match self {
+            Self::Dense(matrix) => {
+                let mut sums = vec![0.0; matrix.nrows()];
+                for column in matrix.column_iter() {
+                    sums.iter_mut().zip(&column).for_each(|(sum, v)| *sum += v.abs());
+                }
+                sums
+            }
+            Self::Sparse(matrix) => {
+                matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
+            }
+        }
+    }
+}
+
+/// The vector of norm 1 in the product by M that comes nearest to the largest eigenvalue of M⁻¹A.
+pub(super) struct Top {
+    pub(super) vector: DVector<f64>,
+    /// At most 1: the root of its Rayleigh quotient, in parts of the root of the largest eigenvalue.
+    pub(super) share: f64,
+}
+
+/// Returns what Lanczos' iteration finds of the largest eigenvalue of M⁻¹A, A being C or K of a
+/// passive system.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1; Parlett, *The Symmetric
+/// Eigenvalue Problem* (1998), section 13.2, on the residual.
+pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, IntegrateError> {
+    let n = equations.dof();
+    let mut mass = equations.mass_only("Lanczos", 0.0)?;
+    let still = vec![0.0; n];
+    // Orthonormal in the product by M: qᵢ and M qᵢ.
+    let (mut basis, mut weighted): (Vec<DVector<f64>>, Vec<DVector<f64>>) = (vec![], vec![]);
+    let (mut diagonal, mut beside): (Vec<f64>, Vec<f64>) = (vec![], vec![]);
+    let mut next = super::krylov::scattered(n);
+    loop {
+        let mut image = equations.times(Matrix::Mass, &next);
+        let norm = next.dot(&image).max(0.0).sqrt();
+        if !basis.is_empty() {
+            beside.push(norm);
+        }
+        let scale = diagonal.iter().fold(0.0, |most, v| f64::max(most, v.abs()));
+        let ended = !basis.is_empty() && norm <= 1e-14 * scale;
+        if basis.len() == LANCZOS_STEPS.min(n) || ended {
+            break;
+        }
+        next /= norm;
+        image /= norm;
+        basis.push(next.clone());
+        weighted.push(image);
+        // M⁻¹ A q, then orthogonal to all before: twice is enough.
+        let mut product = still.clone();
+        match which {
+            Matrix::Damping => mass.solve(next.as_slice(), &still, &mut product),
+            _ => mass.solve(&still, next.as_slice(), &mut product),
+        }
+        next = -DVector::from_vec(product);
+        diagonal.push(0.0);
+        for _ in 0..2 {
+            for (i, (q, mq)) in basis.iter().zip(&weighted).enumerate() {
+                let part = mq.dot(&next);
+                next.axpy(-part, q, 1.0);
+                if i + 1 == basis.len() {
+                    diagonal[i] += part;
+                }
+            }
+        }
+    }
+    let m = diagonal.len();
+    let tridiagonal = DMatrix::from_fn(m, m, |i, j| match i.abs_diff(j) {
+        0 => diagonal[i],
+        1 => beside[i.min(j)],
+        _ => 0.0,
+    });
+    let eigen = tridiagonal.symmetric_eigen();
+    let at = eigen.eigenvalues.imax();
+    let value = eigen.eigenvalues[at].max(0.0);
+    let coordinates = eigen.eigenvectors.column(at);
+    let residual = beside[m - 1] * coordinates[m - 1].abs();
+    let mut vector = DVector::zeros(n);
+    basis.iter().zip(&coordinates).for_each(|(q, y)| vector.axpy(*y, q, 1.0));
+    let share = if value > 0.0 { (value / (value + residual)).sqrt() } else { 1.0 };
+    Ok(Top { vector, share })
+}

@@ -1,0 +1,71 @@
+//! The systems a scheme can step through, whatever the storage of their matrices.
+
+use std::borrow::Cow;
+
+use mechid_model::{Matrix, SecondOrderSystem, SparseSystem};
+use nalgebra_sparse::csr::CsrMatrix;
+
+/// A system M ẍ + C ẋ + K x = F that schemes can be prepared for.
+pub trait System: Sync {
+    /// The matrices M (kg), C (N·s/m) and K (N/m), each n×n, as they are stored.
+    fn matrices(&self) -> Matrices<'_>;
+
+    /// Number of degrees of freedom n.
+    fn dof(&self) -> usize {
+        match self.matrices() {
+            Matrices::Dense(system) => system.dof(),
+            Matrices::Sparse(system) => system.dof(),
+        }
+    }
+}
+
+/// The matrices M (kg), C (N·s/m) and K (N/m), each n×n, in one of the storages there are.
+#[derive(Debug, Clone, Copy)]
+pub enum Matrices<'a> {
+    /// All entries.
+    Dense(&'a SecondOrderSystem),
+    /// The non-zero entries.
+    Sparse(&'a SparseSystem),
+}
+
+impl System for SecondOrderSystem {
+    fn matrices(&self) -> Matrices<'_> {
+        Matrices::Dense(self)
+    }
+}
+
+impl System for SparseSystem {
+    fn matrices(&self) -> Matrices<'_> {
+        Matrices::Sparse(self)
+    }
+}
+
+/// Number of degrees of freedom up to which dense matrices are always taken as dense.
+const ALWAYS_DENSE: usize = 64;
+
+/// Fraction of non-zero entries below which larger dense matrices are taken as sparse.
+const SPARSE_BELOW: f64 = 0.1;
+
+impl<'a> Matrices<'a> {
+    /// One of the three matrices by its non-zero entries.
+    pub(crate) fn sparse(self, which: Matrix) -> Cow<'a, CsrMatrix<f64>> {
+        match self {
+            Matrices::Dense(system) => Cow::Owned(CsrMatrix::from(system.matrix(which))),
+            Matrices::Sparse(system) => Cow::Borrowed(system.matrix(which)),
+        }
+    }
+
+    /// The system, if its steps are faster with dense matrices.
+    pub(crate) fn dense(self) -> Option<&'a SecondOrderSystem> {
+        let Matrices::Dense(system) = self else { return None };
+        let n = system.dof();
+        if n <= ALWAYS_DENSE {
+            return Some(system);
+        }
+        let most = (SPARSE_BELOW * (n * n) as f64) as usize;
+        let full = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
+            .iter()
+            .any(|which| system.matrix(*which).iter().filter(|v| **v != 0.0).count() > most);
+        full.then_some(system)
+    }
+}

@@ -1,0 +1,161 @@
+//! Sparse systems against the same systems with dense matrices.
+
+use mechid_integrate::*;
+use mechid_model::{
+    InitialState, Response, SecondOrderSystem, SparseSystem, band, lumped, triplets,
+};
+use mechid_signal::Sampling;
+use nalgebra::DMatrix;
+
+use crate::common::*;
+
+/// Largest difference, each quantity relative to its own largest value.
+fn distance(left: &Response, right: &Response) -> f64 {
+    let gaps = parts(left).into_iter().zip(parts(right)).map(|(l, r)| (l - r).amax() / r.amax());
+    gaps.fold(0.0, f64::max)
+}
+
+/// The dense system of the same entries.
+fn dense(sparse: &SparseSystem) -> SecondOrderSystem {
+    use mechid_model::Matrix::{Damping, Mass, Stiffness};
+    let [m, c, k] = [Mass, Damping, Stiffness].map(|which| DMatrix::from(sparse.matrix(which)));
+    SecondOrderSystem::new(m, c, k).unwrap()
+}
+
+/// Stable systems of every storage and symmetry, all of at most 64 degrees of freedom, so that the
+/// dense ones are stepped with dense matrices.
+fn systems() -> Vec<(&'static str, SparseSystem)> {
+    let n = 40;
+    let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
+    let weights: Vec<f64> = (0..n).map(|i| 1.0 + 0.02 * i as f64).collect();
+    // Neighbours that are no neighbours in number: 7 is prime to 40.
+    let name = |i: usize| i * 7 % n;
+    let links = |off: f64, skew: f64| {
+        (0..n).flat_map(move |i| {
+            let mut entries = vec![(name(i), name(i), 2000.0 + 10.0 * i as f64)];
+            if i + 1 < n {
+                entries.push((name(i), name(i + 1), off + skew));
+                entries.push((name(i + 1), name(i), off - skew));
+            }
+            entries
+        })
+    };
+    let shuffled = triplets(n, links(-900.0, 0.0)).unwrap();
+    let skewed = triplets(n, links(-700.0, 60.0)).unwrap();
+    let consistent = band(n, &[(-1, 0.2), (0, 1.0), (1, 0.2)]);
+    let random = SparseSystem::from(&mechid_problems::random_stable(12, 3));
+    let system = |m, c, k| SparseSystem::new(m, c, k).unwrap();
+    vec![
+        ("lumped", system(lumped(&weights), lumped(&vec![2.0; n]), chain.clone())),
+        ("uncoupled", system(lumped(&weights), lumped(&vec![2.0; n]), lumped(&vec![900.0; n]))),
+        ("undamped", system(lumped(&weights), band(n, &[]), chain.clone())),
+        ("banded", system(consistent.clone(), &chain * 2e-3, chain)),
+        ("shuffled", system(band(n, &[(0, 1.0)]), &shuffled * 2e-3, shuffled)),
+        ("non-symmetric", system(consistent, &skewed * 4e-3, skewed)),
+        ("full", random),
+    ]
+}
+
+#[test]
+fn sparse_and_dense_agree() {
+    let sampling = Sampling::new(5e-3, 400).unwrap();
+    for (name, system) in systems() {
+        let (n, dense) = (system.dof(), dense(&system));
+        let force = force(sampling, n);
+        for scheme in schemes() {
+            let scheme = scheme.as_ref();
+            let resting = scheme.conventions().iter().any(|c| c.choice.contains("at rest"));
+            let start = if resting { InitialState::rest(n) } else { small(n) };
+            let one = integrate(scheme, &system, &force, &start).unwrap();
+            let other = integrate(scheme, &dense, &force, &start).unwrap();
+            let gap = distance(&one, &other);
+            assert!(gap < 1e-12, "{name}, {}: {gap:e}", scheme.name());
+        }
+    }
+}
+
+/// Non-zero x(0) and ẋ(0) of a size with the response.
+fn small(n: usize) -> InitialState {
+    let wave =
+        |phase: f64| nalgebra::DVector::from_fn(n, |i, _| 1e-2 * (phase + 0.3 * i as f64).sin());
+    InitialState::new(wave(0.0), 10.0 * wave(1.0)).unwrap()
+}
+
+#[test]
+fn selected_degrees_of_freedom_are_those_of_the_whole() {
+    let sampling = Sampling::new(5e-3, 60).unwrap();
+    let (_, system) = systems().swap_remove(4);
+    let n = system.dof();
+    let (forced, observed) = ([31, 4], [7, 31, 0]);
+    let two = force(sampling, 2);
+    let all = DMatrix::from_fn(60, n, |k, at| {
+        forced.iter().position(|f| *f == at).map_or(0.0, |c| two.data()[(k, c)])
+    });
+    let all = mechid_signal::Record::new(sampling, all).unwrap();
+    let selected = SelectedDofs { forced: &forced, observed: &observed };
+    for scheme in schemes() {
+        let scheme = scheme.as_ref();
+        let start = InitialState::rest(n);
+        let some = integrate_selected(scheme, &system, selected, &two, &start).unwrap();
+        let whole = integrate(scheme, &system, &all, &start).unwrap();
+        for (some, whole) in parts(&some).into_iter().zip(parts(&whole)) {
+            for (c, &at) in observed.iter().enumerate() {
+                assert_eq!(some.column(c), whole.column(at), "{}", scheme.name());
+            }
+        }
+    }
+    // One degree of freedom, too, where a whole response is computed at fixed size.
+    let one = mechid_model::Sdof::new(1.0, 0.1, 40.0).unwrap().system();
+    let alone = force(sampling, 1);
+    let selected = SelectedDofs { forced: &[0], observed: &[0] };
+    let scheme = Newmark::AVERAGE_ACCELERATION;
+    let some = integrate_selected(&scheme, &one, selected, &alone, &moving(1)).unwrap();
+    let whole = integrate(&scheme, &one, &alone, &moving(1)).unwrap();
+    assert!(distance(&some, &whole) < 1e-13);
+}
+
+#[test]
+fn selections_that_do_not_fit_are_refused() {
+    let (_, system) = systems().swap_remove(0);
+    let force = force(Sampling::new(5e-3, 10).unwrap(), 2);
+    let refused = |forced: &[usize], observed: &[usize]| {
+        let dofs = SelectedDofs { forced, observed };
+        let rest = InitialState::rest(40);
+        integrate_selected(&Newmark::AVERAGE_ACCELERATION, &system, dofs, &force, &rest)
+            .unwrap_err()
+    };
+    assert_eq!(refused(&[0, 40], &[1]), IntegrateError::DofOutside { index: 40, dof: 40 });
+    assert_eq!(refused(&[0, 1], &[41]), IntegrateError::DofOutside { index: 41, dof: 40 });
+    assert_eq!(refused(&[3, 3], &[1]), IntegrateError::ForcedTwice { index: 3 });
+    assert_eq!(
+        refused(&[3], &[1]),
+        IntegrateError::Components { what: "the force", got: 2, dof: 1 }
+    );
+}
+
+#[test]
+fn a_singular_mass_matrix_is_refused() {
+    let mass = triplets(3, [(0, 0, 1.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 1.0), (2, 2, 1.0)]);
+    let eye = || lumped(&[1.0; 3]);
+    let system = SparseSystem::new(mass.unwrap(), eye(), eye()).unwrap();
+    for scheme in schemes() {
+        let refused = scheme.prepare(&system, 0.01).err();
+        let singular = matches!(refused, Some(IntegrateError::SingularEffectiveMass { .. }));
+        assert!(singular, "{}: {refused:?}", scheme.name());
+    }
+}
+
+#[test]
+fn large_dense_systems_of_few_entries_are_stepped_as_sparse() {
+    // 200 masses: the dense system has 1.5 % of entries that are not zero.
+    let n = 200;
+    let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
+    let sparse = SparseSystem::new(band(n, &[(0, 1.0)]), &chain * 1e-3, chain).unwrap();
+    let force = force(Sampling::new(1e-3, 30).unwrap(), n);
+    for scheme in schemes() {
+        let rest = InitialState::rest(n);
+        let one = integrate(scheme.as_ref(), &sparse, &force, &rest).unwrap();
+        let other = integrate(scheme.as_ref(), &dense(&sparse), &force, &rest).unwrap();
+        assert_eq!(one, other, "{}", scheme.name());
+    }
+}

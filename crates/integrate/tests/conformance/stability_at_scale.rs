@@ -1,0 +1,154 @@
+//! What `prepare` refuses of systems too large for their whole amplification matrix.
+
+use mechid_integrate::*;
+use mechid_model::{Sdof, SecondOrderSystem, SparseSystem, band, triplets};
+use nalgebra::DMatrix;
+
+use crate::common::*;
+
+/// A chain of `n` masses of 1 kg between walls on springs of 900 N/m: ω_i² = 3600 sin² (iπ/2(n+1)).
+fn chain(n: usize, damping: f64) -> SparseSystem {
+    let stiffness = band(n, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
+    SparseSystem::new(band(n, &[(0, 1.0)]), &stiffness * damping, stiffness).unwrap()
+}
+
+fn highest(n: usize) -> f64 {
+    60.0 * (n as f64 * std::f64::consts::FRAC_PI_2 / (n as f64 + 1.0)).sin()
+}
+
+#[test]
+fn known_limits_are_those_of_one_degree_of_freedom() {
+    for scheme in schemes() {
+        let (scheme, name) = (scheme.as_ref(), scheme.name());
+        for ratio in [0.0, 1e-3, 0.1, 0.7, 1.5, 20.0] {
+            let system = Sdof::new(1.0, 2.0 * ratio, 1.0).unwrap().system();
+            let limit = critical_step(scheme, &system).unwrap();
+            let fastest =
+                system.eigenvalues().unwrap().iter().map(|l| l.norm()).fold(0.0, f64::max);
+            match scheme.stable_steps() {
+                StableSteps::All => assert_eq!(limit, None, "{name} ζ {ratio}"),
+                // Damping can but help.
+                StableSteps::Frequencies(known) => {
+                    let gap = limit.map(|limit| limit / known - 1.0);
+                    assert!(gap.is_none_or(|gap| gap > -1e-9), "{name} ζ {ratio}: {gap:?}");
+                    assert!(ratio > 0.0 || gap.is_some_and(|gap| gap < 1e-9), "{name}: {gap:?}");
+                }
+                StableSteps::Eigenvalues(known) => {
+                    let limit = limit.unwrap() * fastest;
+                    assert!(limit > known && limit < 1.2 * known, "{name} ζ {ratio}: {limit}");
+                }
+                StableSteps::Unknown => {}
+            }
+        }
+    }
+}
+
+#[test]
+fn a_long_chain_is_refused_just_beyond_the_limit() {
+    let wilson = WilsonTheta::new(1.2).unwrap();
+    for n in [30, 300, 3000] {
+        for damping in [0.0, 1e-3] {
+            let chain = chain(n, damping);
+            for scheme in schemes() {
+                let (scheme, name) = (scheme.as_ref(), scheme.name());
+                let limit = match scheme.stable_steps() {
+                    StableSteps::All => {
+                        for angle in [1e-3, 1.0, 1e4] {
+                            let accepted = scheme.prepare(&chain, angle / highest(n)).is_ok();
+                            assert!(accepted, "{name} n {n}, {angle}");
+                        }
+                        assert_eq!(critical_step(scheme, &chain).unwrap(), None);
+                        continue;
+                    }
+                    StableSteps::Frequencies(limit) => limit / highest(n),
+                    _ if damping > 0.0 => continue,
+                    // Undamped.
+                    _ => 8_f64.sqrt() / highest(n),
+                };
+                assert!(scheme.prepare(&chain, 0.999 * limit).is_ok(), "{name} n {n}");
+                // Damping in proportion to K moves the limit of γ > ½ up by some per cent.
+                match scheme.prepare(&chain, 1.05 * limit).err() {
+                    Some(IntegrateError::Unstable { critical_step: Some(said), .. }) => {
+                        let gap = said / limit - 1.0;
+                        assert!(gap.abs() < 3e-3, "{name} n {n}: {gap}");
+                    }
+                    other => panic!("{name} n {n} ζ {damping}: {other:?}"),
+                }
+            }
+            if n > 300 {
+                continue;
+            }
+            // No limit known: found by the amplification itself.
+            let limit = critical_step(&wilson, &Sdof::new(1.0, 0.0, 1.0).unwrap().system());
+            let limit = limit.unwrap().unwrap() / highest(n);
+            assert!(wilson.prepare(&chain, 0.99 * limit).is_ok());
+            assert!(damping > 0.0 || wilson.prepare(&chain, 1.05 * limit).is_err());
+        }
+    }
+}
+
+/// C and K full and without symmetry: the exact spectral radius is the judge, of the schemes that
+/// have a limit below and beyond it.
+#[test]
+fn full_systems_without_symmetry_are_judged_by_their_eigenvalues() {
+    let wilson = WilsonTheta::new(1.4).unwrap();
+    let judged: [&dyn Scheme; 5] = [
+        &Newmark::AVERAGE_ACCELERATION,
+        &CentralDifference::default(),
+        &Houbolt::default(),
+        &wilson,
+        &RungeKutta4::LINEAR,
+    ];
+    for seed in 0..2 {
+        let system = mechid_problems::random_stable(24, seed);
+        let scale = 1.0 / 60.0;
+        for scheme in judged {
+            let name = scheme.name();
+            for angle in [0.1, 1.0, 1.8, 2.4, 3.0, 5.0, 100.0] {
+                let dt = angle * scale;
+                let radius = spectral_radius(scheme, &system, dt).unwrap();
+                let accepted = scheme.prepare(&system, dt).is_ok();
+                assert_eq!(accepted, radius < 1.0 + 1e-6, "{name} seed {seed} {angle}: {radius}");
+            }
+        }
+    }
+}
+
+/// A shaft that whirls by itself is not the scheme's fault.
+#[test]
+fn growth_of_its_own_is_no_instability_of_the_scheme() {
+    let n = 60;
+    let shaft = band(2 * n, &[(-2, -900.0), (0, 1900.0), (2, -900.0)]);
+    // Cross-coupling at one bearing: planes x and y alternate.
+    let film = triplets(2 * n, [(0, 1, 300.0), (1, 0, -300.0)]).unwrap();
+    let whirling =
+        SparseSystem::new(band(2 * n, &[(0, 1.0)]), &shaft * 1e-5, shaft + film).unwrap();
+    let dense = SecondOrderSystem::new(
+        DMatrix::from(whirling.matrix(mechid_model::Matrix::Mass)),
+        DMatrix::from(whirling.matrix(mechid_model::Matrix::Damping)),
+        DMatrix::from(whirling.matrix(mechid_model::Matrix::Stiffness)),
+    )
+    .unwrap();
+    let own = dense.eigenvalues().unwrap().iter().map(|l| l.re).fold(0.0, f64::max);
+    assert!(own > 0.1, "{own}");
+    for scheme in schemes() {
+        assert!(scheme.prepare(&whirling, 5e-3).is_ok(), "{}", scheme.name());
+    }
+    let beyond = CentralDifference::default().prepare(&whirling, 0.05).err();
+    assert!(matches!(
+        beyond,
+        Some(IntegrateError::Unstable { critical_step: Some(limit), .. }) if limit < 0.05
+    ));
+}
+
+#[test]
+fn the_spectral_radius_of_a_long_chain_is_that_of_its_fastest_mode() {
+    let n = 400;
+    let chain = chain(n, 0.0);
+    let scheme = CentralDifference::default();
+    let dt = 2.2 / highest(n);
+    let fastest = Sdof::from_modal(1.0, 0.0, highest(n)).unwrap().system();
+    let expected = spectral_radius(&scheme, &fastest, dt).unwrap();
+    let found = spectral_radius(&scheme, &chain, dt).unwrap();
+    assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+}
