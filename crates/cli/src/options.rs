@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use mechid::io::{RecordFile, Table, TimeAxis};
+use mechid::io::{ReadOptions, RecordFile, Table, TimeAxis};
 
 use crate::error::CliError;
 
@@ -101,7 +101,8 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
 impl RecordArgs {
     /// The file, of which so many rows are held.
     pub fn file(&self, held: usize) -> Result<RecordFile, CliError> {
-        Ok(RecordFile::open(&self.record, self.skip_lines, held)?)
+        let options = ReadOptions { skip_lines: self.skip_lines, ..ReadOptions::default() };
+        Ok(RecordFile::open(&self.record, &options, held)?)
     }
 
     /// The time axis asked for, that of the file, or the time column found by its name.
