@@ -1,6 +1,9 @@
 //! What can go wrong between the command line and the result.
 
+use mechid::analysis::AnalysisError;
 use mechid::signal::counted;
+
+use crate::options;
 
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
@@ -8,7 +11,7 @@ use mechid::signal::counted;
 pub enum CliError {
     /// The analysis failed.
     #[error(transparent)]
-    Analysis(#[from] mechid::analysis::AnalysisError),
+    Analysis(#[from] AnalysisError),
     /// A figure or page cannot be made.
     #[error(transparent)]
     Report(#[from] mechid::report::ReportError),
@@ -76,4 +79,16 @@ pub enum CliError {
     /// A model cannot be used.
     #[error(transparent)]
     Model(#[from] mechid::model::ModelError),
+}
+
+impl CliError {
+    /// Returns the message, with the settings that the analysis names spelled as options.
+    pub fn message(&self) -> String {
+        match self {
+            // A file's own words stay as they are.
+            Self::Analysis(AnalysisError::Io(error)) => error.to_string(),
+            Self::Analysis(error) => options::spelled(&error.to_string()),
+            other => other.to_string(),
+        }
+    }
 }

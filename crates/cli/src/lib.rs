@@ -49,7 +49,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match outcome(&cli) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", options::spelled(&error.to_string()));
+            eprintln!("error: {}", error.message());
             ExitCode::from(FAILURE)
         }
     }

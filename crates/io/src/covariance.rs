@@ -6,7 +6,7 @@ use mechid_signal::{counted, told};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::{IoError, standard};
+use crate::{IoError, json};
 
 /// The `covariance` of the report that `mechid identify --json` prints, which
 /// [`read_covariance`] reads back.
@@ -41,8 +41,8 @@ impl ParameterCovariance {
 /// The covariance in a JSON report (`-`: on standard input), if it has one.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is null, as JSON writes
-/// what is infinite, and [`IoError::Description`] if it is not one row and one column per parameter
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is
+/// null, as JSON writes infinite numbers, and [`IoError::Description`] if it is not one row and one column per parameter
 /// with positive variances.
 pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovariance>, IoError> {
     #[derive(Deserialize)]
@@ -55,16 +55,7 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
         matrix: Vec<Vec<Option<f64>>>,
         degrees_of_freedom: usize,
     }
-    let path = path.as_ref();
-    let file = standard::input_name(path);
-    let text = match standard::read_text(path) {
-        Ok(text) => text,
-        Err(source) => return Err(IoError::Read { file, source }),
-    };
-    let described: Described = match serde_json::from_str(&text) {
-        Ok(described) => described,
-        Err(source) => return Err(IoError::Json { file, source }),
-    };
+    let (file, described) = json::read::<Described>(path.as_ref())?;
     let Some(covariance) = described.covariance else { return Ok(None) };
     let n = covariance.parameters.len();
     let wrong = |what: String| IoError::Description { file: file.clone(), what };

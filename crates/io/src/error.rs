@@ -3,7 +3,8 @@
 use mechid_model::ModelError;
 use mechid_signal::{SignalError, counted, told};
 
-use crate::Place;
+use crate::escape::Message;
+use crate::{DecimalSign, Limit, Place};
 
 /// A file that cannot be read or written; every message names the file and the place in it.
 ///
@@ -12,7 +13,7 @@ use crate::Place;
 #[non_exhaustive]
 pub enum IoError {
     /// The file cannot be read.
-    #[error("cannot read {file}: {source}")]
+    #[error("{}", Message(format_args!("cannot read {file}: {source}")))]
     Read {
         /// The file.
         file: String,
@@ -20,15 +21,23 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// The file cannot be written; nothing was left behind.
-    #[error("cannot write {file}: {source}")]
+    #[error("{}", Message(format_args!("cannot write {file}: {source}")))]
     Write {
         /// The file.
         file: String,
         /// What the operating system says.
         source: std::io::Error,
     },
+    /// An output would replace an input.
+    #[error("{}", Message(format_args!("{output} is the input {input}, which would be lost: write to another file")))]
+    OutputIsInput {
+        /// The output.
+        output: String,
+        /// The input.
+        input: String,
+    },
     /// What the file is packed in is damaged.
-    #[error("{file} is damaged or cut short (gzip: {source})")]
+    #[error("{}", Message(format_args!("{file} is damaged or cut short (gzip: {source})")))]
     Gzip {
         /// The file.
         file: String,
@@ -36,22 +45,20 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// The file is of a format that MATLAB writes, but not by default.
-    #[error("{file} is a MATLAB file of version 7.3 (HDF5): save it with -v7")]
+    #[error("{}", Message(format_args!("{file} is a MATLAB file of version 7.3 (HDF5): save it with -v7")))]
     Hdf5 {
         /// The file.
         file: String,
     },
     /// The file is binary, but of no format known.
-    #[error(
-        "{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7), \
-         universal file with datasets 58, or gzip around a record"
-    )]
+    #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7), \
+         universal file with datasets 58, or gzip around a record")))]
     UnknownFormat {
         /// The file.
         file: String,
     },
     /// The file breaks its format.
-    #[error("{file}, {at}: {what}")]
+    #[error("{}", Message(format_args!("{file}, {at}: {what}")))]
     Malformed {
         /// The file.
         file: String,
@@ -60,22 +67,28 @@ pub enum IoError {
         /// How.
         what: String,
     },
+    /// The file is larger than a limit that guards against damaged and forged files.
+    #[error("{}", Message(format_args!("{file}, {at}: {limit}; if the record is right, raise the limit")))]
+    TooLarge {
+        /// The file.
+        file: String,
+        /// Where.
+        at: Place,
+        /// The limit, see [`Limits`](crate::Limits).
+        limit: Limit,
+    },
     /// The file is JSON, which holds descriptions and reports.
-    #[error(
-        "{file} is JSON, no table of samples: simulate, sweep and stability read the description of \
-         an experiment, force --system and modal read a machine or a report of identify"
-    )]
+    #[error("{}", Message(format_args!("{file} is JSON, no table of samples: simulate, sweep and stability read the description of \
+         an experiment, force --system and modal read a machine or a report of identify")))]
     JsonRecord {
         /// The file.
         file: String,
     },
     /// Text stands above the table.
-    #[error(
-        "{file}: the table seems to begin on line {line}, with {}; if so, leave out what \
+    #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, leave out what \
          stands above it with --skip-lines {}",
         counted(*fields, "field"),
-        line - 1
-    )]
+        line - 1)))]
     AboveTable {
         /// The file.
         file: String,
@@ -85,13 +98,13 @@ pub enum IoError {
         fields: usize,
     },
     /// Lines are to be skipped where there are none.
-    #[error("{file} is no text: it has no lines to skip")]
+    #[error("{}", Message(format_args!("{file} is no text: it has no lines to skip")))]
     NothingToSkip {
         /// The file.
         file: String,
     },
     /// The file has no line of numbers.
-    #[error("{file} holds no data: {found}")]
+    #[error("{}", Message(format_args!("{file} holds no data: {found}")))]
     Empty {
         /// The file.
         file: String,
@@ -99,7 +112,7 @@ pub enum IoError {
         found: &'static str,
     },
     /// A line has more or fewer fields than the first one.
-    #[error("{file}, line {line}: {} where the first line has {expected}", counted(*got, "field"))]
+    #[error("{}", Message(format_args!("{file}, line {line}: {} where the first line has {expected}", counted(*got, "field"))))]
     Ragged {
         /// The file.
         file: String,
@@ -111,7 +124,7 @@ pub enum IoError {
         expected: usize,
     },
     /// There is no such column.
-    #[error("{file} has no column \"{wanted}\"; its columns are {available}")]
+    #[error("{}", Message(format_args!("{file} has no column \"{wanted}\"; its columns are {available}")))]
     MissingColumn {
         /// The file.
         file: String,
@@ -121,9 +134,7 @@ pub enum IoError {
         available: String,
     },
     /// Several columns bear the name asked for.
-    #[error(
-        "{file} has several columns \"{wanted}\"; choose one by its number: its columns are {available}"
-    )]
+    #[error("{}", Message(format_args!("{file} has several columns \"{wanted}\"; choose one by its number: its columns are {available}")))]
     AmbiguousColumn {
         /// The file.
         file: String,
@@ -133,9 +144,7 @@ pub enum IoError {
         available: String,
     },
     /// One column was asked for twice.
-    #[error(
-        "column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}"
-    )]
+    #[error("{}", Message(format_args!("column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}")))]
     DuplicateColumn {
         /// The file.
         file: String,
@@ -149,7 +158,7 @@ pub enum IoError {
         available: String,
     },
     /// Text stands where a number is needed.
-    #[error("{file}, line {line}, column {column}: \"{text}\" is not a number")]
+    #[error("{}", Message(format_args!("{file}, line {line}, column {column}: \"{text}\" is not a number")))]
     NotANumber {
         /// The file.
         file: String,
@@ -161,7 +170,7 @@ pub enum IoError {
         text: String,
     },
     /// An empty field stands where a number is needed.
-    #[error("{file}, line {line}, column {column}: the field is empty, a number is needed")]
+    #[error("{}", Message(format_args!("{file}, line {line}, column {column}: the field is empty, a number is needed")))]
     EmptyField {
         /// The file.
         file: String,
@@ -170,8 +179,23 @@ pub enum IoError {
         /// Number and name of the column.
         column: String,
     },
+    /// A number has another decimal sign than the numbers before it.
+    #[error("{}", Message(format_args!("{file}, line {line}, column {column}: \"{text}\" does not have the decimal {sign} of the \
+         other numbers of the file: use one decimal sign, and no sign between thousands")))]
+    MixedDecimalSigns {
+        /// The file.
+        file: String,
+        /// Line of the file.
+        line: u64,
+        /// Number and name of the column.
+        column: String,
+        /// What stands there.
+        text: String,
+        /// The decimal sign of the other numbers.
+        sign: DecimalSign,
+    },
     /// A column holds something else than real numbers.
-    #[error("{file}, column {column}: it holds {what}, a channel needs real numbers in time")]
+    #[error("{}", Message(format_args!("{file}, column {column}: it holds {what}, a channel needs real numbers in time")))]
     NoNumbers {
         /// The file.
         file: String,
@@ -181,7 +205,7 @@ pub enum IoError {
         what: String,
     },
     /// A sample is NaN or infinite.
-    #[error("{file}, {at}, column {column}: {value} is not a finite number", value = told(*value))]
+    #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = told(*value))))]
     NotFinite {
         /// The file.
         file: String,
@@ -193,13 +217,11 @@ pub enum IoError {
         value: f64,
     },
     /// The instants of the time column are not equally spaced.
-    #[error(
-        "{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
+    #[error("{}", Message(format_args!("{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
          {} s ({})",
         told(six_digits(*step)),
         told(six_digits(*usual)),
-        remedy(*step, *usual)
-    )]
+        remedy(*step, *usual))))]
     NonUniformTime {
         /// The file.
         file: String,
@@ -211,13 +233,13 @@ pub enum IoError {
         usual: f64,
     },
     /// One sample has no time step.
-    #[error("{file} holds a single sample: a time column needs two to tell the time step")]
+    #[error("{}", Message(format_args!("{file} holds a single sample: a time column needs two to tell the time step")))]
     SingleSample {
         /// The file.
         file: String,
     },
     /// Columns of one record have different lengths.
-    #[error("{file}: the columns of a record need the same number of samples; column {lengths}")]
+    #[error("{}", Message(format_args!("{file}: the columns of a record need the same number of samples; column {lengths}")))]
     Lengths {
         /// The file.
         file: String,
@@ -225,7 +247,7 @@ pub enum IoError {
         lengths: String,
     },
     /// A column of which the file does not say when it was sampled.
-    #[error("{file} does not say when column {column} was sampled: give a time column or a rate")]
+    #[error("{}", Message(format_args!("{file} does not say when column {column} was sampled: give a time column or a rate")))]
     NoTimeAxis {
         /// The file.
         file: String,
@@ -233,14 +255,12 @@ pub enum IoError {
         column: String,
     },
     /// Columns of one record were sampled at different instants.
-    #[error(
-        "{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
+    #[error("{}", Message(format_args!("{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
          s from {first_start} s, {second} of {second_step} s from {second_start} s",
         first_start = told(*first_start),
         first_step = told(*first_step),
         second_start = told(*second_start),
-        second_step = told(*second_step),
-    )]
+        second_step = told(*second_step))))]
     TimeAxes {
         /// The file.
         file: String,
@@ -258,11 +278,9 @@ pub enum IoError {
         second_step: f64,
     },
     /// The rate given is not that of the file.
-    #[error(
-        "the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
+    #[error("{}", Message(format_args!("the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
          the rate out)",
-        own_hz = told(*own_hz), rate_hz = told(*rate_hz)
-    )]
+        own_hz = told(*own_hz), rate_hz = told(*rate_hz))))]
     RateContradicts {
         /// The file.
         file: String,
@@ -274,32 +292,38 @@ pub enum IoError {
         rate_hz: f64,
     },
     /// The sampling rate is not usable.
-    #[error(
-        "the sample rate must be a positive finite number of Hz, got {rate_hz}",
-        rate_hz = told(*rate_hz)
-    )]
+    #[error("{}", Message(format_args!("the sample rate must be a positive finite number of Hz, got {rate_hz}",
+        rate_hz = told(*rate_hz))))]
     SampleRate {
         /// The rate given, in Hz.
         rate_hz: f64,
     },
     /// The numbers do not make a record.
-    #[error("{file}: {source}")]
+    #[error("{}", Message(format_args!("{file}: {source}")))]
     Signal {
         /// The file.
         file: String,
         /// What is wrong with them.
         source: SignalError,
     },
+    /// The file is no JSON.
+    #[error("{}", Message(format_args!("{file} is not JSON: an experiment, a machine or a report is an object in braces, {{ … }}")))]
+    NotJson {
+        /// The file.
+        file: String,
+    },
     /// The text is no description of an experiment.
-    #[error("{file}: {source}")]
+    #[error("{}", Message(format_args!("{file}: {field}{source}")))]
     Json {
         /// The file.
         file: String,
+        /// Path of the field, followed by a colon; empty for the whole.
+        field: String,
         /// What is wrong, with line and column.
         source: serde_json::Error,
     },
     /// The description of an experiment contradicts itself.
-    #[error("{file}: {what}")]
+    #[error("{}", Message(format_args!("{file}: {what}")))]
     Description {
         /// The file.
         file: String,
@@ -307,11 +331,9 @@ pub enum IoError {
         what: String,
     },
     /// A covariance is not known.
-    #[error(
-        "{file}: the covariance of {parameters} is null: the record it was identified from leaves \
+    #[error("{}", Message(format_args!("{file}: the covariance of {parameters} is null: the record it was identified from leaves \
          {parameters} undetermined; identify from one that moves the machine more, or take \
-         \"covariance\" out of the file to count the machine as exactly known"
-    )]
+         \"covariance\" out of the file to count the machine as exactly known")))]
     Undetermined {
         /// The file.
         file: String,
@@ -319,7 +341,7 @@ pub enum IoError {
         parameters: String,
     },
     /// The matrices make no system.
-    #[error("{file}: {source}")]
+    #[error("{}", Message(format_args!("{file}: {source}")))]
     Model {
         /// The file.
         file: String,
@@ -327,19 +349,15 @@ pub enum IoError {
         source: ModelError,
     },
     /// A text is no choice of spectral lines.
-    #[error(
-        "\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
-         1:2:335 (first:step:last) separated by commas"
-    )]
+    #[error("{}", Message(format_args!("\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
+         1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
         /// What was written.
         lines: String,
     },
     /// A spectral line does not exist in a period.
-    #[error(
-        "lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
-         frequency of a period of {}", counted(*len, "sample")
-    )]
+    #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
+         frequency of a period of {}", counted(*len, "sample"))))]
     LineOutside {
         /// What was written.
         lines: String,

@@ -16,10 +16,14 @@
 //! # Ok::<(), mechid_io::IoError>(())
 //! ```
 
+mod contents;
 mod covariance;
 mod csv_text;
 mod error;
+mod escape;
 mod experiment;
+mod json;
+mod limits;
 mod line_spec;
 mod mat;
 mod output;
@@ -28,15 +32,18 @@ mod system;
 mod table;
 mod uff;
 
+pub use contents::{DecimalSign, Place};
 pub use covariance::{ParameterCovariance, read_covariance};
 pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
+pub use escape::escaped;
 pub use experiment::{
     Experiment, FirstDisplacements, FirstSteps, InitialMotion, Level, LoadBeyond, MiddleLoad,
     Noise, PerDof, ResponseKind, SchemeChoice,
 };
+pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
-pub use output::{BegunFile, OutputFile, write_all};
+pub use output::{BegunFile, OutputFile, refuse_replaced_inputs, write_all};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{SystemMatrices, read_system};
-pub use table::{Inventory, Place, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};
+pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

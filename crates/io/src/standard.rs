@@ -6,6 +6,8 @@ use std::io::{self, Read};
 use std::path::Path;
 use std::sync::OnceLock;
 
+use crate::escaped;
+
 /// What stands for either.
 const DASH: &str = "-";
 
@@ -34,18 +36,22 @@ pub fn is_standard_output(path: &Path) -> bool {
     path == Path::new(DASH) || OUTPUT.iter().any(|name| path == Path::new(name))
 }
 
-/// What to call a file that is written: its path, or `standard output`.
+/// Name of a file that is written, for messages: its path, [`escaped`], or `standard output`.
 pub fn output_name(path: &Path) -> String {
-    if is_standard_output(path) { "standard output".into() } else { path.display().to_string() }
+    if is_standard_output(path) { "standard output".into() } else { shown(path) }
 }
 
-/// What to call a file that is read: its path, or `standard input`.
+/// Name of a file that is read, for messages: its path, [`escaped`], or `standard input`.
 pub fn input_name(path: &Path) -> String {
-    if is_input(path) { "standard input".into() } else { path.display().to_string() }
+    if is_input(path) { "standard input".into() } else { shown(path) }
+}
+
+fn shown(path: &Path) -> String {
+    escaped(&path.display().to_string()).into_owned()
 }
 
 /// Opens a file to be read once.
-pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read>> {
+pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read + Send>> {
     if is_input(path) { Ok(Box::new(io::stdin())) } else { Ok(Box::new(File::open(path)?)) }
 }
 

@@ -9,7 +9,7 @@ use nalgebra::DMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
-use crate::{IoError, standard};
+use crate::{IoError, json};
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
 /// [`read_system`] reads back.
@@ -34,26 +34,18 @@ impl From<&SecondOrderSystem> for SystemMatrices {
     }
 }
 
-/// The system in a JSON file (`-`: on standard input): the `system` of an [`Experiment`](crate::Experiment), or of the report
-/// that `mechid identify --json` prints.
+/// Reads the system in a JSON file (`-`: standard input): the `system` of an
+/// [`Experiment`](crate::Experiment), or of the report that `mechid identify --json` prints.
 ///
 /// # Errors
-/// [`IoError::Read`], [`IoError::Json`], [`IoError::Description`], [`IoError::Model`].
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Description`], [`IoError::Model`].
 pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError> {
     #[derive(Deserialize)]
     struct Described {
         system: SystemDescription,
     }
-    let path = path.as_ref();
-    let file = standard::input_name(path);
-    let text = match standard::read_text(path) {
-        Ok(text) => text,
-        Err(source) => return Err(IoError::Read { file, source }),
-    };
-    match serde_json::from_str::<Described>(&text) {
-        Ok(described) => described.system.system(&file),
-        Err(source) => Err(IoError::Json { file, source }),
-    }
+    let (file, described) = json::read::<Described>(path.as_ref())?;
+    described.system.system(&file)
 }
 
 /// M with C and K, or (one degree of freedom) the mass with natural frequency and damping ratio.

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use mechid_estimate::frequency_domain::{Lines, RepeatedPeriods};
 use mechid_estimate::{EquationOfMotion, EstimateError, FrfAverage, Segments};
-use mechid_io::{IoError, RecordFile, TimeAxis};
+use mechid_io::{IoError, ReadOptions, RecordFile, TimeAxis};
 use mechid_signal::Record;
 use peak_alloc::PeakAlloc;
 
@@ -62,7 +62,7 @@ fn write(path: &Path, rows: usize) {
 fn peak(path: &Path, rows: usize) -> usize {
     MEMORY.reset_peak_usage();
     let before = MEMORY.current_usage();
-    let file = RecordFile::open(path, 0, HELD).unwrap();
+    let file = RecordFile::open(path, &ReadOptions::default(), HELD).unwrap();
     assert!(!file.is_whole());
     let survey = file.survey(&TimeAxis::Column("time"), &COLUMNS).unwrap();
     assert_eq!(survey.sampling.len(), rows);

@@ -52,11 +52,8 @@ mod sdof;
 mod second_order;
 #[cfg(feature = "serde")]
 mod serde_forms;
-<<<<<<< HEAD
-mod state_transition;
-=======
 mod sparse_system;
->>>>>>> integrate
+mod state_transition;
 mod uncertain_system;
 
 pub use discretisation::Discretisation;
@@ -71,9 +68,6 @@ pub use response_quantity::ResponseQuantity;
 pub use sampling_rule::npi_sampling;
 pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};
-<<<<<<< HEAD
-pub use state_transition::StateTransition;
-=======
 pub use sparse_system::{SparseSystem, band, lumped, triplets};
->>>>>>> integrate
+pub use state_transition::StateTransition;
 pub use uncertain_system::UncertainSystem;

@@ -7,7 +7,7 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_io::{RecordFile, Table, TimeAxis, Unit};
+use mechid_io::{ReadOptions, RecordFile, Table, TimeAxis, Unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -58,7 +58,8 @@ impl Reading {
     /// # Errors
     /// As [`RecordFile::open`].
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
-        Ok(RecordFile::open(path, self.skip_lines, rows)?)
+        let options = ReadOptions { skip_lines: self.skip_lines, ..ReadOptions::default() };
+        Ok(RecordFile::open(path, &options, rows)?)
     }
 
     /// Returns the time axis asked for, that of the file, or the time column found by its name.

@@ -5,11 +5,11 @@ use std::fmt;
 use mechid_signal::excitation::{HalfSine, Harmonic, Impulse, Prbs, Random, Sweep, SweepLaw};
 use mechid_signal::{Multisine, Phases, Record, Sampling, SignalError};
 use serde::Deserialize;
-use serde::de::value::SeqAccessDeserializer;
-use serde::de::{DeserializeOwned, Deserializer, Error as _, SeqAccess, Visitor};
+use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::{DeserializeOwned, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 
-use crate::{IoError, LineSpec};
+use crate::{IoError, LineSpec, json};
 
 /// A force: an object with a `kind`, `multisine` where it has none.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,22 +30,25 @@ enum Kind {
     HalfSine(HalfSineForce),
 }
 
-/// The excitations of a description. One alone, without brackets, is refused by the name of the
-/// field: serde would only say that a sequence is missing.
-pub(super) fn list<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Excitation>, D::Error> {
-    struct List;
-    impl<'de> Visitor<'de> for List {
+/// The excitations of a description: a list, or a single one without brackets.
+pub(super) fn one_or_more<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Excitation>, D::Error> {
+    struct OneOrMore;
+    impl<'de> Visitor<'de> for OneOrMore {
         type Value = Vec<Excitation>;
 
         fn expecting(&self, to: &mut fmt::Formatter<'_>) -> fmt::Result {
-            to.write_str("a list, of a single force too: \"excitation\": [{ … }]")
+            to.write_str("a force or a list of forces, each in braces")
         }
 
         fn visit_seq<A: SeqAccess<'de>>(self, forces: A) -> Result<Self::Value, A::Error> {
             Vec::deserialize(SeqAccessDeserializer::new(forces))
         }
+
+        fn visit_map<A: MapAccess<'de>>(self, force: A) -> Result<Self::Value, A::Error> {
+            Ok(vec![Excitation::deserialize(MapAccessDeserializer::new(force))?])
+        }
     }
-    from.deserialize_seq(List)
+    from.deserialize_any(OneOrMore)
 }
 
 /// Names of the kinds, as they are written.
@@ -57,7 +60,7 @@ struct MultisineForce {
     lines: LineSpec,
     /// Amplitude of every line, in N.
     amplitude: f64,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "json::word")]
     phases: PhaseLaw,
     /// Seed of random phases.
     #[serde(default)]
@@ -90,7 +93,7 @@ struct SweepForce {
     start_hz: f64,
     end_hz: f64,
     duration_s: f64,
-    #[serde(default)]
+    #[serde(default, deserialize_with = "json::word")]
     law: Law,
     #[serde(default)]
     ramp_s: f64,
@@ -149,15 +152,16 @@ impl<'de> Deserialize<'de> for Excitation {
         fn rest<T: DeserializeOwned, E: serde::de::Error>(
             fields: Map<String, Value>,
         ) -> Result<T, E> {
-            serde_json::from_value(Value::Object(fields)).map_err(E::custom)
+            serde_path_to_error::deserialize(Value::Object(fields)).map_err(E::custom)
         }
+        let wrong = |field: &str, e: serde_json::Error| D::Error::custom(format!("{field}: {e}"));
         let mut fields = Map::deserialize(deserializer)?;
         let dof = match fields.shift_remove("dof") {
-            Some(dof) => serde_json::from_value(dof).map_err(D::Error::custom)?,
+            Some(dof) => serde_json::from_value(dof).map_err(|e| wrong("dof", e))?,
             None => 1,
         };
         let kind = match fields.shift_remove("kind") {
-            Some(kind) => serde_json::from_value(kind).map_err(D::Error::custom)?,
+            Some(kind) => serde_json::from_value(kind).map_err(|e| wrong("kind", e))?,
             None => "multisine".to_owned(),
         };
         let kind = match kind.as_str() {

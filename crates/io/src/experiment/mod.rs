@@ -17,7 +17,7 @@ pub use self::noise::{Level, Noise};
 pub use self::response::{InitialMotion, PerDof, ResponseKind};
 pub use self::scheme::{FirstDisplacements, FirstSteps, LoadBeyond, MiddleLoad, SchemeChoice};
 use crate::system::SystemDescription;
-use crate::{IoError, standard};
+use crate::{IoError, escaped, json};
 
 /// What to simulate. Every field of the file is one of those below; an unknown one is an error.
 ///
@@ -42,7 +42,7 @@ pub struct Experiment {
     file: String,
     system: SystemDescription,
     sampling: SamplingDescription,
-    #[serde(deserialize_with = "excitation::list")]
+    #[serde(deserialize_with = "excitation::one_or_more")]
     excitation: Vec<Excitation>,
     /// How the response is computed.
     #[serde(default)]
@@ -76,29 +76,22 @@ struct SamplingDescription {
 }
 
 impl Experiment {
-    /// The experiment described in a file, or on standard input as `-`.
+    /// Reads the description of an experiment in a file, or on standard input as `-`.
     ///
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        let path = path.as_ref();
-        let file = standard::input_name(path);
-        match standard::read_text(path) {
-            Ok(text) => Self::parse(file, &text),
-            Err(source) => Err(IoError::Read { file, source }),
-        }
+        json::read::<Self>(path.as_ref()).map(|(file, experiment)| Self { file, ..experiment })
     }
 
-    /// The experiment described by a text; `file` is how messages call it.
+    /// Reads the description of an experiment in a text; `file` is its name in messages.
     ///
     /// # Errors
-    /// [`IoError::Json`] with line and column where the text is no such description.
+    /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and column
+    /// for a wrong description.
     pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
-        let file = file.into();
-        match serde_json::from_str::<Self>(text) {
-            Ok(experiment) => Ok(Self { file, ..experiment }),
-            Err(source) => Err(IoError::Json { file, source }),
-        }
+        let file = escaped(&file.into()).into_owned();
+        json::parse::<Self>(&file, text).map(|experiment| Self { file, ..experiment })
     }
 
     /// How messages call the file.

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::PerDof;
+use crate::json;
 
 /// How the response to a sampled force is computed.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
@@ -24,7 +25,7 @@ pub enum SchemeChoice {
     /// The central difference method.
     CentralDifference {
         /// Where the displacement before the first sample comes from.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "json::word")]
         start: FirstDisplacements,
     },
     /// Houbolt's method.
@@ -39,13 +40,14 @@ pub enum SchemeChoice {
         #[serde(default = "wilson")]
         theta: f64,
         /// The force at t + θΔt.
-        #[serde(default)]
+        #[serde(default, deserialize_with = "json::word")]
         load: LoadBeyond,
     },
     /// The classical Runge-Kutta method of fourth order.
     #[serde(rename = "runge-kutta-4")]
     RungeKutta4 {
         /// The force between two samples.
+        #[serde(deserialize_with = "json::word")]
         load: MiddleLoad,
     },
 }

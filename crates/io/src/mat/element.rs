@@ -1,25 +1,14 @@
 //! The elements of which a MATLAB file is made: a type, a number of bytes, the bytes.
 
+use crate::contents::Fault;
+
 /// A variable.
 pub(crate) const MATRIX: u32 = 14;
 
 /// A compressed variable.
 pub(crate) const COMPRESSED: u32 = 15;
 
-/// What is wrong with a file, and at which byte, counted from 0.
-#[derive(Debug)]
-pub(crate) struct Fault {
-    pub at: usize,
-    pub what: String,
-}
-
-impl Fault {
-    pub fn new(at: usize, what: impl Into<String>) -> Self {
-        Self { at, what: what.into() }
-    }
-}
-
-/// Order of the bytes of a number.
+/// Byte order of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Endian {
     Little,
@@ -54,7 +43,7 @@ impl Endian {
 pub(crate) struct Element<'a> {
     pub kind: u32,
     pub data: &'a [u8],
-    /// Where its data begin in the file.
+    /// Offset of its data in the file.
     pub at: usize,
 }
 
@@ -62,9 +51,9 @@ pub(crate) struct Element<'a> {
 #[derive(Debug)]
 pub(crate) struct Elements<'a> {
     bytes: &'a [u8],
-    /// Bytes read.
+    /// Number of bytes read.
     next: usize,
-    /// Where `bytes` begin in the file.
+    /// Offset of `bytes` in the file.
     base: usize,
     endian: Endian,
 }
@@ -74,17 +63,17 @@ impl<'a> Elements<'a> {
         Self { bytes, next: 0, base, endian }
     }
 
-    /// The next element inside a variable, or nothing at the end; each is padded to 8 bytes.
+    /// Reads the next element inside a variable, `None` at the end; each is padded to 8 bytes.
     pub fn next(&mut self) -> Result<Option<Element<'a>>, Fault> {
         self.padded(|_| true)
     }
 
-    /// The next element of the file itself, where compressed ones are not padded.
+    /// Reads the next element of the file itself, where compressed ones are not padded.
     pub fn next_at_top(&mut self) -> Result<Option<Element<'a>>, Fault> {
         self.padded(|kind| kind != COMPRESSED)
     }
 
-    /// The next element, which must be there.
+    /// Reads the next element, an error at the end.
     pub fn required(&mut self, what: &str) -> Result<Element<'a>, Fault> {
         let at = self.base + self.next;
         self.next()?.ok_or_else(|| Fault::new(at, format!("a variable ends before its {what}")))
@@ -119,7 +108,7 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// Type and, for an element that fits in its tag, length.
+/// Type of an element and, if it fits in its tag, its length.
 fn split(tag: u32) -> (u32, Option<usize>) {
     match tag >> 16 {
         0 => (tag, None),
@@ -128,14 +117,26 @@ fn split(tag: u32) -> (u32, Option<usize>) {
 }
 
 impl Element<'_> {
-    /// The numbers of an element, whatever their type; nothing if it holds none.
+    /// Number of the numbers in an element, `None` if it holds none.
+    pub fn count(&self) -> Option<usize> {
+        let bytes = match self.kind {
+            1 | 2 => 1,
+            3 | 4 => 2,
+            5..=7 => 4,
+            9 | 12 | 13 => 8,
+            _ => return None,
+        };
+        self.data.len().is_multiple_of(bytes).then_some(self.data.len() / bytes)
+    }
+
+    /// The numbers of an element, whatever their type; `None` if it holds none.
     pub fn numbers(&self, endian: Endian) -> Option<Vec<f64>> {
-        fn all<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Option<Vec<f64>> {
-            let (chunks, rest) = data.as_chunks::<N>();
-            rest.is_empty().then(|| chunks.iter().map(|chunk| number(*chunk)).collect())
+        fn all<const N: usize>(data: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
+            data.as_chunks::<N>().0.iter().map(|chunk| number(*chunk)).collect()
         }
+        self.count()?;
         let data = self.data;
-        match self.kind {
+        Some(match self.kind {
             1 => all(data, |b| f64::from(i8::from_le_bytes(b))),
             2 => all(data, |b| f64::from(u8::from_le_bytes(b))),
             3 => all(data, |b| f64::from(endian.u16(b).cast_signed())),
@@ -145,8 +146,7 @@ impl Element<'_> {
             7 => all(data, |b| f64::from(f32::from_bits(endian.u32(b)))),
             9 => all(data, |b| f64::from_bits(endian.u64(b))),
             12 => all(data, |b| endian.u64(b).cast_signed() as f64),
-            13 => all(data, |b| endian.u64(b) as f64),
-            _ => None,
-        }
+            _ => all(data, |b| endian.u64(b) as f64),
+        })
     }
 }

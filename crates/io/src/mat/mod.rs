@@ -10,105 +10,108 @@
 mod array;
 mod element;
 
-use mechid_signal::counted;
 use std::io::Read as _;
 
 use flate2::read::ZlibDecoder;
+use mechid_signal::counted;
 
 use self::array::{Array, Value};
-use self::element::{COMPRESSED, Elements, Endian, Fault, MATRIX};
+use self::element::{COMPRESSED, Elements, Endian, MATRIX};
 use crate::IoError;
-use crate::table::{Column, Contents, Place};
+use crate::contents::{Column, Contents, Fault, Place};
+use crate::limits::{Budget, Limit, Limits};
 
-/// Bytes before the first variable.
+/// Number of bytes before the first variable.
 const HEADER: usize = 128;
 
-/// Wider matrices become no columns, unless they are longer still: more likely they lie on their
-/// side.
+/// Number of columns above which a matrix with more columns than rows is refused: it is probably
+/// transposed.
 const WIDEST: usize = 256;
 
-/// The variables of a file as columns.
-pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Contents, IoError> {
-    let malformed = |fault: Fault| IoError::Malformed {
-        file: file.into(),
-        at: Place::Byte(fault.at + 1),
-        what: fault.what,
-    };
-    let variables = variables(bytes).map_err(malformed)?;
-    let mut contents = Contents { format: "MATLAB level 5".into(), ..Contents::default() };
-    for variable in variables {
-        add(&mut contents, variable);
-    }
+/// Reads the variables of a file as columns.
+pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents, IoError> {
+    let contents = contents(bytes, Budget::new(limits)).map_err(|fault| {
+        let at = Place::Byte(fault.at + 1);
+        fault.error(file, at)
+    })?;
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
     }
     Ok(contents.with_usual_length())
 }
 
-/// All variables of a file.
-fn variables(bytes: &[u8]) -> Result<Vec<Array>, Fault> {
+fn contents(bytes: &[u8], mut budget: Budget) -> Result<Contents, Fault> {
     let endian = match bytes.get(HEADER - 2..HEADER) {
         Some(b"IM") => Endian::Little,
         Some(b"MI") => Endian::Big,
         _ => return Err(Fault::new(0, "the header of 128 bytes ends with neither IM nor MI")),
     };
-    let mut variables = Vec::new();
+    let mut contents = Contents { format: "MATLAB level 5".into(), ..Contents::default() };
     let mut elements = Elements::new(&bytes[HEADER..], HEADER, endian);
     while let Some(element) = elements.next_at_top()? {
         let at = element.at;
-        match element.kind {
-            MATRIX => variables.push(Array::read(element.data, at, endian, 0)?),
+        let variable = match element.kind {
+            MATRIX => Array::read(element.data, at, endian, 0, &mut budget)?,
             COMPRESSED => {
-                let inflated = inflated(element.data, at)?;
-                // Places inside are told by where the compressed variable stands.
+                let inflated = inflated(element.data, at, budget.unpacked_bytes())?;
+                // Places inside are reported as the place of the compressed variable.
                 let inside = |fault: Fault| Fault { at, ..fault };
                 let mut elements = Elements::new(&inflated, at, endian);
                 let inner = elements.next().map_err(inside)?;
                 let Some(inner) = inner.filter(|e| e.kind == MATRIX) else {
                     return Err(Fault::new(at, "the compressed data are no variable"));
                 };
-                variables.push(Array::read(inner.data, at, endian, 0).map_err(inside)?);
+                Array::read(inner.data, at, endian, 0, &mut budget).map_err(inside)?
             }
-            // Others are allowed, and mean nothing here.
-            _ => {}
-        }
+            // Other elements are allowed and hold no variables.
+            _ => continue,
+        };
+        add(&mut contents, variable, at, &mut budget)?;
     }
-    Ok(variables)
+    Ok(contents)
 }
 
-fn inflated(data: &[u8], at: usize) -> Result<Vec<u8>, Fault> {
+fn inflated(data: &[u8], at: usize, limit: usize) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
-    match ZlibDecoder::new(data).read_to_end(&mut bytes) {
+    let read = ZlibDecoder::new(data).take(limit as u64 + 1).read_to_end(&mut bytes);
+    match read {
+        Ok(_) if bytes.len() > limit => Err(Fault::too_large(at, Limit::UnpackedBytes(limit))),
         Ok(_) => Ok(bytes),
         Err(e) => Err(Fault::new(at, format!("a compressed variable is damaged ({e})"))),
     }
 }
 
-/// Adds a variable: its vectors as columns, a single number as such.
-fn add(contents: &mut Contents, Array { name, value }: Array) {
+/// Adds a variable that stands at byte `at`: its vectors as columns, a single number as such.
+fn add(
+    contents: &mut Contents,
+    Array { name, value }: Array,
+    at: usize,
+    budget: &mut Budget,
+) -> Result<(), Fault> {
     let unusable = match value {
         Value::Struct(fields) => {
             for field in fields {
                 let name = format!("{name}.{}", field.name);
-                add(contents, Array { name, ..field });
+                add(contents, Array { name, ..field }, at, budget)?;
             }
-            return;
+            return Ok(());
         }
-        Value::Real { mut values, .. } if values.len() == 1 => {
-            contents.scalars.push((name, values.remove(0)));
-            return;
+        Value::Real { values, .. } if values.len() == 1 => {
+            contents.scalars.push((name, values[0]));
+            return Ok(());
         }
         Value::Real { rows, columns, values } => {
             if rows == 1 || columns == 1 {
                 contents.columns.push(Column::of_numbers(name, values));
-                return;
+                return Ok(());
             }
             if columns <= WIDEST || columns <= rows {
                 for (number, column) in (1..).zip(values.chunks_exact(rows)) {
+                    budget.take_column().map_err(|limit| Fault::too_large(at, limit))?;
                     let name = format!("{name}[{number}]");
                     contents.columns.push(Column::of_numbers(name, column.to_vec()));
                 }
-                return;
+                return Ok(());
             }
             format!(
                 "a matrix of {} and {columns} columns (transpose it: a channel is a column)",
@@ -118,4 +121,5 @@ fn add(contents: &mut Contents, Array { name, value }: Array) {
         Value::Other(what) => what.into(),
     };
     contents.columns.push(Column::unusable(name, unusable));
+    Ok(())
 }

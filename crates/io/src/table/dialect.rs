@@ -1,10 +1,11 @@
-//! How a text tells fields, comments and numbers.
+//! Delimiters, comments and decimal signs of a text.
 
-use std::io::{self, BufRead, Read};
+use memchr::memchr_iter;
 
-use csv::{Reader, ReaderBuilder, Trim};
+use super::fields::{Fields, words};
+use crate::contents::DecimalSign;
 
-/// What stands between two fields.
+/// Separator of two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Delimiter {
     /// One byte: comma, semicolon or tab.
@@ -14,7 +15,7 @@ pub(crate) enum Delimiter {
 }
 
 impl Delimiter {
-    /// How a person calls such a text.
+    /// Name of the format of such a text, for people.
     pub fn name(self) -> &'static str {
         match self {
             Delimiter::Byte(b';') => "text, fields between semicolons",
@@ -23,41 +24,36 @@ impl Delimiter {
             Delimiter::Blanks => "text, fields between blanks",
         }
     }
+
+    /// Whether numbers may have a decimal comma.
+    pub fn allows_decimal_comma(self) -> bool {
+        self != Delimiter::Byte(b',')
+    }
 }
 
-/// Lines that start with this are comments.
+/// First byte of a comment line.
 pub(crate) const COMMENT: u8 = b'#';
 
-/// Lines looked at to find the delimiter.
+/// Number of lines from which the delimiter and the decimal sign are found.
 const SAMPLE_LINES: usize = 8;
 
-/// Bytes read first; then as many again each time, until there are as many lines.
-const FIRST: usize = 1 << 14;
-
-/// The beginning of a text, with as many whole lines as [`detect`] looks at, or all of it.
-pub(crate) fn first_lines(text: &mut impl BufRead) -> io::Result<Vec<u8>> {
-    let mut start = Vec::new();
+/// Whether the beginning of a text has as many whole lines as [`detect`] looks at.
+pub(crate) fn is_sample(start: &[u8], terminator: u8) -> bool {
     // The last line may be cut off, so one more is needed.
-    while sample(&start).nth(SAMPLE_LINES).is_none() {
-        let more = start.len().max(FIRST) as u64;
-        if text.by_ref().take(more).read_to_end(&mut start)? == 0 {
-            break;
-        }
-    }
-    Ok(start)
+    sample(start, terminator).nth(SAMPLE_LINES).is_some()
 }
 
 /// Lines that are neither empty nor comments.
-fn sample(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    text.split(|b| *b == b'\n')
+fn sample(text: &[u8], terminator: u8) -> impl Iterator<Item = &[u8]> {
+    text.split(move |b| *b == terminator)
         .filter(|line| line.trim_ascii().first().is_some_and(|first| *first != COMMENT))
 }
 
 /// The delimiter of a text: the first of semicolon, tab and comma that stands outside quotes on
 /// most of the first lines (a decimal comma may stand between semicolons or tabs, so comma comes
 /// last), otherwise blanks.
-pub(crate) fn detect(text: &[u8]) -> Delimiter {
-    let sample: Vec<&[u8]> = sample(text).take(SAMPLE_LINES).collect();
+pub(crate) fn detect(text: &[u8], terminator: u8) -> Delimiter {
+    let sample: Vec<&[u8]> = sample(text, terminator).take(SAMPLE_LINES).collect();
     let usual = |byte: u8| {
         2 * sample.iter().filter(|line| outside_quotes(line, byte)).count() > sample.len()
     };
@@ -67,37 +63,85 @@ pub(crate) fn detect(text: &[u8]) -> Delimiter {
         .map_or(Delimiter::Blanks, Delimiter::Byte)
 }
 
-/// The fields of a line that stand between blanks.
-pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
-}
-
-/// The rows of a text whose fields stand between delimiters.
-pub(crate) fn fields<R: Read>(text: R, delimiter: u8) -> Reader<R> {
-    ReaderBuilder::new()
-        .has_headers(false)
-        .flexible(true)
-        .delimiter(delimiter)
-        .comment(Some(COMMENT))
-        .trim(Trim::All)
-        .from_reader(text)
+/// The decimal sign of most numbers on the first lines; `None` if no number has one, or as many have
+/// a point as a comma.
+pub(crate) fn decimal_sign(
+    text: &[u8],
+    terminator: u8,
+    delimiter: Delimiter,
+) -> Option<DecimalSign> {
+    if !delimiter.allows_decimal_comma() {
+        return Some(DecimalSign::Point);
+    }
+    let (mut points, mut commas) = (0, 0);
+    let (mut fields, mut with_point) = (Fields::default(), String::new());
+    for line in sample(text, terminator).take(SAMPLE_LINES) {
+        fields.split(line, delimiter);
+        for field in fields.iter() {
+            match number(field, delimiter, &mut with_point).and_then(|number| number.sign) {
+                Some(DecimalSign::Point) => points += 1,
+                Some(DecimalSign::Comma) => commas += 1,
+                None => {}
+            }
+        }
+    }
+    match points.cmp(&commas) {
+        std::cmp::Ordering::Greater => Some(DecimalSign::Point),
+        std::cmp::Ordering::Less => Some(DecimalSign::Comma),
+        std::cmp::Ordering::Equal => None,
+    }
 }
 
 fn outside_quotes(line: &[u8], byte: u8) -> bool {
+    let mut quotes = memchr_iter(b'"', line).peekable();
     let mut quoted = false;
-    line.iter().any(|b| {
-        quoted ^= *b == b'"';
-        *b == byte && !quoted
+    memchr_iter(byte, line).any(|at| {
+        while quotes.next_if(|quote| *quote < at).is_some() {
+            quoted = !quoted;
+        }
+        !quoted
     })
 }
 
-/// The number a field holds; a decimal comma is understood where commas do not separate fields.
-pub(crate) fn number(field: &[u8], delimiter: Delimiter) -> Option<f64> {
+/// A number in a field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Number {
+    pub value: f64,
+    /// `None` if it has no decimal places.
+    pub sign: Option<DecimalSign>,
+}
+
+/// The number in a field; `with_point` is room for one that has a comma.
+pub(crate) fn number(
+    field: &[u8],
+    delimiter: Delimiter,
+    with_point: &mut String,
+) -> Option<Number> {
     let text = std::str::from_utf8(field).ok()?;
-    let parsed = text.parse().ok();
-    if parsed.is_some() || delimiter == Delimiter::Byte(b',') || text.contains('.') {
-        return parsed;
+    let point = text.contains('.').then_some(DecimalSign::Point);
+    if let Ok(value) = text.parse() {
+        return Some(Number { value, sign: point });
     }
-    let (whole, fraction) = text.split_once(',')?;
-    format!("{whole}.{fraction}").parse().ok()
+    if point.is_some() || !delimiter.allows_decimal_comma() {
+        return None;
+    }
+    let (whole, places) = text.split_once(',')?;
+    with_point.clear();
+    with_point.extend([whole, ".", places]);
+    let value = with_point.parse().ok()?;
+    Some(Number { value, sign: Some(DecimalSign::Comma) })
+}
+
+/// Whether a field is a number.
+pub(crate) fn is_number(field: &[u8], delimiter: Delimiter) -> bool {
+    number(field, delimiter, &mut String::new()).is_some()
+}
+
+/// Whether a line is a comment.
+pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
+    let first = match delimiter {
+        Delimiter::Byte(_) => line.first(),
+        Delimiter::Blanks => words(line).next().and_then(<[u8]>::first),
+    };
+    first == Some(&COMMENT)
 }

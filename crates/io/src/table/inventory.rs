@@ -20,6 +20,9 @@ pub struct Inventory {
     /// The last line of a text, counted from 1 in the file, if no line break ends it: the file may
     /// have been cut off there, within its last number.
     pub open_line: Option<u64>,
+    /// What the end of a long text says, of which [`Table::remarks`](super::Table::remarks) only
+    /// knows the beginning.
+    pub remarks: Vec<String>,
 }
 
 /// What a column holds.
@@ -38,7 +41,7 @@ impl RecordFile {
     /// # Errors
     /// What is wrong with a column or the time axis is told there, as by
     /// [`Table::column`](super::Table::column) and [`Table::sampling`](super::Table::sampling);
-    /// what is wrong with the file, as by [`Table::read_below`](super::Table::read_below), is an
+    /// what is wrong with the file, as by [`Table::read_with`](super::Table::read_with), is an
     /// error.
     ///
     /// # Panics
@@ -68,6 +71,7 @@ impl RecordFile {
             columns: columns.iter().map(tally).collect(),
             sampling: instants.map(sampling),
             open_line: self.head.contents.open_line,
+            remarks: Vec::new(),
         })
     }
 
@@ -80,7 +84,7 @@ impl RecordFile {
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();
-        let mut reader = self.rows(&read, &mut |first, rows| {
+        let reader = self.rows(&read, &mut |first, rows| {
             for (sum, column) in sums.iter_mut().zip(columns) {
                 let values = rows.column(*column).values.iter().flatten();
                 *sum = values.fold(*sum, |sum, value| sum + value);
@@ -92,7 +96,7 @@ impl RecordFile {
             }
             Ok::<_, IoError>(ControlFlow::Continue(()))
         })?;
-        let open_line = reader.open_line();
+        let end = reader.end().unwrap_or_default();
         let rows = reader.rows();
         let samples = rows.samples();
         let usable = |column: usize| match &rows.column(column).values {
@@ -109,7 +113,8 @@ impl RecordFile {
             sampling: instants.map(|column| {
                 usable(column).and_then(|()| self.sampling_of(column, steps, samples))
             }),
-            open_line,
+            open_line: end.open_line,
+            remarks: end.remark().into_iter().collect(),
         })
     }
 

@@ -1,9 +1,10 @@
 //! A table of columns as a measuring program writes it.
 
-mod column;
+mod batch;
+mod blocks;
 mod dialect;
+mod fields;
 mod inventory;
-mod numbered_lines;
 mod preamble;
 mod record_file;
 mod rows;
@@ -13,20 +14,24 @@ mod time_axis;
 mod time_unit;
 mod unit;
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use mechid_signal::{Record, Sampling, SignalError};
 use nalgebra::DMatrix;
 
-pub use self::column::Place;
-pub(crate) use self::column::{Axis, Column, Lines};
 pub use self::inventory::{Inventory, Tally};
 pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source};
-use self::text::TextReader;
+use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
 pub use self::unit::{Quantity, Unit};
-use crate::{IoError, mat, uff};
+use crate::contents::{Axis, Contents, DecimalSign, Place};
+use crate::limits::ReadOptions;
+use crate::{IoError, escaped, mat, uff};
+
+/// Number of columns that a message lists.
+const MOST_LISTED: usize = 50;
 
 /// The columns of a record file, whatever its format.
 ///
@@ -58,78 +63,90 @@ pub struct Table {
     contents: Contents,
 }
 
-/// What a format gives.
-#[derive(Debug, Default)]
-pub(crate) struct Contents {
-    /// What a person calls the format.
-    pub format: String,
-    pub columns: Vec<Column>,
-    /// Where the samples stand, for text.
-    pub lines: Lines,
-    /// How many samples most columns have.
-    pub samples: usize,
-    /// Single numbers beside the columns.
-    pub scalars: Vec<(String, f64)>,
-    /// What else the file says.
-    pub remarks: Vec<String>,
-    /// The last line of a text, if no line break ends it.
-    pub open_line: Option<u64>,
+/// The first rows of a file.
+struct FirstRows {
+    table: Table,
+    /// Whether these are all.
+    is_whole: bool,
+    decimal: Option<DecimalSign>,
 }
 
 impl Table {
-    /// The table in a file, or on standard input as `-`.
+    /// Reads the table in a file, or on standard input as `-`.
     ///
     /// # Errors
     /// [`IoError::Read`] if it cannot be read, otherwise as [`Table::parse`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        Self::read_below(path, 0)
+        Self::read_with(path, &ReadOptions::default())
     }
 
-    /// The table in a file that begins below some lines of text, which a measuring program wrote
-    /// above it.
+    /// Reads the table in a file as [`Table::read`] does, with options.
     ///
     /// # Errors
-    /// As [`Table::read`], and [`IoError::NothingToSkip`] if the file is no text.
-    pub fn read_below(path: impl AsRef<Path>, lines: u64) -> Result<Self, IoError> {
-        Ok(Self::first_rows(Source::open(path.as_ref())?, lines, usize::MAX)?.0)
+    /// As [`Table::read`], and [`IoError::NothingToSkip`] for lines to be skipped in a file that is
+    /// no text.
+    pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, IoError> {
+        Ok(Self::first_rows(Source::open(path.as_ref())?, options, usize::MAX)?.table)
     }
 
-    /// The table in the bytes of a file; `file` is how messages call it.
+    /// Reads the table in the bytes of a file; `file` is its name in messages.
     ///
     /// # Errors
     /// [`IoError::Empty`] without data, [`IoError::Ragged`] where the number of fields changes,
-    /// [`IoError::AboveTable`] where that is because something stands above it,
+    /// [`IoError::AboveTable`] where that is because of text above the table,
     /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
-    /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`].
+    /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`],
+    /// [`IoError::TooLarge`] beyond the [`Limits`](crate::Limits).
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
-        Ok(Self::first_rows(Source::new(file.into(), bytes)?, 0, usize::MAX)?.0)
+        Self::parse_with(file, bytes, &ReadOptions::default())
     }
 
-    /// The table below some lines of text, of a text at most the first `limit` rows or few more; and
-    /// whether these are all.
+    /// Reads the table in the bytes of a file as [`Table::parse`] does, with options.
+    ///
+    /// # Errors
+    /// As [`Table::parse`], and [`IoError::NothingToSkip`].
+    pub fn parse_with(
+        file: impl Into<String>,
+        bytes: &[u8],
+        options: &ReadOptions,
+    ) -> Result<Self, IoError> {
+        Ok(Self::first_rows(Source::new(file.into(), bytes)?, options, usize::MAX)?.table)
+    }
+
+    /// Reads a table, of a text at most the first `limit` rows and one more.
     fn first_rows(
         mut source: Source<'_>,
-        skip: u64,
+        options: &ReadOptions,
         limit: usize,
-    ) -> Result<(Self, bool), IoError> {
+    ) -> Result<FirstRows, IoError> {
         let (file, gzip, utf16) = (source.file.clone(), source.gzip, source.utf16);
-        let mut whole = true;
+        let (mut is_whole, mut decimal) = (true, None);
         let contents = match source.kind() {
             Kind::Text => {
-                let mut text = TextReader::open(source, skip, None)?;
-                // One more than may be held, to see whether there is one.
-                whole = !text.read(limit.saturating_add(1))?;
-                text.finish()?
+                let mut text = TextReader::open(source, options, Wanted::default())?;
+                let has_ended = text.read(&mut |rows| {
+                    rows.check_numbers()?;
+                    is_whole = rows.samples() <= limit;
+                    rows.truncate(limit.saturating_add(1));
+                    let flow = [ControlFlow::Break(()), ControlFlow::Continue(())];
+                    Ok::<_, IoError>(flow[usize::from(is_whole)])
+                })?;
+                decimal = text.rows().decimal();
+                let end = text.end().filter(|_| has_ended && is_whole);
+                text.finish(end.unwrap_or_default())?
             }
             Kind::Json => return Err(IoError::JsonRecord { file }),
-            Kind::Mat5 | Kind::Uff if skip > 0 => return Err(IoError::NothingToSkip { file }),
-            Kind::Mat5 => mat::read(&file, &source.bytes()?)?,
-            Kind::Uff => uff::read(&file, &source.bytes()?)?,
+            Kind::Mat5 | Kind::Uff if options.skip_lines > 0 => {
+                return Err(IoError::NothingToSkip { file });
+            }
+            Kind::Mat5 => mat::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
+            Kind::Uff => uff::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
         let names = contents.columns.iter().map(|column| column.name.clone()).collect();
-        Ok((Self { file, gzip, utf16, names, contents }, whole))
+        let table = Self { file, gzip, utf16, names, contents };
+        Ok(FirstRows { table, is_whole, decimal })
     }
 
     /// How messages call the file.
@@ -187,7 +204,7 @@ impl Table {
         &self.contents.scalars
     }
 
-    /// What the file says besides: its units, or what was left out of it.
+    /// Further information from the file: its units, or what was left out of it.
     pub fn remarks(&self) -> &[String] {
         &self.contents.remarks
     }
@@ -223,10 +240,17 @@ impl Table {
         self.contents.lines.place(sample)
     }
 
-    /// The columns there are, for a message: `1 "time", 2 "force"`.
+    /// List of the columns, for a message: `1 "time", 2 "force"`; of the first ones if there are very
+    /// many.
     pub fn available(&self) -> String {
-        let columns: Vec<String> = self.filled_columns().map(|c| self.label(c)).collect();
-        columns.join(", ")
+        let mut columns = self.filled_columns();
+        let mut list: Vec<String> =
+            columns.by_ref().take(MOST_LISTED).map(|c| self.label(c)).collect();
+        let others = columns.count();
+        if others > 0 {
+            list.push(format!("… ({others} more)"));
+        }
+        list.join(", ")
     }
 
     /// Index, counted from 0, of the column with this name or, failing that, with this number
@@ -380,18 +404,7 @@ impl Table {
     pub fn label(&self, column: usize) -> String {
         match self.names[column].as_str() {
             "" => format!("{}", column + 1),
-            name => format!("{} \"{name}\"", column + 1),
+            name => format!("{} \"{}\"", column + 1, escaped(name)),
         }
-    }
-}
-
-impl Contents {
-    /// Says how many samples most columns have, or the longest of as many.
-    pub fn with_usual_length(mut self) -> Self {
-        let lengths: Vec<usize> =
-            self.columns.iter().filter_map(|c| c.values.as_ref().ok()).map(Vec::len).collect();
-        let votes = |len: usize| (lengths.iter().filter(|l| **l == len).count(), len);
-        self.samples = lengths.iter().copied().max_by_key(|l| votes(*l)).unwrap_or(0);
-        self
     }
 }

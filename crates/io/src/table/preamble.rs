@@ -1,71 +1,66 @@
-//! Where the table begins in a text that has something else above it.
+//! The line on which a table begins below other text.
 
-use csv::ByteRecord;
+use super::dialect::{detect, is_comment, is_number};
+use super::fields::{Fields, Layout, Row, RowIter};
 
-use super::dialect::{Delimiter, detect, fields, number, words};
-
-/// Rows looked at: a header, units, and numbers.
+/// Number of rows looked at: a header, units, and numbers.
 const ROWS: usize = 4;
 
-/// Lines that may stand above a table.
-const LONGEST: usize = 200;
+/// Number of lines that may stand above a table.
+const MOST_LINES: usize = 200;
 
-/// Where a table begins.
+/// Beginning of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Beginning {
     /// Line of its first row, counted from 1.
     pub line: u64,
-    /// Fields of each of its rows.
+    /// Number of fields of each of its rows.
     pub fields: usize,
 }
 
-/// The first line from which on rows have the same number of fields, two or more, and are numbers
-/// below at most two rows of words.
-pub(crate) fn table(text: &[u8]) -> Option<Beginning> {
+/// Finds the first line from which on rows have the same number of fields, two or more, and are
+/// numbers below at most two rows of words.
+pub(crate) fn table(text: &[u8], terminator: u8) -> Option<Beginning> {
     let mut rest = text;
-    for line in (1..).take(LONGEST) {
-        if let Some(fields) = begins(rest) {
+    for line in (1..).take(MOST_LINES) {
+        if let Some(fields) = begins(rest, terminator) {
             return Some(Beginning { line, fields });
         }
-        let end = rest.iter().position(|b| *b == b'\n')?;
+        let end = rest.iter().position(|b| *b == terminator)?;
         rest = &rest[end + 1..];
     }
     None
 }
 
-/// How many fields the rows have, if a table begins here.
-fn begins(text: &[u8]) -> Option<usize> {
-    let delimiter = detect(text);
-    let rows = first_rows(text, delimiter);
-    let filled = |row: &ByteRecord| row.iter().rposition(|f| !f.is_empty()).map_or(0, |at| at + 1);
-    let width = rows.first().map(filled).filter(|width| *width > 1)?;
-    let numbers = |row: &ByteRecord| {
-        let count = row.iter().filter(|field| number(field, delimiter).is_some()).count();
-        2 * count >= filled(row)
+/// Number of fields of the rows, if a table begins here.
+fn begins(text: &[u8], terminator: u8) -> Option<usize> {
+    let delimiter = detect(text, terminator);
+    let rows = first_rows(text, Layout { delimiter, terminator });
+    let width = rows.first().map(Fields::filled).filter(|width| *width > 1)?;
+    let numbers = |row: &Fields| {
+        let count = row.iter().filter(|field| is_number(field, delimiter)).count();
+        2 * count >= row.filled()
     };
     let words = rows.iter().take_while(|row| !numbers(row)).count();
     let table = words <= 2
         && rows.len() >= words + 2
         && rows[words..].iter().all(numbers)
-        && rows.iter().all(|row| filled(row) == width);
+        && rows.iter().all(|row| row.filled() == width);
     table.then_some(width)
 }
 
 /// The first rows; none if the first line is empty or a comment.
-fn first_rows(text: &[u8], delimiter: Delimiter) -> Vec<ByteRecord> {
-    let first = text.split(|b| *b == b'\n').next().unwrap_or_default().trim_ascii();
-    if first.is_empty() || first.starts_with(b"#") {
+fn first_rows(text: &[u8], layout: Layout) -> Vec<Fields> {
+    let first = text.split(|b| *b == layout.terminator).next().unwrap_or_default();
+    if first.trim_ascii().is_empty() || is_comment(first.trim_ascii(), layout.delimiter) {
         return Vec::new();
     }
-    match delimiter {
-        Delimiter::Byte(byte) => {
-            fields(text, byte).into_byte_records().flatten().take(ROWS).collect()
-        }
-        Delimiter::Blanks => {
-            let lines = text.split(|b| *b == b'\n').map(|line| words(line).collect());
-            lines.filter(|row: &ByteRecord| !row.is_empty()).take(ROWS).collect()
-        }
-    }
+    let fields = |row: Row<'_>| {
+        let mut fields = Fields::default();
+        fields.split(row.text, layout.delimiter);
+        fields
+    };
+    RowIter::new(text, layout).take(ROWS).map(fields).collect()
 }
 
 #[cfg(test)]
@@ -81,10 +76,10 @@ mod tests {
             ("Rig: 4, left\nGain;3\n\nt;f;x\ns;N;m\n0;1,5;2\n1;2,5;3\n", 4, 3),
             ("Serial 1\nRate 100 Hz\n\n0 1 2 3\n1 2 3 4\n", 4, 4),
         ] {
-            assert_eq!(table(text.as_bytes()), Some(Beginning { line, fields }), "{text}");
+            assert_eq!(table(text.as_bytes(), b'\n'), Some(Beginning { line, fields }), "{text}");
         }
         for text in ["", "only words\n", "x\n1\n2\n", "t,f\n0,1\n", "a,b\nc,d\ne,f\ng,h\n"] {
-            assert_eq!(table(text.as_bytes()), None, "{text}");
+            assert_eq!(table(text.as_bytes(), b'\n'), None, "{text}");
         }
     }
 }

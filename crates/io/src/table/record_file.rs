@@ -7,16 +7,15 @@ use std::path::{Path, PathBuf};
 use mechid_signal::Sampling;
 use nalgebra::DMatrix;
 
-use super::column::{Lines, Unusable};
+use super::blocks::TextEnd;
 use super::rows::Rows;
 use super::source::{Kind, Source};
-use super::text::TextReader;
+use super::text::{TextReader, Wanted};
 use super::time_axis::{self, Steps};
-use super::{Table, TimeAxis};
+use super::{FirstRows, Table, TimeAxis};
+use crate::contents::{DecimalSign, Lines, Unusable};
+use crate::limits::ReadOptions;
 use crate::{IoError, standard};
-
-/// Rows taken from a text at a time.
-const CHUNK: usize = 4096;
 
 /// A record file whose samples need not all be held.
 ///
@@ -25,11 +24,11 @@ const CHUNK: usize = 4096;
 /// held whole.
 ///
 /// ```
-/// use mechid_io::{IoError, RecordFile, TimeAxis};
+/// use mechid_io::{IoError, ReadOptions, RecordFile, TimeAxis};
 ///
 /// let path = std::env::temp_dir().join("mechid-record-file.csv");
 /// std::fs::write(&path, "t,f\n0,1\n1,2\n2,3\n3,4\n4,5\n").unwrap();
-/// let file = RecordFile::open(&path, 0, 2)?;
+/// let file = RecordFile::open(&path, &ReadOptions::default(), 2)?;
 /// assert!(!file.is_whole());
 /// let survey = file.survey(&TimeAxis::Column("t"), &["f"])?;
 /// assert_eq!((survey.sampling.len(), survey.means[0]), (5, 3.0));
@@ -46,10 +45,12 @@ const CHUNK: usize = 4096;
 #[derive(Debug)]
 pub struct RecordFile {
     path: PathBuf,
-    skip: u64,
+    options: ReadOptions,
     /// All samples, or the first ones.
     pub(super) head: Table,
     whole: bool,
+    /// Decimal sign of the first samples.
+    decimal: Option<DecimalSign>,
 }
 
 /// What one pass over some columns tells of them.
@@ -61,6 +62,8 @@ pub struct Survey {
     pub means: Vec<f64>,
     /// Largest magnitude of each, in its unit.
     pub peaks: Vec<f64>,
+    /// Further information from the file, as [`Table::remarks`].
+    pub remarks: Vec<String>,
 }
 
 /// Some rows of the columns of a file.
@@ -71,23 +74,27 @@ struct Chunk<'a> {
     lines: &'a Lines,
 }
 
-/// What rows read again go to, with the first of them; says whether to go on.
+/// Callback for rows read again and the index of the first of them; says whether to go on.
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file, or standard input as `-`, below some lines of text; of a text at most `held`
-    /// rows are held.
+    /// Opens a file, or standard input as `-`; of a text at most `held` rows are held.
     ///
     /// # Errors
-    /// As [`Table::read_below`].
-    pub fn open(path: impl AsRef<Path>, skip: u64, held: usize) -> Result<Self, IoError> {
+    /// As [`Table::read_with`].
+    pub fn open(
+        path: impl AsRef<Path>,
+        options: &ReadOptions,
+        held: usize,
+    ) -> Result<Self, IoError> {
         let path = path.as_ref().to_owned();
         let source = Source::open(&path)?;
         let file = !standard::is_input(&path) && fs::metadata(&path).is_ok_and(|m| m.is_file());
         let again = file && source.kind() == Kind::Text;
         let limit = if again { held } else { usize::MAX };
-        let (head, whole) = Table::first_rows(source, skip, limit)?;
-        Ok(Self { path, skip, head, whole })
+        let FirstRows { table: head, is_whole: whole, decimal } =
+            Table::first_rows(source, options, limit)?;
+        Ok(Self { path, options: *options, head, whole, decimal })
     }
 
     /// The table; only the first of its samples if the file is not held whole.
@@ -119,7 +126,7 @@ impl RecordFile {
         let (mut len, mut sums, mut peaks) = (0, vec![0.0; count], vec![0.0_f64; count]);
         let mut steps = Steps::default();
         let known = if self.whole { Some(self.head.sampling(time, wanted)?) } else { None };
-        self.chunks(&columns, &mut |chunk| {
+        let end = self.chunks(&columns, &mut |chunk| {
             for (c, values) in chunk.columns[..count].iter().enumerate() {
                 sums[c] = values.iter().fold(sums[c], |sum, v| sum + v);
                 peaks[c] = values.iter().fold(peaks[c], |peak, v| peak.max(v.abs()));
@@ -142,7 +149,11 @@ impl RecordFile {
             },
         };
         let means = sums.into_iter().map(|sum| sum / len as f64).collect();
-        Ok(Survey { sampling, means, peaks })
+        let remarks = match end {
+            Some(end) => end.remark().into_iter().collect(),
+            None => self.head.remarks().to_vec(),
+        };
+        Ok(Survey { sampling, means, peaks, remarks })
     }
 
     /// Takes the samples `window` of the columns `wanted` in blocks of so many rows, each beginning
@@ -217,19 +228,20 @@ impl RecordFile {
         }
     }
 
-    /// Every sample of some columns, by their indices, in order; stops where `take` says so.
+    /// Passes every sample of some columns, by their indices, in order until `take` breaks; returns
+    /// the end of a text that was read again.
     fn chunks<E: From<IoError>>(
         &self,
         columns: &[usize],
         take: &mut dyn FnMut(Chunk<'_>) -> Result<ControlFlow<()>, E>,
-    ) -> Result<(), E> {
+    ) -> Result<Option<TextEnd>, E> {
         if self.whole {
             let values = columns.iter().map(|c| self.head.values(*c));
             let values = values.collect::<Result<Vec<_>, _>>()?;
             let lines = &self.head.contents.lines;
-            return take(Chunk { first: 0, columns: &values, lines }).map(|_| ());
+            return take(Chunk { first: 0, columns: &values, lines }).map(|_| None);
         }
-        let mut reader = self.rows(columns, &mut |first, rows| {
+        let reader = self.rows(columns, &mut |first, rows| {
             let values = columns.iter().map(|c| rows.column(*c).values.as_deref().ok());
             match values.collect::<Option<Vec<_>>>() {
                 Some(columns) => take(Chunk { first, columns: &columns, lines: rows.lines() }),
@@ -242,11 +254,11 @@ impl RecordFile {
                 return Err(self.unusable(*column, why).into());
             }
         }
-        Ok(())
+        Ok(reader.end())
     }
 
-    /// Reads a text again, of some columns the numbers, a few rows at a time of which `take` is told
-    /// the first one; stops where it says so. What is left says what is wrong with a column.
+    /// Reads the numbers of some columns of a text again, block by block, until `take` breaks. The
+    /// reader that is left knows what is wrong with a column.
     pub(super) fn rows<E: From<IoError>>(
         &self,
         columns: &[usize],
@@ -255,17 +267,16 @@ impl RecordFile {
         let mut once = columns.to_vec();
         once.sort_unstable();
         once.dedup();
-        let mut reader = TextReader::open(Source::open(&self.path)?, self.skip, Some(once))?;
+        let wanted = Wanted { columns: Some(once), decimal: self.decimal };
+        let mut reader = TextReader::open(Source::open(&self.path)?, &self.options, wanted)?;
         let mut first = 0;
-        loop {
-            let more = reader.read(CHUNK)?;
-            let rows = reader.rows();
-            if take(first, rows)?.is_break() || !more {
-                return Ok(reader);
-            }
+        reader.read(&mut |rows| {
+            let flow = take(first, rows)?;
             first = rows.samples();
             rows.forget();
-        }
+            Ok::<_, E>(flow)
+        })?;
+        Ok(reader)
     }
 
     pub(super) fn unusable(&self, column: usize, why: &Unusable) -> IoError {

@@ -1,23 +1,29 @@
 //! Rows of fields into columns of numbers, none of which is held as text.
 
-use csv::ByteRecord;
-
-use super::Contents;
-use super::column::{Axis, Column, Lines, Place, Unusable};
-use super::dialect::{Delimiter, number};
+use super::batch::{BadRow, Batch, Plan};
+use super::blocks::Block;
+use super::dialect::is_number;
+use super::fields::{Fields, Layout, RowIter};
 use crate::IoError;
+use crate::contents::{Axis, Column, Contents, DecimalSign, Lines, Place, Unusable};
+use crate::limits::{Limit, Limits};
 
 /// Columns that grow row by row.
+#[derive(Debug)]
 pub(super) struct Rows {
     file: String,
-    delimiter: Delimiter,
-    /// Nothing before the first row.
-    shape: Option<Shape>,
+    layout: Layout,
+    limits: Limits,
+    /// Decimal sign of the numbers, as far as it is known.
+    decimal: Option<DecimalSign>,
+    /// Line and number of fields of the first row, all and up to the last that is not empty.
+    first: Option<FirstRow>,
     columns: Vec<Column>,
-    /// Columns whose fields are read; all of them, once they are known, if nothing is said.
+    /// Columns to read; `None` before the first row if all are wanted.
     wanted: Option<Vec<usize>>,
     has_header: bool,
     has_units: bool,
+    has_samples: bool,
     samples: usize,
     lines: Lines,
     /// Rows of empty fields not yet followed by another one: line and number of fields. At the end
@@ -25,25 +31,36 @@ pub(super) struct Rows {
     empty: Vec<(u64, usize)>,
 }
 
-/// The first row: its line, and its fields, all of them and up to the last that is not empty.
+/// The first row, which all others are like.
 #[derive(Debug, Clone, Copy)]
-struct Shape {
+struct FirstRow {
     line: u64,
+    /// Number of fields.
     width: usize,
+    /// The same up to the last that is not empty.
     filled: usize,
 }
 
 impl Rows {
-    /// No rows yet; the fields of the columns `wanted` will be read, or of all.
-    pub fn new(file: String, delimiter: Delimiter, wanted: Option<Vec<usize>>) -> Self {
+    /// No rows yet; the columns `wanted` will be read, by their indices, or all.
+    pub fn new(
+        file: String,
+        layout: Layout,
+        limits: Limits,
+        decimal: Option<DecimalSign>,
+        wanted: Option<Vec<usize>>,
+    ) -> Self {
         Self {
             file,
-            delimiter,
-            shape: None,
+            layout,
+            limits,
+            decimal,
+            first: None,
             columns: Vec::new(),
             wanted,
             has_header: false,
             has_units: false,
+            has_samples: false,
             samples: 0,
             lines: Lines::default(),
             empty: Vec::new(),
@@ -52,7 +69,7 @@ impl Rows {
 
     /// Line of the first row, if there was one.
     pub fn first_line(&self) -> Option<u64> {
-        self.shape.map(|shape| shape.line)
+        self.first.map(|first| first.line)
     }
 
     /// Number of columns.
@@ -60,108 +77,197 @@ impl Rows {
         self.columns.len()
     }
 
-    /// Samples so far.
+    /// Number of samples so far.
     pub fn samples(&self) -> usize {
         self.samples
     }
 
-    /// A column, by its index; it has the samples since [`Rows::forget`].
+    /// Decimal sign of the numbers so far.
+    pub fn decimal(&self) -> Option<DecimalSign> {
+        self.decimal
+    }
+
+    /// A column, by its index, with the samples since [`Rows::forget`].
     pub fn column(&self, column: usize) -> &Column {
         &self.columns[column]
     }
 
-    /// Where the samples since [`Rows::forget`] stand.
+    /// Lines of the samples since [`Rows::forget`].
     pub fn lines(&self) -> &Lines {
         &self.lines
     }
 
-    /// Forgets the samples so far, but neither their number nor what is wrong with a column.
+    /// Forgets the samples so far, but neither their number nor why a column cannot be used.
     pub fn forget(&mut self) {
         for values in self.columns.iter_mut().filter_map(|column| column.values.as_mut().ok()) {
             values.clear();
         }
-        self.lines = Lines::default();
+        self.lines.clear();
     }
 
-    /// One more row.
-    pub fn push(&mut self, line: u64, fields: &ByteRecord) -> Result<(), IoError> {
-        if fields.iter().all(<[u8]>::is_empty) {
-            self.empty.push((line, fields.len()));
-            return Ok(());
+    /// Keeps at most the first samples, of those since the beginning.
+    pub fn truncate(&mut self, samples: usize) {
+        for values in self.columns.iter_mut().filter_map(|column| column.values.as_mut().ok()) {
+            values.truncate(samples);
         }
-        for (line, width) in std::mem::take(&mut self.empty) {
-            let blank: ByteRecord = std::iter::repeat_n("", width).collect();
-            self.take(line, &blank)?;
-        }
-        self.take(line, fields)
+        self.samples = self.samples.min(samples);
     }
 
-    fn take(&mut self, line: u64, fields: &ByteRecord) -> Result<(), IoError> {
-        let filled = fields.iter().rposition(|field| !field.is_empty()).map_or(0, |last| last + 1);
-        match self.shape {
-            None => {
-                let shape = Shape { line, width: fields.len(), filled };
-                self.shape = Some(shape);
-                self.columns = (0..shape.width).map(|_| new_column()).collect();
-                self.wanted.get_or_insert_with(|| (0..shape.width).collect());
-                if self.take_header(fields) {
-                    return Ok(());
+    /// Takes the names and units of the columns from the beginning of the text, until a row of
+    /// samples follows; returns the offset of that row in the block.
+    pub fn begin(&mut self, block: &Block) -> Result<usize, IoError> {
+        if self.has_samples {
+            return Ok(0);
+        }
+        let mut fields = Fields::default();
+        for row in RowIter::new(&block.text, self.layout) {
+            let line = block.line + row.line;
+            if row.text.len() > self.limits.row_bytes {
+                return Err(self.bad_row(BadRow::TooLong { line }));
+            }
+            fields.split(row.text, self.layout.delimiter);
+            if fields.filled() == 0 {
+                continue;
+            }
+            match self.first {
+                None => {
+                    self.take_first(line, &fields)?;
+                    if self.has_header {
+                        continue;
+                    }
+                }
+                Some(_) => {
+                    let fits = self.plan().check(line, fields.len(), fields.filled());
+                    fits.map_err(|bad| self.bad_row(bad))?;
+                    if !self.has_units && self.take_units(&fields) {
+                        continue;
+                    }
                 }
             }
-            // Fields beyond either end are forgiven where they are empty: rigs end some lines with
-            // a delimiter and others not.
-            Some(first) => {
-                let (got, expected) = (fields.len(), first.filled);
-                if got < expected || filled > first.width {
-                    return Err(IoError::Ragged { file: self.file.clone(), line, got, expected });
-                }
+            for &column in self.wanted.iter().flatten() {
+                self.columns[column].filled |= !fields.get(column).is_empty();
             }
+            self.has_samples = true;
+            return Ok(row.at);
         }
-        if self.take_units(fields) {
-            return Ok(());
-        }
-        for &c in self.wanted.iter().flatten() {
-            let (column, field) = (&mut self.columns[c], fields.get(c).unwrap_or_default());
-            column.filled |= self.samples == 0 && !field.is_empty();
-            let Ok(values) = &mut column.values else { continue };
-            match value(line, field, self.delimiter) {
-                Ok(value) => values.push(value),
-                Err(wrong) => column.values = Err(wrong),
-            }
-        }
-        self.lines.push(self.samples, line);
-        self.samples += 1;
-        Ok(())
+        Ok(block.text.len())
     }
 
-    /// Takes the names of the columns, if the first row has any field that is no number.
-    fn take_header(&mut self, fields: &ByteRecord) -> bool {
-        self.has_header =
-            fields.iter().any(|field| !field.is_empty() && number(field, self.delimiter).is_none());
+    /// Takes the number of columns from the first row and, if any of its fields is no number, their
+    /// names.
+    fn take_first(&mut self, line: u64, fields: &Fields) -> Result<(), IoError> {
+        let width = fields.len();
+        if width > self.limits.columns {
+            let (at, limit) = (Place::Line(line), Limit::Columns(self.limits.columns));
+            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
+        }
+        self.first = Some(FirstRow { line, width, filled: fields.filled() });
+        let empty = || Column {
+            name: String::new(),
+            filled: false,
+            values: Ok(Vec::new()),
+            axis: Axis::Unknown,
+            about: String::new(),
+        };
+        self.columns = std::iter::repeat_with(empty).take(width).collect();
+        self.wanted.get_or_insert_with(|| (0..width).collect());
+        let is_name = |field: &[u8]| !field.is_empty() && !is_number(field, self.layout.delimiter);
+        self.has_header = fields.iter().any(is_name);
         if self.has_header {
-            for (column, field) in self.columns.iter_mut().zip(fields) {
+            for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
                 column.name = String::from_utf8_lossy(field).into_owned();
                 column.filled = !field.is_empty();
             }
         }
-        self.has_header
+        Ok(())
     }
 
     /// Takes the units of the columns, if the row below the names has no number at all.
-    fn take_units(&mut self, fields: &ByteRecord) -> bool {
-        let below_names = self.has_header && self.samples == 0 && !self.has_units;
-        let wordy = fields.iter().all(|field| number(field, self.delimiter).is_none());
-        self.has_units |= below_names && wordy;
-        if below_names && wordy {
-            for (column, field) in self.columns.iter_mut().zip(fields) {
+    fn take_units(&mut self, fields: &Fields) -> bool {
+        self.has_units =
+            self.has_header && !fields.iter().any(|field| is_number(field, self.layout.delimiter));
+        if self.has_units {
+            for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
                 column.about = String::from_utf8_lossy(field).into_owned();
             }
         }
-        below_names && wordy
+        self.has_units
+    }
+
+    /// What is known before the next rows are read.
+    pub fn plan(&self) -> Plan {
+        let (width, filled) = self.first.map_or((0, 0), |first| (first.width, first.filled));
+        Plan {
+            layout: self.layout,
+            width,
+            filled,
+            wanted: self.wanted.clone().unwrap_or_default(),
+            decimal: self.decimal,
+            row_bytes: self.limits.row_bytes,
+        }
+    }
+
+    /// Whether rows were read on the assumption of another decimal sign than that of the rows before.
+    pub fn contradicts(&self, batch: &Batch) -> bool {
+        self.decimal.is_some() && batch.decimal.is_some() && self.decimal != batch.decimal
+    }
+
+    /// Appends the rows of the next block.
+    ///
+    /// # Errors
+    /// [`IoError::Ragged`] and [`IoError::TooLarge`] for a row that does not fit.
+    pub fn append(&mut self, batch: &mut Batch) -> Result<(), IoError> {
+        let plan = self.plan();
+        if batch.samples > 0 {
+            for (line, fields) in std::mem::take(&mut self.empty) {
+                plan.check(line, fields, 0).map_err(|bad| self.bad_row(bad))?;
+                for column in &plan.wanted {
+                    let values = &mut self.columns[*column].values;
+                    if values.is_ok() {
+                        *values = Err(Unusable::Empty { line });
+                    }
+                }
+                self.lines.push(self.samples, line);
+                self.samples += 1;
+            }
+        }
+        for (at, column) in plan.wanted.iter().enumerate() {
+            let column = &mut self.columns[*column];
+            match (&mut column.values, batch.unusable[at].take()) {
+                (Err(_), _) => {}
+                (values, Some(why)) => *values = Err(why),
+                (Ok(values), None) if values.is_empty() => {
+                    std::mem::swap(values, &mut batch.columns[at]);
+                }
+                (Ok(values), None) => values.extend_from_slice(&batch.columns[at]),
+            }
+        }
+        self.lines.append(self.samples, &batch.lines);
+        self.samples += batch.samples;
+        self.empty.append(&mut batch.empty);
+        self.decimal = self.decimal.or(batch.decimal);
+        batch.bad_row.map_or(Ok(()), |bad| Err(self.bad_row(bad)))
+    }
+
+    fn bad_row(&self, bad: BadRow) -> IoError {
+        let file = self.file.clone();
+        match bad {
+            BadRow::Ragged { line, fields } => {
+                let expected = self.first.map_or(0, |first| first.filled);
+                IoError::Ragged { file, line, got: fields, expected }
+            }
+            BadRow::TooLong { line } => {
+                let limit = Limit::RowBytes(self.limits.row_bytes);
+                IoError::TooLarge { file, at: Place::Line(line), limit }
+            }
+        }
     }
 
     /// The columns with all samples since [`Rows::forget`].
-    pub fn finish(self, format: &str) -> Result<Contents, IoError> {
+    ///
+    /// # Errors
+    /// [`IoError::Empty`] without samples.
+    pub fn finish(self) -> Result<Contents, IoError> {
         if self.samples == 0 {
             let found = match self.has_header {
                 true => "there is a header and nothing below it",
@@ -169,30 +275,27 @@ impl Rows {
             };
             return Err(IoError::Empty { file: self.file, found });
         }
+        let comma = match self.decimal {
+            Some(DecimalSign::Comma) => ", decimal comma",
+            _ => "",
+        };
         Ok(Contents {
-            format: format.into(),
+            format: format!("{}{comma}", self.layout.delimiter.name()),
             columns: self.columns,
             lines: self.lines,
             samples: self.samples,
             ..Contents::default()
         })
     }
-}
 
-fn new_column() -> Column {
-    let (name, about) = (String::new(), String::new());
-    Column { name, filled: false, values: Ok(Vec::new()), axis: Axis::Unknown, about }
-}
-
-/// The number in a field, or what is wrong with it.
-fn value(line: u64, field: &[u8], delimiter: Delimiter) -> Result<f64, Unusable> {
-    match number(field, delimiter) {
-        Some(value) if value.is_finite() => Ok(value),
-        Some(value) => Err(Unusable::NotFinite { at: Place::Line(line), value }),
-        None if field.is_empty() => Err(Unusable::Empty { line }),
-        None => {
-            let text = String::from_utf8_lossy(field).chars().take(40).collect();
-            Err(Unusable::Text { line, text })
+    /// Whether more numbers are held than the limit allows.
+    pub fn check_numbers(&self) -> Result<(), IoError> {
+        let width = self.wanted.as_ref().map_or(0, Vec::len);
+        if self.samples.saturating_mul(width) > self.limits.numbers {
+            let at = self.lines.place(self.samples.saturating_sub(1));
+            let limit = Limit::Numbers(self.limits.numbers);
+            return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
         }
+        Ok(())
     }
 }

@@ -6,7 +6,9 @@ use std::path::Path;
 use encoding_rs_io::DecodeReaderBytesBuilder;
 use flate2::bufread::MultiGzDecoder;
 
-use crate::{IoError, standard};
+use crate::contents::Place;
+use crate::limits::{Limit, Limits};
+use crate::{IoError, escaped, standard};
 
 /// Bytes asked of the operating system at a time.
 const CHUNK: usize = 1 << 16;
@@ -26,7 +28,7 @@ pub(crate) struct Source<'a> {
     pub utf16: bool,
     /// Its first bytes, which stand in `reader` too.
     head: Vec<u8>,
-    pub reader: Box<dyn BufRead + 'a>,
+    pub reader: Box<dyn BufRead + Send + 'a>,
 }
 
 /// What a file is, by its first bytes.
@@ -52,13 +54,14 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Looks at the first bytes of a stream; `file` is how messages call it.
-    pub fn new(file: String, mut raw: impl BufRead + 'a) -> Result<Self, IoError> {
+    /// Looks at the first bytes of a stream; `file` is its name in messages.
+    pub fn new(file: String, mut raw: impl BufRead + Send + 'a) -> Result<Self, IoError> {
+        let file = escaped(&file).into_owned();
         let (mut magic, mut gzip, mut utf16) = (Vec::new(), false, false);
         let looked = raw.by_ref().take(2).read_to_end(&mut magic).and_then(|_| {
             gzip = magic == [0x1f, 0x8b];
             let whole = Cursor::new(magic).chain(raw);
-            let stream: Box<dyn BufRead + 'a> = if gzip {
+            let stream: Box<dyn BufRead + Send + 'a> = if gzip {
                 Box::new(BufReader::with_capacity(CHUNK, MultiGzDecoder::new(whole)))
             } else {
                 Box::new(whole)
@@ -86,7 +89,7 @@ impl<'a> Source<'a> {
             Kind::Hdf5
         } else if is_uff(head) {
             Kind::Uff
-        } else if head.contains(&0) {
+        } else if is_binary(head) {
             Kind::Unknown
         } else if is_json(head) {
             Kind::Json
@@ -95,10 +98,22 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// All that is left to read.
-    pub fn bytes(&mut self) -> Result<Vec<u8>, IoError> {
+    /// Last byte of a line: a line feed, or a carriage return in a text without any.
+    pub fn terminator(&self) -> u8 {
+        let is_old = self.head.contains(&b'\r') && !self.head.contains(&b'\n');
+        if is_old { b'\r' } else { b'\n' }
+    }
+
+    /// Reads the rest of the file; what gzip unpacks is held to the limit.
+    pub fn bytes(&mut self, limits: &Limits) -> Result<Vec<u8>, IoError> {
+        let limit = if self.gzip { limits.unpacked_bytes } else { usize::MAX };
         let mut bytes = Vec::new();
-        match self.reader.read_to_end(&mut bytes) {
+        let most = (limit as u64).saturating_add(1);
+        match self.reader.by_ref().take(most).read_to_end(&mut bytes) {
+            Ok(_) if bytes.len() > limit => {
+                let (at, limit) = (Place::Byte(limit), Limit::UnpackedBytes(limit));
+                Err(IoError::TooLarge { file: self.file.clone(), at, limit })
+            }
             Ok(_) => Ok(bytes),
             Err(source) => Err(failed(&self.file, self.gzip, source)),
         }
@@ -106,7 +121,9 @@ impl<'a> Source<'a> {
 }
 
 /// The first bytes of a stream, and the stream with them still in it.
-fn peek<'a>(mut stream: Box<dyn BufRead + 'a>) -> io::Result<(Vec<u8>, Box<dyn BufRead + 'a>)> {
+fn peek<'a>(
+    mut stream: Box<dyn BufRead + Send + 'a>,
+) -> io::Result<(Vec<u8>, Box<dyn BufRead + Send + 'a>)> {
     let mut head = Vec::new();
     stream.by_ref().take(HEAD).read_to_end(&mut head)?;
     Ok((head.clone(), Box::new(Cursor::new(head).chain(stream))))
@@ -116,6 +133,15 @@ fn peek<'a>(mut stream: Box<dyn BufRead + 'a>) -> io::Result<(Vec<u8>, Box<dyn B
 fn is_utf16(head: &[u8]) -> bool {
     let little = head.starts_with(&[0xff, 0xfe]) && !head.starts_with(&[0xff, 0xfe, 0, 0]);
     little || head.starts_with(&[0xfe, 0xff])
+}
+
+/// Whether the first bytes are no text: zeros may stand only at its end, where a preallocated file has
+/// them.
+fn is_binary(head: &[u8]) -> bool {
+    let text = head.len() - head.iter().rev().take_while(|b| **b == 0).count();
+    let is_control = |b: &u8| *b < b' ' && !b.is_ascii_whitespace();
+    text < head.len() && (text == 0 || head[..text].iter().any(is_control))
+        || head[..text].contains(&0)
 }
 
 /// Whether a text begins as an object of JSON does, or a list of objects.
@@ -135,7 +161,7 @@ pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
 }
 
 /// Whether the first line that is not empty holds -1 in its columns 5 and 6, and the next one the
-/// number of a dataset in its first six.
+/// number of a dataset in its first six, or a misplaced 58b.
 fn is_uff(head: &[u8]) -> bool {
     let mut lines =
         head.split(|b| *b == b'\n').map(<[u8]>::trim_ascii_end).skip_while(|line| line.is_empty());
@@ -143,6 +169,10 @@ fn is_uff(head: &[u8]) -> bool {
         let field = line.get(..6).unwrap_or(line).trim_ascii();
         !field.is_empty() && field.iter().all(u8::is_ascii_digit)
     };
+    let binary = |line: &[u8]| {
+        let word = line.trim_ascii_start().get(..3).unwrap_or_default();
+        word.eq_ignore_ascii_case(b"58b")
+    };
     lines.next() == Some(b"    -1")
-        && lines.next().is_some_and(|line| line.starts_with(b"  ") && number(line))
+        && lines.next().is_some_and(|line| line.starts_with(b"  ") && number(line) || binary(line))
 }

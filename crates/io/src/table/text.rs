@@ -1,149 +1,229 @@
-//! Delimited text into columns of numbers, as many rows at a time as are asked for.
+//! Delimited text into columns of numbers, on all cores and in the order of the file.
 
-use std::io::{self, BufRead, Cursor, Read as _};
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::thread;
 
-use csv::ByteRecord;
-
-use super::Contents;
-use super::dialect::{self, COMMENT, Delimiter};
-use super::numbered_lines::NumberedLines;
+use super::batch::{Batch, Plan};
+use super::blocks::{Block, Blocks, TextEnd};
+use super::dialect;
+use super::fields::Layout;
 use super::preamble::{self, Beginning};
 use super::rows::Rows;
-use super::source::{BYTE_ORDER_MARK, Source, failed};
+use super::source::Source;
 use crate::IoError;
+use crate::contents::{Contents, DecimalSign};
+use crate::limits::ReadOptions;
+
+/// Largest number of threads that read rows; more would wait for memory.
+const MOST_THREADS: usize = 8;
 
 /// A text on its way into columns.
+#[derive(Debug)]
 pub(super) struct TextReader<'a> {
-    file: String,
-    gzip: bool,
-    delimiter: Delimiter,
-    /// Where the table seems to begin, lines counted in the file.
+    layout: Layout,
+    /// Beginning of the table by its looks, lines counted in the file.
     table: Option<Beginning>,
-    stream: Stream<'a>,
-    fields: ByteRecord,
+    blocks: Blocks<'a>,
     rows: Rows,
 }
 
-type Text<'a> = NumberedLines<Box<dyn BufRead + 'a>>;
-
-/// How the fields of a row are told apart.
-enum Stream<'a> {
-    Words(Text<'a>),
-    Fields(Box<csv::Reader<Text<'a>>>),
+/// Which columns of a text to read, and what is known of it.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Wanted {
+    /// Indices of the columns, rising; all if `None`.
+    pub columns: Option<Vec<usize>>,
+    /// Decimal sign, if the text was read before.
+    pub decimal: Option<DecimalSign>,
 }
 
+/// Callback for the rows so far after each block; says whether to go on.
+pub(super) type TakeRows<'a, E> = dyn FnMut(&mut Rows) -> Result<ControlFlow<()>, E> + 'a;
+
 impl<'a> TextReader<'a> {
-    /// Finds out how a text tells fields, below some lines that are skipped; of the columns `wanted`,
-    /// or of all, the numbers will be read.
+    /// Finds the dialect of a text.
     pub fn open(
         source: Source<'a>,
-        skip: u64,
-        wanted: Option<Vec<usize>>,
+        options: &ReadOptions,
+        wanted: Wanted,
     ) -> Result<Self, IoError> {
-        let Source { file, gzip, mut reader, .. } = source;
-        let wrong = |e| failed(&file, gzip, e);
-        for _ in 0..skip {
-            reader.skip_until(b'\n').map_err(wrong)?;
-        }
-        let mut start = dialect::first_lines(&mut reader).map_err(wrong)?;
-        if start.starts_with(BYTE_ORDER_MARK) {
-            start.drain(..BYTE_ORDER_MARK.len());
-        }
-        let delimiter = dialect::detect(&start);
-        let table = preamble::table(&start).map(|t| Beginning { line: skip + t.line, ..t });
-        let text: Box<dyn BufRead + 'a> = Box::new(Cursor::new(start).chain(reader));
-        let lines = NumberedLines::new(text, skip);
-        let stream = match delimiter {
-            Delimiter::Blanks => Stream::Words(lines),
-            Delimiter::Byte(byte) => Stream::Fields(Box::new(dialect::fields(lines, byte))),
-        };
-        let rows = Rows::new(file.clone(), delimiter, wanted);
-        Ok(Self { file, gzip, delimiter, table, stream, fields: ByteRecord::new(), rows })
+        let blocks = Blocks::open(source, options)?;
+        let (start, terminator) = (blocks.start(), blocks.terminator());
+        let delimiter = dialect::detect(start, terminator);
+        let layout = Layout { delimiter, terminator };
+        let decimal =
+            wanted.decimal.or_else(|| dialect::decimal_sign(start, terminator, delimiter));
+        let table = preamble::table(start, terminator)
+            .map(|t| Beginning { line: options.skip_lines + t.line, ..t });
+        let file = blocks.file().to_owned();
+        let rows = Rows::new(file, layout, options.limits, decimal, wanted.columns);
+        Ok(Self { layout, table, blocks, rows })
     }
 
     /// The rows so far.
-    pub fn rows(&mut self) -> &mut Rows {
-        &mut self.rows
+    pub fn rows(&self) -> &Rows {
+        &self.rows
     }
 
-    /// Number of the line read last, if nothing ends it.
-    pub fn open_line(&self) -> Option<u64> {
-        match &self.stream {
-            Stream::Words(text) => text.open_line(),
-            Stream::Fields(reader) => reader.get_ref().open_line(),
-        }
+    /// The end of the text, if it was reached.
+    pub fn end(&self) -> Option<TextEnd> {
+        self.blocks.end()
     }
 
-    /// Reads about so many more samples; whether there may be more still.
-    pub fn read(&mut self, count: usize) -> Result<bool, IoError> {
-        let goal = self.rows.samples().saturating_add(count);
-        while self.rows.samples() < goal {
-            let next = self.stream.next(&mut self.fields);
-            match next.map_err(|e| failed(&self.file, self.gzip, e))? {
-                None => return Ok(false),
-                Some(line) => self.rows.push(line, &self.fields).map_err(|e| self.above_or(e))?,
+    /// Reads rows until the text ends, or `take`, which gets them block by block, breaks; returns
+    /// whether the text has ended.
+    pub fn read<E: From<IoError>>(&mut self, take: &mut TakeRows<'_, E>) -> Result<bool, E> {
+        let (mut block, mut batch) = (Block::default(), Batch::default());
+        // The names come first, and a short text needs no threads.
+        for _ in 0..2 {
+            loop {
+                if !self.blocks.next(self.layout, &mut block)? {
+                    return Ok(true);
+                }
+                let begin = self.rows.begin(&block).map_err(|e| self.above_or(e))?;
+                if begin < block.text.len() {
+                    batch.read(&self.rows.plan(), &block, begin);
+                    break;
+                }
+            }
+            self.rows.append(&mut batch).map_err(|e| self.above_or(e))?;
+            if take(&mut self.rows)?.is_break() {
+                return Ok(false);
             }
         }
-        Ok(true)
+        self.read_in_parallel(take)
     }
 
-    /// What was read, as the contents of a file.
-    pub fn finish(self) -> Result<Contents, IoError> {
-        match self.above() {
+    fn read_in_parallel<E: From<IoError>>(
+        &mut self,
+        take: &mut TakeRows<'_, E>,
+    ) -> Result<bool, E> {
+        let threads = thread::available_parallelism().map_or(1, usize::from).min(MOST_THREADS);
+        let Self { layout, table, blocks, rows } = self;
+        let (layout, plan) = (*layout, rows.plan());
+        let shared = Mutex::new(Shared { blocks, next: 0 });
+        // As many blocks are under way as the threads can work on while others wait to be taken.
+        let (free, freed) = channel();
+        let freed = Mutex::new(freed);
+        let under_way = 2 * threads;
+        (0..under_way).for_each(|_| drop(free.send(Work::default())));
+        let (done, finished) = sync_channel(under_way);
+        thread::scope(|scope| {
+            for _ in 0..threads {
+                let (shared, freed, done, plan) = (&shared, &freed, done.clone(), &plan);
+                scope.spawn(move || worker(layout, plan, shared, freed, &done));
+            }
+            drop(done);
+            let above_or = |e: IoError, rows: &Rows| above_or(*table, rows, e);
+            let mut early = BTreeMap::new();
+            for next in 0.. {
+                let work = loop {
+                    if let Some(work) = early.remove(&next) {
+                        break work;
+                    }
+                    match finished.recv() {
+                        Ok((number, work)) => drop(early.insert(number, work)),
+                        Err(_) => return Ok(true),
+                    }
+                };
+                let mut work: Work = work?;
+                if rows.contradicts(&work.batch) {
+                    work.batch.read(&rows.plan(), &work.block, 0);
+                }
+                rows.append(&mut work.batch).map_err(|e| above_or(e, rows))?;
+                if take(rows)?.is_break() {
+                    break;
+                }
+                drop(free.send(work));
+            }
+            // The threads end where nobody takes their work any more.
+            drop((finished, free));
+            Ok(false)
+        })
+    }
+
+    /// The contents of the file, which ends with `end`.
+    ///
+    /// # Errors
+    /// [`IoError::Empty`] without samples, [`IoError::AboveTable`] if the table seems to begin
+    /// further down.
+    pub fn finish(self, end: TextEnd) -> Result<Contents, IoError> {
+        match above(self.table, &self.rows, self.blocks.file()) {
             Some(above) if self.table.is_some_and(|t| self.rows.width() < t.fields) => Err(above),
             _ => {
-                let open_line = self.open_line();
-                let contents = self.rows.finish(self.delimiter.name())?;
-                Ok(Contents { open_line, ..contents })
+                let (open_line, remarks) = (end.open_line, end.remark().into_iter().collect());
+                Ok(Contents { open_line, remarks, ..self.rows.finish()? })
             }
         }
     }
 
-    /// That rows differ in length is no wonder where something stands above the table.
     fn above_or(&self, error: IoError) -> IoError {
-        match error {
-            IoError::Ragged { .. } => self.above().unwrap_or(error),
-            other => other,
-        }
-    }
-
-    /// That something stands above the table, if it does.
-    fn above(&self) -> Option<IoError> {
-        let Beginning { line, fields } = self.table?;
-        let above = self.rows.first_line()? < line;
-        above.then(|| IoError::AboveTable { file: self.file.clone(), line, fields })
+        above_or(self.table, &self.rows, error)
     }
 }
 
-impl Stream<'_> {
-    /// The fields of the next row, and its line.
-    fn next(&mut self, into: &mut ByteRecord) -> io::Result<Option<u64>> {
-        match self {
-            Stream::Words(text) => {
-                while let Some((line, content)) = text.next_line()? {
-                    into.clear();
-                    dialect::words(content).for_each(|word| into.push_field(word));
-                    if into.get(0).is_some_and(|word| word[0] != COMMENT) {
-                        return Ok(Some(line));
-                    }
-                }
-                Ok(None)
+/// The source of blocks that threads share.
+struct Shared<'a, 'b> {
+    blocks: &'a mut Blocks<'b>,
+    /// Number of the next block.
+    next: usize,
+}
+
+/// A block and its rows.
+#[derive(Debug, Default)]
+struct Work {
+    block: Block,
+    batch: Batch,
+}
+
+/// Reads the rows of one block after the other until the text ends or nobody takes them.
+fn worker(
+    layout: Layout,
+    plan: &Plan,
+    shared: &Mutex<Shared<'_, '_>>,
+    freed: &Mutex<Receiver<Work>>,
+    done: &SyncSender<(usize, Result<Work, IoError>)>,
+) {
+    loop {
+        let Ok(mut work) = lock(freed).recv() else { return };
+        let (number, read) = {
+            let mut shared = lock(shared);
+            let read = shared.blocks.next(layout, &mut work.block);
+            shared.next += 1;
+            (shared.next - 1, read)
+        };
+        let (work, is_last) = match read {
+            Ok(false) => return,
+            Ok(true) => {
+                work.batch.read(plan, &work.block, 0);
+                (Ok(work), false)
             }
-            Stream::Fields(reader) => {
-                if !reader.read_byte_record(into).map_err(plain)? {
-                    return Ok(None);
-                }
-                let from = into.position().map_or(0, csv::Position::line);
-                Ok(Some(reader.get_mut().row_from(from)))
-            }
+            Err(error) => (Err(error), true),
+        };
+        if done.send((number, work)).is_err() || is_last {
+            return;
         }
     }
 }
 
-/// What the operating system or the decompressor said, without the csv reader's words around it.
-fn plain(error: csv::Error) -> io::Error {
-    match error.into_kind() {
-        csv::ErrorKind::Io(e) => e,
-        other => io::Error::other(format!("{other:?}")),
+/// Locks what only a panic elsewhere could have left locked, and that panic is on its way out.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Explains rows that differ in length by what stands above the table, if something does.
+fn above_or(table: Option<Beginning>, rows: &Rows, error: IoError) -> IoError {
+    match &error {
+        IoError::Ragged { file, .. } => above(table, rows, file).unwrap_or(error),
+        _ => error,
     }
+}
+
+/// The error for text above the table, if there is any.
+fn above(table: Option<Beginning>, rows: &Rows, file: &str) -> Option<IoError> {
+    let Beginning { line, fields } = table?;
+    let above = rows.first_line()? < line;
+    above.then(|| IoError::AboveTable { file: file.into(), line, fields })
 }

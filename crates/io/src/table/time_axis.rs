@@ -2,8 +2,9 @@
 
 use mechid_signal::Sampling;
 
-use super::{Axis, Place, Table, time_unit};
+use super::{Table, time_unit};
 use crate::IoError;
+use crate::contents::{Axis, Place};
 
 /// The time axis of columns of a [`Table`].
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Columns of instants that say by their names what they are and in which unit.
 
-use super::Column;
+use crate::contents::Column;
 
 /// Names of a time column, without its unit and in lower case.
 const NAMES: [&str; 2] = ["time", "t"];

@@ -1,28 +1,35 @@
 //! A dataset 58 as a column of a table.
 
 use super::header::Header;
-use super::lines::{Fault, Line, Lines};
+use super::lines::{Line, Lines};
 use super::values::{Binary, printed};
-use crate::table::{Axis, Column};
+use crate::contents::{Axis, Column, Fault};
+use crate::limits::Budget;
 
-/// Abscissa that is not time: frequency, and revolutions or orders of a shaft.
+/// Abscissa types other than time: frequency, and revolutions or orders of a shaft.
 const NOT_TIME: [u32; 3] = [18, 19, 20];
 
-/// Adds the columns of a dataset whose number stands on `id`: one or, for uneven instants, two.
+/// Adds the columns of the dataset whose number stands on `id`: one or, for uneven instants, two.
 pub(crate) fn read(
     lines: &mut Lines<'_>,
     id: &Line<'_>,
     columns: &mut Vec<Column>,
+    budget: &mut Budget,
 ) -> Result<(), Fault> {
     let binary = Binary::of(id)?;
     let header = Header::read(lines)?;
+    if header.count == 0 {
+        return Err(Fault::new(header.form_at, "a function without values"));
+    }
+    // A number takes a byte at least, whatever the header says.
+    let numbers = header.numbers().min(lines.rest().len());
+    let room = (0..if header.is_even { 1 } else { 2 }).try_for_each(|_| budget.take_column());
+    room.and_then(|()| budget.take_numbers(numbers))
+        .map_err(|limit| Fault::too_large(header.form_at, limit))?;
     let values = match binary {
         None => printed(&header, lines)?,
         Some(binary) => binary.read(&header, lines)?,
     };
-    if header.count == 0 {
-        return Err(Fault { at: header.form_at, what: "a function without values".into() });
-    }
     add(header, values, columns);
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The eleven lines that describe a function.
 
-use super::lines::{Fault, Line, Lines, number};
+use super::lines::{Line, Lines, number};
+use crate::contents::Fault;
 
 /// What a dataset 58 says of its function.
 #[derive(Debug)]
@@ -73,7 +74,13 @@ impl Header {
         })
     }
 
-    /// What a person calls the kind of function.
+    /// Number of the numbers in the file: values, each with its instant where the spacing is uneven.
+    pub fn numbers(&self) -> usize {
+        let each = 1 + usize::from(self.is_complex) + usize::from(!self.is_even);
+        self.count.saturating_mul(each)
+    }
+
+    /// Kind of the function, for people.
     pub fn kind(&self) -> String {
         match self.function {
             0 => "a function of unknown kind".into(),

@@ -1,11 +1,6 @@
 //! Lines of a universal file, and numbers in Fortran's fields.
 
-/// What is wrong, and at which byte, counted from 0.
-#[derive(Debug)]
-pub(crate) struct Fault {
-    pub at: usize,
-    pub what: String,
-}
+use crate::contents::Fault;
 
 /// A line and where it begins.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +11,7 @@ pub(crate) struct Line<'a> {
 
 impl Line<'_> {
     pub fn fault(&self, what: impl Into<String>) -> Fault {
-        Fault { at: self.at, what: what.into() }
+        Fault::new(self.at, what)
     }
 }
 
@@ -47,7 +42,7 @@ impl<'a> Lines<'a> {
     /// The next line, which must be there; `missing` says what it means if it is not.
     pub fn required(&mut self, missing: &str) -> Result<Line<'a>, Fault> {
         let at = self.bytes.len();
-        self.next().ok_or_else(|| Fault { at, what: missing.into() })
+        self.next().ok_or_else(|| Fault::new(at, missing))
     }
 
     /// The bytes that are left.

@@ -11,27 +11,27 @@ mod values;
 
 use std::collections::BTreeMap;
 
-use self::lines::{Fault, Lines, is_mark, number};
+use self::lines::{Line, Lines, is_mark, number};
 use crate::IoError;
-use crate::table::{Contents, Place};
+use crate::contents::{Contents, Fault, Place};
+use crate::limits::{Budget, Limits};
 
-/// The functions of a file as columns.
-pub(crate) fn read(file: &str, bytes: &[u8]) -> Result<Contents, IoError> {
+/// Reads the functions of a file as columns.
+pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents, IoError> {
     let mut lines = Lines::new(bytes);
-    match datasets(&mut lines) {
+    match datasets(&mut lines, Budget::new(limits)) {
         Ok(contents) if contents.columns.is_empty() => {
             Err(IoError::Empty { file: file.into(), found: "it has no dataset 58" })
         }
         Ok(contents) => Ok(contents.with_usual_length()),
-        Err(fault) => Err(IoError::Malformed {
-            file: file.into(),
-            at: Place::Line(lines.number_at(fault.at)),
-            what: fault.what,
-        }),
+        Err(fault) => {
+            let at = Place::Line(lines.number_at(fault.at));
+            Err(fault.error(file, at))
+        }
     }
 }
 
-fn datasets(lines: &mut Lines<'_>) -> Result<Contents, Fault> {
+fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault> {
     let mut contents = Contents { format: "universal file".into(), ..Contents::default() };
     let mut skipped: BTreeMap<u32, usize> = BTreeMap::new();
     while let Some(mark) = lines.next() {
@@ -42,10 +42,9 @@ fn datasets(lines: &mut Lines<'_>) -> Result<Contents, Fault> {
             return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
         }
         let id = lines.required("a dataset begins here and has no number")?;
-        let dataset: u32 = number(id.text.get(..6).unwrap_or(id.text))
-            .ok_or_else(|| id.fault("the number of the dataset is missing in columns 1 to 6"))?;
+        let dataset = dataset_number(&id)?;
         match dataset {
-            58 => function::read(lines, &id, &mut contents.columns)?,
+            58 => function::read(lines, &id, &mut contents.columns, &mut budget)?,
             164 => contents.remarks.push(units(lines)?),
             _ => *skipped.entry(dataset).or_default() += 1,
         }
@@ -60,7 +59,20 @@ fn datasets(lines: &mut Lines<'_>) -> Result<Contents, Fault> {
     Ok(contents)
 }
 
-/// What dataset 164 says of the units.
+/// The number of a dataset, in columns 1 to 6 of its first line.
+fn dataset_number(id: &Line<'_>) -> Result<u32, Fault> {
+    let field = id.text.get(..6).unwrap_or(id.text);
+    number(field).ok_or_else(|| {
+        let word = id.text.trim_ascii_start().get(..3).unwrap_or_default();
+        id.fault(if word.eq_ignore_ascii_case(b"58b") {
+            "the number of a binary dataset is 58 in columns 5 and 6, followed by b in column 7"
+        } else {
+            "the number of the dataset is missing in columns 1 to 6"
+        })
+    })
+}
+
+/// The units that dataset 164 describes.
 fn units(lines: &mut Lines<'_>) -> Result<String, Fault> {
     let first = lines.required("the units are cut short")?;
     let code: u32 = number(first.text.get(..10).unwrap_or(first.text))

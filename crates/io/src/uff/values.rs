@@ -3,7 +3,8 @@
 use mechid_signal::counted;
 
 use super::header::Header;
-use super::lines::{Fault, Line, Lines, is_mark, number};
+use super::lines::{Line, Lines, is_mark, number};
+use crate::contents::Fault;
 
 /// How many columns a printed number takes, in single and in double precision.
 const SINGLE: usize = 13;
@@ -11,7 +12,7 @@ const DOUBLE: usize = 20;
 
 /// The printed numbers up to the end of the dataset, whose mark is left to read.
 pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
-    let expected = numbers(header);
+    let expected = header.numbers();
     let mut values = Vec::new();
     while values.len() < expected {
         let line = lines.required("the file is cut short within the values of a dataset 58")?;
@@ -26,18 +27,10 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
         row(header, &line, &mut values)?;
     }
     if values.len() > expected {
-        return Err(Fault {
-            at: lines.at().saturating_sub(1),
-            what: format!("a function of {} has more", counted(expected, "number")),
-        });
+        let what = format!("a function of {} has more", counted(expected, "number"));
+        return Err(Fault::new(lines.at().saturating_sub(1), what));
     }
     Ok(values)
-}
-
-/// Numbers in the file: values, or an instant before each.
-fn numbers(header: &Header) -> usize {
-    let each = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
-    header.count.saturating_mul(each)
 }
 
 /// The numbers of a line, between blanks or, where they touch, by their columns.
@@ -103,7 +96,7 @@ impl Binary {
     /// The numbers, which end where the end of the dataset follows.
     pub fn read(self, header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
         let width = if header.is_double { 8 } else { 4 };
-        let expected = numbers(header);
+        let expected = header.numbers();
         let plain = expected.saturating_mul(width);
         // By the standard instants are single precision, but not every program writes them so.
         let narrow = plain.saturating_sub(4 * header.count);
@@ -113,12 +106,9 @@ impl Binary {
             && ends_after(lines.rest(), narrow);
         let len = if is_mixed { narrow } else { plain };
         if !ends_after(lines.rest(), len) {
-            return Err(Fault {
-                at: lines.at(),
-                what: format!(
-                    "the end of the dataset does not follow {len} bytes of binary values"
-                ),
-            });
+            let what =
+                format!("the end of the dataset does not follow {len} bytes of binary values");
+            return Err(Fault::new(lines.at(), what));
         }
         let mut bytes = lines.take(len);
         let each = 2 + usize::from(header.is_complex);

@@ -3,8 +3,8 @@
 use mechid_io::{IoError, Table, TimeAxis};
 use proptest::prelude::*;
 
-const PLAIN: &[u8] = include_bytes!("../data/plain.mat");
-const COMPRESSED: &[u8] = include_bytes!("../data/compressed.mat");
+const PLAIN: &[u8] = include_bytes!("../../data/plain.mat");
+const COMPRESSED: &[u8] = include_bytes!("../../data/compressed.mat");
 
 pub const FORCE: [f64; 8] = [-3.0, -2.0, 1.0, -1.0, -1.0, 1.0, -2.0, -3.0];
 pub const X: [f64; 8] = [1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125, 0.015625, 0.0078125];
@@ -73,16 +73,19 @@ fn uneven_time_is_refused_with_its_sample() {
     assert!(e.contains("not uniform") && e.contains("up to sample "), "{e}");
 }
 
-/// A file of one vector of doubles, put together by hand.
-fn by_hand(values: &[f64], big: bool) -> Vec<u8> {
+/// A file of one variable of doubles, put together by hand; its lengths are of type `kind`.
+fn by_hand(values: &[f64], (kind, lengths): (u32, &[u8]), big: bool) -> Vec<u8> {
     let word = |v: u32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
     let double = |v: &f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
     let len = u32::try_from(values.len()).unwrap();
     let mut data = Vec::new();
-    // Class 6 (double); size; name; numbers.
-    for v in [6, 8, 6, 0, 5, 8, len, 1, 1, 1] {
+    // Class 6 (double).
+    for v in [6, 8, 6, 0, kind, u32::try_from(lengths.len()).unwrap()] {
         data.extend(word(v));
     }
+    data.extend(lengths);
+    data.resize(data.len().next_multiple_of(8), 0);
+    data.extend([word(1), word(1)].concat());
     data.extend(b"v\0\0\0\0\0\0\0");
     data.extend([word(9), word(8 * len)].concat());
     values.iter().for_each(|v| data.extend(double(v)));
@@ -97,9 +100,36 @@ fn by_hand(values: &[f64], big: bool) -> Vec<u8> {
 #[test]
 fn both_byte_orders_are_read() {
     for big in [false, true] {
-        let table = Table::parse("a.mat", &by_hand(&[1.5, -2.25e300], big)).unwrap();
+        let lengths = [2_u32, 1].map(|v| if big { v.to_be_bytes() } else { v.to_le_bytes() });
+        let file = by_hand(&[1.5, -2.25e300], (5, &lengths.concat()), big);
+        let table = Table::parse("a.mat", &file).unwrap();
         assert_eq!(table.column("v").unwrap(), [1.5, -2.25e300]);
     }
+}
+
+#[test]
+fn lengths_that_are_none_are_refused() {
+    let doubles =
+        |lengths: &[f64]| -> Vec<u8> { lengths.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let words =
+        |lengths: &[i32]| -> Vec<u8> { lengths.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let values = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
+    for (kind, lengths, part) in [
+        (5, words(&[-2, -4]), "a dimension of -2 is no length"),
+        (9, doubles(&[0.5, 16.0]), "a dimension of 0.5 is no length"),
+        (9, doubles(&[f64::NAN, 8.0]), "is no length"),
+        (9, doubles(&[f64::INFINITY, 0.0]), "is no length"),
+        (5, words(&[0, 8]), "a variable of 0 × 8 numbers holds 8"),
+        (5, words(&[1 << 30, 1 << 30, 1 << 30]), "numbers holds 8"),
+        (5, words(&[8]), "a variable has no size"),
+        (5, words(&[1; 65]), "a variable has no size"),
+    ] {
+        let e = Table::parse("a.mat", &by_hand(&values, (kind, &lengths), false)).unwrap_err();
+        assert!(matches!(e, IoError::Malformed { .. }), "{e}");
+        assert!(e.to_string().contains(part), "\"{part}\" is missing in: {e}");
+    }
+    let table = Table::parse("a.mat", &by_hand(&values, (5, &words(&[4, 2])), false)).unwrap();
+    assert_eq!(table.column("v[2]").unwrap(), [5.0, 6.0, 7.0, 8.0]);
 }
 
 #[test]

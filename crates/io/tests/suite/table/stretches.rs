@@ -3,11 +3,14 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use mechid_io::{IoError, RecordFile, Table, TimeAxis};
+use mechid_io::{IoError, Limits, ReadOptions, RecordFile, Table, TimeAxis};
 use nalgebra::DMatrix;
 use proptest::prelude::*;
 
 const TIME: TimeAxis<'_> = TimeAxis::Column("t");
+
+/// One line stands above the table.
+const BELOW: ReadOptions = ReadOptions { skip_lines: 1, limits: Limits::DEFAULT };
 
 /// A text of so many rows with a comment and an empty line now and then, in a folder.
 fn written(text: &str) -> (tempfile::TempDir, PathBuf) {
@@ -31,7 +34,7 @@ fn text(rows: usize) -> String {
 
 /// Both ways to read a file.
 fn both(path: &PathBuf) -> [RecordFile; 2] {
-    let files = [usize::MAX, 3].map(|held| RecordFile::open(path, 1, held).unwrap());
+    let files = [usize::MAX, 3].map(|held| RecordFile::open(path, &BELOW, held).unwrap());
     assert!(files[0].is_whole() && !files[1].is_whole());
     files
 }
@@ -55,7 +58,7 @@ fn blocks(
 #[test]
 fn surveys_and_tables_agree() {
     let (_folder, path) = written(&text(9001));
-    let table = Table::read_below(&path, 1).unwrap();
+    let table = Table::read_with(&path, &BELOW).unwrap();
     let record = table.record(&TIME, &["f", "x"]).unwrap();
     for file in both(&path) {
         let survey = file.survey(&TIME, &["f", "x"]).unwrap();
@@ -102,11 +105,11 @@ fn what_is_wrong_is_said_in_the_same_words() {
     ];
     for text in late {
         let (_folder, path) = written(&text);
-        let said = Table::read_below(&path, 1)
+        let said = Table::read_with(&path, &BELOW)
             .and_then(|table| table.record(&TIME, &["f", "x"]).map(|_| ()))
             .unwrap_err()
             .to_string();
-        let file = RecordFile::open(&path, 1, 3).unwrap();
+        let file = RecordFile::open(&path, &BELOW, 3).unwrap();
         let e = file.survey(&TIME, &["f", "x"]).unwrap_err().to_string();
         assert_eq!(e, said);
         assert!(e.contains("line "), "{e}");

@@ -2,7 +2,7 @@
 
 use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, InitialMotion, IoError, LoadBeyond, MiddleLoad,
-    PerDof, ResponseKind, SchemeChoice, SystemMatrices, read_system,
+    PerDof, ResponseKind, SchemeChoice, SystemMatrices, read_covariance, read_system,
 };
 
 /// A description with these lines in place of the default ones.
@@ -239,14 +239,63 @@ fn wrong_excitations_say_what_is_wrong() {
         let e = parse(&description(SDOF, excitation, "")).and_then(|e| e.force()).unwrap_err();
         assert!(e.to_string().contains(part), "\"{part}\" is missing in: {e}");
     }
-    let alone = description(SDOF, FORCE, "").replace(['[', ']'], "");
-    let e = parse(&alone).unwrap_err().to_string();
-    assert!(
-        e.contains("expected a list, of a single force too: \"excitation\": [{ … }] at"),
-        "{e}"
-    );
+    let number = description(SDOF, "", "").replace("[]", "3");
+    let e = parse(&number).unwrap_err().to_string();
+    assert!(e.contains("excitation: invalid type: integer `3`, expected a force or a list"), "{e}");
     let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
     let experiment = parse(&description(SDOF, random, "")).unwrap();
     let e = experiment.mid_step_force().unwrap_err().to_string();
     assert!(e.contains("a random force has none: choose load held or linear"), "{e}");
+}
+
+#[test]
+fn a_single_force_needs_no_brackets() {
+    let one = parse(&description(SDOF, FORCE, "")).unwrap();
+    assert_eq!(parse(&description(SDOF, FORCE, "").replace(['[', ']'], "")).unwrap(), one);
+}
+
+#[test]
+fn a_value_of_the_wrong_shape_is_told_by_its_field() {
+    let phases = |value: &str| {
+        let force = format!(r#"{{ "lines": "odd", "amplitude": 1, "phases": {value} }}"#);
+        description(SDOF, &format!("{FORCE}, {force}"), "")
+    };
+    let scheme = |value: &str| description(SDOF, FORCE, &format!(r#", "scheme": {value}"#));
+    for (text, part) in [
+        (phases(r#"{ "random": 3 }"#), "excitation[1]: phases: invalid type: map, expected a word"),
+        (phases("3"), "phases: invalid type: integer `3`, expected a word in quotes"),
+        (phases(r#""noisy""#), "phases: unknown variant `noisy`, expected one of `schroeder`"),
+        (
+            scheme(r#"{ "name": "wilson-theta", "load": { "held": 1 } }"#),
+            "scheme: invalid type: map, expected a word in quotes",
+        ),
+        (scheme("3"), "scheme: "),
+        (description(r#"{ "mass": [] }"#, FORCE, r#", "periods": -1"#), "periods: invalid value"),
+        (description(SDOF, r#"{ "dof": "x" }"#, ""), "excitation[0]: dof: invalid type: string"),
+        (description(SDOF, r#"{ "kind": 3 }"#, ""), "excitation[0]: kind: invalid type: integer"),
+    ] {
+        let e = parse(&text).unwrap_err().to_string();
+        assert!(e.contains(part) && e.contains(" at line "), "\"{part}\" is missing in: {e}");
+        assert!(!e.contains("unit"), "{e}");
+    }
+}
+
+#[test]
+fn what_is_no_json_is_told_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv");
+    for content in [&b"time,force\n0,1\n"[..], b"", b"12", b"[1]", b"\xff\xfe\0", b"MATLAB 5.0"] {
+        std::fs::write(&path, content).unwrap();
+        let errors = [
+            Experiment::read(&path).map(drop),
+            read_system(&path).map(drop),
+            read_covariance(&path).map(drop),
+        ];
+        for e in errors.map(Result::unwrap_err) {
+            assert!(matches!(e, IoError::NotJson { .. }), "{content:?}: {e}");
+            assert!(e.to_string().contains("a.csv is not JSON: an experiment, a machine"), "{e}");
+        }
+    }
+    std::fs::write(&path, format!("\u{feff}\n{}", description(SDOF, FORCE, ""))).unwrap();
+    assert!(Experiment::read(&path).is_ok());
 }

@@ -14,9 +14,9 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 
 const FILES: [&[u8]; 4] = [
     b"t;f\r\n0,0;1,5\r\n0,5;-2\r\n",
-    include_bytes!("../data/plain.mat"),
-    include_bytes!("../data/compressed.mat"),
-    include_bytes!("../data/binary.unv"),
+    include_bytes!("../../data/plain.mat"),
+    include_bytes!("../../data/compressed.mat"),
+    include_bytes!("../../data/binary.unv"),
 ];
 
 #[test]

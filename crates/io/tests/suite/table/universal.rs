@@ -5,9 +5,9 @@ use proptest::prelude::*;
 
 use super::matlab::{FORCE, X};
 
-const PRINTED: &[u8] = include_bytes!("../data/printed.unv");
-const BINARY: &[u8] = include_bytes!("../data/binary.unv");
-const SINGLE: &[u8] = include_bytes!("../data/single.unv");
+const PRINTED: &[u8] = include_bytes!("../../data/printed.unv");
+const BINARY: &[u8] = include_bytes!("../../data/binary.unv");
+const SINGLE: &[u8] = include_bytes!("../../data/single.unv");
 
 fn both() -> [Table; 2] {
     [PRINTED, BINARY].map(|bytes| Table::parse("a.unv", bytes).unwrap())
@@ -68,6 +68,24 @@ fn a_rate_may_only_say_what_the_file_says() {
             at(5.0).unwrap_err().to_string(),
             "the sample rate 5 Hz contradicts a.unv: column 2 \"12+Z\" has 4 Hz (leave the rate out)"
         );
+    }
+}
+
+#[test]
+fn a_binary_dataset_with_a_misplaced_number_is_told() {
+    let text = String::from_utf8_lossy(BINARY).into_owned();
+    assert!(text.contains("\n    58b     1"));
+    let first = BINARY.windows(7).position(|bytes| bytes == b"    58b").unwrap();
+    for id in [&b"   58b "[..], b"  58b  ", b"58b    ", b"     58"] {
+        let only = [&b"    -1\n"[..], id, &BINARY[first + 7..]].concat();
+        let e = Table::parse("a.unv", &only).unwrap_err();
+        assert!(matches!(e, IoError::Malformed { .. }), "{e}");
+        let whole = [&BINARY[..first], id, &BINARY[first + 7..]].concat();
+        let e = Table::parse("a.unv", &whole).unwrap_err();
+        assert!(matches!(e, IoError::Malformed { .. }), "{e}");
+        if id[6] != b'8' {
+            assert!(e.to_string().contains("58 in columns 5 and 6, followed by b"), "{e}");
+        }
     }
 }
 

@@ -1,0 +1,230 @@
+//! The contents of a record file in the form that every format is read into.
+
+use std::fmt;
+
+use crate::IoError;
+use crate::limits::Limit;
+
+/// Position in a file, counted from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// A line, as a text editor counts them.
+    Line(u64),
+    /// A sample of a column, where the file has no lines.
+    Sample(usize),
+    /// A byte, in a binary file.
+    Byte(usize),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Place::Line(n) => write!(f, "line {n}"),
+            Place::Sample(n) => write!(f, "sample {n}"),
+            Place::Byte(n) => write!(f, "byte {n}"),
+        }
+    }
+}
+
+/// The contents of a record file, whatever its format.
+#[derive(Debug, Default)]
+pub(crate) struct Contents {
+    /// Name of the format, for people.
+    pub format: String,
+    pub columns: Vec<Column>,
+    /// Lines of the samples, in text.
+    pub lines: Lines,
+    /// Most frequent number of samples of a column.
+    pub samples: usize,
+    /// Single numbers beside the columns.
+    pub scalars: Vec<(String, f64)>,
+    /// Further information from the file.
+    pub remarks: Vec<String>,
+    /// Last line of a text, if no line break ends it.
+    pub open_line: Option<u64>,
+}
+
+impl Contents {
+    /// Sets `samples` to the most frequent length of a column, the longest of equally frequent ones.
+    pub fn with_usual_length(mut self) -> Self {
+        let lengths: Vec<usize> =
+            self.columns.iter().filter_map(|c| c.values.as_ref().ok()).map(Vec::len).collect();
+        let mut sorted = lengths;
+        sorted.sort_unstable();
+        let runs = sorted.chunk_by(|a, b| a == b);
+        self.samples = runs.max_by_key(|run| (run.len(), run[0])).map_or(0, |run| run[0]);
+        self
+    }
+}
+
+/// A column of a file.
+#[derive(Debug)]
+pub(crate) struct Column {
+    /// Empty if it has none.
+    pub name: String,
+    /// Whether it has a name or a first value; false for a column made by a trailing delimiter.
+    pub filled: bool,
+    /// Its numbers, all finite, or the reason why it cannot be used.
+    pub values: Result<Vec<f64>, Unusable>,
+    /// Its time axis in the file.
+    pub axis: Axis,
+    /// What the file says of it besides its name.
+    pub about: String,
+}
+
+/// The time axis that a file gives a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Axis {
+    /// None: a time column or a sample rate is needed.
+    Unknown,
+    /// Uniform, in s.
+    Even { start: f64, step: f64 },
+    /// In the column with this index.
+    Column(usize),
+}
+
+/// Reason why a column cannot be used; reported when the column is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Unusable {
+    Empty {
+        line: u64,
+    },
+    Text {
+        line: u64,
+        text: String,
+    },
+    /// A number whose decimal sign differs from that of the file.
+    DecimalSign {
+        line: u64,
+        text: String,
+        sign: DecimalSign,
+    },
+    NotFinite {
+        at: Place,
+        value: f64,
+    },
+    Kind(String),
+}
+
+impl Unusable {
+    /// The error for the column that `label` names.
+    pub fn error(&self, file: &str, label: String) -> IoError {
+        let file = file.to_owned();
+        match self.clone() {
+            Self::Empty { line } => IoError::EmptyField { file, line, column: label },
+            Self::Text { line, text } => IoError::NotANumber { file, line, column: label, text },
+            Self::DecimalSign { line, text, sign } => {
+                IoError::MixedDecimalSigns { file, line, column: label, text, sign }
+            }
+            Self::NotFinite { at, value } => IoError::NotFinite { file, at, column: label, value },
+            Self::Kind(what) => IoError::NoNumbers { file, column: label, what },
+        }
+    }
+}
+
+impl Column {
+    /// A column of numbers from a file without lines; infinite values and NaN make it unusable.
+    pub fn of_numbers(name: String, values: Vec<f64>) -> Self {
+        let values = match values.iter().position(|v| !v.is_finite()) {
+            None => Ok(values),
+            Some(k) => Err(Unusable::NotFinite { at: Place::Sample(k + 1), value: values[k] }),
+        };
+        Self { name, filled: true, values, axis: Axis::Unknown, about: String::new() }
+    }
+
+    /// A column that holds no real numbers in time, but `what`.
+    pub fn unusable(name: String, what: impl Into<String>) -> Self {
+        let values = Err(Unusable::Kind(what.into()));
+        Self { name, filled: true, values, axis: Axis::Unknown, about: String::new() }
+    }
+}
+
+/// The sign between the whole and the decimal places of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DecimalSign {
+    /// `1.5`.
+    Point,
+    /// `1,5`.
+    Comma,
+}
+
+impl fmt::Display for DecimalSign {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Point => "point",
+            Self::Comma => "comma",
+        })
+    }
+}
+
+/// Lines of the samples, as runs of consecutive lines: a file of ten million rows and one comment
+/// has two.
+#[derive(Debug, Default)]
+pub(crate) struct Lines {
+    /// First sample, counted from 0, and first line of each run.
+    runs: Vec<(usize, u64)>,
+}
+
+impl Lines {
+    pub fn clear(&mut self) {
+        self.runs.clear();
+    }
+
+    /// Appends the lines of samples that follow the first `samples`.
+    pub fn append(&mut self, samples: usize, other: &Self) {
+        other.runs.iter().for_each(|(first, line)| self.push(samples + first, *line));
+    }
+
+    /// Appends the line of `sample`; samples come in order.
+    pub fn push(&mut self, sample: usize, line: u64) {
+        let expected = self.runs.last().map(|(first, at)| at + (sample - first) as u64);
+        if expected != Some(line) {
+            self.runs.push((sample, line));
+        }
+    }
+
+    /// Line of a sample, counted from 0.
+    pub fn place(&self, sample: usize) -> Place {
+        let after = self.runs.partition_point(|(first, _)| *first <= sample);
+        match after.checked_sub(1).map(|run| self.runs[run]) {
+            Some((first, line)) => Place::Line(line + (sample - first) as u64),
+            None => Place::Sample(sample + 1),
+        }
+    }
+}
+
+/// An error in a binary or universal file.
+#[derive(Debug)]
+pub(crate) struct Fault {
+    /// Offset of its byte.
+    pub at: usize,
+    pub cause: Cause,
+}
+
+/// Kinds of [`Fault`].
+#[derive(Debug)]
+pub(crate) enum Cause {
+    /// The file breaks its format.
+    Malformed(String),
+    /// The file is larger than a limit allows.
+    TooLarge(Limit),
+}
+
+impl Fault {
+    pub fn new(at: usize, what: impl Into<String>) -> Self {
+        Self { at, cause: Cause::Malformed(what.into()) }
+    }
+
+    pub fn too_large(at: usize, limit: Limit) -> Self {
+        Self { at, cause: Cause::TooLarge(limit) }
+    }
+
+    /// The error for a file, with the place of the byte.
+    pub fn error(self, file: &str, at: Place) -> IoError {
+        let file = file.to_owned();
+        match self.cause {
+            Cause::Malformed(what) => IoError::Malformed { file, at, what },
+            Cause::TooLarge(limit) => IoError::TooLarge { file, at, limit },
+        }
+    }
+}

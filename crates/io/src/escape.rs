@@ -1,0 +1,91 @@
+//! Text from files as it may be shown on a terminal.
+
+use std::borrow::Cow;
+use std::fmt::{self, Write as _};
+
+/// A text in which characters that a terminal obeys instead of showing them are written as Rust
+/// writes them, such as `\u{1b}` or `\n`: control characters, those that turn the direction of
+/// writing or are invisible, and characters that Unicode excludes from text.
+///
+/// Names of columns and files may hold anything; shown raw, they could move the cursor, hide text or
+/// forge a line.
+///
+/// ```
+/// use mechid_io::escaped;
+///
+/// assert_eq!(escaped("force [µN]"), "force [µN]");
+/// assert_eq!(escaped("a\u{1b}[2Jb\u{202e}c\n"), r"a\u{1b}[2Jb\u{202e}c\n");
+/// ```
+pub fn escaped(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_unshown) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        push(&mut shown, c);
+    }
+    Cow::Owned(shown)
+}
+
+/// Whether a character is not shown as it is.
+fn is_unshown(c: char) -> bool {
+    c.is_control()
+        || matches!(c,
+            '\u{ad}'
+            | '\u{61c}'
+            | '\u{180e}'
+            | '\u{200b}'..='\u{200f}'
+            | '\u{2028}'..='\u{202e}'
+            | '\u{2060}'..='\u{206f}'
+            | '\u{feff}'
+            | '\u{fff0}'..='\u{fffb}'
+            | '\u{e0000}'..='\u{e007f}')
+        // The last two of every plane, and 32 more, are no characters.
+        || u32::from(c) & 0xfffe == 0xfffe
+        || ('\u{fdd0}'..='\u{fdef}').contains(&c)
+}
+
+fn push(into: &mut String, c: char) {
+    if is_unshown(c) {
+        into.extend(c.escape_default());
+    } else {
+        into.push(c);
+    }
+}
+
+/// A message whose parts come from files, shown [`escaped`].
+pub(crate) struct Message<'a>(pub fmt::Arguments<'a>);
+
+impl fmt::Display for Message<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        struct Escaping<'a, 'b>(&'a mut fmt::Formatter<'b>);
+
+        impl fmt::Write for Escaping<'_, '_> {
+            fn write_str(&mut self, text: &str) -> fmt::Result {
+                self.0.write_str(&escaped(text))
+            }
+        }
+        Escaping(f).write_fmt(self.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_obeys_is_written_out() {
+        for (text, shown) in [
+            ("Schwingweg µm – 加速度 é 👍", "Schwingweg µm – 加速度 é 👍"),
+            ("a\\b \"c\" 'd'", "a\\b \"c\" 'd'"),
+            ("\t\r\n", "\\t\\r\\n"),
+            ("\u{0}\u{7}\u{7f}\u{9b}", "\\u{0}\\u{7}\\u{7f}\\u{9b}"),
+            ("\u{2066}x\u{2069}\u{200f}", "\\u{2066}x\\u{2069}\\u{200f}"),
+            ("\u{fffe}\u{ffff}\u{1ffff}", "\\u{fffe}\\u{ffff}\\u{1ffff}"),
+            ("\u{fffd}", "\u{fffd}"),
+        ] {
+            assert_eq!(escaped(text), shown);
+            assert_eq!(Message(format_args!("{text}")).to_string(), shown);
+        }
+    }
+}

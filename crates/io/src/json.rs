@@ -1,0 +1,63 @@
+//! Descriptions and reports in JSON.
+
+use std::fmt;
+use std::io;
+use std::path::Path;
+
+use serde::Deserialize;
+use serde::de::value::StrDeserializer;
+use serde::de::{DeserializeOwned, Deserializer, Error, Visitor};
+
+use crate::{IoError, standard};
+
+/// Reads a value from a JSON file, or from standard input as `-`; returns its name in messages, too.
+pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoError> {
+    let file = standard::input_name(path);
+    match standard::read_text(path) {
+        Ok(text) => parse(&file, &text).map(|value| (file, value)),
+        // No UTF-8: a binary file.
+        Err(e) if e.kind() == io::ErrorKind::InvalidData => Err(IoError::NotJson { file }),
+        Err(source) => Err(IoError::Read { file, source }),
+    }
+}
+
+/// Reads a value from a JSON text; `file` is its name in messages.
+pub(crate) fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, IoError> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if !text.trim_start().starts_with('{') {
+        return Err(IoError::NotJson { file: file.into() });
+    }
+    let wrong = |source| IoError::Json { file: file.into(), field: String::new(), source };
+    let mut deserializer = serde_json::Deserializer::from_str(text);
+    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+        let field = match error.path().to_string() {
+            root if root == "." => String::new(),
+            field => format!("{field}: "),
+        };
+        IoError::Json { file: file.into(), field, source: error.into_inner() }
+    })?;
+    deserializer.end().map_err(wrong)?;
+    Ok(value)
+}
+
+/// Reads a word, one of the variants of an enum. Without this a value of another shape is refused
+/// with the words of the serialisation library, such as "expected unit".
+pub(crate) fn word<'de, D: Deserializer<'de>, T: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<T, D::Error> {
+    struct Word;
+
+    impl Visitor<'_> for Word {
+        type Value = String;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a word in quotes")
+        }
+
+        fn visit_str<E: Error>(self, word: &str) -> Result<String, E> {
+            Ok(word.into())
+        }
+    }
+    let word = deserializer.deserialize_any(Word)?;
+    T::deserialize(StrDeserializer::new(&word))
+}

@@ -1,0 +1,200 @@
+//! A text in blocks of whole rows.
+
+use std::io::{BufRead, Read};
+
+use mechid_signal::counted;
+use memchr::{memchr, memchr_iter};
+
+use super::dialect::is_sample;
+use super::fields::{Layout, RowIter};
+use super::source::{BYTE_ORDER_MARK, Source, failed};
+use crate::IoError;
+use crate::contents::Place;
+use crate::limits::{Limit, ReadOptions};
+
+/// Number of bytes read at a time.
+const BLOCK_BYTES: usize = 1 << 16;
+
+/// Number of bytes, with lines of any length, in which the delimiter must show.
+const SAMPLE_BYTES: usize = 1 << 24;
+
+/// Whole rows of a text.
+#[derive(Debug, Default)]
+pub(super) struct Block {
+    pub text: Vec<u8>,
+    /// Number of the first line in the file, counted from 1.
+    pub line: u64,
+}
+
+/// The end of a text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct TextEnd {
+    /// Last line, if no line break ends it.
+    pub open_line: Option<u64>,
+    /// Number of zero bytes behind the last line, which a preallocated file ends with.
+    pub padding: u64,
+}
+
+impl TextEnd {
+    /// What is to be said of the end of a text.
+    pub fn remark(self) -> Option<String> {
+        let bytes = counted(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
+        Some(format!("left out: {bytes} behind the last line (a preallocated file not filled?)"))
+    }
+}
+
+/// The blocks of a text.
+pub(super) struct Blocks<'a> {
+    file: String,
+    gzip: bool,
+    reader: Box<dyn BufRead + Send + 'a>,
+    terminator: u8,
+    /// Number of the line that `rest` begins with.
+    line: u64,
+    row_bytes: usize,
+    /// Bytes read behind the last block.
+    rest: Vec<u8>,
+    end: Option<TextEnd>,
+}
+
+impl<'a> Blocks<'a> {
+    /// Skips the lines above the table and reads as much as tells the dialect of the text.
+    pub fn open(source: Source<'a>, options: &ReadOptions) -> Result<Self, IoError> {
+        let terminator = source.terminator();
+        let Source { file, gzip, mut reader, .. } = source;
+        for _ in 0..options.skip_lines {
+            match reader.skip_until(terminator) {
+                Ok(0) => {
+                    let found = "it has no more lines than are to be skipped";
+                    return Err(IoError::Empty { file, found });
+                }
+                Ok(_) => {}
+                Err(source) => return Err(failed(&file, gzip, source)),
+            }
+        }
+        let mut blocks = Self {
+            file,
+            gzip,
+            reader,
+            terminator,
+            line: options.skip_lines + 1,
+            row_bytes: options.limits.row_bytes,
+            rest: Vec::new(),
+            end: None,
+        };
+        while blocks.end.is_none() && !is_sample(&blocks.rest, terminator) {
+            blocks.fill(blocks.rest.len().max(BLOCK_BYTES))?;
+            if blocks.rest.len() >= SAMPLE_BYTES {
+                break;
+            }
+        }
+        if blocks.rest.starts_with(BYTE_ORDER_MARK) {
+            blocks.rest.drain(..BYTE_ORDER_MARK.len());
+        }
+        Ok(blocks)
+    }
+
+    /// Name of the file in messages.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
+    pub fn terminator(&self) -> u8 {
+        self.terminator
+    }
+
+    /// The bytes read before the first block.
+    pub fn start(&self) -> &[u8] {
+        &self.rest
+    }
+
+    /// The end of the text, once all of it has been read.
+    pub fn end(&self) -> Option<TextEnd> {
+        self.end.filter(|_| self.rest.is_empty())
+    }
+
+    /// Reads the next block into `block`; false at the end.
+    ///
+    /// # Errors
+    /// [`IoError::TooLarge`] for a row longer than the limit, [`IoError::Malformed`] for zero bytes
+    /// within the text, and those of reading.
+    pub fn next(&mut self, layout: Layout, block: &mut Block) -> Result<bool, IoError> {
+        let complete = loop {
+            if self.rest.len() < BLOCK_BYTES && self.end.is_none() {
+                self.fill(BLOCK_BYTES - self.rest.len())?;
+            }
+            if self.end.is_some() {
+                break self.rest.len();
+            }
+            match RowIter::complete(&self.rest, layout) {
+                0 if self.rest.len() > self.row_bytes => return Err(self.too_long(self.line)),
+                0 => self.fill(self.rest.len())?,
+                complete => break complete,
+            }
+        };
+        block.line = self.line;
+        block.text.clear();
+        std::mem::swap(&mut block.text, &mut self.rest);
+        self.rest.extend_from_slice(&block.text[complete..]);
+        block.text.truncate(complete);
+        self.line += memchr_iter(self.terminator, &block.text).count() as u64;
+        Ok(complete > 0)
+    }
+
+    /// The error for a row that is too long.
+    pub fn too_long(&self, line: u64) -> IoError {
+        let limit = Limit::RowBytes(self.row_bytes);
+        IoError::TooLarge { file: self.file.clone(), at: Place::Line(line), limit }
+    }
+
+    /// Reads about `count` bytes more.
+    fn fill(&mut self, count: usize) -> Result<(), IoError> {
+        let before = self.rest.len();
+        let read = self.reader.by_ref().take(count as u64).read_to_end(&mut self.rest);
+        let read = read.map_err(|source| failed(&self.file, self.gzip, source))?;
+        if let Some(zero) = memchr(0, &self.rest[before..]) {
+            self.end_at_zero(before + zero)?;
+        } else if read < count {
+            self.end = Some(TextEnd { open_line: self.open_line(), padding: 0 });
+        }
+        Ok(())
+    }
+
+    /// Ends the text at a zero byte, behind which there must be no others.
+    fn end_at_zero(&mut self, zero: usize) -> Result<(), IoError> {
+        let mut is_zero = self.rest[zero..].iter().all(|b| *b == 0);
+        let mut padding = (self.rest.len() - zero) as u64;
+        self.rest.truncate(zero);
+        while is_zero {
+            let more = self.reader.fill_buf();
+            let more = more.map_err(|source| failed(&self.file, self.gzip, source))?;
+            if more.is_empty() {
+                self.end = Some(TextEnd { open_line: self.open_line(), padding });
+                return Ok(());
+            }
+            is_zero = more.iter().all(|b| *b == 0);
+            let len = more.len();
+            padding += len as u64;
+            self.reader.consume(len);
+        }
+        let line = self.line + memchr_iter(self.terminator, &self.rest).count() as u64;
+        Err(IoError::Malformed {
+            file: self.file.clone(),
+            at: Place::Line(line),
+            what: "zero bytes stand within the text: the file is damaged, or no text".into(),
+        })
+    }
+
+    /// Number of the last line read, if no line break ends it.
+    fn open_line(&self) -> Option<u64> {
+        let ended = self.rest.last().is_none_or(|last| *last == self.terminator);
+        let lines = memchr_iter(self.terminator, &self.rest).count() as u64;
+        (!ended).then_some(self.line + lines)
+    }
+}
+
+impl std::fmt::Debug for Blocks<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Blocks").field("file", &self.file).field("line", &self.line).finish()
+    }
+}

@@ -1,0 +1,224 @@
+//! Rows of a text and their fields.
+
+use std::ops::Range;
+
+use memchr::{memchr, memchr_iter};
+
+use super::dialect::{Delimiter, is_comment};
+
+/// The quote around fields that hold delimiters or line breaks.
+const QUOTE: u8 = b'"';
+
+/// How rows and fields are told apart.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Layout {
+    pub delimiter: Delimiter,
+    /// Last byte of a line: a line feed, or a carriage return where there is none.
+    pub terminator: u8,
+}
+
+/// A row of a text that is neither empty nor a comment.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row<'a> {
+    /// Without the end of its line.
+    pub text: &'a [u8],
+    /// Offset in the text.
+    pub at: usize,
+    /// Number of line ends before it in the text.
+    pub line: u64,
+    /// Whether it holds a quote that may matter.
+    pub is_quoted: bool,
+}
+
+/// The rows of a text that begins with a row.
+#[derive(Debug, Clone)]
+pub(crate) struct RowIter<'a> {
+    text: &'a [u8],
+    layout: Layout,
+    /// Whether quotes are looked for.
+    has_quotes: bool,
+    at: usize,
+    line: u64,
+}
+
+impl<'a> RowIter<'a> {
+    pub fn new(text: &'a [u8], layout: Layout) -> Self {
+        let has_quotes = layout.delimiter != Delimiter::Blanks && memchr(QUOTE, text).is_some();
+        Self { text, layout, has_quotes, at: 0, line: 0 }
+    }
+
+    /// Offset behind the last complete row or line, from which on the text is incomplete.
+    pub fn complete(text: &'a [u8], layout: Layout) -> usize {
+        let mut rows = Self::new(text, layout);
+        if !rows.has_quotes {
+            return memchr::memrchr(layout.terminator, text).map_or(0, |last| last + 1);
+        }
+        let mut complete = 0;
+        while let Some((_, is_complete)) = rows.next_line() {
+            if is_complete {
+                complete = rows.at;
+            }
+        }
+        complete
+    }
+
+    /// The next row, empty line or comment, and whether it has an end.
+    fn next_line(&mut self) -> Option<(Row<'a>, bool)> {
+        if self.at >= self.text.len() {
+            return None;
+        }
+        let (at, line, rest) = (self.at, self.line, &self.text[self.at..]);
+        let end_from = |from: usize| match memchr(self.layout.terminator, &rest[from..]) {
+            Some(len) => (from + len, true),
+            None => (rest.len(), false),
+        };
+        let (mut end, mut ended) = end_from(0);
+        let mut is_quoted = false;
+        self.line += 1;
+        if let (true, Delimiter::Byte(delimiter)) = (self.has_quotes, self.layout.delimiter)
+            && memchr(QUOTE, &rest[..end]).is_some()
+            && !is_comment(&rest[..end], self.layout.delimiter)
+        {
+            is_quoted = true;
+            let (mut state, mut from) = (State::FieldStart, 0);
+            loop {
+                state = state.after(&rest[from..end], delimiter);
+                if state != State::Quoted || !ended {
+                    break;
+                }
+                // The line break belongs to the field.
+                from = end;
+                (end, ended) = end_from(end + 1);
+                self.line += 1;
+            }
+            ended &= state != State::Quoted;
+        }
+        self.at += if end < rest.len() { end + 1 } else { end };
+        let mut text = &rest[..end];
+        while let Some((b'\r', before)) = text.split_last() {
+            text = before;
+        }
+        Some((Row { text, at, line, is_quoted }, ended))
+    }
+}
+
+impl<'a> Iterator for RowIter<'a> {
+    type Item = Row<'a>;
+
+    fn next(&mut self) -> Option<Row<'a>> {
+        loop {
+            let (row, _) = self.next_line()?;
+            let is_blank = row.text.iter().all(|b| *b == b' ');
+            if !is_blank && !is_comment(row.text, self.layout.delimiter) {
+                return Some(row);
+            }
+        }
+    }
+}
+
+/// Position in a row between delimiters and quotes, as RFC 4180 and the programs that stretch it
+/// have it: a quote counts at the beginning of a field only, two within a quoted field are one, and
+/// text behind the closing quote belongs to the field.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    FieldStart,
+    Plain,
+    Quoted,
+    /// Behind a quote within a quoted field.
+    QuoteInQuoted,
+}
+
+impl State {
+    fn next(self, byte: u8, delimiter: u8) -> Self {
+        match (self, byte) {
+            (Self::Quoted, QUOTE) => Self::QuoteInQuoted,
+            (Self::Quoted, _) => Self::Quoted,
+            (Self::FieldStart | Self::QuoteInQuoted, QUOTE) => Self::Quoted,
+            (_, byte) if byte == delimiter => Self::FieldStart,
+            _ => Self::Plain,
+        }
+    }
+
+    fn after(self, text: &[u8], delimiter: u8) -> Self {
+        text.iter().fold(self, |state, byte| state.next(*byte, delimiter))
+    }
+}
+
+/// The fields of one row, without blanks around them and without their quotes.
+#[derive(Debug, Default)]
+pub(crate) struct Fields {
+    text: Vec<u8>,
+    ranges: Vec<Range<usize>>,
+}
+
+impl Fields {
+    /// Splits a row.
+    pub fn split(&mut self, row: &[u8], delimiter: Delimiter) {
+        self.text.clear();
+        self.ranges.clear();
+        match delimiter {
+            Delimiter::Blanks => words(row).for_each(|word| self.push(word)),
+            Delimiter::Byte(byte) if memchr(QUOTE, row).is_none() => {
+                let mut from = 0;
+                for at in memchr_iter(byte, row).chain([row.len()]) {
+                    self.push(&row[from..at]);
+                    from = at + 1;
+                }
+            }
+            Delimiter::Byte(byte) => self.split_quoted(row, byte),
+        }
+    }
+
+    fn split_quoted(&mut self, row: &[u8], delimiter: u8) {
+        let mut state = State::FieldStart;
+        let mut field = Vec::new();
+        for (at, byte) in row.iter().enumerate() {
+            // A line break is a line feed, in whatever file.
+            if *byte == b'\r' && row.get(at + 1) == Some(&b'\n') {
+                continue;
+            }
+            let next = state.next(*byte, delimiter);
+            match (state, next) {
+                // A quote that opens or may close.
+                (State::FieldStart, State::Quoted) | (_, State::QuoteInQuoted) => {}
+                (_, State::FieldStart) => {
+                    self.push(&field);
+                    field.clear();
+                }
+                _ => field.push(*byte),
+            }
+            state = next;
+        }
+        self.push(&field);
+    }
+
+    fn push(&mut self, field: &[u8]) {
+        let from = self.text.len();
+        self.text.extend_from_slice(field.trim_ascii());
+        self.ranges.push(from..self.text.len());
+    }
+
+    /// Number of fields.
+    pub fn len(&self) -> usize {
+        self.ranges.len()
+    }
+
+    /// Number of fields up to the last that is not empty.
+    pub fn filled(&self) -> usize {
+        self.ranges.iter().rposition(|range| !range.is_empty()).map_or(0, |last| last + 1)
+    }
+
+    /// A field, empty beyond the last.
+    pub fn get(&self, field: usize) -> &[u8] {
+        self.ranges.get(field).map_or(&[], |range| &self.text[range.clone()])
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
+        self.ranges.iter().map(|range| &self.text[range.clone()])
+    }
+}
+
+/// The fields of a line that stand between blanks.
+pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}

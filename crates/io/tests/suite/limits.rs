@@ -1,0 +1,155 @@
+//! Small files that stand for much memory are refused before it is taken.
+
+use std::io::Write as _;
+
+use flate2::Compression;
+use flate2::write::{GzEncoder, ZlibEncoder};
+use mechid_io::{IoError, Limit, Limits, Place, ReadOptions, RecordFile, Table, TimeAxis, escaped};
+
+const LIMITS: Limits =
+    Limits { row_bytes: 1 << 16, columns: 100, unpacked_bytes: 1 << 20, numbers: 1 << 16 };
+
+const OPTIONS: ReadOptions = ReadOptions { skip_lines: 0, limits: LIMITS };
+
+fn limit(bytes: &[u8]) -> (Limit, Place) {
+    match Table::parse_with("a", bytes, &OPTIONS) {
+        Err(IoError::TooLarge { limit, at, .. }) => (limit, at),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(bytes).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// A MATLAB file of one compressed variable.
+fn compressed(variable: &[u8]) -> Vec<u8> {
+    let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
+    encoder.write_all(variable).unwrap();
+    let packed = encoder.finish().unwrap();
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, b' ');
+    file.extend(b"\x00\x01IM");
+    file.extend([15_u32, packed.len() as u32].map(u32::to_le_bytes).concat());
+    file.extend(packed);
+    file
+}
+
+/// A vector of bytes.
+fn bytes_variable(len: u32) -> Vec<u8> {
+    let words = [14, 56 + len.next_multiple_of(8), 6, 8, 9, 0, 5, 8, len, 1, 1, 1];
+    let mut variable = words.map(u32::to_le_bytes).concat();
+    variable.extend(b"v\0\0\0\0\0\0\0");
+    variable.extend([2, len].map(u32::to_le_bytes).concat());
+    variable.resize(variable.len() + len.next_multiple_of(8) as usize, 0);
+    variable
+}
+
+#[test]
+fn rows_have_a_limit() {
+    let row = Limit::RowBytes(LIMITS.row_bytes);
+    let long = "1".repeat(1 << 21);
+    assert_eq!(limit(long.as_bytes()), (row, Place::Line(1)));
+    assert_eq!(limit(&gzip(long.as_bytes())), (row, Place::Line(1)));
+    assert_eq!(limit(format!("t,f\n0,1\n1,{long}\n").as_bytes()), (row, Place::Line(3)));
+    // Shorter than what is read at a time.
+    let some = "1".repeat(LIMITS.row_bytes);
+    assert_eq!(limit(format!("t,f\n0,1\n1,{some}\n").as_bytes()), (row, Place::Line(3)));
+    assert_eq!(limit(format!("{some},1\n").as_bytes()), (row, Place::Line(1)));
+    let unclosed = format!("t,f\n0,1\n1,\"{}", "2,3\n".repeat(1 << 19));
+    assert_eq!(limit(unclosed.as_bytes()), (row, Place::Line(3)));
+    let e = Table::parse_with("a", unclosed.as_bytes(), &OPTIONS).unwrap_err().to_string();
+    assert_eq!(
+        e,
+        "a, line 3: the row is longer than 65536 bytes (is a quote not closed?); if the record is \
+         right, raise the limit"
+    );
+    // As long as allowed.
+    let padded = format!("t,f\n0,{}1\n", " ".repeat(LIMITS.row_bytes - 3));
+    assert_eq!(Table::parse_with("a", padded.as_bytes(), &OPTIONS).unwrap().len(), 1);
+}
+
+#[test]
+fn columns_have_a_limit() {
+    let columns = Limit::Columns(LIMITS.columns);
+    assert_eq!(limit(format!("0{}\n", ",1".repeat(100)).as_bytes()), (columns, Place::Line(1)));
+    assert!(Table::parse_with("a", format!("0{}\n", ",1".repeat(99)).as_bytes(), &OPTIONS).is_ok());
+    let many = compressed(&bytes_variable(8))[128..].repeat(101);
+    let file = [&compressed(&bytes_variable(8))[..128], &many].concat();
+    assert_eq!(limit(&file).0, columns);
+    // Empty variables in a struct take a few bytes each.
+    let names = 1_000_u32;
+    let mut data = [6, 8, 2, 0, 5, 8, 1, 1, 1, 1].map(u32::to_le_bytes).concat();
+    data.extend(b"s\0\0\0\0\0\0\0");
+    data.extend([5 | 4 << 16, 1, 1, names].map(u32::to_le_bytes).concat());
+    data.resize(data.len() + names as usize, b'x');
+    data.extend([14_u32, 0].map(u32::to_le_bytes).concat().repeat(names as usize));
+    let variable = [[14, data.len() as u32].map(u32::to_le_bytes).concat(), data].concat();
+    assert_eq!(limit(&compressed(&variable)).0, columns);
+}
+
+#[test]
+fn what_is_packed_has_a_limit() {
+    let unpacked = Limit::UnpackedBytes(LIMITS.unpacked_bytes);
+    let file = compressed(&bytes_variable(1 << 22));
+    assert!(file.len() < 10_000);
+    assert_eq!(limit(&file), (unpacked, Place::Byte(137)));
+    let whole = [&file[..128], &vec![0; 1 << 21]].concat();
+    assert_eq!(limit(&gzip(&whole)), (unpacked, Place::Byte(LIMITS.unpacked_bytes)));
+    let universal = [&b"    -1\n    15\n"[..], &vec![b'\n'; 1 << 21]].concat();
+    assert_eq!(limit(&gzip(&universal)).0, unpacked);
+    // Twice is once too often.
+    let twice = compressed(&file[128..]);
+    let e = Table::parse_with("a", &twice, &OPTIONS).unwrap_err().to_string();
+    assert!(e.contains("the compressed data are no variable"), "{e}");
+}
+
+#[test]
+fn numbers_held_have_a_limit() {
+    let numbers = Limit::Numbers(LIMITS.numbers);
+    assert_eq!(limit(&compressed(&bytes_variable(1 << 17))).0, numbers);
+    assert!(Table::parse_with("a", &compressed(&bytes_variable(1 << 16)), &OPTIONS).is_ok());
+    let text = format!("t,f\n{}", "0,1\n".repeat(1 << 18));
+    assert_eq!(limit(&gzip(text.as_bytes())).0, numbers);
+    // A text that is not held may have more.
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.csv.gz");
+    std::fs::write(&path, gzip(text.as_bytes())).unwrap();
+    let file = RecordFile::open(&path, &OPTIONS, 1000).unwrap();
+    let survey = file.survey(&TimeAxis::RateHz(1.0), &["f"]).unwrap();
+    assert_eq!(survey.sampling.len(), 1 << 18);
+}
+
+#[test]
+fn more_lines_are_skipped_than_there_are() {
+    let options = ReadOptions { skip_lines: 1_000_000_000_000, ..OPTIONS };
+    let e = Table::parse_with("a", b"t,f\n0,1\n", &options).unwrap_err();
+    assert_eq!(e.to_string(), "a holds no data: it has no more lines than are to be skipped");
+}
+
+/// Whatever a file holds, messages show it on one line and as it stands.
+#[test]
+fn messages_hold_nothing_that_a_terminal_obeys() {
+    let name = "x\u{1b}[31m\u{202e}\u{7}";
+    let rows = "2,3,4\n".repeat(8);
+    let text = format!("\"{name}\n\",{name}b,c\n0,{name},1\n1,2,\u{9b}\n{rows}");
+    let table = Table::parse(format!("{name}.csv"), text.as_bytes()).unwrap();
+    let errors = [
+        table.column(&format!("{name}?")).map(drop),
+        table.column(&format!("{name}b")).map(drop),
+        table.column("c").map(drop),
+        table.record(&TimeAxis::RateHz(1.0), &["1", name]).map(drop),
+        Table::parse(name, b"").map(drop),
+        mechid_io::Experiment::parse(name, &format!("{{\"{name}\": 3}}")).map(drop),
+        name.parse::<mechid_io::LineSpec>().map(drop),
+    ];
+    for e in errors.map(|e| e.unwrap_err().to_string()) {
+        assert_eq!(escaped(&e), e);
+        assert!(e.contains(r"x\u{1b}[31m\u{202e}\u{7}") || e.contains(r"\u{9b}"), "{e}");
+    }
+    for shown in [table.available(), table.label(1), table.file().to_owned(), table.format()] {
+        assert_eq!(escaped(&shown), shown);
+    }
+}
