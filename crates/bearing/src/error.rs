@@ -1,0 +1,105 @@
+//! Errors of bearings that cannot be described or have no solution.
+
+use mechid_signal::told;
+
+/// A bearing that cannot be described or solved; every variant carries the offending numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BearingError {
+    /// A parameter is out of range.
+    #[error("the {name} must be {requirement}, got {value}", value = told(*value))]
+    Parameter {
+        /// Name of the parameter.
+        name: &'static str,
+        /// Range expected.
+        requirement: &'static str,
+        /// Value given, in the unit of the quantity.
+        value: f64,
+    },
+    /// The journal touches the bore: no film is left.
+    #[error(
+        "the journal touches the bore: eccentricity {eccentricity} of the clearance",
+        eccentricity = told(*eccentricity)
+    )]
+    Contact {
+        /// Eccentricity over the clearance, a ratio of at least 1.
+        eccentricity: f64,
+    },
+    /// The equations of the film cannot be solved at this position of the journal.
+    #[error(
+        "the equations of the film are singular with the journal at ({}, {}) clearances \
+         along and across the load",
+        told(position[0]),
+        told(position[1])
+    )]
+    SingularFilm {
+        /// Position of the journal along the load and across, in clearances.
+        position: [f64; 2],
+    },
+    /// The ends of the film did not settle within the iterations allowed.
+    #[error(
+        "the ends of the film did not converge in {iterations} iterations \
+         (last change {change:.1e} rad) with the journal at ({}, {}) clearances; \
+         a finer mesh may help",
+        told(position[0]),
+        told(position[1])
+    )]
+    FilmNotConverged {
+        /// Iterations made.
+        iterations: usize,
+        /// Last change of an end of the film, in rad.
+        change: f64,
+        /// Position of the journal along the load and across, in clearances.
+        position: [f64; 2],
+    },
+    /// No equilibrium was found within the iterations allowed.
+    #[error(
+        "no equilibrium was found for the Sommerfeld number {sommerfeld} in {iterations} \
+         iterations (last step {step:.1e} clearances); a finer mesh may help",
+        sommerfeld = told(*sommerfeld)
+    )]
+    EquilibriumNotConverged {
+        /// Sommerfeld number asked for.
+        sommerfeld: f64,
+        /// Iterations made.
+        iterations: usize,
+        /// Length of the last step of the journal, in clearances.
+        step: f64,
+    },
+    /// The covariance of the coefficients is not 8 × 8.
+    #[error("the covariance of eight coefficients is {rows}×{columns}, expected 8×8")]
+    CovarianceShape {
+        /// Its rows.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// The covariance of the coefficients has an entry that is not finite or a negative variance.
+    #[error(
+        "entry ({row}, {column}) of the covariance of the coefficients is {value}: \
+         expected finite entries and variances of at least 0",
+        value = told(*value)
+    )]
+    CovarianceEntry {
+        /// Row, counted from 1.
+        row: usize,
+        /// Column, counted from 1.
+        column: usize,
+        /// Value found, in the squared unit of the coefficients.
+        value: f64,
+    },
+}
+
+/// `value` must be finite and satisfy `holds`, or it is named in an error.
+pub(crate) fn require(
+    name: &'static str,
+    value: f64,
+    requirement: &'static str,
+    holds: bool,
+) -> Result<(), BearingError> {
+    if holds && value.is_finite() {
+        Ok(())
+    } else {
+        Err(BearingError::Parameter { name, requirement, value })
+    }
+}

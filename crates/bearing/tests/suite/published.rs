@@ -1,0 +1,100 @@
+//! Lund and Thomsen's tables of 1978: 14 rows, transcribed.
+
+use mechid_bearing::{Bore, Conditions, Equilibrium, FiniteBearing};
+
+/// A row of the table: our equilibrium and what is printed.
+struct Row {
+    name: String,
+    ours: Equilibrium,
+    eccentricity: f64,
+    attitude: f64,
+    /// Kxx, Kxy, Kyx, Kyy.
+    stiffness: [f64; 4],
+    /// Bxx, Bxy, Byy.
+    damping: [f64; 3],
+}
+
+fn rows() -> Vec<Row> {
+    let table = include_str!("../lund_thomsen_1978.csv");
+    let rows = table.lines().skip(1).map(|line| {
+        let (name, numbers) = line.split_once(',').unwrap();
+        let v: Vec<f64> = numbers.split(',').map(|cell| cell.parse().unwrap()).collect();
+        // The grooves of both bearings are 20° wide.
+        let bore = Bore::elliptical(v[1], 20_f64.to_radians()).unwrap();
+        Row {
+            name: format!("{name} L/D = {} S = {}", v[0], v[2]),
+            ours: FiniteBearing::new(bore, v[0]).unwrap().equilibrium(v[2]).unwrap(),
+            eccentricity: v[3],
+            attitude: v[4],
+            stiffness: v[5..9].try_into().unwrap(),
+            damping: v[9..].try_into().unwrap(),
+        }
+    });
+    let rows: Vec<Row> = rows.collect();
+    assert_eq!(rows.len(), 14);
+    rows
+}
+
+/// Largest difference over the largest entry of its kind.
+fn deviation(ours: &[f64], printed: &[f64]) -> f64 {
+    let largest = printed.iter().fold(0.0_f64, |a, b| a.max(b.abs()));
+    let differences = ours.iter().zip(printed).map(|(a, b)| (a - b).abs());
+    differences.fold(0.0, f64::max) / largest
+}
+
+/// The issue asks for 2 %. The rows of the elliptical bearing agree within the printed digits;
+/// those of the bearing with two grooves within 1 %, see the book for the reason.
+#[test]
+fn coefficients_agree_with_lund_and_thomsen() {
+    for row in rows() {
+        let c = row.ours.coefficients();
+        let stiffness = deviation(c.stiffness.as_flattened(), &row.stiffness);
+        let [[bxx, bxy], [byx, byy]] = c.damping;
+        let damping = deviation(&[bxx, bxy, byy], &row.damping);
+        let bound = if row.name.starts_with("elliptical") { 0.005 } else { 0.01 };
+        assert!(stiffness < bound && damping < bound, "{}: {stiffness} {damping}", row.name);
+        // The exact film has a symmetric damping matrix; the mesh nearly.
+        assert!((bxy - byx).abs() < 1e-3 * bxx, "{}: {bxy} {byx}", row.name);
+    }
+}
+
+#[test]
+fn places_of_the_journal_agree_with_lund_and_thomsen() {
+    for row in rows() {
+        // S is printed to three digits, so the eccentricity is known to about 0.001.
+        let eccentricity = row.ours.eccentricity();
+        assert!((eccentricity - row.eccentricity).abs() < 0.0015, "{}: {eccentricity}", row.name);
+        let attitude = row.ours.attitude().to_degrees();
+        // 83.29° stands in the table where the neighbours ask for 85.29°: a digit misprinted.
+        let printed = if row.attitude == 83.29 { 85.29 } else { row.attitude };
+        assert!((attitude - printed).abs() < 0.15, "{}: {attitude}", row.name);
+    }
+}
+
+/// A worked size: forward to a film with units and back.
+#[test]
+fn units_go_there_and_back() {
+    let conditions = Conditions {
+        diameter: 0.1,
+        length: 0.1,
+        clearance: 100e-6,
+        viscosity: 0.02,
+        omega: std::f64::consts::TAU * 50.0,
+    };
+    let row = &rows()[5];
+    let load = conditions.load(0.991).unwrap();
+    assert!((conditions.sommerfeld_number(load).unwrap() - 0.991).abs() < 1e-14);
+    assert!((load - 0.02 * 50.0 * 0.1 * 0.1 * 500.0_f64.powi(2) / 0.991).abs() < 1e-9 * load);
+    let film = conditions.film(row.ours.coefficients(), load).unwrap();
+    let [kxy, cxx] =
+        [row.ours.coefficients().stiffness[0][1], row.ours.coefficients().damping[0][0]];
+    assert!((film.kxy / (kxy * load / 100e-6) - 1.0).abs() < 1e-14);
+    assert!((film.cxx / (cxx * load / (100e-6 * conditions.omega)) - 1.0).abs() < 1e-14);
+    let again = conditions.coefficients(&film, load).unwrap();
+    let same = |a: [[f64; 2]; 2], b: [[f64; 2]; 2]| {
+        let pairs = a.as_flattened().iter().zip(b.as_flattened());
+        pairs.fold(0.0, |worst: f64, (a, b)| worst.max((a - b).abs()))
+    };
+    assert!(same(again.stiffness, row.ours.coefficients().stiffness) < 1e-12);
+    assert!(same(again.damping, row.ours.coefficients().damping) < 1e-12);
+}
