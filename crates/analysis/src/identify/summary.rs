@@ -246,16 +246,32 @@ impl IdentificationSummary {
             text += &format!("\n{}", validation.text());
         }
         text.push('\n');
-        for check in self.checks.iter().filter(|check| !check.is_conspicuous()) {
-            text += &format!("{}: {}\n", check.subject, check.sentence());
-        }
-        let conspicuous = self.checks.iter().filter(|check| check.is_conspicuous());
-        text +=
-            &paragraph(conspicuous.map(|c| format!("warning, {}: {}", c.subject, c.sentence())));
+        text += &self.verdict();
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
     }
 
-    /// What a picture of it is called: the record and its modes.
+    /// Returns how many checks passed, and each warning with its sentence.
+    fn verdict(&self) -> String {
+        let all = self.checks.len();
+        let warnings: Vec<&CheckRow> =
+            self.checks.iter().filter(|check| check.is_conspicuous()).collect();
+        let mut text = match warnings.len() {
+            0 => format!("{all} of {} passed\n", counted(all, "check")),
+            some => format!("{some} of {}: warning\n", counted(all, "check")),
+        };
+        for check in warnings {
+            text += &format!("  {}: {}\n", check.subject, check.sentence());
+        }
+        text
+    }
+
+    /// Returns every check with its verdict, in the order in which they were made.
+    pub fn all_checks(&self) -> String {
+        let rows = self.checks.iter();
+        rows.map(|c| format!("{}, {}: {}\n", c.verdict, c.subject, c.sentence())).collect()
+    }
+
+    /// Returns the title of a figure: the record and its modes.
     pub fn title(&self) -> String {
         let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
         let modes: Vec<String> = self

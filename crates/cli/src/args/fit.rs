@@ -59,6 +59,9 @@ pub struct FitArgs {
     segments: SegmentArgs,
     #[command(flatten)]
     validation: ValidationArgs,
+    /// List every check with its verdict, not only the warnings (--json and the report always do)
+    #[arg(long, help_heading = "Output", conflicts_with_all = ["json", "quiet"])]
+    verbose: bool,
 }
 
 /// Domain of the fit.
@@ -208,6 +211,14 @@ impl FitArgs {
         let other = found.validation_window(other, &ValidationWindow { start, samples })?;
         found.add_validation(&other)?;
         Ok(found)
+    }
+
+    /// Returns the result as text, with every check if asked for.
+    pub fn text(&self, found: &Identified) -> String {
+        match self.verbose {
+            true => format!("{found}\nchecks:\n{}", found.summary().all_checks()),
+            false => found.to_string(),
+        }
     }
 
     /// Returns the settings of the identification.

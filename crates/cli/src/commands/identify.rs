@@ -45,6 +45,6 @@ impl IdentifyArgs {
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let found = self.fit.identify()?;
-        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+        Outcome::new(self.fit.text(&found), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
     }
 }

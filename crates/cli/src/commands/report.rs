@@ -74,7 +74,7 @@ impl PageArgs {
         };
         let page = options::spelled(&page(&found, &settings)?);
         let html = output_name(&self.output);
-        let text = format!("{found}\nreport: {html}\n");
+        let text = format!("{}\nreport: {html}\n", self.fit.text(&found));
         Ok(Outcome::new(text, &Printed { found: &found, html })?.with_file(&self.output, page))
     }
 }
