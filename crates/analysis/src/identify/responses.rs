@@ -83,7 +83,8 @@ fn found(
         Some(Method::MaximumLikelihood) | None => {
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
             let fit = output_error(data, unknowns)?;
-            let misfit = Misfit { ratio: fit.misfit_ratio, noise: "the coherence" };
+            let misfit =
+                Misfit { ratio: fit.misfit_ratio, noise: "that follows from the coherence" };
             Ok((name, fit.estimate, Some(misfit)))
         }
     }

@@ -1,8 +1,8 @@
 //! Fits sample by sample.
 
 use mechid_estimate::checks::{
-    Finding, Subject, before_equation_of_motion, before_fit, delay_at_samples, delay_between_samples,
-    noise_on_response, periodicity_across,
+    Finding, Subject, before_equation_of_motion, before_fit, delay_at_samples,
+    delay_between_samples, noise_on_response, periodicity_across,
 };
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};

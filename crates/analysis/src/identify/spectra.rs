@@ -58,7 +58,7 @@ pub struct Misfit {
 impl fmt::Display for Misfit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (ratio, noise) = (self.ratio, self.noise);
-        write!(f, "the residual has {ratio:.3} times the power that {noise} explains")
+        write!(f, "residual power is {ratio:.3} × the noise power {noise}")
     }
 }
 
@@ -158,7 +158,7 @@ fn found(
                     output_error(&noisy, unknowns)?
                 }
             };
-            let noise = "the noise of the periods";
+            let noise = "estimated from the periods";
             Found {
                 estimator: "maximum likelihood, in the frequency domain",
                 estimate: fit.estimate,

@@ -211,7 +211,7 @@ fn a_missing_mode_shows_in_the_residual() {
         for (heading, text) in &remarks {
             let bad = heading.starts_with("Before");
             assert_eq!(text.contains("not white"), bad && is_missing, "{text}");
-            assert_eq!(text.contains("times the power"), bad == is_missing, "{text}");
+            assert_eq!(text.contains("× the noise power"), bad == is_missing, "{text}");
         }
         assert_eq!(remarks.len(), if is_missing { 2 } else { 1 });
     }
