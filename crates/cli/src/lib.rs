@@ -5,8 +5,6 @@
 //! `Outcome`. It neither prints nor gives a file its name: that happens in `outcome`, once everything
 //! has succeeded, so that a failure leaves nothing half written. Every failure ends with one message on
 //! the error stream and exit code 2.
-#![allow(clippy::print_stderr, reason = "the program talks to its user")]
-
 mod args;
 mod commands;
 mod error;
@@ -16,6 +14,7 @@ mod progress;
 mod repeat;
 
 use std::ffi::OsString;
+use std::io::{ErrorKind, Write as _, stderr};
 use std::process::ExitCode;
 
 use clap::Parser as _;
@@ -25,6 +24,9 @@ use crate::error::CliError;
 
 /// Exit code of every failure; the argument parser uses the same one.
 const FAILURE: u8 = 2;
+
+/// Exit code that a shell gives a program which a closed pipe has ended: 128 and SIGPIPE.
+const BROKEN_PIPE: u8 = 141;
 
 /// Runs the program with these arguments, the first of which is its name, and returns its exit code.
 ///
@@ -48,14 +50,20 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     };
     match outcome(&cli) {
         Ok(()) => ExitCode::SUCCESS,
+        // The reader has seen enough (`mechid … | head`).
+        Err(CliError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {
+            ExitCode::from(BROKEN_PIPE)
+        }
         Err(error) => {
-            eprintln!("error: {}", error.message());
+            // A message that cannot be told changes nothing: the exit code stays.
+            let _ = writeln!(stderr(), "error: {}", outcome::shown(&error.message()));
             ExitCode::from(FAILURE)
         }
     }
 }
 
 fn outcome(cli: &Cli) -> Result<(), CliError> {
+    cli.command.files().check()?;
     let outcome = match cli.command.waiting() {
         Some(message) => progress::watched(message, || cli.command.run())?,
         None => cli.command.run()?,

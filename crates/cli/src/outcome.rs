@@ -1,8 +1,12 @@
 //! What a subcommand found, and how it reaches the user.
 
+use std::fmt::Write as _;
 use std::io;
+use std::path::{Path, PathBuf};
 
-use mechid::io::{BegunFile, OutputFile, is_standard_output, write_all};
+use mechid::io::{
+    BegunFile, OutputFile, escaped, is_standard_output, refuse_replaced_inputs, write_all,
+};
 use mechid::plot::Figure;
 use serde::Serialize;
 
@@ -12,6 +16,32 @@ use crate::options;
 
 /// Pixels of a PNG file for each px of the drawing.
 const PNG_SCALE: f64 = 2.0;
+
+/// Files that a subcommand reads and writes, as far as its arguments name them.
+#[derive(Debug, Default)]
+pub struct Files<'a> {
+    inputs: Vec<&'a Path>,
+    outputs: Vec<&'a Path>,
+}
+
+impl<'a> Files<'a> {
+    /// Adds files that are read.
+    pub fn reads(mut self, inputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.inputs.extend(inputs.into_iter().map(PathBuf::as_path));
+        self
+    }
+
+    /// Adds files that are written.
+    pub fn writes(mut self, outputs: impl IntoIterator<Item = &'a PathBuf>) -> Self {
+        self.outputs.extend(outputs.into_iter().map(PathBuf::as_path));
+        self
+    }
+
+    /// Refuses an output that is an input, by whatever path or link.
+    pub fn check(&self) -> Result<(), CliError> {
+        Ok(refuse_replaced_inputs(&self.inputs, &self.outputs)?)
+    }
+}
 
 /// The result of a subcommand, complete before anything is written or printed.
 #[derive(Debug)]
@@ -40,7 +70,7 @@ impl Outcome {
     }
 
     /// The same outcome with one more file to write.
-    pub fn with_file(mut self, path: &std::path::Path, content: impl Into<Vec<u8>>) -> Self {
+    pub fn with_file(mut self, path: &Path, content: impl Into<Vec<u8>>) -> Self {
         self.files.push(OutputFile { path: path.to_owned(), content: content.into() });
         self
     }
@@ -75,22 +105,54 @@ impl Outcome {
         }
         write_all(self.begun, &self.files)?;
         let text = match report {
-            ReportArgs { json: true, .. } => &self.json,
+            ReportArgs { json: true, .. } => shown_json(&self.json),
             ReportArgs { quiet: true, .. } => return Ok(()),
-            _ => &self.text,
+            _ => shown(&self.text),
         };
-        let printed = match taken {
-            0 => print(io::stdout().lock(), text),
-            _ => print(io::stderr().lock(), text),
-        };
-        match printed {
-            // The reader has seen enough (`mechid … | head`).
-            Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(()),
-            other => Ok(other?),
+        match taken {
+            0 => print(io::stdout().lock(), &text)?,
+            _ => print(io::stderr().lock(), &text)?,
         }
+        Ok(())
     }
 }
 
 fn print(mut out: impl io::Write, text: &str) -> io::Result<()> {
     out.write_all(text.as_bytes()).and_then(|()| out.flush())
+}
+
+/// Returns lines of text in which characters that a terminal obeys are written out.
+pub fn shown(text: &str) -> String {
+    text.split('\n').map(escaped).collect::<Vec<_>>().join("\n")
+}
+
+/// Returns JSON in which such characters, which can only stand in strings, are escaped as JSON has it.
+fn shown_json(json: &str) -> String {
+    let mut shown = String::with_capacity(json.len());
+    for c in json.chars() {
+        let raw = c.encode_utf8(&mut [0; 4]).to_owned();
+        if c == '\n' || escaped(&raw) == raw {
+            shown.push(c);
+            continue;
+        }
+        for unit in c.encode_utf16(&mut [0; 2]) {
+            let _ = write!(shown, "\\u{unit:04x}");
+        }
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_from_a_file_moves_the_cursor() {
+        assert_eq!(shown("a\u{1b}[2J\nb\u{202e}c µN"), "a\\u{1b}[2J\nb\\u{202e}c µN");
+        let json = serde_json::to_string_pretty(&["x\u{202e}\u{9b}µ", "y"]).unwrap();
+        let shown = shown_json(&json);
+        assert!(shown.contains("\\u202e\\u009bµ"), "{shown}");
+        let read: Vec<String> = serde_json::from_str(&shown).unwrap();
+        assert_eq!(read, ["x\u{202e}\u{9b}µ", "y"]);
+    }
 }

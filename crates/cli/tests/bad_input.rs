@@ -259,7 +259,11 @@ fn pages_that_cannot_be_written() {
 #[test]
 fn descriptions_that_describe_nothing() {
     let common = "simulate a.csv --output out.csv";
-    refused("{ \"system\": 3 }", common, &["a.csv: invalid type: integer `3`", "line 1 column"]);
+    refused(
+        "{ \"system\": 3 }",
+        common,
+        &["a.csv: system: invalid type: integer `3`", "line 1 column"],
+    );
     let text = |system: &str, more: &str| {
         format!(
             "{{ \"system\": {system}, \"sampling\": {{ \"samples\": 16, \"rate_hz\": 16 }}, \

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mechid_io::Table;
+use mechid_io::{Table, escaped};
 use mechid_signal::counted;
 use serde::Serialize;
 
@@ -139,7 +139,7 @@ impl RecordSummary {
             );
         }
         for Scalar { name, value } in &self.scalars {
-            text += &format!("{name} = {value:e}\n");
+            text += &format!("{} = {value:e}\n", escaped(name));
         }
         for remark in &self.remarks {
             text += &format!("{remark}\n");
@@ -189,7 +189,12 @@ impl RecordSummary {
                 None => ("–".into(), "–".into()),
             };
             let peaks: Vec<String> = c.spectrum_peaks.iter().map(SpectrumPeak::text).collect();
-            rows.push(vec![format!("{} {}", c.column, c.name), period, mismatch, peaks.join(", ")]);
+            rows.push(vec![
+                format!("{} {}", c.column, escaped(&c.name)),
+                period,
+                mismatch,
+                peaks.join(", "),
+            ]);
         }
         format!("{}\n", text_table(&rows)).replace("\n\n\n", "\n\n")
     }
@@ -198,9 +203,12 @@ impl RecordSummary {
 impl Channel {
     /// Number and name of the column, and what the file says of it.
     pub fn title(&self) -> String {
-        let about =
-            if self.about.is_empty() { String::new() } else { format!(" ({})", self.about) };
-        format!("{} {}{about}", self.column, self.name)
+        let about = if self.about.is_empty() {
+            String::new()
+        } else {
+            format!(" ({})", escaped(&self.about))
+        };
+        format!("{} {}{about}", self.column, escaped(&self.name))
     }
 }
 

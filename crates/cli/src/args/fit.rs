@@ -17,6 +17,7 @@ use super::choices::{
 };
 use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
+use crate::outcome::Files;
 
 /// Records, what in them, and how to identify the machine.
 #[derive(Debug, Args)]
@@ -211,6 +212,14 @@ impl FitArgs {
         let other = found.validation_window(other, &ValidationWindow { start, samples })?;
         found.add_validation(&other)?;
         Ok(found)
+    }
+
+    /// Returns the records that are read.
+    pub fn files(&self) -> Files<'_> {
+        Files::default()
+            .reads([&self.input.record])
+            .reads(&self.more)
+            .reads(&self.validation.validate)
     }
 
     /// Returns the result as text, with every check if asked for.

@@ -14,7 +14,7 @@ use mechid::report::{ToFigure as _, spectrum_csv};
 use crate::args::choices::{ForceMethodChoice, RuleChoice};
 use crate::args::{PlotArgs, RecordArgs, ReportArgs, ResponseArgs, at_least_one};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Find the force that drove a known machine from its measured motion
 ///
@@ -75,6 +75,12 @@ pub struct ForceArgs {
 }
 
 impl ForceArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        let outputs = [&self.output, &self.spectrum, &self.plot.plot].into_iter().flatten();
+        Files::default().reads([&self.input.record, &self.system]).writes(outputs)
+    }
+
     /// Reads, reconstructs, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let machine = Machine::read(&self.system)?;

@@ -10,7 +10,7 @@ use crate::args::choices::EstimatorChoice;
 use crate::args::fit::{LineArgs, SegmentArgs};
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
@@ -46,6 +46,12 @@ pub struct FrfArgs {
 }
 
 impl FrfArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        let outputs = [&self.output, &self.plot.plot].into_iter().flatten();
+        Files::default().reads([&self.input.record]).writes(outputs)
+    }
+
     /// Reads, averages, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let channels = self.channels.channels();

@@ -6,7 +6,7 @@ use mechid::report::ToFigure as _;
 use crate::args::fit::FitArgs;
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Find mass, damping and stiffness from a measured force and response
 ///
@@ -42,6 +42,11 @@ pub struct IdentifyArgs {
 }
 
 impl IdentifyArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        self.fit.files().writes(&self.plot.plot)
+    }
+
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let found = self.fit.identify()?;

@@ -6,7 +6,7 @@ use mechid::report::ToFigure as _;
 
 use crate::args::{PlotArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Show what is in a record: format, columns, sampling, levels, strongest lines, period
 ///
@@ -38,6 +38,11 @@ pub struct InfoArgs {
 }
 
 impl InfoArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.input.record]).writes(&self.plot.plot)
+    }
+
     /// Reads the record and measures each of its columns.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let how =

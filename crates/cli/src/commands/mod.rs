@@ -21,7 +21,7 @@ use clap::{Parser, Subcommand};
 
 use crate::args::ReportArgs;
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// From a measured force and response to the machine behind it.
 #[derive(Debug, Parser)]
@@ -34,8 +34,8 @@ use crate::outcome::Outcome;
                   or any of them in gzip.\n\n\
                   A file called - is standard input where it is read, standard output where it is written; the\n\
                   report for people then goes to the error stream.\n\n\
-                  Exit codes:\n  0  success\n  2  every failure, wrong options included: one message on \
-                  the error stream, no file written"
+                  Exit codes:\n  0    success\n  2    every failure, wrong options included: one message on \
+                  the error stream, no file written\n  141  the reader of standard output has closed it"
 )]
 pub struct Cli {
     #[command(subcommand)]
@@ -72,6 +72,23 @@ impl Command {
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
             Command::Sweep(args) => args.run(),
+        }
+    }
+
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        match self {
+            Command::Completions(_) => Files::default(),
+            Command::Force(args) => args.files(),
+            Command::Frf(args) => args.files(),
+            Command::Identify(args) => args.files(),
+            Command::Info(args) => args.files(),
+            Command::Modal(args) => args.files(),
+            Command::Multisine(args) => args.files(),
+            Command::Report(args) => args.files(),
+            Command::Simulate(args) => args.files(),
+            Command::Stability(args) => args.files(),
+            Command::Sweep(args) => args.files(),
         }
     }
 

@@ -8,7 +8,7 @@ use mechid::report::ToFigure as _;
 
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Natural frequencies, damping ratios and complex mode shapes of a machine
 ///
@@ -35,6 +35,11 @@ pub struct ModalArgs {
 }
 
 impl ModalArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.system]).writes(&self.plot.plot)
+    }
+
     /// Reads the machine and finds its modes.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let machine = Machine::read(&self.system)?;

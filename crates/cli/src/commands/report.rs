@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::args::ReportArgs;
 use crate::args::fit::FitArgs;
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 use crate::{options, repeat};
 
 /// Identify, and write a report: one HTML file with data, fit, intervals, residual and pictures
@@ -64,6 +64,11 @@ struct Printed<'a> {
 }
 
 impl PageArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        self.fit.files().writes([&self.output])
+    }
+
     /// Reads, identifies, draws and writes.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let found = self.fit.identify()?;

@@ -15,7 +15,7 @@ use serde::Serialize;
 
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 use mechid::analysis::text::{compact, significant, text_table};
 
 /// Show stability and accuracy of the time-stepping schemes
@@ -105,6 +105,11 @@ struct MachineReport {
 }
 
 impl StabilityArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads(&self.experiment).writes(&self.plot.plot)
+    }
+
     /// Analyses every scheme.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let schemes = self.schemes()?;

@@ -12,7 +12,7 @@ use mechid::report::ToFigure as _;
 use crate::args::choices::SweepEstimatorChoice;
 use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 
 /// Identify a machine at many sampling steps, and find the step that suits the estimator best
 ///
@@ -97,6 +97,11 @@ impl SettingArgs {
 }
 
 impl SweepArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.input.record]).reads(&self.reference).writes(&self.plot.plot)
+    }
+
     /// Runs all settings and reports which was best.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let described = |ending: &std::ffi::OsStr| ending.eq_ignore_ascii_case("json");

@@ -139,7 +139,7 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     assert!((finding["frequency_hz"].as_f64().unwrap() - 3.18).abs() < 0.01, "{step}");
     assert!(finding["limit"] == "euler" && finding["bias"].as_f64().unwrap() > 0.01, "{step}");
     let (_, text, _) = run(folder, &format!("{common} --between-samples euler"));
-    assert!(text.contains(&format!("\nwarning, step: {}", step["text"].as_str().unwrap())));
+    assert!(text.contains(&format!("\n  step: {}", step["text"].as_str().unwrap())));
 
     // One line carries two equations; the three unknowns of the next record need two lines.
     let one = Multisine::flat([3], 5.0, Phases::Zero).unwrap().sample(sampling).unwrap();

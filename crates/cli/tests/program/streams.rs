@@ -152,3 +152,68 @@ fn a_description_may_come_from_standard_input() {
         shell(folder.path(), "mechid simulate - -q -o - < machine.json | cmp - machine.csv");
     assert!(simulated.status.success(), "{}", text(&simulated.stderr));
 }
+
+/// An output is never an input, by whatever path, and the input stays as it was.
+#[test]
+fn an_output_that_is_an_input_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    shell(
+        folder,
+        "ln -s machine.csv link.csv; ln machine.csv hard.csv; ln -s machine.json to.json",
+    );
+    let record = fs::read(folder.join("machine.csv")).unwrap();
+    let frf = "mechid frf machine.csv --force force --displacement displacement --period 256";
+    let page = "mechid report ./machine.csv --force force --displacement displacement";
+    for line in [
+        format!("{FORCE} --output machine.csv"),
+        format!("{FORCE} --output ./link.csv"),
+        format!("{FORCE} --spectrum hard.csv"),
+        format!("{FORCE} --output machine.json"),
+        format!("{frf} --output machine.csv"),
+        "mechid simulate machine.json --output to.json".to_owned(),
+        format!("mv machine.csv a.html; {} --output a.html", page.replace("machine.csv", "a.html")),
+    ] {
+        let run = shell(folder, &line);
+        assert_eq!(run.status.code(), Some(2), "{line}: {}", text(&run.stderr));
+        assert!(text(&run.stderr).contains("input"), "{line}: {}", text(&run.stderr));
+        let kept = fs::read(folder.join("hard.csv")).unwrap();
+        assert!(kept == record, "{line}");
+    }
+}
+
+/// What cannot be told is a failure, and never a panic.
+#[test]
+fn a_full_stream_is_told_by_the_exit_code() {
+    let folder = tempfile::tempdir().unwrap();
+    let info = "mechid info machine.csv";
+    for (line, code) in [
+        (format!("{info} > /dev/full"), 2),
+        (format!("{info} --json > /dev/full"), 2),
+        ("mechid --help > /dev/full".to_owned(), 2),
+        ("mechid --version > /dev/full".to_owned(), 2),
+        ("mechid info nowhere.csv 2> /dev/full".to_owned(), 2),
+        ("mechid info --nonsense 2> /dev/full".to_owned(), 2),
+        ("mechid info nowhere.csv 2>&-".to_owned(), 2),
+        (format!("{info} | true; exit ${{PIPESTATUS[0]}}"), 141),
+    ] {
+        let run = shell(folder.path(), &line);
+        // A report may be in the pipe before its reader is gone.
+        let piped = code == 141 && run.status.code() == Some(0);
+        assert!(piped || run.status.code() == Some(code), "{line}: {:?}", run.status);
+        assert!(!text(&run.stderr).contains("panicked"), "{line}");
+    }
+}
+
+/// Names from a file do not reach a terminal raw.
+#[test]
+fn names_that_a_terminal_would_obey_are_written_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = "t,\u{1b}[2Jforce,x\u{202e}y\n0,1,2\n1,2,3\n2,1,2\n3,2,3\n";
+    fs::write(folder.path().join("odd.csv"), table).unwrap();
+    for line in ["mechid info odd.csv", "mechid info odd.csv --json", "mechid identify odd.csv"] {
+        let run = shell(folder.path(), line);
+        let told = format!("{}{}", text(&run.stdout), text(&run.stderr));
+        assert!(!told.contains('\u{1b}') && !told.contains('\u{202e}'), "{line}: {told:?}");
+    }
+}

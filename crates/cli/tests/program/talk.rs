@@ -117,10 +117,12 @@ fn warnings_stand_together() {
     let of = |kind: &str| -> Vec<usize> {
         (0..lines.len()).filter(|at| lines[*at].starts_with(kind)).collect()
     };
-    for kind in ["warning, ", "note: "] {
+    for kind in ["  ", "note: "] {
         let at = of(kind);
         assert!(at.len() > 1, "{told}");
         assert!(at.windows(2).all(|pair| pair[1] == pair[0] + 1), "{told}");
-        assert_eq!(lines[at[0] - 1], "", "{told}");
     }
+    let first = |kind: &str| of(kind)[0];
+    assert!(lines[first("  ") - 1].ends_with("checks: warning"), "{told}");
+    assert_eq!(lines[first("note: ") - 1], "", "{told}");
 }

@@ -13,7 +13,7 @@ use mechid::signal::{Interpolation, Sampling};
 
 use crate::args::{PlotArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 use design::Channel;
 use report::Report;
 
@@ -128,6 +128,11 @@ enum Separation {
 const LARGEST: usize = 100_000_000;
 
 impl MultisineArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().writes(&self.output).writes(&self.plot.plot)
+    }
+
     /// Designs the excitation, samples it and measures it.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let columns = match self.uncorrelated {

@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::outcome::Outcome;
+use crate::outcome::{Files, Outcome};
 use mechid::analysis::text::{compact, significant, text_table};
 
 /// Simulate the experiment described in a file and write its record
@@ -108,6 +108,11 @@ struct Channel {
 }
 
 impl SimulateArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.experiment]).writes([&self.output]).writes(&self.plot.plot)
+    }
+
     /// Simulates and hands over the record.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let experiment = Experiment::read(&self.experiment)?;
