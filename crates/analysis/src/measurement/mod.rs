@@ -141,7 +141,7 @@ pub(crate) struct Source {
 
 #[derive(Debug)]
 enum Samples {
-    File(RecordFile),
+    File(Box<RecordFile>),
     /// Samples × columns used.
     Memory(DMatrix<f64>),
 }
@@ -214,7 +214,7 @@ impl Measurement {
             peaks: survey.peaks,
             offsets: offsets(reading.detrend, survey.means),
             units,
-            samples: Samples::File(file),
+            samples: Samples::File(Box::new(file)),
         };
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }
