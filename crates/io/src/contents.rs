@@ -68,7 +68,7 @@ pub(crate) struct Column {
     pub values: Result<Vec<f64>, Unusable>,
     /// Its time axis in the file.
     pub axis: Axis,
-    /// What the file says of it besides its name.
+    /// Description in the file besides its name.
     pub about: String,
 }
 
@@ -79,6 +79,8 @@ pub(crate) enum Axis {
     Unknown,
     /// Uniform, in s.
     Even { start: f64, step: f64 },
+    /// Uniform from 0 s, with a step in s that a number beside the columns states by its name.
+    Stated { step: f64 },
     /// In the column with this index.
     Column(usize),
 }

@@ -1,4 +1,4 @@
-//! The covariance of identified parameters, so that what is derived from them can have one too.
+//! The covariance of identified parameters.
 
 use std::path::Path;
 
@@ -16,12 +16,12 @@ pub struct ParameterCovariance {
     pub parameters: Vec<String>,
     /// One row and one column per parameter, in products of their SI units.
     pub matrix: Vec<Vec<f64>>,
-    /// Degrees of freedom of the variance behind it.
+    /// Degrees of freedom of the variance estimate.
     pub degrees_of_freedom: usize,
 }
 
 impl ParameterCovariance {
-    /// From a square matrix, one row and column for each of the parameters, in the products of
+    /// Creates a covariance from a square matrix, one row and column per parameter, in the products of
     /// their units.
     pub fn new(parameters: Vec<String>, matrix: &DMatrix<f64>, degrees_of_freedom: usize) -> Self {
         let matrix = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
@@ -38,7 +38,7 @@ impl ParameterCovariance {
     }
 }
 
-/// The covariance in a JSON report (`-`: on standard input), if it has one.
+/// Reads the covariance in a JSON report (`-`: standard input), if it has one.
 ///
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Undetermined`] if an entry is
@@ -67,7 +67,7 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     }
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
     let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);
-    // A parameter whose own variance is missing explains what is missing in its row and column.
+    // A parameter without a variance has no covariances either.
     let own = |row: &usize| matrix[*row][*row].is_none();
     let rows = if (0..n).any(|row| own(&row)) {
         (0..n).filter(own).collect::<Vec<_>>()

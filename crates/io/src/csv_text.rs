@@ -7,11 +7,12 @@ use mechid_signal::Sampling;
 
 use crate::{BegunFile, IoError};
 
-/// Characters of text that are gathered before they are written.
-const GATHERED: usize = 1 << 16;
+/// Number of bytes of text that are collected before they are written.
+const BUFFER_BYTES: usize = 1 << 16;
 
-/// A table with a `time` column in seconds and the named columns, as [`Table`](crate::Table) reads
-/// it back bit for bit: every number has as many digits as it takes to tell it from its neighbours.
+/// Writes a table with a `time` column in seconds and the named columns, which
+/// [`Table`](crate::Table) reads back bit for bit: every number has the fewest digits that identify
+/// it.
 ///
 /// # Panics
 /// If a column is not as long as the sampling.
@@ -26,8 +27,7 @@ pub fn csv_text(sampling: Sampling, columns: &[(String, &[f64])]) -> String {
     text
 }
 
-/// The text that [`csv_text`] gives, written some rows at a time into a file that is not complete
-/// yet.
+/// The text of [`csv_text`], written in blocks of rows into a [`BegunFile`].
 ///
 /// ```
 /// use mechid_io::{CsvFile, write_all};
@@ -46,14 +46,14 @@ pub fn csv_text(sampling: Sampling, columns: &[(String, &[f64])]) -> String {
 pub struct CsvFile {
     file: BegunFile,
     sampling: Sampling,
-    /// Rows there are.
+    /// Number of rows so far.
     rows: usize,
-    /// What is not written yet.
+    /// Text not written yet.
     text: String,
 }
 
 impl CsvFile {
-    /// Begins the file that is to stand at `path`: a `time` column, in seconds, and the named ones.
+    /// Begins the file with destination `path`: a `time` column, in seconds, and the named columns.
     ///
     /// # Errors
     /// As [`BegunFile::begin`].
@@ -66,7 +66,7 @@ impl CsvFile {
         Ok(Self { file: BegunFile::begin(path)?, sampling, rows: 0, text })
     }
 
-    /// Adds rows: so many samples of each column, in its own unit.
+    /// Appends rows: the next samples of each column, in its own unit.
     ///
     /// # Errors
     /// [`IoError::Write`].
@@ -80,7 +80,7 @@ impl CsvFile {
             let time = self.sampling.time(self.rows);
             push_row(&mut self.text, time, columns.iter().map(|column| column[k]));
             self.rows += 1;
-            if self.text.len() >= GATHERED {
+            if self.text.len() >= BUFFER_BYTES {
                 self.file.append(&self.text)?;
                 self.text.clear();
             }
@@ -88,7 +88,7 @@ impl CsvFile {
         Ok(())
     }
 
-    /// The complete file, which takes its name in [`write_all`](crate::write_all).
+    /// Returns the complete file, which gets its name in [`write_all`](crate::write_all).
     ///
     /// # Errors
     /// [`IoError::Write`].

@@ -1,10 +1,10 @@
-//! What can be wrong with a file.
+//! Errors of reading and writing files.
 
 use mechid_model::ModelError;
 use mechid_signal::{SignalError, counted, told};
 
 use crate::escape::Message;
-use crate::{DecimalSign, Limit, Place};
+use crate::{DecimalSign, Limit, Place, Quantity};
 
 /// A file that cannot be read or written; every message names the file and the place in it.
 ///
@@ -17,7 +17,7 @@ pub enum IoError {
     Read {
         /// The file.
         file: String,
-        /// What the operating system says.
+        /// Cause.
         source: std::io::Error,
     },
     /// The file cannot be written; nothing was left behind.
@@ -25,7 +25,7 @@ pub enum IoError {
     Write {
         /// The file.
         file: String,
-        /// What the operating system says.
+        /// Cause.
         source: std::io::Error,
     },
     /// An output would replace an input.
@@ -36,12 +36,12 @@ pub enum IoError {
         /// The input.
         input: String,
     },
-    /// What the file is packed in is damaged.
+    /// The gzip around the file is damaged.
     #[error("{}", Message(format_args!("{file} is damaged or cut short (gzip: {source})")))]
     Gzip {
         /// The file.
         file: String,
-        /// What the decompressor says.
+        /// Cause.
         source: std::io::Error,
     },
     /// The file is of a format that MATLAB writes, but not by default.
@@ -62,9 +62,9 @@ pub enum IoError {
     Malformed {
         /// The file.
         file: String,
-        /// Where.
+        /// Place in the file.
         at: Place,
-        /// How.
+        /// Cause.
         what: String,
     },
     /// The file is larger than a limit that guards against damaged and forged files.
@@ -72,7 +72,7 @@ pub enum IoError {
     TooLarge {
         /// The file.
         file: String,
-        /// Where.
+        /// Place in the file.
         at: Place,
         /// The limit, see [`Limits`](crate::Limits).
         limit: Limit,
@@ -84,9 +84,9 @@ pub enum IoError {
         /// The file.
         file: String,
     },
-    /// Text stands above the table.
-    #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, leave out what \
-         stands above it with --skip-lines {}",
+    /// Other text precedes the table.
+    #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, skip the lines \
+         above it with --skip-lines {}",
         counted(*fields, "field"),
         line - 1)))]
     AboveTable {
@@ -97,7 +97,7 @@ pub enum IoError {
         /// Fields of the table.
         fields: usize,
     },
-    /// Lines are to be skipped where there are none.
+    /// Lines are to be skipped in a file that is no text.
     #[error("{}", Message(format_args!("{file} is no text: it has no lines to skip")))]
     NothingToSkip {
         /// The file.
@@ -108,7 +108,7 @@ pub enum IoError {
     Empty {
         /// The file.
         file: String,
-        /// What was found instead.
+        /// Description of the content.
         found: &'static str,
     },
     /// A line has more or fewer fields than the first one.
@@ -123,12 +123,12 @@ pub enum IoError {
         /// Fields on the first line.
         expected: usize,
     },
-    /// There is no such column.
+    /// The file has no such column.
     #[error("{}", Message(format_args!("{file} has no column \"{wanted}\"; its columns are {available}")))]
     MissingColumn {
         /// The file.
         file: String,
-        /// What was asked for.
+        /// Name or number asked for.
         wanted: String,
         /// Numbers and names of the columns there are.
         available: String,
@@ -138,7 +138,7 @@ pub enum IoError {
     AmbiguousColumn {
         /// The file.
         file: String,
-        /// What was asked for.
+        /// Name or number asked for.
         wanted: String,
         /// Numbers and names of the columns there are.
         available: String,
@@ -166,7 +166,7 @@ pub enum IoError {
         line: u64,
         /// Number and name of the column.
         column: String,
-        /// What stands there.
+        /// Content of the field.
         text: String,
     },
     /// An empty field stands where a number is needed.
@@ -189,7 +189,7 @@ pub enum IoError {
         line: u64,
         /// Number and name of the column.
         column: String,
-        /// What stands there.
+        /// Content of the field.
         text: String,
         /// The decimal sign of the other numbers.
         sign: DecimalSign,
@@ -201,8 +201,24 @@ pub enum IoError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// What it holds.
+        /// Description of the content.
         what: String,
+    },
+    /// A column is in a unit of another quantity.
+    #[error("{}", Message(format_args!(
+        "{file}, column {column}: its unit {unit} is one of {quantity}, {wanted} is needed"
+    )))]
+    OtherQuantity {
+        /// The file.
+        file: String,
+        /// Number and name of the column.
+        column: String,
+        /// Its unit.
+        unit: &'static str,
+        /// Quantity of the unit.
+        quantity: Quantity,
+        /// Quantity needed.
+        wanted: Quantity,
     },
     /// A sample is NaN or infinite.
     #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = told(*value))))]
@@ -225,7 +241,7 @@ pub enum IoError {
     NonUniformTime {
         /// The file.
         file: String,
-        /// Where the worst step ends.
+        /// End of the worst step.
         at: Place,
         /// The worst step, in seconds.
         step: f64,
@@ -303,7 +319,7 @@ pub enum IoError {
     Signal {
         /// The file.
         file: String,
-        /// What is wrong with them.
+        /// Cause.
         source: SignalError,
     },
     /// The file is no JSON.
@@ -319,7 +335,7 @@ pub enum IoError {
         file: String,
         /// Path of the field, followed by a colon; empty for the whole.
         field: String,
-        /// What is wrong, with line and column.
+        /// Cause, with line and column.
         source: serde_json::Error,
     },
     /// The description of an experiment contradicts itself.
@@ -327,7 +343,7 @@ pub enum IoError {
     Description {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// Cause.
         what: String,
     },
     /// A covariance is not known.
@@ -345,21 +361,21 @@ pub enum IoError {
     Model {
         /// The file.
         file: String,
-        /// What is wrong with them.
+        /// Cause.
         source: ModelError,
     },
     /// A text is no choice of spectral lines.
     #[error("{}", Message(format_args!("\"{lines}\" is no choice of lines: write all, odd, even, or numbers and ranges such as \
          1:2:335 (first:step:last) separated by commas")))]
     LineSpec {
-        /// What was written.
+        /// Text of the choice.
         lines: String,
     },
     /// A spectral line does not exist in a period.
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
          frequency of a period of {}", counted(*len, "sample"))))]
     LineOutside {
-        /// What was written.
+        /// Text of the choice.
         lines: String,
         /// The line in question.
         line: usize,
@@ -375,7 +391,7 @@ fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
-/// What to do about a time step unlike the usual one, both in s.
+/// Remedy for a time step that differs from the usual one, both in s.
 fn remedy(step: f64, usual: f64) -> &'static str {
     if usual > 0.0 && step < 0.0 {
         "the time goes back, as where a second record was appended: keep them in files of their own"

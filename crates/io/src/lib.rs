@@ -1,8 +1,8 @@
 //! Measured records and system descriptions, in and out of files.
 //!
-//! Rigs write tables of many dialects: quoted headers, a trailing comma on every line, columns that
-//! are empty but for their first row, semicolons with decimal commas. A [`Table`] reads them all,
-//! and says file, line and column of what it cannot read.
+//! A [`Table`] reads delimited text in many dialects (quoted headers, trailing delimiters, columns
+//! that are empty below their first row, decimal commas), MATLAB and universal files. Its errors name
+//! file, line and column.
 //!
 //! ```
 //! use mechid_io::{Table, TimeAxis};

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// How a record file is read.
+/// Options for reading a record file.
 ///
 /// ```
 /// use mechid_io::{Limits, ReadOptions, Table};
@@ -42,7 +42,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The limits that hold where nothing else is said.
+    /// The default limits.
     pub const DEFAULT: Self =
         Self { row_bytes: 4 << 20, columns: 1 << 16, unpacked_bytes: 1 << 30, numbers: 1 << 28 };
 }
@@ -84,7 +84,7 @@ impl fmt::Display for Limit {
     }
 }
 
-/// What is left of the [`Limits`] while a binary or universal file is read.
+/// Remainder of the [`Limits`] while a binary or universal file is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Budget {
     limits: Limits,

@@ -1,4 +1,4 @@
-//! Spectral lines as a person writes them.
+//! Spectral lines as text.
 
 use std::fmt;
 use std::str::FromStr;
@@ -42,7 +42,7 @@ struct Range {
 }
 
 impl LineSpec {
-    /// The lines of a period, rising, each once; all strictly between DC and Nyquist.
+    /// Returns the lines of a period, ascending, each once, all strictly between DC and Nyquist.
     ///
     /// # Errors
     /// [`IoError::LineOutside`] for DC and for lines at or above Nyquist.

@@ -1,5 +1,4 @@
-//! `-`: standard input where a file is read, standard output where one is written, as everywhere in
-//! a shell. A file of that name is `./-`.
+//! `-`, the name of standard input and standard output. A file of that name is `./-`.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -8,21 +7,19 @@ use std::sync::OnceLock;
 
 use crate::escaped;
 
-/// What stands for either.
+/// Name of both.
 const DASH: &str = "-";
 
-/// Other names that systems have for standard output. Opened as files they would not do: where
-/// standard output was redirected to a file, a new file would take its place, or its beginning be
-/// written over.
+/// Other names of standard output. They cannot be opened as files: if standard output is redirected
+/// to a file, that file would be replaced or overwritten from its beginning.
 const OUTPUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
-/// Whether what is read from `path` comes from standard input by its common name `-`.
+/// Whether `path` is the common name of standard input, `-`.
 pub(crate) fn is_input(path: &Path) -> bool {
     path == Path::new(DASH)
 }
 
-/// Whether what is written to `path` goes to standard output: it is `-`, or `/dev/stdout` and its
-/// like.
+/// Returns whether `path` is a name of standard output: `-`, `/dev/stdout` or the like.
 ///
 /// ```
 /// use std::path::Path;
@@ -36,12 +33,12 @@ pub fn is_standard_output(path: &Path) -> bool {
     path == Path::new(DASH) || OUTPUT.iter().any(|name| path == Path::new(name))
 }
 
-/// Name of a file that is written, for messages: its path, [`escaped`], or `standard output`.
+/// Returns the name of a file that is written, for messages: its path, [`escaped`], or `standard output`.
 pub fn output_name(path: &Path) -> String {
     if is_standard_output(path) { "standard output".into() } else { shown(path) }
 }
 
-/// Name of a file that is read, for messages: its path, [`escaped`], or `standard input`.
+/// Returns the name of a file that is read, for messages: its path, [`escaped`], or `standard input`.
 pub fn input_name(path: &Path) -> String {
     if is_input(path) { "standard input".into() } else { shown(path) }
 }
@@ -55,8 +52,8 @@ pub(crate) fn open(path: &Path) -> io::Result<Box<dyn Read + Send>> {
     if is_input(path) { Ok(Box::new(io::stdin())) } else { Ok(Box::new(File::open(path)?)) }
 }
 
-/// The text of a description. That of standard input is kept, for it cannot be read twice: a machine
-/// and the covariance of its parameters stand in one.
+/// Reads the text of a description. Standard input is cached, since it can be read only once: a
+/// system and the covariance of its parameters are read from the same text.
 pub(crate) fn read_text(path: &Path) -> io::Result<String> {
     static KEPT: OnceLock<String> = OnceLock::new();
     if !is_input(path) {

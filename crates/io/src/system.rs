@@ -1,4 +1,4 @@
-//! The system of an experiment, in any of the ways people state it.
+//! The system of an experiment: matrices, or modal parameters of one degree of freedom.
 
 use std::fmt;
 use std::path::Path;

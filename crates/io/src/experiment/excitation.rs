@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 
 use crate::{IoError, LineSpec, json};
 
-/// A force: an object with a `kind`, `multisine` where it has none.
+/// A force: an object with a `kind`, by default `multisine`.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Excitation {
     /// Counted from 1.
@@ -147,7 +147,7 @@ struct HalfSineForce {
 }
 
 impl<'de> Deserialize<'de> for Excitation {
-    /// By hand: serde knows no default for the tag of an enum.
+    /// Written by hand: serde has no default for the tag of an enum.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         fn rest<T: DeserializeOwned, E: serde::de::Error>(
             fields: Map<String, Value>,
@@ -182,13 +182,13 @@ impl<'de> Deserialize<'de> for Excitation {
     }
 }
 
-/// What a force does between two samples.
+/// The force between two samples.
 enum Between {
-    /// What this function of time says.
+    /// A function of time.
     Function(Box<dyn Fn(f64) -> f64>),
-    /// It keeps the value of the earlier one.
+    /// The value of the earlier sample.
     Held,
-    /// Nobody knows; what a person calls the force.
+    /// Unknown; holds the name of the force, for people.
     Unknown(&'static str),
 }
 

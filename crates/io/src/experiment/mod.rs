@@ -19,7 +19,7 @@ pub use self::scheme::{FirstDisplacements, FirstSteps, LoadBeyond, MiddleLoad, S
 use crate::system::SystemDescription;
 use crate::{IoError, escaped, json};
 
-/// What to simulate. Every field of the file is one of those below; an unknown one is an error.
+/// A simulated experiment. An unknown field in the file is an error.
 ///
 /// ```
 /// use mechid_io::Experiment;
@@ -44,23 +44,23 @@ pub struct Experiment {
     sampling: SamplingDescription,
     #[serde(deserialize_with = "excitation::one_or_more")]
     excitation: Vec<Excitation>,
-    /// How the response is computed.
+    /// Scheme that computes the response.
     #[serde(default)]
     pub scheme: SchemeChoice,
-    /// Which response: the one that repeats, or one that starts.
+    /// Kind of the response: the periodic steady state, or from initial conditions.
     #[serde(default)]
     pub response: ResponseKind,
-    /// Whether a scheme may take steps at which the motion grows by itself.
+    /// Whether unstable time steps are allowed.
     #[serde(default)]
     pub allow_unstable: bool,
-    /// How many periods of the excitation the record has.
+    /// Number of periods of the excitation in the record.
     #[serde(default = "one")]
     pub periods: usize,
     /// Noise added to the records.
     pub noise: Option<Noise>,
 }
 
-/// Numbers in the largest force record that is made: 800 MB.
+/// Largest number of values in a force record: 800 MB.
 const LARGEST: usize = 100_000_000;
 
 fn one() -> usize {
@@ -94,18 +94,19 @@ impl Experiment {
         json::parse::<Self>(&file, text).map(|experiment| Self { file, ..experiment })
     }
 
-    /// How messages call the file.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// The same experiment at another sampling rate, in Hz: the period is so much longer or shorter.
+    /// Returns the same experiment at another sampling rate, in Hz; the number of samples in a period
+    /// stays the same.
     pub fn with_rate_hz(mut self, rate_hz: f64) -> Self {
         self.sampling.rate_hz = rate_hz;
         self
     }
 
-    /// Samples in one period.
+    /// Number of samples in one period.
     pub fn samples(&self) -> usize {
         self.sampling.samples
     }
@@ -128,7 +129,7 @@ impl Experiment {
         self.sampled(false)
     }
 
-    /// The same force half a step later, in N: sample k belongs to t = (k + ½) Δt.
+    /// One period of the force at mid-step instants, in N: sample k is at t = (k + ½) Δt.
     ///
     /// # Errors
     /// As [`Experiment::force`].
@@ -136,7 +137,7 @@ impl Experiment {
         self.sampled(true)
     }
 
-    /// The motion at the first sample, for a response that starts.
+    /// The initial state, of a response that is not periodic.
     ///
     /// # Errors
     /// [`IoError::Description`] if it has not one number per degree of freedom, [`IoError::Model`]
@@ -154,8 +155,8 @@ impl Experiment {
         state.map_err(|source| IoError::Model { file: self.file.clone(), source })
     }
 
-    /// One number per degree of freedom of the system, in the unit given; `what` is how a message
-    /// calls them.
+    /// One number per degree of freedom of the system, in the unit given; `what` is their name in
+    /// messages.
     ///
     /// # Errors
     /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].

@@ -19,7 +19,7 @@ pub struct Noise {
     pub seed: u64,
 }
 
-/// How strong a noise is.
+/// Level of a noise.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Level {

@@ -1,12 +1,12 @@
-//! Which response an experiment records.
+//! The response that an experiment records.
 
 use serde::{Deserialize, Serialize};
 
-/// Which of the responses to the force.
+/// Kind of the response to the force.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResponseKind {
-    /// The steady state: one period is like the next.
+    /// The periodic steady state.
     #[default]
     Periodic,
     /// Displacement and velocity are zero at the first sample.
@@ -25,7 +25,7 @@ pub struct InitialMotion {
     pub velocity: PerDof,
 }
 
-/// One number per degree of freedom, or a single one for the only degree of freedom.
+/// One number per degree of freedom, or a single number for a system of one.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize, Serialize)]
 #[serde(untagged, expecting = "expected a number, or a list with one for each degree of freedom")]
 pub enum PerDof {
@@ -40,7 +40,7 @@ pub enum PerDof {
 }
 
 impl PerDof {
-    /// The numbers for so many degrees of freedom, or how many there are instead.
+    /// The numbers for `dof` degrees of freedom, or the number of entries if it differs.
     pub(super) fn values(&self, dof: usize) -> Result<Vec<f64>, usize> {
         match self {
             Self::Zero => Ok(vec![0.0; dof]),

@@ -5,15 +5,15 @@ use serde::Deserialize;
 use super::PerDof;
 use crate::json;
 
-/// How the response to a sampled force is computed.
+/// Scheme that computes the response to a sampled force.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
 #[non_exhaustive]
 pub enum SchemeChoice {
-    /// No time step at all: line by line through the receptance. Periodic responses only.
+    /// No time steps: the receptance at each spectral line. Periodic responses only.
     #[default]
     Exact,
-    /// Newmark's method; the average acceleration method unless told otherwise.
+    /// Newmark's method; by default average acceleration.
     Newmark {
         /// β, a pure number, 1/4 by default.
         #[serde(default = "quarter")]
@@ -24,13 +24,13 @@ pub enum SchemeChoice {
     },
     /// The central difference method.
     CentralDifference {
-        /// Where the displacement before the first sample comes from.
+        /// Source of the displacement before the first sample.
         #[serde(default, deserialize_with = "json::word")]
         start: FirstDisplacements,
     },
     /// Houbolt's method.
     Houbolt {
-        /// Where the first two steps come from.
+        /// Source of the first two steps.
         #[serde(default)]
         start: FirstSteps,
     },
@@ -64,7 +64,7 @@ fn wilson() -> f64 {
     1.4
 }
 
-/// The force in the middle of a step, which a sampled force leaves open.
+/// The force in the middle of a step, which the samples do not determine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MiddleLoad {
@@ -72,7 +72,7 @@ pub enum MiddleLoad {
     Held,
     /// The mean of both ends.
     Linear,
-    /// That of the excitation itself.
+    /// The value of the excitation itself.
     Exact,
 }
 
@@ -83,7 +83,7 @@ pub enum FirstDisplacements {
     /// By the Taylor step with the consistent acceleration.
     #[default]
     Taylor,
-    /// That of the first sample: at rest until then.
+    /// The displacement of the first sample: at rest until then.
     Rest,
 }
 

@@ -9,6 +9,7 @@
 
 mod array;
 mod element;
+mod sampling;
 
 use std::io::Read as _;
 
@@ -34,6 +35,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents
         let at = Place::Byte(fault.at + 1);
         fault.error(file, at)
     })?;
+    let contents = sampling::with_stated_rates(contents);
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
     }

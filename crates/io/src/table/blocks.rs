@@ -36,7 +36,7 @@ pub(super) struct TextEnd {
 }
 
 impl TextEnd {
-    /// What is to be said of the end of a text.
+    /// Remark on the end of a text.
     pub fn remark(self) -> Option<String> {
         let bytes = counted(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
         Some(format!("left out: {bytes} behind the last line (a preallocated file not filled?)"))

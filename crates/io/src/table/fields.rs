@@ -9,7 +9,7 @@ use super::dialect::{Delimiter, is_comment};
 /// The quote around fields that hold delimiters or line breaks.
 const QUOTE: u8 = b'"';
 
-/// How rows and fields are told apart.
+/// Separators of rows and fields.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Layout {
     pub delimiter: Delimiter,

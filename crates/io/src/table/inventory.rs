@@ -1,4 +1,4 @@
-//! What a file holds, column by column, whether it can be used or not.
+//! The contents of a file, column by column, usable or not.
 
 use std::ops::ControlFlow;
 
@@ -8,24 +8,23 @@ use super::time_axis::Steps;
 use super::{RecordFile, time_unit};
 use crate::IoError;
 
-/// What one reading of a file to its end tells of columns of which some may be of no use.
+/// Result of reading a file to its end, with columns of which some may be unusable.
 #[derive(Debug)]
 pub struct Inventory {
     /// Number of samples that most columns of the file have; in text, all of them.
     pub samples: usize,
-    /// Of each column asked for what it holds, or why it cannot be used.
+    /// Contents of each column asked for, or the reason why it cannot be used.
     pub columns: Vec<Result<Tally, IoError>>,
-    /// The time axis that the column of instants gives, if there is one, or why it gives none.
+    /// Time axis of the column of instants, if one is given, or the reason why it has none.
     pub sampling: Option<Result<Sampling, IoError>>,
-    /// The last line of a text, counted from 1 in the file, if no line break ends it: the file may
-    /// have been cut off there, within its last number.
+    /// Last line of a text, counted from 1 in the file, if no line break ends it: the file may have
+    /// been cut off within its last number.
     pub open_line: Option<u64>,
-    /// What the end of a long text says, of which [`Table::remarks`](super::Table::remarks) only
-    /// knows the beginning.
+    /// Remarks on the end of a long text, which [`Table::remarks`](super::Table::remarks) does not have.
     pub remarks: Vec<String>,
 }
 
-/// What a column holds.
+/// Contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tally {
     /// Number of its samples.
@@ -35,14 +34,13 @@ pub struct Tally {
 }
 
 impl RecordFile {
-    /// Reads columns to the end, by their indices, counted from 0; and a time axis from the column
-    /// `instants`, in the unit that it says.
+    /// Reads columns to the end, by their indices, counted from 0, and the time axis from the column
+    /// `instants`, in its stated unit.
     ///
     /// # Errors
-    /// What is wrong with a column or the time axis is told there, as by
+    /// Errors of a column or of the time axis are part of the result, as by
     /// [`Table::column`](super::Table::column) and [`Table::sampling`](super::Table::sampling);
-    /// what is wrong with the file, as by [`Table::read_with`](super::Table::read_with), is an
-    /// error.
+    /// those of the file are those of [`Table::read_with`](super::Table::read_with).
     ///
     /// # Panics
     /// If there is no such column.
@@ -80,7 +78,7 @@ impl RecordFile {
         columns: &[usize],
         instants: Option<usize>,
     ) -> Result<Inventory, IoError> {
-        // What a sum of nothing is.
+        // The sum of no numbers, as of a column in memory.
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();
@@ -118,7 +116,7 @@ impl RecordFile {
         })
     }
 
-    /// So many samples at the instants of a column.
+    /// The time axis of `len` samples at the instants of a column.
     pub(super) fn sampling_of(
         &self,
         column: usize,

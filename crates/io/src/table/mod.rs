@@ -6,6 +6,7 @@ mod dialect;
 mod fields;
 mod inventory;
 mod preamble;
+mod printed;
 mod record_file;
 mod rows;
 mod source;
@@ -25,6 +26,7 @@ pub use self::record_file::{RecordFile, Survey};
 use self::source::{Kind, Source};
 use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
+use self::unit::without_unit;
 pub use self::unit::{Quantity, Unit};
 use crate::contents::{Axis, Contents, DecimalSign, Place};
 use crate::limits::ReadOptions;
@@ -35,25 +37,25 @@ const MOST_LISTED: usize = 50;
 
 /// The columns of a record file, whatever its format.
 ///
-/// | Format | Known by | Columns |
+/// | Format | Recognised by | Columns |
 /// |---|---|---|
-/// | delimited text | nothing else | fields of a row |
+/// | delimited text | none of the others | fields of a row |
 /// | MATLAB level 5, versions 5 to 7.2 | its first words | vectors, columns of matrices, fields of structs |
 /// | universal file, datasets 58 and 58b | `    -1` in its first line | functions of time, by node and direction |
 /// | gzip around any of them | its first two bytes | |
 ///
 /// In text:
 ///
-/// - The delimiter (comma, semicolon, tab, blanks) is found by itself; between semicolons or tabs a
-///   decimal comma is understood.
+/// - The delimiter (comma, semicolon, tab, blanks) and the decimal sign are detected; a decimal comma
+///   needs another delimiter.
 /// - The first row names the columns if any of its fields is not a number; otherwise columns have
 ///   numbers only. A second row without any number holds their units.
-/// - Lines that start with `#`, and empty lines, are left out; so are lines above the table, if
-///   [`Table::read_below`] says how many there are.
-/// - UTF-16 is understood where the file begins with a byte order mark.
+/// - Lines that start with `#`, and empty lines, are skipped; so are header lines above the table, by
+///   [`ReadOptions::skip_lines`].
+/// - UTF-16 is read if the file begins with a byte order mark.
 ///
-/// A column is chosen by its name, or by its number counted from 1; one that nobody asks for may
-/// hold anything. Only numbers are held, never the text.
+/// A column is chosen by its name, or by its number counted from 1; a column that is not used may
+/// hold anything. Only the numbers are kept in memory, not the text.
 #[derive(Debug)]
 pub struct Table {
     file: String,
@@ -149,12 +151,12 @@ impl Table {
         Ok(FirstRows { table, is_whole, decimal })
     }
 
-    /// How messages call the file.
+    /// Name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// What a person calls its format.
+    /// Name of the format, for people.
     pub fn format(&self) -> String {
         let encoding = if self.utf16 { ", in UTF-16" } else { "" };
         let around = if self.gzip { ", in gzip" } else { "" };
@@ -166,22 +168,22 @@ impl Table {
         self.names.len()
     }
 
-    /// Number of samples that most columns have; in text, all of them.
+    /// Most frequent number of samples of a column; in text, that of all.
     pub fn len(&self) -> usize {
         self.contents.samples
     }
 
-    /// Whether no column can be used, as in a universal file of spectra.
+    /// Whether no column is usable, as in a universal file of spectra.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Names of the columns, empty where they have none.
+    /// Names of the columns, empty for columns without a name.
     pub fn names(&self) -> &[String] {
         &self.names
     }
 
-    /// What the file says of a column beyond its name, by its index counted from 0.
+    /// Description of a column in the file besides its name, by its index counted from 0.
     ///
     /// # Panics
     /// If there is no such column.
@@ -189,14 +191,36 @@ impl Table {
         &self.contents.columns[column].about
     }
 
-    /// The unit of a force or a motion that a column says to be in, by its index counted from 0:
+    /// The unit of a force or a response that a column states, by its index counted from 0:
     /// at the end of its name in brackets (`Force [kN]`, `x (µm)`) or after a stroke (`F / kN`), or
-    /// in the line of units. Nothing here is rescaled by it.
+    /// in the line of units. [`Table::to_si`] has the factor.
     ///
     /// # Panics
     /// If there is no such column.
     pub fn unit(&self, column: usize) -> Option<Unit> {
         Unit::of(&self.names[column], self.about(column))
+    }
+
+    /// Factor that takes a column, by its index counted from 0, to the SI unit of `wanted` (N, m, m/s,
+    /// m/s²): 1 where it says no unit.
+    ///
+    /// # Errors
+    /// [`IoError::OtherQuantity`] if its unit is one of another quantity.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn to_si(&self, column: usize, wanted: Quantity) -> Result<f64, IoError> {
+        match self.unit(column) {
+            None => Ok(1.0),
+            Some(unit) if unit.quantity == wanted => Ok(unit.in_si),
+            Some(unit) => Err(IoError::OtherQuantity {
+                file: self.file.clone(),
+                column: self.label(column),
+                unit: unit.name,
+                quantity: unit.quantity,
+                wanted,
+            }),
+        }
     }
 
     /// Single numbers that the file holds beside its columns.
@@ -209,33 +233,38 @@ impl Table {
         &self.contents.remarks
     }
 
-    /// Whether columns bring their own time axis, [`TimeAxis::OfFile`].
+    /// Whether columns have a time axis in the file, [`TimeAxis::OfFile`]: that of a universal file,
+    /// or the rate that a number in a MATLAB file states by its name (`Fs`, `dt`) where no column is
+    /// called time.
     pub fn has_time_axis(&self) -> bool {
-        self.contents.columns.iter().any(|column| column.axis != Axis::Unknown)
+        self.contents.columns.iter().any(|column| match column.axis {
+            Axis::Unknown => false,
+            Axis::Stated { .. } => self.time_column().is_none(),
+            Axis::Even { .. } | Axis::Column(_) => true,
+        })
     }
 
-    /// The first column whose name says that it holds instants: `time` or `t`, in any case, with a
-    /// unit (`time_ms`, `Time [s]`) or without.
+    /// The first column named `time` or `t`, in any case, with a unit (`time_ms`, `Time [s]`) or without.
     pub fn time_column(&self) -> Option<&str> {
         self.names.iter().map(String::as_str).find(|name| time_unit::is_time(name))
     }
 
-    /// Whether a column of instants, by its index counted from 0, says its unit, in its name or in
-    /// the line of units; otherwise it is taken as seconds.
+    /// Whether a time column, by its index counted from 0, states its unit, in its name or in the line
+    /// of units; otherwise it is taken as seconds.
     ///
     /// # Panics
     /// If there is no such column.
     pub fn says_unit_of_time(&self, column: usize) -> bool {
-        time_unit::told(&self.contents.columns[column]).is_some()
+        time_unit::stated(&self.contents.columns[column]).is_some()
     }
 
-    /// Indices, counted from 0, of the columns that have a name or a first value: not those that a
-    /// trailing delimiter leaves.
+    /// Indices, counted from 0, of the columns that have a name or a first value; a trailing delimiter
+    /// makes a column without either.
     pub fn filled_columns(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.width()).filter(|c| self.contents.columns[*c].filled)
     }
 
-    /// Where a sample, counted from 0, stands in the file.
+    /// Place of a sample, counted from 0, in the file.
     pub fn place(&self, sample: usize) -> Place {
         self.contents.lines.place(sample)
     }
@@ -253,32 +282,40 @@ impl Table {
         list.join(", ")
     }
 
-    /// Index, counted from 0, of the column with this name or, failing that, with this number
-    /// counted from 1.
+    /// Index, counted from 0, of the column with this name; failing that, of the one with this name
+    /// before its unit (`Fx` for `Fx [N]`); failing that, of the one with this number, counted from 1.
     ///
     /// # Errors
     /// [`IoError::MissingColumn`], [`IoError::AmbiguousColumn`].
     pub fn find(&self, wanted: &str) -> Result<usize, IoError> {
         let wanted = wanted.trim();
         let width = self.width();
-        let mut named = (0..width).filter(|c| !wanted.is_empty() && self.names[*c] == wanted);
-        let (file, available) = (|| self.file.clone(), || self.available());
-        match (named.next(), named.next()) {
-            (Some(column), None) => Ok(column),
-            (Some(_), Some(_)) => Err(IoError::AmbiguousColumn {
-                file: file(),
-                wanted: wanted.into(),
-                available: available(),
-            }),
-            (None, _) => match wanted.parse::<usize>() {
-                Ok(n) if (1..=width).contains(&n) => Ok(n - 1),
-                _ => Err(IoError::MissingColumn {
-                    file: file(),
-                    wanted: wanted.into(),
-                    available: available(),
-                }),
-            },
+        let number = || wanted.parse().ok().filter(|n| (1..=width).contains(n)).map(|n| n - 1);
+        let missing = || IoError::MissingColumn {
+            file: self.file.clone(),
+            wanted: wanted.into(),
+            available: self.available(),
+        };
+        if wanted.is_empty() {
+            return Err(missing());
         }
+        let only = |is_named: &dyn Fn(&str) -> bool| {
+            let mut named = (0..width).filter(|c| is_named(&self.names[*c]));
+            let first = named.next();
+            match named.next() {
+                None => Ok(first),
+                Some(_) => Err(IoError::AmbiguousColumn {
+                    file: self.file.clone(),
+                    wanted: wanted.into(),
+                    available: self.available(),
+                }),
+            }
+        };
+        let named = match only(&|name| name == wanted)? {
+            None => only(&|name| without_unit(name) == wanted)?,
+            found => found,
+        };
+        named.or_else(number).ok_or_else(missing)
     }
 
     /// The numbers of the column `wanted`, chosen as in [`Table::find`].
@@ -312,7 +349,8 @@ impl Table {
         time.sampling(self, &columns)
     }
 
-    /// A record of the columns `wanted`, one channel each, on the given time axis.
+    /// A record of the columns `wanted`, one channel each, on the given time axis. The numbers are
+    /// those of the file, in the units that its columns say: [`Table::to_si`] has the factors.
     ///
     /// # Errors
     /// [`IoError::DuplicateColumn`] if a column is used twice (the time column included), and those
@@ -323,9 +361,9 @@ impl Table {
         wanted: &[impl AsRef<str>],
     ) -> Result<Record, IoError> {
         let columns = self.record_columns(time, wanted)?;
-        let sampling = self.sampling(time, wanted)?;
         let channels: Vec<&[f64]> =
             columns.iter().map(|c| self.values(*c)).collect::<Result<_, _>>()?;
+        let sampling = self.sampling(time, wanted)?;
         let mut data = DMatrix::zeros(sampling.len(), channels.len());
         for (mut into, channel) in data.column_iter_mut().zip(channels) {
             into.copy_from_slice(channel);
@@ -368,7 +406,7 @@ impl Table {
         Ok(columns)
     }
 
-    /// The number of samples that all the columns `wanted` have.
+    /// The common number of samples of the columns `wanted`.
     ///
     /// # Errors
     /// [`IoError::Lengths`] if they differ, and those of [`Table::column`].
@@ -392,7 +430,7 @@ impl Table {
         }
     }
 
-    /// The instants that the file gives a column, by its index.
+    /// The time axis of a column in the file, by its index.
     pub(crate) fn axis(&self, column: usize) -> Axis {
         self.contents.columns[column].axis
     }

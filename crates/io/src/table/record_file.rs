@@ -1,4 +1,4 @@
-//! Records of any length, read as often and as little at a time as is asked for.
+//! Records of any length, read repeatedly in blocks.
 
 use std::fs;
 use std::ops::{ControlFlow, Range};
@@ -17,11 +17,11 @@ use crate::contents::{DecimalSign, Lines, Unusable};
 use crate::limits::ReadOptions;
 use crate::{IoError, standard};
 
-/// A record file whose samples need not all be held.
+/// A record file whose samples need not fit in memory.
 ///
-/// A text of more rows than may be held is read again for each pass over its samples, in memory that
-/// does not grow with it. Shorter ones, other formats, and what can be read only once (a pipe) are
-/// held whole.
+/// A text with more rows than may be held is read again for each pass over its samples, in memory
+/// that does not grow with the file. Shorter texts, other formats, and what can be read only once (a
+/// pipe) are held whole.
 ///
 /// ```
 /// use mechid_io::{IoError, ReadOptions, RecordFile, TimeAxis};
@@ -53,7 +53,7 @@ pub struct RecordFile {
     decimal: Option<DecimalSign>,
 }
 
-/// What one pass over some columns tells of them.
+/// Result of one pass over some columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
     /// Their time axis.
@@ -66,7 +66,7 @@ pub struct Survey {
     pub remarks: Vec<String>,
 }
 
-/// Some rows of the columns of a file.
+/// Consecutive rows of the columns of a file.
 struct Chunk<'a> {
     /// The first sample, counted from 0.
     first: usize,
@@ -78,7 +78,7 @@ struct Chunk<'a> {
 type TakeRows<'a, E> = dyn FnMut(usize, &Rows) -> Result<ControlFlow<()>, E> + 'a;
 
 impl RecordFile {
-    /// Opens a file, or standard input as `-`; of a text at most `held` rows are held.
+    /// Opens a file, or standard input as `-`; at most `held` rows of a text are held in memory.
     ///
     /// # Errors
     /// As [`Table::read_with`].
@@ -97,7 +97,7 @@ impl RecordFile {
         Ok(Self { path, options: *options, head, whole, decimal })
     }
 
-    /// The table; only the first of its samples if the file is not held whole.
+    /// The table, with only the first samples if the file is not held whole.
     pub fn head(&self) -> &Table {
         &self.head
     }
@@ -107,7 +107,7 @@ impl RecordFile {
         self.whole
     }
 
-    /// Reads the columns `wanted` to the end: their time axis, and what they hold.
+    /// Reads the columns `wanted` to the end: their time axis, means and peaks.
     ///
     /// # Errors
     /// As [`Table::record`].
@@ -125,7 +125,6 @@ impl RecordFile {
         columns.extend(instants);
         let (mut len, mut sums, mut peaks) = (0, vec![0.0; count], vec![0.0_f64; count]);
         let mut steps = Steps::default();
-        let known = if self.whole { Some(self.head.sampling(time, wanted)?) } else { None };
         let end = self.chunks(&columns, &mut |chunk| {
             for (c, values) in chunk.columns[..count].iter().enumerate() {
                 sums[c] = values.iter().fold(sums[c], |sum, v| sum + v);
@@ -139,12 +138,12 @@ impl RecordFile {
             len = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             Ok::<_, IoError>(ControlFlow::Continue(()))
         })?;
-        let sampling = match (known, instants) {
-            (Some(sampling), _) => sampling,
-            (None, Some(column)) => self.sampling_of(column, steps, len)?,
-            (None, None) => match time {
+        let sampling = match (self.whole, instants) {
+            (true, _) => self.head.sampling(time, wanted)?,
+            (false, Some(column)) => self.sampling_of(column, steps, len)?,
+            (false, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
-                // A text gives its columns none: that is what this says.
+                // A text has none, which is the error.
                 _ => self.head.sampling(time, wanted)?,
             },
         };
@@ -156,12 +155,11 @@ impl RecordFile {
         Ok(Survey { sampling, means, peaks, remarks })
     }
 
-    /// Takes the samples `window` of the columns `wanted` in blocks of so many rows, each beginning
-    /// `advance` rows after the one before (samples × columns); the last block may be shorter.
+    /// Passes the samples `window` of the columns `wanted` to `take` in blocks of `rows` rows (samples ×
+    /// columns), each `advance` rows after the one before; the last block may be shorter.
     ///
     /// # Errors
-    /// As [`Table::column`], [`IoError::Read`] if the file has become shorter, and whatever `take`
-    /// gives.
+    /// As [`Table::column`], [`IoError::Read`] if the file has become shorter, and those of `take`.
     ///
     /// # Panics
     /// If `rows` or `advance` is 0, or `advance` is more than `rows`.
@@ -178,7 +176,7 @@ impl RecordFile {
         self.blocks_at(&columns, window, rows, advance, take)
     }
 
-    /// As [`RecordFile::blocks`], of columns by their indices, counted from 0.
+    /// Passes samples as [`RecordFile::blocks`] does, of columns by their indices, counted from 0.
     ///
     /// # Errors
     /// As [`RecordFile::blocks`].
@@ -199,7 +197,7 @@ impl RecordFile {
         self.chunks(columns, &mut |chunk| {
             let last = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
             let mut next = window.start.max(chunk.first);
-            // A few rows at a time: a table in memory is one chunk.
+            // At most one block at a time: a table in memory is a single chunk.
             while next < last.min(window.end) {
                 let upto = last.min(window.end).min(next + rows);
                 for (values, column) in held.iter_mut().zip(chunk.columns) {
@@ -248,7 +246,7 @@ impl RecordFile {
                 None => Ok(ControlFlow::Continue(())),
             }
         })?;
-        // What is wrong is told column by column, as of a table that is held.
+        // The first unusable column is reported, as of a table in memory.
         for column in columns {
             if let Err(why) = &reader.rows().column(*column).values {
                 return Err(self.unusable(*column, why).into());

@@ -16,7 +16,7 @@ pub(super) struct Rows {
     limits: Limits,
     /// Decimal sign of the numbers, as far as it is known.
     decimal: Option<DecimalSign>,
-    /// Line and number of fields of the first row, all and up to the last that is not empty.
+    /// `None` before the first row.
     first: Option<FirstRow>,
     columns: Vec<Column>,
     /// Columns to read; `None` before the first row if all are wanted.
@@ -37,7 +37,7 @@ struct FirstRow {
     line: u64,
     /// Number of fields.
     width: usize,
-    /// The same up to the last that is not empty.
+    /// Number of fields up to the last that is not empty.
     filled: usize,
 }
 
@@ -194,7 +194,7 @@ impl Rows {
         self.has_units
     }
 
-    /// What is known before the next rows are read.
+    /// Layout and decimal sign known before the next rows are read.
     pub fn plan(&self) -> Plan {
         let (width, filled) = self.first.map_or((0, 0), |first| (first.width, first.filled));
         Plan {

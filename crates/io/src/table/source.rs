@@ -1,4 +1,4 @@
-//! The bytes of a file, out of their gzip if they are in one, text as UTF-8, and what format they are.
+//! The bytes of a file, without gzip, text as UTF-8, and their format.
 
 use std::io::{self, BufRead, BufReader, Cursor, Read as _};
 use std::path::Path;
@@ -10,13 +10,13 @@ use crate::contents::Place;
 use crate::limits::{Limit, Limits};
 use crate::{IoError, escaped, standard};
 
-/// Bytes asked of the operating system at a time.
+/// Number of bytes read at a time.
 const CHUNK: usize = 1 << 16;
 
-/// What some programs put before UTF-8.
+/// Byte order mark of UTF-8.
 pub(crate) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Bytes by which a format is told.
+/// Number of bytes from which the format is detected.
 const HEAD: u64 = 512;
 
 /// A file being read.
@@ -24,14 +24,14 @@ pub(crate) struct Source<'a> {
     pub file: String,
     /// Whether it is read through gzip.
     pub gzip: bool,
-    /// Whether it was UTF-16 and is read as UTF-8.
+    /// Whether it is UTF-16, read as UTF-8.
     pub utf16: bool,
     /// Its first bytes, which stand in `reader` too.
     head: Vec<u8>,
     pub reader: Box<dyn BufRead + Send + 'a>,
 }
 
-/// What a file is, by its first bytes.
+/// Format of a file, by its first bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Text,
@@ -80,7 +80,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// What format the file has.
+    /// Format of the file.
     pub fn kind(&self) -> Kind {
         let head = &self.head;
         if head.starts_with(b"MATLAB 5.0 MAT-file") {
@@ -154,7 +154,7 @@ fn is_json(head: &[u8]) -> bool {
     )
 }
 
-/// What a reading error says: of the file, or of the gzip around it.
+/// The error for a failed read: of the file, or of the gzip around it.
 pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     let file = file.to_owned();
     if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }

@@ -1,7 +1,8 @@
-//! Where the time axis of a table comes from.
+//! The time axis of a table.
 
 use mechid_signal::Sampling;
 
+use super::printed::PrintedInstants;
 use super::{Table, time_unit};
 use crate::IoError;
 use crate::contents::{Axis, Place};
@@ -9,17 +10,17 @@ use crate::contents::{Axis, Place};
 /// The time axis of columns of a [`Table`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeAxis<'a> {
-    /// A column of instants, chosen by name or number: in the unit that its name or a line of units
-    /// says, otherwise in seconds.
+    /// A time column, chosen by name or number: in the unit that its name or the line of units states,
+    /// otherwise in seconds.
     Column(&'a str),
     /// A known sampling rate, in Hz.
     RateHz(f64),
-    /// The one that the file gives its columns.
+    /// The time axis of the columns in the file.
     OfFile,
 }
 
-/// Steps may differ from the median step by this part of it: printed times are rounded, and a
-/// hundredth of a step is a phase error of 1.8° at the Nyquist frequency.
+/// Largest deviation of a step from the median step, as a fraction of it: a hundredth of a step is a
+/// phase error of 1.8° at the Nyquist frequency.
 const STEP_TOLERANCE: f64 = 0.01;
 
 /// Rates and steps are the same if they differ by this part at most: universal files print them with
@@ -62,7 +63,7 @@ impl TimeAxis<'_> {
     }
 }
 
-/// The number of samples that all the columns have.
+/// The common number of samples of the columns.
 pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, IoError> {
     let mut lengths = Vec::new();
     for column in columns {
@@ -77,7 +78,7 @@ pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, I
     Err(IoError::Lengths { file: table.file().into(), lengths })
 }
 
-/// The instants that the file gives all the columns.
+/// The common instants of the columns in the file.
 fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError> {
     let mut common: Option<(usize, Instants)> = None;
     for column in columns {
@@ -109,11 +110,12 @@ fn common_instants(table: &Table, columns: &[usize]) -> Result<Instants, IoError
         .ok_or_else(|| IoError::NoTimeAxis { file: table.file().into(), column: table.available() })
 }
 
-/// The instants that the file gives a column.
+/// The instants of a column in the file.
 fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoError> {
     Ok(match table.axis(column) {
         Axis::Unknown => None,
         Axis::Even { start, step } => Some(Instants { start, step }),
+        Axis::Stated { step } => Some(Instants { start: 0.0, step }),
         Axis::Column(times) => {
             let times = table.values(times)?;
             Some(Instants { start: times[0], step: uniform_step(table, times, 1.0)? })
@@ -125,8 +127,12 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_STEP * a.abs().max(b.abs())
 }
 
-/// An error if the file gives a column another rate.
+/// An error if the file gives a column another rate. What only the name of a number states may be
+/// overruled.
 fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError> {
+    if matches!(table.axis(column), Axis::Stated { .. }) {
+        return Ok(());
+    }
     match own_instants(table, column)? {
         Some(own) if !same(1.0 / own.step, rate_hz) => Err(IoError::RateContradicts {
             file: table.file().into(),
@@ -156,29 +162,30 @@ fn uniform_step(table: &Table, times: &[f64], unit: f64) -> Result<f64, IoError>
     steps.step(table.file(), unit)
 }
 
-/// Steps whose median is the usual one: the first ones, so that not all need be held.
-const USUAL: usize = 1024;
+/// Number of steps, the first ones, whose median is the usual step.
+const MEDIAN_STEPS: usize = 1024;
 
-/// The steps of instants that come one by one.
+/// Running statistics of the steps between instants.
 #[derive(Debug, Default)]
 pub(super) struct Steps {
     instants: usize,
     first: f64,
     last: f64,
-    /// The first ones.
+    /// The first steps.
     beginning: Vec<f64>,
     shortest: Option<(f64, Place)>,
     longest: Option<(f64, Place)>,
+    printed: PrintedInstants,
 }
 
 impl Steps {
-    /// The next instant, and where it stands.
+    /// Takes the next instant and its place.
     pub fn push(&mut self, time: f64, place: impl Fn() -> Place) {
         if self.instants == 0 {
             self.first = time;
         } else {
             let step = time - self.last;
-            if self.beginning.len() < USUAL {
+            if self.beginning.len() < MEDIAN_STEPS {
                 self.beginning.push(step);
             }
             if self.shortest.is_none_or(|(shortest, _)| step < shortest) {
@@ -188,6 +195,7 @@ impl Steps {
                 self.longest = Some((step, place()));
             }
         }
+        self.printed.push(time);
         self.last = time;
         self.instants += 1;
     }
@@ -201,8 +209,9 @@ impl Steps {
         let (_, &mut usual, _) = self.beginning.select_nth_unstable_by(middle, f64::total_cmp);
         let off = |(step, _): (f64, Place)| (step - usual).abs();
         let worst = if off(shortest) > off(longest) { shortest } else { longest };
-        // Also refuses time that stands still or runs backwards, and steps that overflow.
-        if usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual {
+        // Steps of zero, negative ones and those that overflow are refused, too.
+        let is_uniform = usual > 0.0 && off(worst) <= STEP_TOLERANCE * usual;
+        if is_uniform || self.printed.are_uniform() {
             return Ok(unit * (self.last - self.first) / (self.instants - 1) as f64);
         }
         let (step, at) = worst;

@@ -1,4 +1,4 @@
-//! Columns of instants that say by their names what they are and in which unit.
+//! Time columns and their units, by their names.
 
 use crate::contents::Column;
 
@@ -17,22 +17,27 @@ const UNITS: [(&str, f64); 8] = [
     ("min", 60.0),
 ];
 
-/// The unit of a column of instants, in s: that of its name or else of the line of units below it;
-/// seconds where neither says.
+/// The unit of a time column, in s: that of its name or else of the line of units; seconds if
+/// neither states one.
 pub(super) fn unit(column: &Column) -> f64 {
-    told(column).unwrap_or(1.0)
+    stated(column).unwrap_or(1.0)
 }
 
-/// The same; nothing where neither says.
-pub(super) fn told(column: &Column) -> Option<f64> {
+/// The same; `None` if neither states one.
+pub(super) fn stated(column: &Column) -> Option<f64> {
     let (_, named) = split(&column.name);
     named.or_else(|| known(&column.about))
 }
 
-/// Whether a name says that these are instants: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.
+/// Whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.
 pub(super) fn is_time(name: &str) -> bool {
     let (bare, unit) = split(name);
     NAMES.contains(&bare.to_lowercase().as_str()) && (unit.is_some() || bare == name.trim())
+}
+
+/// A name without the unit of time at its end.
+pub(super) fn without_unit(name: &str) -> &str {
+    split(name).0
 }
 
 /// A name without the unit at its end, and that unit, in s.
@@ -40,7 +45,7 @@ fn split(name: &str) -> (&str, Option<f64>) {
     let name = name.trim();
     let Some(at) = name.rfind(['_', ' ', '[', '(', '/']) else { return (name, None) };
     match known(&name[at..]) {
-        Some(unit) => (name[..at].trim_end_matches([' ', '_']), Some(unit)),
+        Some(unit) => (name[..at].trim_end_matches([' ', '_', '/']), Some(unit)),
         None => (name, None),
     }
 }
@@ -64,6 +69,7 @@ mod tests {
             ("Time [ms]", 1e-3),
             ("t (µs)", 1e-6),
             ("time/ms", 1e-3),
+            ("Time / s", 1.0),
             ("Time_min", 60.0),
         ] {
             assert!(is_time(name), "{name}");

@@ -4,6 +4,8 @@ use std::fmt;
 
 use mechid_model::ResponseQuantity;
 
+use super::time_unit;
+
 /// Quantity that the numbers of a column measure, as far as a unit tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
@@ -45,11 +47,11 @@ impl fmt::Display for Quantity {
 /// A unit of a force or a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// As it is commonly written.
+    /// Common name.
     pub name: &'static str,
-    /// What it measures.
+    /// Quantity that it measures.
     pub quantity: Quantity,
-    /// How many N, m, m/s or m/s² it is.
+    /// Size in N, m, m/s or m/s².
     pub in_si: f64,
 }
 
@@ -109,7 +111,7 @@ const UNITS: [Unit; 32] = {
 const BARE: [&str; 6] = ["kN", "mm", "µm", "um", "mm/s", "m/s²"];
 
 impl Unit {
-    /// The unit that a column says: at the end of its `name`, in brackets (`Force [kN]`, `x (mm)`)
+    /// The unit that a column states: at the end of its `name`, in brackets (`Force [kN]`, `x (mm)`)
     /// or after a stroke (`F / kN`), without them where no word is like it (`x_mm`), or as the
     /// whole of what the line of units has for it, `about`.
     pub fn of(name: &str, about: &str) -> Option<Self> {
@@ -143,6 +145,26 @@ impl Unit {
     }
 }
 
+/// A name without the unit at its end, in brackets whatever they hold, or otherwise if it is a unit
+/// that is known.
+pub(super) fn without_unit(name: &str) -> &str {
+    let name = name.trim();
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        if let Some(inner) = name.strip_suffix(close) {
+            return inner.rfind(open).map_or(name, |at| inner[..at].trim_end());
+        }
+    }
+    if Unit::known(name).is_some() {
+        return name;
+    }
+    if Unit::at_end(name).is_none() {
+        return time_unit::without_unit(name);
+    }
+    let stroke = name.split_once('/').filter(|(_, unit)| Unit::known(unit).is_some());
+    let bare = || name.rsplit_once(['_', ' ']);
+    stroke.or_else(bare).map_or(name, |(name, _)| name.trim_end())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -170,6 +192,30 @@ mod tests {
             let unit = Unit::of(name, about).unwrap_or_else(|| panic!("{name} {about}"));
             assert_eq!(unit.quantity, quantity, "{name} {about}");
             assert!((unit.in_si / in_si - 1.0).abs() < 1e-15, "{name} {about}: {}", unit.in_si);
+        }
+    }
+
+    #[test]
+    fn a_name_is_what_stands_before_the_unit() {
+        for (name, bare) in [
+            ("Fx [N]", "Fx"),
+            ("Force [shaker 1]", "Force"),
+            ("x (µm)", "x"),
+            ("F / kN", "F"),
+            ("v/mm/s", "v"),
+            ("x_mm", "x"),
+            ("Disp um", "Disp"),
+            ("time_ms", "time"),
+            ("Time / s", "Time"),
+            ("a", "a"),
+            ("x_m", "x_m"),
+            ("F / V", "F / V"),
+            ("m/s", "m/s"),
+            ("[N]", ""),
+            ("N]", "N]"),
+            ("", ""),
+        ] {
+            assert_eq!(without_unit(name), bare, "{name}");
         }
     }
 

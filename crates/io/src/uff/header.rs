@@ -3,7 +3,7 @@
 use super::lines::{Line, Lines, number};
 use crate::contents::Fault;
 
-/// What a dataset 58 says of its function.
+/// Description of the function in a dataset 58.
 #[derive(Debug)]
 pub(crate) struct Header {
     /// The first line, empty if it says NONE.
@@ -24,7 +24,7 @@ pub(crate) struct Header {
     pub step: f64,
     /// 17 is time, 18 frequency.
     pub abscissa: u32,
-    /// What was measured, in words; empty if the file does not say.
+    /// Quantity, for people; empty if the file does not state it.
     pub quantity: String,
     /// The line with the numbers, for messages.
     pub form_at: usize,
@@ -99,7 +99,7 @@ impl Header {
     }
 }
 
-/// A field of a line; what lies past the end is blank.
+/// A field of a line; blank beyond the end.
 fn field<'a>(line: &Line<'a>, from: usize, width: usize) -> &'a [u8] {
     let rest = line.text.get(from..).unwrap_or_default();
     rest.get(..width).unwrap_or(rest).trim_ascii()
@@ -156,7 +156,7 @@ fn degree_of_freedom((node, direction): (i64, i64), line: &Line<'_>) -> Result<S
     Ok(format!("{node}{sign}{axis}"))
 }
 
-/// What the ordinate is: its label or, without one, its type, and its unit.
+/// Quantity of the ordinate: its label or, without one, its type, and its unit.
 fn quantity(line: &Line<'_>) -> Result<String, Fault> {
     let kind: u32 = whole(line, 0, 10)?;
     let (name, unit) = (label(field(line, 26, 20)), label(field(line, 47, 20)));

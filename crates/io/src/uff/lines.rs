@@ -2,7 +2,7 @@
 
 use crate::contents::Fault;
 
-/// A line and where it begins.
+/// A line and its offset.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line<'a> {
     pub text: &'a [u8],
@@ -39,23 +39,23 @@ impl<'a> Lines<'a> {
         Some(line)
     }
 
-    /// The next line, which must be there; `missing` says what it means if it is not.
+    /// Reads the next line; at the end, the error `missing`.
     pub fn required(&mut self, missing: &str) -> Result<Line<'a>, Fault> {
         let at = self.bytes.len();
         self.next().ok_or_else(|| Fault::new(at, missing))
     }
 
-    /// The bytes that are left.
+    /// The rest of the bytes.
     pub fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.next..).unwrap_or_default()
     }
 
-    /// Where they begin.
+    /// Offset of the rest.
     pub fn at(&self) -> usize {
         self.next
     }
 
-    /// Takes so many of them, or what there is.
+    /// Takes `len` bytes, or fewer at the end.
     pub fn take(&mut self, len: usize) -> &'a [u8] {
         let taken = self.rest().get(..len).unwrap_or(self.rest());
         self.next += taken.len();

@@ -6,7 +6,7 @@ use super::header::Header;
 use super::lines::{Line, Lines, is_mark, number};
 use crate::contents::Fault;
 
-/// How many columns a printed number takes, in single and in double precision.
+/// Width of a printed number in single and in double precision.
 const SINGLE: usize = 13;
 const DOUBLE: usize = 20;
 
@@ -65,14 +65,14 @@ fn by_columns(header: &Header, line: &Line<'_>, values: &mut Vec<f64>) -> Result
     Ok(())
 }
 
-/// How the numbers of a dataset 58b are stored.
+/// Number format of a dataset 58b.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Binary {
     is_big_endian: bool,
 }
 
 impl Binary {
-    /// From the line with the number of the dataset; nothing if its values are printed.
+    /// Reads the format from the line with the number of the dataset; `None` if the values are printed.
     pub fn of(id: &Line<'_>) -> Result<Option<Self>, Fault> {
         if !matches!(id.text.get(6), Some(b'b' | b'B')) {
             return Ok(None);
@@ -93,12 +93,12 @@ impl Binary {
         }
     }
 
-    /// The numbers, which end where the end of the dataset follows.
+    /// Reads the numbers, which the end of the dataset must follow.
     pub fn read(self, header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>, Fault> {
         let width = if header.is_double { 8 } else { 4 };
         let expected = header.numbers();
         let plain = expected.saturating_mul(width);
-        // By the standard instants are single precision, but not every program writes them so.
+        // By the standard, instants are single precision; some programs write double.
         let narrow = plain.saturating_sub(4 * header.count);
         let is_mixed = header.is_double
             && !header.is_even

@@ -132,6 +132,50 @@ fn lengths_that_are_none_are_refused() {
     assert_eq!(table.column("v[2]").unwrap(), [5.0, 6.0, 7.0, 8.0]);
 }
 
+/// A file of vectors, of which the short ones are single numbers.
+fn of_vectors(vectors: &[(&str, &[f64])]) -> Vec<u8> {
+    let lengths = |values: &[f64]| [1, values.len() as u32].map(u32::to_le_bytes).concat();
+    let variable = |(name, values): &(&str, &[f64])| {
+        assert!(name.len() <= 8);
+        let mut file = by_hand(values, (5, &lengths(values)), false).split_off(128);
+        let at = 8 + 16 + 16;
+        file[at + 4] = name.len() as u8;
+        file[at + 8..at + 16].fill(0);
+        file[at + 8..at + 8 + name.len()].copy_from_slice(name.as_bytes());
+        file
+    };
+    let header = by_hand(&[0.0], (5, &lengths(&[0.0])), false)[..128].to_vec();
+    [header, vectors.iter().flat_map(variable).collect()].concat()
+}
+
+#[test]
+fn a_rate_stated_by_its_name_is_the_time_axis() {
+    let x = ("x", &[1.0, 2.0, 3.0][..]);
+    let of = |vectors: &[(&str, &[f64])]| Table::parse("a.mat", &of_vectors(vectors)).unwrap();
+    for (name, value) in
+        [("Fs", 4.0), ("fs_hz", 4.0), ("SampFreq", 4.0), ("dt", 0.25), ("T_s", 0.25)]
+    {
+        let table = of(&[(name, &[value]), x]);
+        assert!(table.has_time_axis(), "{name}");
+        let record = table.record(&TimeAxis::OfFile, &["x"]).unwrap();
+        assert_eq!((record.sampling().dt(), record.len()), (0.25, 3), "{name}");
+        // Who gives another rate knows why.
+        let other = table.record(&TimeAxis::RateHz(8.0), &["x"]).unwrap();
+        assert_eq!(other.sampling().dt(), 0.125);
+    }
+    // The same twice; a contradiction, nonsense, another number, and a column of instants.
+    assert!(of(&[("Fs", &[4.0]), ("dt", &[0.25]), x]).has_time_axis());
+    for numbers in [("Fs", 5.0, "dt", 0.25), ("Fs", 0.0, "g", 9.8), ("Fs", -4.0, "f0", 4.0)] {
+        let (a, b) = ([numbers.1], [numbers.3]);
+        let table = of(&[(numbers.0, &a), (numbers.2, &b), x]);
+        assert!(!table.has_time_axis(), "{numbers:?}");
+        let e = table.record(&TimeAxis::OfFile, &["x"]).unwrap_err();
+        assert!(matches!(e, IoError::NoTimeAxis { .. }), "{e}");
+    }
+    let table = of(&[("Fs", &[4.0]), ("time", &[0.0, 0.5, 1.0]), x]);
+    assert_eq!((table.has_time_axis(), table.time_column()), (false, Some("time")));
+}
+
 #[test]
 fn other_versions_say_how_to_save() {
     let mut header = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec();

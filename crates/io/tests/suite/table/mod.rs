@@ -6,7 +6,8 @@ mod packed;
 mod stretches;
 mod universal;
 
-use mechid_io::{IoError, ReadOptions, Table, TimeAxis, csv_text};
+use mechid_io::{IoError, Quantity, ReadOptions, Table, TimeAxis, csv_text};
+use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;
 use proptest::prelude::*;
 
@@ -87,6 +88,53 @@ fn missing_and_duplicate_columns_list_those_there_are() {
     assert!(matches!(e, IoError::DuplicateColumn { column: 2, .. }), "{e}");
     let e = t.record(&TimeAxis::Column("t"), &["1"]).unwrap_err();
     assert!(matches!(e, IoError::DuplicateColumn { column: 1, .. }), "{e}");
+}
+
+#[test]
+fn a_column_is_found_by_its_name_before_the_unit() {
+    let t = table("Time [s],Fx [N],Fy [N],Fx,x_mm,a / g,2 [V]\n0,1,2,3,4,5,6\n1,1,2,3,4,5,6\n");
+    for (wanted, column) in [("Fy", 2), ("Fx", 3), ("Fx [N]", 1), ("x", 4), ("a", 5), ("Time", 0)] {
+        assert_eq!(t.find(wanted).unwrap(), column, "{wanted}");
+    }
+    // A name wins over a number, before its unit too.
+    assert_eq!((t.find("2").unwrap(), t.find("3").unwrap()), (6, 2));
+    let t = table("F [N],F (kN)\n0,1\n");
+    assert!(matches!(t.find("F"), Err(IoError::AmbiguousColumn { .. })));
+    assert!(matches!(table("[N],x\n0,1\n").find(""), Err(IoError::MissingColumn { .. })));
+}
+
+#[test]
+fn units_have_a_factor_to_the_si() {
+    let t = table("F [kN],x [um],y\n1,2,3\n");
+    let displacement = ResponseQuantity::Displacement.into();
+    assert_eq!(t.to_si(0, Quantity::Force).unwrap(), 1e3);
+    assert_eq!(t.to_si(1, displacement).unwrap(), 1e-6);
+    assert_eq!(t.to_si(2, displacement).unwrap(), 1.0);
+    assert_eq!(
+        t.to_si(0, displacement).unwrap_err().to_string(),
+        "a.csv, column 1 \"F [kN]\": its unit kN is one of force, displacement is needed"
+    );
+}
+
+/// 25.6 kHz with six decimals: steps differ by 2.6 % of one another.
+#[test]
+fn instants_rounded_to_printed_digits_are_uniform() {
+    for (decimals, unit) in [(6, ""), (5, ""), (3, "_ms"), (2, " [ms]")] {
+        let scale = if unit.is_empty() { 1.0 } else { 1e3 };
+        let times = (0..20_000).map(|k| f64::from(k) / 25_600.0 * scale);
+        let rows: String = times.map(|t| format!("{t:.decimals$},1\n")).collect();
+        let time = format!("t{unit}");
+        let t = table(&format!("{time},f\n{rows}"));
+        let record = t.record(&TimeAxis::Column(&time), &["f"]).unwrap();
+        let error = record.sampling().dt() * 25_600.0 - 1.0;
+        assert!(error.abs() < 1e-5, "{decimals} {unit}: {error}");
+        // Without one of them they are not.
+        let (before, after) = rows.split_at(rows.match_indices('\n').nth(9_000).unwrap().0 + 1);
+        let gap = after.split_once('\n').unwrap().1;
+        let t = table(&format!("{time},f\n{before}{gap}"));
+        let e = t.record(&TimeAxis::Column(&time), &["f"]).unwrap_err();
+        assert!(matches!(e, IoError::NonUniformTime { .. }), "{e}");
+    }
 }
 
 #[test]

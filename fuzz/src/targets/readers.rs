@@ -1,0 +1,270 @@
+//! The readers of `mechid-io`.
+
+use std::fs;
+use std::path::Path;
+
+use mechid_io::{
+    Experiment, IoError, Limits, LineSpec, ReadOptions, RecordFile, Table, TimeAxis, escaped,
+    read_covariance, read_system,
+};
+use mechid_signal::Sampling;
+
+use crate::Target;
+
+/// Words of delimited text.
+const TEXT: &[&str] = &[
+    "time",
+    "t [ms]",
+    "F [kN]",
+    "x (µm)",
+    "a / g",
+    "\u{feff}",
+    "\r\n",
+    "\n\n",
+    "# comment\n",
+    "\"",
+    "\"\"",
+    "\",\n\"",
+    "1,000",
+    "999.5",
+    "NaN",
+    ";;;;",
+    ",,,,",
+    "\u{202e}",
+    "\u{1b}[2J",
+    "−",
+];
+
+/// Words of MATLAB and universal files.
+const BINARY: &[&str] = &[
+    "MATLAB 5.0 MAT-file",
+    "IM",
+    "MI",
+    "\x0e\0\0\0",
+    "\x0f\0\0\0",
+    "\x09\0\0\0",
+    "    -1\n",
+    "    58\n",
+    "    58b",
+    "   164\n",
+    "  1.00000e+00",
+    "  1.0D+00",
+    "         1",
+    "NONE",
+];
+
+const JSON: &[&str] = &[
+    "{",
+    "}",
+    "[",
+    "]",
+    ":",
+    ",",
+    "null",
+    "true",
+    "\"\"",
+    "1e999",
+    "-1",
+    "\"dof\"",
+    "\"kind\"",
+    "\"system\"",
+    "\"mass\"",
+    "\"phases\"",
+    "\"random\"",
+    "\"scheme\"",
+    "\"name\"",
+    "\"load\"",
+    "\"from\"",
+    "\"noise\"",
+    "\"periods\"",
+    "\"matrix\"",
+    "\"odd\"",
+    "{\"a\":",
+    "[[[[",
+];
+
+pub const TARGETS: [Target; 5] = [
+    Target { name: "text", corpus: "text", words: TEXT, memory: [4 << 20, 100], run: record },
+    Target { name: "binary", corpus: "binary", words: BINARY, memory: [8 << 20, 100], run: record },
+    Target { name: "chunks", corpus: "text", words: TEXT, memory: [8 << 20, 200], run: chunks },
+    Target {
+        name: "json",
+        corpus: "json",
+        words: JSON,
+        memory: [4 << 20, 1000],
+        run: descriptions,
+    },
+    Target {
+        name: "lines",
+        corpus: "lines",
+        words: &["odd", "even", "all", ":", ","],
+        memory: [1 << 20, 1000],
+        run: lines,
+    },
+];
+
+/// Limits that a small input can exceed.
+const OPTIONS: ReadOptions = ReadOptions {
+    skip_lines: 0,
+    limits: Limits { row_bytes: 1 << 14, columns: 200, unpacked_bytes: 1 << 20, numbers: 1 << 17 },
+};
+
+/// Longest message, in bytes: a name may be as long as a row.
+const LONGEST_MESSAGE: usize = 1 << 20;
+
+/// What is shown to a person must be one line without characters that a terminal obeys.
+fn shown(text: &str) -> Result<(), String> {
+    if escaped(text) != text {
+        return Err(format!("a message is not escaped: {text:?}"));
+    }
+    if text.len() > LONGEST_MESSAGE {
+        return Err(format!("a message has {} bytes", text.len()));
+    }
+    Ok(())
+}
+
+/// Passes a value on, and looks at the message of an error.
+fn told<T>(result: Result<T, IoError>) -> Result<Option<T>, String> {
+    match result {
+        Ok(value) => Ok(Some(value)),
+        Err(error) => shown(&error.to_string()).map(|()| None),
+    }
+}
+
+fn ensure(holds: bool, what: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(what.into()) }
+}
+
+/// Reads a record, and uses all that is known of it.
+fn record(bytes: &[u8]) -> Result<(), String> {
+    let Some(table) = told(Table::parse_with("a\u{1b}.csv", bytes, &OPTIONS))? else {
+        return Ok(());
+    };
+    for text in [table.file().to_owned(), table.format(), table.available()] {
+        shown(&text)?;
+    }
+    ensure(table.width() <= OPTIONS.limits.columns, "there are more columns than allowed")?;
+    let axes = [
+        table.has_time_axis().then_some(TimeAxis::OfFile),
+        table.time_column().map(TimeAxis::Column),
+        Some(TimeAxis::RateHz(100.0)),
+        Some(TimeAxis::Column("1")),
+    ];
+    let mut good = Vec::new();
+    for column in 0..table.width() {
+        shown(&table.label(column))?;
+        let _ = (table.unit(column), table.about(column), table.says_unit_of_time(column));
+        if let Some(values) = told(table.values(column))? {
+            ensure(values.iter().all(|v| v.is_finite()), "a column is not finite")?;
+            good.push((column + 1).to_string());
+        }
+        let number = (column + 1).to_string();
+        for axis in axes.iter().flatten() {
+            if let Some(record) = told(table.record(axis, &[&number]))? {
+                ensure(record.sampling().dt() > 0.0, "the time step is not positive")?;
+            }
+        }
+    }
+    for name in table.names() {
+        told(table.column(name))?;
+    }
+    for axis in axes.iter().flatten() {
+        told(table.record(axis, &good))?;
+        told(table.sampling(axis, &[] as &[&str]))?;
+    }
+    told(table.common_length(&good))?;
+    shown(&table.place(0).to_string())
+}
+
+/// A text that is not held says what the one in memory says.
+fn chunks(bytes: &[u8]) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let path = folder.path().join("a.csv");
+    fs::write(&path, bytes).map_err(|e| e.to_string())?;
+    let open = |held| RecordFile::open(&path, &OPTIONS, held);
+    let (Some(held), Some(part)) = (told(open(usize::MAX))?, told(open(1))?) else {
+        return Ok(());
+    };
+    ensure(held.head().names() == part.head().names(), "the names of the columns differ")?;
+    let time = held.head().time_column().map_or(TimeAxis::RateHz(10.0), TimeAxis::Column);
+    let columns: Vec<usize> = (0..held.head().width().min(8)).collect();
+    let mut sums = [Vec::new(), Vec::new()];
+    for (file, sums) in [&held, &part].into_iter().zip(&mut sums) {
+        for column in &columns {
+            let name = (column + 1).to_string();
+            match file.survey(&time, &[&name]) {
+                Ok(survey) => {
+                    sums.push(format!(
+                        "{:?} {:?} {:?}",
+                        survey.sampling, survey.means, survey.peaks
+                    ));
+                    let len = survey.sampling.len();
+                    let mut all = Vec::new();
+                    let read = file.blocks(&[&name], 0..len, 7, 7, &mut |block| {
+                        all.extend(block.iter().map(|v| v.to_bits()));
+                        Ok::<_, IoError>(())
+                    });
+                    told(read)?;
+                    ensure(all.len() == len, "blocks have another number of samples")?;
+                    sums.push(format!("{all:?}"));
+                }
+                Err(error) => {
+                    let text = error.to_string();
+                    shown(&text)?;
+                    sums.push(text);
+                }
+            }
+        }
+    }
+    let [a, b] = sums;
+    match a.iter().zip(&b).find(|(a, b)| a != b) {
+        Some((a, b)) => Err(format!("held {a}, in chunks {b}")),
+        None => ensure(a.len() == b.len(), "there are more results"),
+    }
+}
+
+/// Largest number of samples of a period that is computed.
+const MOST_SAMPLES: usize = 1 << 12;
+
+/// Reads a description as all that it may be.
+fn descriptions(bytes: &[u8]) -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
+    let path = folder.path().join("a.json");
+    fs::write(&path, bytes).map_err(|e| e.to_string())?;
+    described(&path)
+}
+
+fn described(path: &Path) -> Result<(), String> {
+    if let Some(covariance) = told(read_covariance(path))?.flatten() {
+        let n = covariance.parameters.len();
+        ensure(covariance.matrix().shape() == (n, n), "the covariance is not square")?;
+    }
+    if let Some(system) = told(read_system(path))? {
+        ensure(system.stiffness().iter().all(|k| k.is_finite()), "the system is not finite")?;
+    }
+    let Some(experiment) = told(Experiment::read(path))? else { return Ok(()) };
+    told(experiment.system())?;
+    told(experiment.initial_state())?;
+    if experiment.samples() <= MOST_SAMPLES && experiment.periods <= 4 {
+        for force in [experiment.force(), experiment.mid_step_force()] {
+            if let Some(force) = told(force)? {
+                ensure(force.len() == experiment.samples(), "the force has another length")?;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Reads a choice of spectral lines.
+fn lines(bytes: &[u8]) -> Result<(), String> {
+    let text = String::from_utf8_lossy(bytes);
+    let Some(lines) = told(text.parse::<LineSpec>())? else { return Ok(()) };
+    ensure(lines.to_string() == text, "it is written in another way")?;
+    for len in [1, 2, 3, 16, 1000] {
+        let period = Sampling::new(0.01, len).map_err(|e| e.to_string())?;
+        if let Some(lines) = told(lines.lines(period))? {
+            ensure(lines.is_sorted() && lines.iter().all(|n| 2 * n < len), "a line is not one")?;
+        }
+    }
+    Ok(())
+}
