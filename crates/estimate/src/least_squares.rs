@@ -1,5 +1,6 @@
 //! Linear least squares from row blocks, with everything one must know about the answer.
 
+use mechid_model::linear_algebra::svd;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::EstimateError;
@@ -147,7 +148,7 @@ pub(crate) fn solve_compressed(
     if rows < unknowns {
         return Err(EstimateError::TooFewRows { rows, unknowns });
     }
-    let scaled = Scaled::new(regressors);
+    let scaled = Scaled::new(regressors)?;
     let undetermined = scaled.undetermined();
     let inverse = scaled.pseudo_inverse(undetermined.len());
     let mut coefficients = &inverse * targets;
@@ -192,7 +193,7 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn new(regressors: DMatrixView<'_, f64>) -> Self {
+    fn new(regressors: DMatrixView<'_, f64>) -> Result<Self, EstimateError> {
         let mut scaled = regressors.into_owned();
         let lengths = DVector::from_iterator(
             scaled.ncols(),
@@ -203,10 +204,10 @@ impl Scaled {
         }
         let qr = scaled.qr();
         let (q, r) = qr.unpack();
-        let svd = r.clone().svd(true, true);
+        let svd = svd(r.clone())?;
         let u = svd.u.expect("asked for");
         let v_t = svd.v_t.expect("asked for");
-        Self { lengths, q, r, singular_values: svd.singular_values, u, v_t }
+        Ok(Self { lengths, q, r, singular_values: svd.singular_values, u, v_t })
     }
 
     fn relative(&self, at: usize) -> f64 {

@@ -1,6 +1,7 @@
 //! A whole period: one small problem per line.
 
 use mechid_model::SecondOrderSystem;
+use mechid_model::linear_algebra::svd;
 use mechid_signal::{Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -43,7 +44,7 @@ impl PeriodOperator {
         for &n in lines {
             let unit = noise_weight(sampling.len(), n).sqrt();
             let weight = if unit * unit * sampling.len() as f64 > 1.5 { 2.0 } else { 1.0 };
-            let svd = transfer.scaled(n, spectrum.omega(n))?.svd(true, true);
+            let svd = svd(transfer.scaled(n, spectrum.omega(n))?)?;
             let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
             let data =
                 DVector::from_fn(scale.len(), |c, _| spectrum.line(n, c) / (scale[c] * unit));
