@@ -82,10 +82,10 @@ impl Operator for OpenOperator {
         &self.components
     }
 
-    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+    fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError> {
         let damped = DVector::from_fn(factors.len(), |i, _| factors[i] * self.coefficients[i]);
-        (&self.shapes * damped)
-            .reshape_generic(nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces))
+        let (samples, forces) = (nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces));
+        Ok((&self.shapes * damped).reshape_generic(samples, forces))
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

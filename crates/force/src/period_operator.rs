@@ -76,7 +76,7 @@ impl Operator for PeriodOperator {
         &self.components
     }
 
-    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+    fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError> {
         let mut lines = DMatrix::zeros(self.sampling.lines(), self.forces);
         for (place, factor) in self.places.iter().zip(factors) {
             let unit = factor * noise_weight(self.sampling.len(), place.line).sqrt();
@@ -84,7 +84,7 @@ impl Operator for PeriodOperator {
                 lines[(place.line, f)] += shape * place.coefficient * unit;
             }
         }
-        Spectrum::from_lines(self.sampling, lines).to_record().into_data()
+        Ok(Spectrum::from_lines(self.sampling, lines)?.to_record()?.into_data())
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

@@ -140,7 +140,7 @@ fn solve(
         }
         Record::new(measured.sampling(), all)
     };
-    let force = IdentifiedForce::of(spread(operator.force(&factors))?);
+    let force = IdentifiedForce::of(spread(operator.force(&factors)?)?);
     let error = spread(operator.variance(&variance).map(f64::sqrt))?;
     Ok(RegularisedForce {
         force: force.with_standard_error(Some(error)),

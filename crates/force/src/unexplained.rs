@@ -97,9 +97,9 @@ impl Rest {
             }
             weight += noise_weight(measured.sampling().len(), n);
         }
-        let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines).to_record();
+        let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines)?.to_record();
         let noise = level.map(|level| level.iter().map(|sigma| sigma * weight.sqrt()).collect());
-        Ok(Self::of(in_time(seen).data(), in_time(left).into_data(), noise))
+        Ok(Self::of(in_time(seen)?.data(), in_time(left)?.into_data(), noise))
     }
 
     /// Of an open record: what no force of these samples, linear between them, and no motion at the

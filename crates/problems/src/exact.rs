@@ -98,8 +98,9 @@ pub fn exact_harmonic_periodic(
             quantity.set_row(n, &x.map(|z| z * i_omega.powi(power as i32)).transpose());
         }
     }
-    let [x, v, a] = lines.map(|l| Spectrum::from_lines(force.sampling(), l).to_record());
-    Ok(Response::new(x, v, a)?)
+    let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
+    let [x, v, a] = lines.map(record);
+    Ok(Response::new(x?, v?, a?)?)
 }
 
 /// Response from `start` to the band-limited force: the periodic motion and the free decay of
