@@ -11,7 +11,7 @@
 //! | [`SavitzkyGolay::twice_differentiated`] | the same, of force and acceleration | as above, and noise four orders up |
 
 use mechid_model::Response;
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{Record, SignalError, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
@@ -21,14 +21,14 @@ use crate::EstimateError;
 /// The Nyquist line (even length) has no velocity at the samples.
 ///
 /// # Errors
-/// [`EstimateError::Model`] if a derivative overflows.
+/// [`EstimateError::Signal`] if a derivative is too large for a record.
 ///
 /// # Source
 /// Dissertation eqs. (4.6.2)–(4.6.3).
 pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, EstimateError> {
     let spectrum = Spectrum::of(displacement);
-    let velocity = times(&spectrum, |i_omega| i_omega);
-    let acceleration = times(&spectrum, |i_omega| i_omega * i_omega);
+    let velocity = times(&spectrum, |i_omega| i_omega)?;
+    let acceleration = times(&spectrum, |i_omega| i_omega * i_omega)?;
     Ok(Response::new(displacement.clone(), velocity, acceleration)?)
 }
 
@@ -38,7 +38,7 @@ pub fn spectral_from_displacement(displacement: &Record) -> Result<Response, Est
 /// off the force too before fitting, [`Record::without_mean`].
 ///
 /// # Errors
-/// [`EstimateError::Model`] if an integral overflows.
+/// [`EstimateError::Signal`] if an integral is too large for a record.
 pub fn spectral_from_acceleration(acceleration: &Record) -> Result<Response, EstimateError> {
     let acceleration = acceleration.without_mean();
     let spectrum = Spectrum::of(&acceleration);
@@ -48,16 +48,19 @@ pub fn spectral_from_acceleration(acceleration: &Record) -> Result<Response, Est
             _ => i_omega.powi(-power),
         })
     };
-    Ok(Response::new(over(2), over(1), acceleration)?)
+    Ok(Response::new(over(2)?, over(1)?, acceleration)?)
 }
 
-fn times(spectrum: &Spectrum, factor: impl Fn(Complex<f64>) -> Complex<f64>) -> Record {
+fn times(
+    spectrum: &Spectrum,
+    factor: impl Fn(Complex<f64>) -> Complex<f64>,
+) -> Result<Record, SignalError> {
     let mut lines = spectrum.lines().clone();
     for (n, mut row) in lines.row_iter_mut().enumerate() {
         let factor = factor(Complex::new(0.0, spectrum.omega(n)));
         row.iter_mut().for_each(|line| *line *= factor);
     }
-    Spectrum::from_lines(spectrum.sampling(), lines).to_record()
+    Spectrum::from_lines(spectrum.sampling(), lines)?.to_record()
 }
 
 /// A sliding polynomial fit: 2·half_width + 1 samples, a polynomial of some order through them.
@@ -76,6 +79,12 @@ pub struct SavitzkyGolay {
 }
 
 impl SavitzkyGolay {
+    /// Largest half-width, in samples; a polynomial over more follows no vibration.
+    pub const MOST_HALF_WIDTH: usize = 10_000;
+
+    /// Highest order: powers of time beyond it do not differ by more than rounding.
+    pub const MOST_ORDER: usize = 20;
+
     /// Samples under the polynomial, 2·half_width + 1.
     pub fn window(&self) -> usize {
         2 * self.half_width + 1
@@ -84,8 +93,13 @@ impl SavitzkyGolay {
     /// A polynomial of `order` through `2 * half_width + 1` samples.
     ///
     /// # Errors
-    /// [`EstimateError::Window`] unless order ≤ 2·half_width and half_width > 0.
+    /// [`EstimateError::Window`] unless order ≤ 2·half_width and half_width > 0,
+    /// [`EstimateError::WindowTooLarge`] beyond [`MOST_HALF_WIDTH`](Self::MOST_HALF_WIDTH) or
+    /// [`MOST_ORDER`](Self::MOST_ORDER).
     pub fn new(half_width: usize, order: usize) -> Result<Self, EstimateError> {
+        if half_width > Self::MOST_HALF_WIDTH || order > Self::MOST_ORDER {
+            return Err(EstimateError::WindowTooLarge { half_width, order });
+        }
         if half_width == 0 || order > 2 * half_width {
             return Err(EstimateError::Window { samples: 2 * half_width + 1, order });
         }
@@ -115,14 +129,19 @@ impl SavitzkyGolay {
             return Err(EstimateError::Window { samples: window, order: self.order });
         }
         let scale = (self.half_width as f64 * record.sampling().dt()).powi(-(times as i32));
-        let kernels: Vec<Vec<f64>> =
-            (0..window).map(|place| self.kernel(place, times, scale)).collect();
         let (half, len) = (self.half_width, record.len());
-        let data = DMatrix::from_fn(len, record.channels(), |k, channel| {
+        let centre = self.kernel(half, times, scale);
+        let mut data = DMatrix::zeros(len, record.channels());
+        for k in 0..len {
             let start = k.saturating_sub(half).min(len - window);
-            let values = &record.channel(channel)[start..start + window];
-            values.iter().zip(&kernels[k - start]).map(|(v, w)| v * w).sum()
-        });
+            // Off the centre at the two ends only: one kernel at a time, not all of them.
+            let end = (k - start != half).then(|| self.kernel(k - start, times, scale));
+            let kernel = end.as_ref().unwrap_or(&centre);
+            for channel in 0..record.channels() {
+                let values = &record.channel(channel)[start..start + window];
+                data[(k, channel)] = values.iter().zip(kernel).map(|(v, w)| v * w).sum();
+            }
+        }
         Ok(Record::new(record.sampling(), data)?)
     }
 

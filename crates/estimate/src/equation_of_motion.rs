@@ -89,11 +89,11 @@ impl EquationOfMotion {
     /// Adds everything `other` has seen, as from another record.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if it has another number of degrees of freedom.
+    /// [`EstimateError::Size`] if it has another number of degrees of freedom,
+    /// [`EstimateError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
         size("degrees of freedom", self.dof, other.dof)?;
-        self.factor.merge(&other.factor);
-        Ok(())
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
     }
 
     /// Least squares for the free entries of M, C and K, one equation of motion after another.
@@ -104,7 +104,8 @@ impl EquationOfMotion {
     /// # Errors
     /// [`EstimateError::Size`] if `unknowns` has another number of degrees of freedom,
     /// [`EstimateError::NothingUnknown`], [`EstimateError::TooFewRows`],
-    /// [`EstimateError::OnlyRatios`] if an equation has neither force nor known entry.
+    /// [`EstimateError::Underflow`], [`EstimateError::OnlyRatios`] if an equation has neither force
+    /// nor known entry.
     ///
     /// # Source
     /// Dissertation eqs. (4.4.1)–(4.4.6), (4.6.12), (4.6.31).
@@ -122,6 +123,10 @@ impl EquationOfMotion {
         let free = unknowns.free();
         if free.is_empty() {
             return Err(EstimateError::NothingUnknown);
+        }
+        if let Some((at, norm)) = self.factor.too_small() {
+            let what = ["acceleration", "velocity", "displacement", "force"][at / self.dof];
+            return Err(EstimateError::Underflow { what, column: at % self.dof, norm });
         }
         let groups = self.groups(unknowns, &free)?;
         let places: Vec<Place<'_>> =

@@ -79,6 +79,20 @@ pub enum EstimateError {
     /// Squares of the data are beyond the largest number.
     #[error("the squares of the data overflow: use other units, values below 1e150")]
     Overflow,
+    /// Squares of the data are below the least number.
+    #[error(
+        "all values of the {what} {} are so small that their squares vanish (their root sum of \
+         squares is about {norm:.0e}): use other units",
+        column + 1
+    )]
+    Underflow {
+        /// Which data.
+        what: &'static str,
+        /// Column, counted from 0.
+        column: usize,
+        /// Root sum of squares of the column, in its unit; 0 where all squares vanish.
+        norm: f64,
+    },
     /// An equation of motion without force and without known entry fixes ratios only.
     #[error(
         "no force acts on degree of freedom {dof} and none of its parameters ({parameters}) is known: \
@@ -100,8 +114,8 @@ pub enum EstimateError {
     },
     /// Values beyond the largest number stand behind a parameter.
     #[error(
-        "{parameter} or its standard error is beyond the largest number: a known value or the data are \
-         far too large"
+        "{parameter} or its standard error is beyond the largest number: a known value or the force \
+         is far too large, or the response far too small"
     )]
     Unbounded {
         /// Name of the parameter.
@@ -131,6 +145,19 @@ pub enum EstimateError {
     Window {
         /// Samples of the window.
         samples: usize,
+        /// Order of the polynomial.
+        order: usize,
+    },
+    /// A sliding polynomial over too many samples, or of too high an order.
+    #[error(
+        "a sliding polynomial of order {order} with {half_width} samples to either side: at most \
+         order {} and {} samples",
+        crate::derivatives::SavitzkyGolay::MOST_ORDER,
+        crate::derivatives::SavitzkyGolay::MOST_HALF_WIDTH
+    )]
+    WindowTooLarge {
+        /// Samples to either side of the centre.
+        half_width: usize,
         /// Order of the polynomial.
         order: usize,
     },

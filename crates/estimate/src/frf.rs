@@ -166,7 +166,7 @@ impl Frf {
             FrfEstimator::H2 => {
                 spectra.h2().ok_or(EstimateError::IncoherentMotion { frequency_hz })?
             }
-            FrfEstimator::Hv => spectra.hv(),
+            FrfEstimator::Hv => spectra.hv()?,
         };
         // What one estimator is larger than another it scatters more.
         for (v, (h, h1)) in variance.iter_mut().zip(response.iter().zip(h1.iter())) {

@@ -1,5 +1,6 @@
 //! Linear least squares from row blocks, with everything one must know about the answer.
 
+use mechid_model::linear_algebra::svd;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::EstimateError;
@@ -110,12 +111,12 @@ impl LeastSquares {
     /// Adds everything `other` has seen, as from another record.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if it has other numbers of unknowns or right-hand sides.
+    /// [`EstimateError::Size`] if it has other numbers of unknowns or right-hand sides,
+    /// [`EstimateError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
         size("columns of the regressors", self.unknowns, other.unknowns)?;
         size("columns of the right-hand side", self.targets, other.targets)?;
-        self.factor.merge(&other.factor);
-        Ok(())
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
     }
 
     /// The least-squares solution of all rows so far; more rows may follow.
@@ -124,12 +125,20 @@ impl LeastSquares {
     /// singular value decomposition where it is rank-deficient.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewRows`].
+    /// [`EstimateError::TooFewRows`], [`EstimateError::NothingUnknown`] without unknowns,
+    /// [`EstimateError::Underflow`].
     ///
     /// # Source
     /// Björck, *Numerical Methods for Least Squares Problems* (1996), chapters 1–2;
     /// Dissertation eqs. (4.4.1)–(4.4.6), there by normal equations.
     pub fn solve(&self) -> Result<Solution, EstimateError> {
+        if let Some((at, norm)) = self.factor.too_small() {
+            let (what, column) = match at.checked_sub(self.unknowns) {
+                None => ("regressors in column", at),
+                Some(target) => ("right-hand side in column", target),
+            };
+            return Err(EstimateError::Underflow { what, column, norm });
+        }
         let r = self.factor.r();
         let regressors = r.columns(0, self.unknowns);
         let targets = r.columns(self.unknowns, self.targets);
@@ -144,10 +153,13 @@ pub(crate) fn solve_compressed(
     rows: usize,
 ) -> Result<Solution, EstimateError> {
     let unknowns = regressors.ncols();
+    if unknowns == 0 {
+        return Err(EstimateError::NothingUnknown);
+    }
     if rows < unknowns {
         return Err(EstimateError::TooFewRows { rows, unknowns });
     }
-    let scaled = Scaled::new(regressors);
+    let scaled = Scaled::new(regressors)?;
     let undetermined = scaled.undetermined();
     let inverse = scaled.pseudo_inverse(undetermined.len());
     let mut coefficients = &inverse * targets;
@@ -192,7 +204,7 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn new(regressors: DMatrixView<'_, f64>) -> Self {
+    fn new(regressors: DMatrixView<'_, f64>) -> Result<Self, EstimateError> {
         let mut scaled = regressors.into_owned();
         let lengths = DVector::from_iterator(
             scaled.ncols(),
@@ -203,10 +215,10 @@ impl Scaled {
         }
         let qr = scaled.qr();
         let (q, r) = qr.unpack();
-        let svd = r.clone().svd(true, true);
+        let svd = svd(r.clone())?;
         let u = svd.u.expect("asked for");
         let v_t = svd.v_t.expect("asked for");
-        Self { lengths, q, r, singular_values: svd.singular_values, u, v_t }
+        Ok(Self { lengths, q, r, singular_values: svd.singular_values, u, v_t })
     }
 
     fn relative(&self, at: usize) -> f64 {

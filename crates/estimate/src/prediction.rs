@@ -8,6 +8,7 @@ pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
 pub use self::start::{StartFit, fitted_start};
 
+use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem, StateTransition};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
@@ -55,7 +56,7 @@ pub fn predict(
 ) -> Result<Response, EstimateError> {
     size("channels of the force", system.dof(), force.channels())?;
     size("degrees of freedom of the initial state", system.dof(), start.dof())?;
-    let step = Step::new(system, force.sampling().dt(), discretisation);
+    let step = Step::new(system, force.sampling().dt(), discretisation)?;
     let n = system.dof();
     let mut state = DVector::zeros(2 * n);
     match extent {
@@ -85,18 +86,22 @@ struct Step {
 }
 
 impl Step {
-    fn new(system: &SecondOrderSystem, dt: f64, discretisation: Discretisation) -> Self {
+    fn new(
+        system: &SecondOrderSystem,
+        dt: f64,
+        discretisation: Discretisation,
+    ) -> Result<Self, EstimateError> {
         let input = StateTransition::force_input(system, dt);
         let StateTransition { state: transition, held, ramp } =
-            StateTransition::exact(system, dt, &input);
-        match discretisation {
+            StateTransition::exact(system, dt, &input)?;
+        Ok(match discretisation {
             Discretisation::FirstOrderHold => {
                 Self { dt, transition, now: held - &ramp, next: ramp }
             }
             Discretisation::Euler | Discretisation::ZeroOrderHold => {
                 Self { dt, transition, now: held, next: ramp * 0.0 }
             }
-        }
+        })
     }
 
     /// States at the samples (samples × 2n), and one step after the last.
@@ -134,7 +139,7 @@ impl Step {
         let closing = DMatrix::identity(size, size) - over;
         let period = force.sampling().duration();
         let resolved = growth.is_finite() && {
-            let smallest = closing.singular_values().min();
+            let smallest = singular_values(closing.clone())?.min();
             smallest > 4.0 * f64::EPSILON * force.len() as f64 * (1.0 + growth)
         };
         let state = if resolved { closing.lu().solve(&from_rest) } else { None };

@@ -29,12 +29,18 @@ pub(crate) struct TriangularFactor {
     r: DMatrix<f64>,
     /// One block, column after column.
     block: Vec<f64>,
+    /// Columns with a value whose square is 0 and with none that is larger.
+    vanished: Vec<bool>,
 }
+
+/// Columns of a smaller norm have lost digits where squares fell below the least normal number.
+const LEAST_NORM: f64 = 1e-140;
 
 impl TriangularFactor {
     pub(crate) fn new(columns: usize) -> Self {
         let r = DMatrix::zeros(columns, columns);
-        Self { columns, rows: 0, r, block: vec![0.0; BLOCK_ROWS * columns] }
+        let block = vec![0.0; BLOCK_ROWS * columns];
+        Self { columns, rows: 0, r, block, vanished: vec![false; columns] }
     }
 
     /// Rows seen so far.
@@ -64,8 +70,7 @@ impl TriangularFactor {
         };
         let starts = (0..rows.div_ceil(SEGMENT_ROWS)).into_par_iter().map(|s| s * SEGMENT_ROWS);
         let Some(segments) = starts.map(segment).collect::<Option<Vec<_>>>() else { return false };
-        segments.iter().for_each(|segment| self.merge(segment));
-        true
+        segments.iter().all(|segment| self.merge(segment))
     }
 
     fn push_range(&mut self, parts: &[DMatrixView<'_, f64>], rows: Range<usize>) -> bool {
@@ -83,16 +88,36 @@ impl TriangularFactor {
             self.r = before;
             return false;
         }
+        let columns = parts.iter().flat_map(|part| part.column_iter());
+        for ((own, column), vanished) in self.r.column_iter().zip(columns).zip(&mut self.vanished) {
+            if own.iter().all(|v| *v == 0.0) {
+                *vanished |= column.rows(rows.start, rows.len()).iter().any(|v| *v != 0.0);
+            }
+        }
         self.rows += rows.len();
         true
     }
 
-    /// Takes everything another factor has seen.
-    pub(crate) fn merge(&mut self, other: &Self) {
+    /// Takes everything another factor has seen; false, and nothing taken, if a square overflows.
+    #[must_use]
+    pub(crate) fn merge(&mut self, other: &Self) -> bool {
         let rows = self.rows + other.rows;
         let finite = self.push_range(&[other.r.as_view()], 0..other.columns);
-        debug_assert!(finite, "a factor of finite rows");
-        self.stand_for(rows);
+        if finite {
+            self.vanished.iter_mut().zip(&other.vanished).for_each(|(own, other)| *own |= other);
+            self.stand_for(rows);
+        }
+        finite
+    }
+
+    /// The first column whose squares are too small to be told from 0, and its norm.
+    pub(crate) fn too_small(&self) -> Option<(usize, f64)> {
+        let norms = self.r.column_iter().map(|column| column.norm()).enumerate();
+        norms.into_iter().find(
+            |(at, norm)| {
+                if *norm == 0.0 { self.vanished[*at] } else { *norm < LEAST_NORM }
+            },
+        )
     }
 
     /// From now on the rows seen count as `rows`.
@@ -285,7 +310,7 @@ mod tests {
             prop_assert!(parts.push(&[a.rows(0, cut)]));
             let mut second = TriangularFactor::new(5);
             prop_assert!(second.push(&[a.rows(cut, a.nrows() - cut)]));
-            parts.merge(&second);
+            prop_assert!(parts.merge(&second));
             prop_assert_eq!(parts.rows(), a.nrows());
             for factor in [whole, parts] {
                 let gram = factor.r().tr_mul(factor.r());

@@ -23,7 +23,7 @@ pub(crate) struct Components {
 pub(crate) trait Operator {
     fn components(&self) -> &Components;
     /// Samples × forces of the components times these factors (f̂_i = φ_i y_i / s_i).
-    fn force(&self, factors: &[f64]) -> DMatrix<f64>;
+    fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError>;
     /// Samples × forces: variance, given that of each component per real unknown.
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }

@@ -1,10 +1,12 @@
 //! The discretised equation of motion, solved for the force of each step.
 
+use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Discretisation, Response, SecondOrderSystem, StateTransition};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, Dyn, LU};
 
 use crate::continuous::check_dof;
+use crate::state_space::exact_transition;
 use crate::{ForceError, IdentifiedForce};
 
 /// The force that carries the response from each sample to the next.
@@ -24,8 +26,8 @@ use crate::{ForceError, IdentifiedForce};
 ///
 /// # Errors
 /// [`ForceError::Dof`], [`ForceError::TooShort`] for a response shorter than one step,
-/// and [`ForceError::StepTooLong`] where the step is so long that
-/// its end does not show the force during it.
+/// [`ForceError::StepTooLong`] where the step is so long that its end does not show the force
+/// during it, and [`ForceError::Unstable`] where the free response overflows within a step.
 ///
 /// # Source
 /// Dissertation eqs. (4.7.1)–(4.7.3), read as their velocity rows with the minus sign between the
@@ -97,12 +99,11 @@ impl Solution {
         dt: f64,
         discretisation: Discretisation,
     ) -> Result<Self, ForceError> {
-        let n = system.dof();
-        let exact = || StateTransition::exact(system, dt, &DMatrix::identity(n, n));
+        let exact = || exact_transition(system, dt);
         match discretisation {
             Discretisation::Euler => Self::new(StateTransition::taylor(system, dt, 1), dt, true),
-            Discretisation::ZeroOrderHold => Self::new(exact(), dt, true),
-            Discretisation::FirstOrderHold => Self::new(exact(), dt, false),
+            Discretisation::ZeroOrderHold => Self::new(exact()?, dt, true),
+            Discretisation::FirstOrderHold => Self::new(exact()?, dt, false),
         }
     }
 
@@ -166,7 +167,8 @@ fn changes(state: &DMatrix<f64>, response: &Response, extent: Extent) -> DMatrix
 
 /// The factorised input matrix, unless some force leaves no trace in its rows.
 fn invertible(input: DMatrix<f64>, dt: f64) -> Result<LU<f64, Dyn, Dyn>, ForceError> {
-    let singular_values = input.singular_values();
+    let no_trace = ForceError::StepTooLong { dt, reciprocal_condition: 0.0 };
+    let singular_values = singular_values(input.clone()).map_err(|_| no_trace)?;
     // In step units the input matrix of a short step is about I: a single force is judged too.
     let reciprocal_condition = singular_values.min() / singular_values.max().max(1.0);
     if reciprocal_condition.is_nan() || reciprocal_condition < NO_TRACE {

@@ -85,6 +85,21 @@ pub enum ForceError {
         /// Smallest over largest singular value of the input matrix.
         reciprocal_condition: f64,
     },
+    /// The free response of an unstable machine outgrows what double precision can resolve.
+    #[error(
+        "the machine is unstable: its free response grows e-fold every {} s, by a factor of \
+         10^{:.0} within {} s, which leaves no digits for the force; use whole periods in steady \
+         state, the Kalman smoother, a shorter record or a shorter time step",
+        told_to(rate.recip(), 3),
+        rate * duration / std::f64::consts::LN_10,
+        told_to(*duration, 6)
+    )]
+    Unstable {
+        /// Largest real part of an eigenvalue, in 1/s.
+        rate: f64,
+        /// Duration considered, in s: the record, or one time step.
+        duration: f64,
+    },
     /// No line was chosen.
     #[error("no spectral line was chosen")]
     NoLines,
@@ -184,6 +199,13 @@ pub enum ForceError {
         /// Forces sought.
         forces: usize,
     },
+    /// The Kalman filter overflows at every tuning tried, or at the one given.
+    #[error(
+        "the Kalman filter of this measurement overflows: use units that keep the values \
+         of data and system between 1e-50 and 1e50; of an unstable machine, shorten the time step \
+         or take the initial state as unknown"
+    )]
+    NoLikelihood,
     /// Nothing to reconstruct from.
     #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
     Silent,

@@ -57,7 +57,7 @@ pub fn frequency_domain(
                 * inverse.row(f).iter().zip(&scale).map(|(g, s)| g.norm_sqr() * s * s).sum::<f64>();
         }
     }
-    let force = Spectrum::from_lines(sampling, force);
+    let force = Spectrum::from_lines(sampling, force)?;
     let level = level.as_deref();
     let rest = measured
         .exceeds(forced)
@@ -67,7 +67,7 @@ pub fn frequency_domain(
             DMatrix::from_fn(sampling.len(), system.dof(), |_, dof| variance[dof].sqrt());
         Record::new(sampling, constant)
     });
-    Ok(IdentifiedForce::of(force.to_record())
+    Ok(IdentifiedForce::of(force.to_record()?)
         .with_standard_error(standard_error.transpose()?)
         .with_rest(rest.transpose()?))
 }

@@ -72,7 +72,10 @@ pub struct KalmanForce {
 /// [`ForceError::MoreForcesThanMeasurements`], [`ForceError::NoForcedDof`],
 /// [`ForceError::NoSuchDof`], [`ForceError::TooShort`]; [`ForceError::Unseen`] if the channels
 /// cannot tell the forces apart; [`ForceError::Silent`] if all channels are zero;
-/// [`ForceError::NotPositive`] and [`ForceError::ChannelCount`] for a given tuning.
+/// [`ForceError::NotPositive`] and [`ForceError::ChannelCount`] for a given tuning;
+/// [`ForceError::NoLikelihood`], [`ForceError::StepTooLong`] and [`ForceError::Unstable`] where the
+/// filter or a step of it overflows (an unstable machine is no hindrance, a free response that
+/// grows by more than about e⁵ within a step is).
 ///
 /// # Source
 /// Lourens, Reynders, De Roeck, Degrande & Lombaert (2012), An augmented Kalman filter for force
@@ -102,10 +105,10 @@ pub fn kalman(
         }
     };
     check_seen(system, measured, forced, &scale)?;
-    let model = Model::new(system, measured, forced, start, &scale);
+    let model = Model::new(system, measured, forced, start, &scale)?;
     let parameters = match tuning {
-        Tuning::Likelihood => model.most_likely(None),
-        Tuning::NoiseKnown(_) => model.most_likely(Some(0.0)),
+        Tuning::Likelihood => model.most_likely(None)?,
+        Tuning::NoiseKnown(_) => model.most_likely(Some(0.0))?,
         Tuning::Given { walk, .. } => {
             let unit = model.walk_unit();
             std::iter::once(0.0).chain(walk.iter().map(|w| (w / unit).ln())).collect()
@@ -172,11 +175,11 @@ impl Model {
         forced: &[usize],
         start: Start,
         scale: &[f64],
-    ) -> Self {
+    ) -> Result<Self, ForceError> {
         let sampling = measured.sampling();
         let (n, p, channels) = (system.dof(), forced.len(), scale.len());
         let (m, dt) = (2 * n + p, sampling.dt());
-        let machine = Machine::new(system, measured, forced, scale);
+        let machine = Machine::new(system, measured, forced, scale)?;
         let (held, ramp) =
             (&machine.transition.held * &machine.input, &machine.transition.ramp * &machine.input);
         let transition = DMatrix::from_fn(m, m, |j, i| match (i < 2 * n, j < 2 * n) {
@@ -221,7 +224,7 @@ impl Model {
             start_mean: vec![0.0; m],
             start: covariance,
         };
-        Self { space, data, drives, force_size, dt, samples: sampling.len() }
+        Ok(Self { space, data, drives, force_size, dt, samples: sampling.len() })
     }
 
     /// A walk of this many N/√s crosses the force's size within the record.
@@ -254,7 +257,7 @@ impl Model {
 
     /// The parameters of greatest likelihood, that of the noise kept if it is given: a coarse grid
     /// with one walk for all forces, then downhill from its best point.
-    fn most_likely(&self, noise: Option<f64>) -> Vec<f64> {
+    fn most_likely(&self, noise: Option<f64>) -> Result<Vec<f64>, ForceError> {
         let all = |free: &[f64]| -> Vec<f64> { noise.iter().chain(free).copied().collect() };
         // Beyond these the noise has no digits left or is all there is.
         let (least, most) = (1e-8_f64.ln(), 3_f64.ln());
@@ -281,8 +284,11 @@ impl Model {
                 }
             }
         }
+        if best.0 == f64::INFINITY {
+            return Err(ForceError::NoLikelihood);
+        }
         // A hundredth in the log-likelihood moves no parameter by a tenth of its own uncertainty.
-        all(&minimise(cost, &best.1, 1.0, 0.01, 60 * free))
+        Ok(all(&minimise(cost, &best.1, 1.0, 0.01, 60 * free)))
     }
 
     /// The same, started from what a first pass says of the first sample, within a hundred times
@@ -317,6 +323,9 @@ impl Model {
         let space = self.started(self.at(parameters));
         let (n, m, sampling) = (system.dof(), space.states, measured.sampling());
         let (mean, variance) = space.smooth(space.filter(&self.data));
+        if mean.iter().chain(&variance).any(|value| !value.is_finite()) {
+            return Err(ForceError::NoLikelihood);
+        }
         let mut force = DMatrix::zeros(sampling.len(), n);
         let mut error = DMatrix::zeros(sampling.len(), n);
         for (f, &dof) in forced.iter().enumerate() {

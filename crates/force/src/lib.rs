@@ -36,8 +36,8 @@
 //!     force.set_row(n, &load.transpose());
 //!     motion.set_row(n, &stiffness.lu().solve(&load).unwrap().transpose());
 //! }
-//! let force = Spectrum::from_lines(period, force).to_record();
-//! let displacement = Spectrum::from_lines(period, motion).to_record();
+//! let force = Spectrum::from_lines(period, force)?.to_record()?;
+//! let displacement = Spectrum::from_lines(period, motion)?.to_record()?;
 //!
 //! // Only the displacement of the first direction is measured: it tells the force all the same.
 //! let measured = Measurement::of_all(

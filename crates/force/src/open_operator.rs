@@ -1,14 +1,20 @@
 //! An open record: the impulse responses as one dense matrix.
 
 use mechid_model::SecondOrderSystem;
+use mechid_model::linear_algebra::svd;
 use nalgebra::{DMatrix, DVector};
 
 use crate::components::{Components, Operator};
-use crate::state_space::Machine;
+use crate::state_space::{Machine, growth_rate};
 use crate::{ForceError, Measurement, Start};
 
 /// Most unknowns (samples × forces) of an open record: the dense problem then takes seconds.
 pub const OPEN_UNKNOWNS: usize = 512;
+
+/// Largest growth of the free response over the record, as a natural logarithm: a factor of 10⁶.
+/// Impulse responses that grow more leave too few digits for those that begin late: beyond 10⁸ the
+/// force found is wrong as a whole.
+const MOST_GROWTH: f64 = 14.0;
 
 pub(crate) struct OpenOperator {
     components: Components,
@@ -36,7 +42,11 @@ impl OpenOperator {
             let (unknowns, limit) = (samples * forces, OPEN_UNKNOWNS);
             return Err(ForceError::TooLarge { unknowns, limit });
         }
-        let machine = Machine::new(system, measured, forced, scale);
+        let (rate, duration) = (growth_rate(system)?, measured.sampling().duration());
+        if rate * duration > MOST_GROWTH {
+            return Err(ForceError::Unstable { rate, duration });
+        }
+        let machine = Machine::new(system, measured, forced, scale)?;
         let mut matrix = machine.impulse_responses(samples);
         let mut data = DVector::from_fn(samples * scale.len(), |row, _| {
             measured.record().data()[(row % samples, row / samples)] / scale[row / samples]
@@ -50,8 +60,7 @@ impl OpenOperator {
             matrix -= &free * free.tr_mul(&matrix);
             data -= &free * free.tr_mul(&data);
         }
-        let mut svd = matrix.svd(true, true);
-        svd.sort_by_singular_values();
+        let svd = svd(matrix)?;
         let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
         let parts = u.tr_mul(&data);
         let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
@@ -73,10 +82,10 @@ impl Operator for OpenOperator {
         &self.components
     }
 
-    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+    fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError> {
         let damped = DVector::from_fn(factors.len(), |i, _| factors[i] * self.coefficients[i]);
-        (&self.shapes * damped)
-            .reshape_generic(nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces))
+        let (samples, forces) = (nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces));
+        Ok((&self.shapes * damped).reshape_generic(samples, forces))
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

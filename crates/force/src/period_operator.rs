@@ -1,6 +1,7 @@
 //! A whole period: one small problem per line.
 
 use mechid_model::SecondOrderSystem;
+use mechid_model::linear_algebra::svd;
 use mechid_signal::{Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -43,7 +44,7 @@ impl PeriodOperator {
         for &n in lines {
             let unit = noise_weight(sampling.len(), n).sqrt();
             let weight = if unit * unit * sampling.len() as f64 > 1.5 { 2.0 } else { 1.0 };
-            let svd = transfer.scaled(n, spectrum.omega(n))?.svd(true, true);
+            let svd = svd(transfer.scaled(n, spectrum.omega(n))?)?;
             let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
             let data =
                 DVector::from_fn(scale.len(), |c, _| spectrum.line(n, c) / (scale[c] * unit));
@@ -75,7 +76,7 @@ impl Operator for PeriodOperator {
         &self.components
     }
 
-    fn force(&self, factors: &[f64]) -> DMatrix<f64> {
+    fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError> {
         let mut lines = DMatrix::zeros(self.sampling.lines(), self.forces);
         for (place, factor) in self.places.iter().zip(factors) {
             let unit = factor * noise_weight(self.sampling.len(), place.line).sqrt();
@@ -83,7 +84,7 @@ impl Operator for PeriodOperator {
                 lines[(place.line, f)] += shape * place.coefficient * unit;
             }
         }
-        Spectrum::from_lines(self.sampling, lines).to_record().into_data()
+        Ok(Spectrum::from_lines(self.sampling, lines)?.to_record()?.into_data())
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

@@ -56,7 +56,8 @@ pub struct RegularisedForce {
 ///
 /// # Errors
 /// As [`frequency_domain`](crate::frequency_domain()); [`ForceError::TooLarge`] for an open record
-/// beyond the limit; [`ForceError::Silent`] where no force reaches any channel, or all are zero.
+/// beyond the limit; [`ForceError::Unstable`] for one over which the free response of an unstable
+/// machine grows by more than 10⁶ (a period asks for no stability); [`ForceError::Silent`] where no force reaches any channel, or all are zero.
 ///
 /// # Source
 /// Tikhonov & Arsenin (1977); Hansen (1998), Rank-Deficient and Discrete Ill-Posed Problems.
@@ -89,7 +90,7 @@ pub fn regularised(
     let rest = measured.exceeds(forced).then(|| match unknowns {
         ForceUnknowns::Samples(start) => {
             let start = (*start, &scale[..]);
-            Ok(Rest::of_open(system, measured, forced, force.record(), start, level))
+            Rest::of_open(system, measured, forced, force.record(), start, level)
         }
         _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
     });
@@ -139,7 +140,7 @@ fn solve(
         }
         Record::new(measured.sampling(), all)
     };
-    let force = IdentifiedForce::of(spread(operator.force(&factors))?);
+    let force = IdentifiedForce::of(spread(operator.force(&factors)?)?);
     let error = spread(operator.variance(&variance).map(f64::sqrt))?;
     Ok(RegularisedForce {
         force: force.with_standard_error(Some(error)),

@@ -3,7 +3,25 @@
 use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use nalgebra::{DMatrix, DVector};
 
-use crate::Measurement;
+use crate::{ForceError, Measurement};
+
+/// Returns the exact transition over a step, for the input q.
+pub(crate) fn exact_transition(
+    system: &SecondOrderSystem,
+    dt: f64,
+) -> Result<StateTransition, ForceError> {
+    let input = DMatrix::identity(system.dof(), system.dof());
+    StateTransition::exact(system, dt, &input).map_err(|reason| match growth_rate(system) {
+        Ok(rate) if rate * dt > 1.0 => ForceError::Unstable { rate, duration: dt },
+        Ok(_) => ForceError::StepTooLong { dt, reciprocal_condition: 0.0 },
+        Err(_) => reason.into(),
+    })
+}
+
+/// Returns the growth rate of the free response: the largest real part of an eigenvalue, in 1/s.
+pub(crate) fn growth_rate(system: &SecondOrderSystem) -> Result<f64, ForceError> {
+    Ok(system.eigenvalues()?.iter().map(|l| l.re).fold(f64::NEG_INFINITY, f64::max))
+}
 
 /// Outputs of the machine in step units: y = out·z + through·q, the force linear over a step.
 pub(crate) struct Machine {
@@ -22,9 +40,9 @@ impl Machine {
         measured: &Measurement,
         forced: &[usize],
         scale: &[f64],
-    ) -> Self {
+    ) -> Result<Self, ForceError> {
         let (n, dt) = (system.dof(), measured.sampling().dt());
-        let transition = StateTransition::exact(system, dt, &DMatrix::identity(n, n));
+        let transition = exact_transition(system, dt)?;
         let unit =
             DMatrix::from_fn(n, forced.len(), |i, j| if i == forced[j] { dt * dt } else { 0.0 });
         let input = system.mass().clone().lu().solve(&unit).expect("M is invertible");
@@ -43,7 +61,7 @@ impl Machine {
                 }
             }
         }
-        Self { transition, out, through, input }
+        Ok(Self { transition, out, through, input })
     }
 
     /// Channels × samples from rest, of a force given as forces × samples.

@@ -1,6 +1,7 @@
 //! From unknown forces to measured channels, and back, at one angular frequency.
 
 use mechid_model::SecondOrderSystem;
+use mechid_model::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix};
 
 use crate::{Channel, ForceError};
@@ -49,7 +50,7 @@ impl Transfer<'_> {
             return self.direct(line, omega);
         }
         let transfer = self.scaled(line, omega)?;
-        let svd = transfer.clone().svd(true, true);
+        let svd = svd(transfer.clone())?;
         let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
         let reciprocal_condition = if largest > 0.0 { smallest / largest } else { 0.0 };
         if reciprocal_condition < NOT_TRANSMITTED {

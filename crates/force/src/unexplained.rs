@@ -97,9 +97,9 @@ impl Rest {
             }
             weight += noise_weight(measured.sampling().len(), n);
         }
-        let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines).to_record();
+        let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines)?.to_record();
         let noise = level.map(|level| level.iter().map(|sigma| sigma * weight.sqrt()).collect());
-        Ok(Self::of(in_time(seen).data(), in_time(left).into_data(), noise))
+        Ok(Self::of(in_time(seen)?.data(), in_time(left)?.into_data(), noise))
     }
 
     /// Of an open record: what no force of these samples, linear between them, and no motion at the
@@ -111,8 +111,8 @@ impl Rest {
         force: &Record,
         (start, scale): (Start, &[f64]),
         level: Option<&[f64]>,
-    ) -> Self {
-        let machine = Machine::new(system, measured, forced, scale);
+    ) -> Result<Self, ForceError> {
+        let machine = Machine::new(system, measured, forced, scale)?;
         let (samples, channels) = (measured.sampling().len(), scale.len());
         let force = DMatrix::from_fn(forced.len(), samples, |f, k| force.channel(forced[f])[k]);
         let made = machine.response(&force);
@@ -129,7 +129,7 @@ impl Rest {
         for (mut column, scale) in left.column_iter_mut().zip(scale) {
             column *= *scale;
         }
-        Self::of(measured.record().data(), left, level.map(<[f64]>::to_vec))
+        Ok(Self::of(measured.record().data(), left, level.map(<[f64]>::to_vec)))
     }
 
     /// Where displacement, velocity and force of every degree of freedom were found together.

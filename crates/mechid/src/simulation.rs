@@ -158,7 +158,9 @@ pub enum SimulateError {
 /// Dissertation eqs. (4.6.9)–(4.6.10).
 pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Response, ModelError> {
     let dof = system.dof();
-    assert_eq!(force.channels(), dof, "one force per degree of freedom");
+    if force.channels() != dof {
+        return Err(ModelError::ForceChannels { got: force.channels(), dof });
+    }
     let forces = Spectrum::of(force);
     let mut motions = [(); 3].map(|()| DMatrix::<Complex<f64>>::zeros(forces.len(), dof));
     for n in 0..forces.len() {
@@ -172,8 +174,9 @@ pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Resp
         motions[1].set_row(n, &(&displacement * i_omega));
         motions[2].set_row(n, &(displacement * (i_omega * i_omega)));
     }
-    let [x, v, a] = motions.map(|lines| Spectrum::from_lines(force.sampling(), lines).to_record());
-    Response::new(x, v, a)
+    let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
+    let [x, v, a] = motions.map(record);
+    Response::new(x?, v?, a?)
 }
 
 fn has_given_start(experiment: &Experiment) -> bool {

@@ -127,11 +127,38 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// The eigenvalue iteration of a matrix did not converge.
-    #[error("the eigenvalues of a {size}×{size} matrix could not be computed")]
+    /// The eigenvalue or singular value iteration of a matrix did not converge.
+    #[error("the eigenvalues or singular values of a {rows}×{columns} matrix did not converge")]
     NotConverged {
         /// Rows of the matrix.
-        size: usize,
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// A matrix that must be square is not.
+    #[error("a {rows}×{columns} matrix was given where a square one is needed")]
+    NotSquare {
+        /// Rows of the matrix.
+        rows: usize,
+        /// Its columns.
+        columns: usize,
+    },
+    /// An entry of a matrix to be decomposed is NaN or infinite.
+    #[error("entry ({}, {}) of a matrix to be decomposed is not a finite number", row + 1, column + 1)]
+    EntryNotFinite {
+        /// Row, counted from 0.
+        row: usize,
+        /// Column, counted from 0.
+        column: usize,
+    },
+    /// A matrix exponential is too large to be computed.
+    #[error(
+        "the exponential of a matrix of norm {norm:.1e} overflows: the time step is too long for \
+         the system"
+    )]
+    ExponentialOverflow {
+        /// Largest column sum of moduli, dimensionless.
+        norm: f64,
     },
     /// A word that names none of the choices.
     #[error("there is no {what} `{name}`: {known}")]

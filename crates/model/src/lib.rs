@@ -30,6 +30,7 @@
 //! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
 //! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
+//! | singular values, a matrix exponential | [`linear_algebra`] |
 //! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
@@ -41,6 +42,7 @@ mod error;
 mod frequency_response;
 mod initial_state;
 mod journal_bearing;
+pub mod linear_algebra;
 mod modes;
 mod parameter;
 mod real_schur;

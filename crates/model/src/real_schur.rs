@@ -6,6 +6,7 @@
 use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
 use crate::ModelError;
+use crate::linear_algebra::{check_finite, check_square};
 
 /// Sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is dropped too.
 const PATIENCE: usize = 20;
@@ -41,15 +42,13 @@ impl RealSchur {
     /// with exceptional shifts.
     ///
     /// # Errors
-    /// [`ModelError::NotConverged`] if the iteration does not converge, as for entries that are not
-    /// finite.
-    ///
-    /// # Panics
-    /// If `a` is not square.
+    /// [`ModelError::NotSquare`], [`ModelError::EntryNotFinite`], [`ModelError::NotConverged`].
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
     pub fn new(a: DMatrix<f64>) -> Result<Self, ModelError> {
+        check_square(&a)?;
+        check_finite(&a)?;
         let size = a.nrows();
         if size < 2 {
             let blocks = (0..size).map(|at| (at, 1)).collect();
@@ -71,7 +70,7 @@ impl RealSchur {
             }
             sweeps += 1;
             if sweeps > LIMIT {
-                return Err(ModelError::NotConverged { size });
+                return Err(ModelError::NotConverged { rows: size, columns: size });
             }
             sweep(&mut t, &mut q, start, last, sweeps);
         }

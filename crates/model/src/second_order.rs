@@ -5,6 +5,7 @@ use std::fmt;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::ModelError;
+use crate::linear_algebra::singular_values;
 
 /// Which of the three matrices of a [`SecondOrderSystem`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -142,8 +143,8 @@ impl SecondOrderSystem {
 fn reciprocal_condition(mass: &DMatrix<f64>, factored: &LU<f64, Dyn, Dyn>) -> f64 {
     let n = mass.nrows();
     if n <= ALL_SINGULAR_VALUES {
-        let singular_values = mass.singular_values();
-        return singular_values.min() / singular_values.max();
+        let Ok(values) = singular_values(mass.clone()) else { return 0.0 };
+        return if values.max() > 0.0 { values.min() / values.max() } else { 0.0 };
     }
     if !factored.is_invertible() {
         return 0.0;

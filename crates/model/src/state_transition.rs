@@ -2,7 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::SecondOrderSystem;
+use crate::linear_algebra::exponential;
+use crate::{ModelError, SecondOrderSystem};
 
 /// Transition of the state over one step Δt:
 /// z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with Γ₁ only for a linear input.
@@ -26,7 +27,7 @@ use crate::SecondOrderSystem;
 /// let zero = dmatrix![0.0];
 /// let mass = SecondOrderSystem::new(dmatrix![2.0], zero.clone(), zero)?;
 /// let dt = 0.5;
-/// let step = StateTransition::exact(&mass, dt, &StateTransition::force_input(&mass, dt));
+/// let step = StateTransition::exact(&mass, dt, &StateTransition::force_input(&mass, dt))?;
 /// let z: DVector<f64> = &step.held * dvector![6.0];
 /// assert!((z[0] - 0.375).abs() < 1e-15 && (z[1] / dt - 1.5).abs() < 1e-15);
 /// # Ok::<(), mechid_model::ModelError>(())
@@ -46,25 +47,33 @@ impl StateTransition {
     /// Exact transition at any step, for the input matrix B (n × inputs, in m per unit of the input):
     /// one matrix exponential of order 2(n + inputs).
     ///
-    /// # Panics
-    /// If B has not one row per degree of freedom.
+    /// # Errors
+    /// [`ModelError::ForceChannels`] if B has not one row per degree of freedom;
+    /// [`ModelError::ExponentialOverflow`] if the step is so long that Φ overflows.
     ///
     /// # Source
     /// Van Loan (1978), IEEE Trans. Automatic Control 23(3), 395–404.
-    pub fn exact(system: &SecondOrderSystem, dt: f64, input: &DMatrix<f64>) -> Self {
+    pub fn exact(
+        system: &SecondOrderSystem,
+        dt: f64,
+        input: &DMatrix<f64>,
+    ) -> Result<Self, ModelError> {
         let (n, inputs) = (system.dof(), input.ncols());
+        if input.nrows() != n {
+            return Err(ModelError::ForceChannels { got: input.nrows(), dof: n });
+        }
         let (states, order) = (2 * n, 2 * (n + inputs));
         let mut generator = DMatrix::zeros(order, order);
         generator.view_mut((0, 0), (states, states)).copy_from(&Self::rate(system, dt));
         generator.view_mut((n, states), (n, inputs)).copy_from(input);
         generator.view_mut((states, states + inputs), (inputs, inputs)).fill_with_identity();
-        let exponential = generator.exp();
+        let exponential = exponential(&generator)?;
         let block = |at, width| exponential.view((0, at), (states, width)).into_owned();
-        Self {
+        Ok(Self {
             state: block(0, states),
             held: block(states, inputs),
             ramp: block(states + inputs, inputs),
-        }
+        })
     }
 
     /// Transition under a held input with the exponential series cut after `order` terms, for B = I
@@ -128,7 +137,7 @@ mod tests {
     fn a_step_is_the_closed_form() {
         let (sdof, dt, force) = (Sdof::new(3.0, 0.8, 50.0).unwrap(), 0.13, [4.0, -7.0]);
         let (system, start) = (sdof.system(), dvector![0.02, dt * -0.3]);
-        let step = StateTransition::exact(&system, dt, &StateTransition::force_input(&system, dt));
+        let step = StateTransition::exact(&system, dt, &StateTransition::force_input(&system, dt)).unwrap();
         let record = Record::from_channel(Sampling::new(dt, 2).unwrap(), force.to_vec()).unwrap();
         let held = sdof.held_force_response(&record, 0.02, -0.3).unwrap();
         let linear = sdof.linear_force_response(&record, 0.02, -0.3).unwrap();
@@ -151,8 +160,8 @@ mod tests {
         )
         .unwrap();
         let all = StateTransition::force_input(&system, 0.2);
-        let one = StateTransition::exact(&system, 0.2, &all.columns(1, 1).into_owned());
-        let all = StateTransition::exact(&system, 0.2, &all);
+        let one = StateTransition::exact(&system, 0.2, &all.columns(1, 1).into_owned()).unwrap();
+        let all = StateTransition::exact(&system, 0.2, &all).unwrap();
         assert!((one.held - all.held.columns(1, 1)).norm() < 1e-16);
         assert!((one.ramp - all.ramp.columns(1, 1)).norm() < 1e-16);
         assert!((one.state - all.state).norm() < 1e-15);
@@ -161,7 +170,7 @@ mod tests {
     #[test]
     fn the_series_ends_at_the_exponential_and_begins_with_eulers_rule() {
         let system = SecondOrderSystem::new(dmatrix![2.0], dmatrix![1.0], dmatrix![8.0]).unwrap();
-        let exact = StateTransition::exact(&system, 0.1, &dmatrix![1.0]);
+        let exact = StateTransition::exact(&system, 0.1, &dmatrix![1.0]).unwrap();
         let long = StateTransition::taylor(&system, 0.1, 12);
         assert!((long.state - exact.state).norm() < 1e-15);
         assert!((long.held - exact.held).norm() < 1e-15);

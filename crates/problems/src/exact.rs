@@ -13,6 +13,7 @@
 //! force jumps at every sample and the acceleration with it: ẍ is the limit from the right,
 //! under the force that begins there.
 
+use mechid_model::linear_algebra::singular_values;
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -97,8 +98,9 @@ pub fn exact_harmonic_periodic(
             quantity.set_row(n, &x.map(|z| z * i_omega.powi(power as i32)).transpose());
         }
     }
-    let [x, v, a] = lines.map(|l| Spectrum::from_lines(force.sampling(), l).to_record());
-    Ok(Response::new(x, v, a)?)
+    let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
+    let [x, v, a] = lines.map(record);
+    Ok(Response::new(x?, v?, a?)?)
 }
 
 /// Response from `start` to the band-limited force: the periodic motion and the free decay of
@@ -161,7 +163,7 @@ fn periodic(
     // An unstable system may overflow over the period; singular values of that do not exist.
     if growth.is_finite() {
         // Not the condition of I − Φᴺ: without damping it may vanish as a whole.
-        reciprocal_condition = closing.singular_values().min() / (1.0 + growth);
+        reciprocal_condition = singular_values(closing.clone())?.min() / (1.0 + growth);
     }
     // N products of matrices leave rounding of about N ε in Φᴺ.
     let resolved = reciprocal_condition > 4.0 * f64::EPSILON * force.len() as f64;

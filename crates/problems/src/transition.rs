@@ -1,5 +1,6 @@
 //! The exact motion over one time step.
 
+use mechid_model::linear_algebra::exponential;
 use mechid_model::{ModelError, SecondOrderSystem};
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
@@ -52,7 +53,7 @@ impl Transition {
         generator.view_mut((0, 0), (2 * n, 2 * n)).copy_from(&a);
         generator.view_mut((n, 2 * n), (n, n)).fill_with_identity();
         generator.view_mut((2 * n, 3 * n), (n, n)).fill_with_identity();
-        let exponential = generator.exp();
+        let exponential = exponential(&generator)?;
         let block = |column, width| exponential.view((0, column), (2 * n, width)).into_owned();
 
         let mass = system.mass().clone().lu();

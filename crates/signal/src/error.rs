@@ -41,6 +41,53 @@ pub enum SignalError {
         /// The value found, in the unit of the record.
         value: f64,
     },
+    /// A sample is so large that sums of its powers overflow.
+    #[error(
+        "sample {} of channel {} is {value}: values beyond {limit} cannot be squared and summed; \
+         use other units",
+        sample + 1, channel + 1,
+        value = told(*value), limit = told(crate::Record::LARGEST)
+    )]
+    TooLarge {
+        /// Sample, counted from 0.
+        sample: usize,
+        /// Channel, counted from 0.
+        channel: usize,
+        /// The value found, in the unit of the record.
+        value: f64,
+    },
+    /// A record does not fit in memory.
+    #[error("{} of {} do not fit in memory", counted(*channels, "channel"), counted(*samples, "sample"))]
+    Memory {
+        /// Samples of a channel.
+        samples: usize,
+        /// Channels.
+        channels: usize,
+    },
+    /// There is no such channel.
+    #[error("channel {} was asked for, there {} {channels}", channel + 1, if *channels == 1 { "is" } else { "are" })]
+    NoSuchChannel {
+        /// Channel, counted from 0.
+        channel: usize,
+        /// Channels there are.
+        channels: usize,
+    },
+    /// The lines of a spectrum do not belong to its sampling.
+    #[error("{} where the sampling has {expected}", counted(*got, "line"))]
+    SpectrumLength {
+        /// Lines given.
+        got: usize,
+        /// Lines expected.
+        expected: usize,
+    },
+    /// A complex amplitude is NaN or infinite.
+    #[error("line {line} of channel {} is not a finite number", channel + 1)]
+    LineNotFinite {
+        /// The line, counted from 0 (DC).
+        line: usize,
+        /// Channel, counted from 0.
+        channel: usize,
+    },
     /// A window does not lie inside the record.
     #[error("samples {} to {end} were asked for, the record has {len}", start + 1)]
     Window {
@@ -259,4 +306,15 @@ pub(crate) fn finite(what: &'static str, value: f64) -> Result<f64, SignalError>
         return Ok(value);
     }
     Err(SignalError::Infinite { what, value })
+}
+
+/// An error if `channels` channels of `samples` samples cannot be allocated.
+pub(crate) fn fits_in_memory(samples: usize, channels: usize) -> Result<(), SignalError> {
+    let reserve = |len: usize| Vec::<f64>::new().try_reserve_exact(len).ok();
+    samples.checked_mul(channels).and_then(reserve).ok_or(SignalError::Memory { samples, channels })
+}
+
+/// An error unless `channel` is one of `channels`.
+pub(crate) fn has_channel(channel: usize, channels: usize) -> Result<(), SignalError> {
+    if channel < channels { Ok(()) } else { Err(SignalError::NoSuchChannel { channel, channels }) }
 }

@@ -17,7 +17,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::error::{not_negative, within};
+use crate::error::{has_channel, not_negative, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// Root mean square, in the unit of the samples; 0 for no samples.
@@ -45,15 +45,13 @@ pub fn peak(samples: &[f64]) -> f64 {
 /// [`Multisine::crest_factor`](crate::Multisine::crest_factor).
 ///
 /// # Errors
-/// [`SignalError::Silent`] if the channel is zero throughout.
-///
-/// # Panics
-/// If there is no such channel.
+/// [`SignalError::Silent`] if the channel is zero throughout, [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, on the choice of
 /// excitation signals.
 pub fn crest_factor(record: &Record, channel: usize) -> Result<f64, SignalError> {
+    has_channel(channel, record.channels())?;
     let samples = record.channel(channel);
     let peak = peak(samples);
     if peak == 0.0 {
@@ -66,15 +64,13 @@ pub fn crest_factor(record: &Record, channel: usize) -> Result<f64, SignalError>
 /// factor.
 ///
 /// # Errors
-/// [`SignalError::Silent`] if the channel is constant.
-///
-/// # Panics
-/// If there is no such channel.
+/// [`SignalError::Silent`] if the channel is constant, [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Schroeder (1970), *Synthesis of low-peak-factor signals and binary sequences with low
 /// autocorrelation*, IEEE Trans. Inf. Theory 16, 85–89.
 pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, SignalError> {
+    has_channel(channel, record.channels())?;
     let column = record.column(channel);
     let range = column.max() - column.min();
     if range == 0.0 {
@@ -122,9 +118,10 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
         let half = if n == 0 || 2 * n == period { 1.0 } else { 0.5 };
         *line = Complex::from(half * line.norm_sqr());
     }
-    let correlation = Spectrum::from_lines(sampling, lines).to_record();
+    let correlation = Spectrum::from_lines(sampling, lines).map(|spectrum| spectrum.samples());
+    let correlation = correlation.expect("squares of what a record may hold are finite");
     let scale = period as f64 / x.len() as f64;
-    correlation.channel(0)[..x.len()].iter().map(|a| scale * a).collect()
+    correlation.as_slice()[..x.len()].iter().map(|a| scale * a).collect()
 }
 
 /// Geometric over arithmetic mean of the power of some lines, a pure number: 1 if all are equal, 0
@@ -132,10 +129,7 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
 ///
 /// # Errors
 /// [`SignalError::NoLines`] for an empty choice, [`SignalError::Range`] for a line the spectrum
-/// has not, [`SignalError::Silent`] if none of them carries power.
-///
-/// # Panics
-/// If there is no such channel.
+/// has not, [`SignalError::Silent`] if none of them carries power, [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Gray and Markel (1974), IEEE Trans. Acoustics, Speech, Signal Processing 22, 207–217.
@@ -144,6 +138,7 @@ pub fn spectral_flatness(
     channel: usize,
     lines: impl IntoIterator<Item = usize>,
 ) -> Result<f64, SignalError> {
+    has_channel(channel, spectrum.channels())?;
     let highest = (spectrum.len() - 1) as f64;
     let mut power = Vec::new();
     for n in lines {
@@ -168,10 +163,8 @@ pub fn spectral_flatness(
 /// Lines weaker than the part `floor` of the strongest count as absent.
 ///
 /// # Errors
-/// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power.
-///
-/// # Panics
-/// If there is no such channel.
+/// [`SignalError::Negative`] for the floor, [`SignalError::Silent`] for a signal without power,
+/// [`SignalError::NoSuchChannel`].
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, section on persistence of excitation: the
@@ -181,6 +174,7 @@ pub fn persistent_excitation_order(
     channel: usize,
     floor: f64,
 ) -> Result<usize, SignalError> {
+    has_channel(channel, spectrum.channels())?;
     not_negative("floor", floor)?;
     let threshold = floor * strongest(spectrum, channel)?;
     let period = spectrum.sampling().len();
@@ -205,15 +199,13 @@ pub struct Band {
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the drop, [`SignalError::Silent`] for a signal without power
-/// above DC.
-///
-/// # Panics
-/// If there is no such channel.
+/// above DC, [`SignalError::NoSuchChannel`].
 pub fn effective_band(
     spectrum: &Spectrum,
     channel: usize,
     drop_db: f64,
 ) -> Result<Band, SignalError> {
+    has_channel(channel, spectrum.channels())?;
     not_negative("drop in dB", drop_db)?;
     let amplitude = |n: usize| spectrum.line(n, channel).norm();
     let strongest = (1..spectrum.len()).map(amplitude).fold(0.0, f64::max);

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::error::{not_negative, positive};
+use crate::error::{fits_in_memory, has_channel, not_negative, positive};
 use crate::phases::gcd;
 use crate::{Phases, Record, Sampling, SignalError, Spectrum};
 
@@ -90,11 +90,10 @@ impl Multisine {
     /// The multisine of a measured period: its lines between DC and Nyquist, exactly.
     ///
     /// # Errors
-    /// As [`Multisine::new`]: a period of one or two samples has no such lines.
-    ///
-    /// # Panics
-    /// If the spectrum has no such channel.
+    /// As [`Multisine::new`]: a period of one or two samples has no such lines;
+    /// [`SignalError::NoSuchChannel`].
     pub fn from_spectrum(spectrum: &Spectrum, channel: usize) -> Result<Self, SignalError> {
+        has_channel(channel, spectrum.channels())?;
         let lines = crate::lines::full(spectrum.sampling());
         let (amplitudes, phases) =
             lines.iter().map(|n| spectrum.line(*n, channel).to_polar()).unzip();
@@ -165,9 +164,10 @@ impl Multisine {
     /// One period: the lines stand at multiples of `sampling.omega0()`.
     ///
     /// # Errors
-    /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate.
+    /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate,
+    /// [`SignalError::Memory`], [`SignalError::TooLarge`] for amplitudes beyond those of a record.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
-        Ok(self.spectrum(sampling)?.to_record())
+        self.spectrum(sampling)?.to_record()
     }
 
     /// The complex amplitudes A_n exp(i φ_n) as the spectrum of one period.
@@ -179,11 +179,12 @@ impl Multisine {
         if 2 * line >= sampling.len() {
             return Err(SignalError::Nyquist { line, len: sampling.len() });
         }
+        fits_in_memory(sampling.len(), 1)?;
         let mut values = DMatrix::zeros(sampling.lines(), 1);
         for ((n, a), phase) in self.lines.iter().zip(&self.amplitudes).zip(&self.phases) {
             values[(*n, 0)] = Complex::from_polar(*a, *phase);
         }
-        Ok(Spectrum::from_lines(sampling, values))
+        Spectrum::from_lines(sampling, values)
     }
 
     /// Root mean square over a period, √(Σ A_n² / 2).
@@ -227,8 +228,8 @@ impl Multisine {
         let reduced =
             Self { lines, amplitudes: self.amplitudes.clone(), phases: self.phases.clone() };
         let sampling = Sampling::new(1.0, len).expect("a positive step and length");
-        let record = reduced.sample(sampling).expect("far below Nyquist");
-        record.channel(0).to_vec()
+        let spectrum = reduced.spectrum(sampling).expect("far below Nyquist");
+        spectrum.samples().as_slice().to_vec()
     }
 }
 

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use crate::error::{finite, not_negative, positive, within};
+use crate::error::{finite, fits_in_memory, not_negative, positive, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// How strong a disturbance is.
@@ -87,6 +87,7 @@ pub fn coloured(
     seed: u64,
 ) -> Result<Record, SignalError> {
     not_negative("standard deviation", standard_deviation)?;
+    fits_in_memory(sampling.len(), channels)?;
     let mut data = DMatrix::zeros(sampling.len(), channels);
     for (channel, mut column) in data.column_iter_mut().enumerate() {
         let rng = &mut stream(seed, channel);
@@ -159,7 +160,7 @@ fn power_law(
     for (n, mut row) in lines.row_iter_mut().enumerate() {
         row *= nalgebra::Complex::from(scale * gain(n));
     }
-    let shaped = Spectrum::from_lines(twice, lines).to_record();
+    let shaped = Spectrum::from_lines(twice, lines)?.to_record()?;
     Ok(shaped.channel(0)[..sampling.len()].to_vec())
 }
 

@@ -2,11 +2,13 @@
 
 use nalgebra::{DMatrix, DVectorView};
 
+use crate::error::fits_in_memory;
 use crate::{Sampling, SignalError};
 
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
-/// Every value is finite: a record that exists can be computed with. Values are in any unit: whoever
+/// Every value is finite and at most [`LARGEST`](Self::LARGEST): a record that exists can be computed
+/// with. Values are in any unit: whoever
 /// takes a record says in which, and what is derived from one here keeps it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
@@ -15,11 +17,15 @@ pub struct Record {
 }
 
 impl Record {
+    /// Largest modulus of a sample, in the unit of the record: sums of fourth powers stay finite.
+    pub const LARGEST: f64 = 1e70;
+
     /// A record from a matrix of `sampling.len()` rows and one column per channel.
     ///
     /// # Errors
     /// [`SignalError::Length`] if the rows do not match the sampling,
-    /// [`SignalError::NotFinite`] at the first NaN or infinity.
+    /// [`SignalError::NotFinite`] at the first NaN or infinity, [`SignalError::TooLarge`] at the
+    /// first sample beyond [`LARGEST`](Self::LARGEST).
     pub fn new(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
         if data.nrows() != sampling.len() {
             return Err(SignalError::Length {
@@ -28,9 +34,14 @@ impl Record {
                 expected: sampling.len(),
             });
         }
-        if let Some(at) = first_not_finite(data.as_slice()) {
+        if let Some(at) = first_unusable(data.as_slice()) {
             let (channel, sample) = (at / data.nrows(), at % data.nrows());
-            return Err(SignalError::NotFinite { sample, channel, value: data[(sample, channel)] });
+            let value = data[(sample, channel)];
+            return Err(if value.is_finite() {
+                SignalError::TooLarge { sample, channel, value }
+            } else {
+                SignalError::NotFinite { sample, channel, value }
+            });
         }
         Ok(Self { sampling, data })
     }
@@ -65,8 +76,9 @@ impl Record {
     /// A record of one channel from its value at each instant, in seconds.
     ///
     /// # Errors
-    /// [`SignalError::NotFinite`] at the first NaN or infinity.
+    /// As [`Record::new`], and [`SignalError::Memory`].
     pub fn from_fn(sampling: Sampling, value: impl FnMut(f64) -> f64) -> Result<Self, SignalError> {
+        fits_in_memory(sampling.len(), 1)?;
         Self::from_channel(sampling, sampling.times().map(value).collect())
     }
 
@@ -154,9 +166,10 @@ impl Record {
     /// The record, `periods` times one after the other.
     ///
     /// # Errors
-    /// [`SignalError::Empty`] if `periods` is 0.
+    /// [`SignalError::Empty`] if `periods` is 0, [`SignalError::Memory`].
     pub fn repeated(&self, periods: usize) -> Result<Self, SignalError> {
         let sampling = self.sampling.with_len(self.len().saturating_mul(periods))?;
+        fits_in_memory(sampling.len(), self.channels())?;
         let len = self.len();
         let data =
             DMatrix::from_fn(sampling.len(), self.channels(), |k, c| self.data[(k % len, c)]);
@@ -182,14 +195,15 @@ impl Record {
     }
 }
 
-/// Where the first NaN or infinity stands.
+/// Position of the first NaN, infinity or value beyond [`Record::LARGEST`].
 ///
 /// Block by block without a branch inside, so that a sound record is checked at the speed of memory.
-fn first_not_finite(values: &[f64]) -> Option<usize> {
+fn first_unusable(values: &[f64]) -> Option<usize> {
     const BLOCK: usize = 1024;
-    let sound = |block: &[f64]| block.iter().fold(true, |sound, v| sound & v.is_finite());
+    let usable = |v: &f64| v.abs() <= Record::LARGEST;
+    let sound = |block: &[f64]| block.iter().fold(true, |sound, v| sound & usable(v));
     let block = values.chunks(BLOCK).position(|block| !sound(block))?;
-    let at = values[block * BLOCK..].iter().position(|v| !v.is_finite())?;
+    let at = values[block * BLOCK..].iter().position(|v| !usable(v))?;
     Some(block * BLOCK + at)
 }
 
@@ -243,6 +257,19 @@ mod tests {
         let e = Record::new(Sampling::new(0.1, 3000).unwrap(), long).unwrap_err();
         let value = f64::NEG_INFINITY;
         assert_eq!(e, SignalError::NotFinite { sample: 2500, channel: 1, value });
+        let e = Record::from_channels(s, &[[1.0, -1e71]]).unwrap_err();
+        assert_eq!(e, SignalError::TooLarge { sample: 1, channel: 0, value: -1e71 });
+    }
+
+    #[test]
+    fn what_does_not_fit_in_memory_is_refused() {
+        for periods in [usize::MAX, 1 << 60, 1 << 50] {
+            let refused = two_channels().repeated(periods);
+            let samples = periods.saturating_mul(4);
+            assert_eq!(refused, Err(SignalError::Memory { samples, channels: 2 }));
+        }
+        let endless = Sampling::new(1.0, usize::MAX).unwrap();
+        assert!(matches!(Record::from_fn(endless, |t| t), Err(SignalError::Memory { .. })));
     }
 
     #[test]

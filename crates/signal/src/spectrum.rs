@@ -15,7 +15,7 @@
 use nalgebra::{Complex, DMatrix};
 use realfft::RealFftPlanner;
 
-use crate::{Record, Sampling};
+use crate::{Record, Sampling, SignalError};
 
 /// Lines × channels of one-sided complex amplitudes, in the unit of the record; line n stands at n·ω0.
 ///
@@ -53,23 +53,38 @@ impl Spectrum {
     /// The imaginary parts of DC and (for an even length) Nyquist describe nothing
     /// that can be sampled and are set to zero.
     ///
-    /// # Panics
-    /// If the number of rows is not `sampling.lines()`.
-    pub fn from_lines(sampling: Sampling, mut lines: DMatrix<Complex<f64>>) -> Self {
-        assert_eq!(lines.nrows(), sampling.lines(), "one row per line of the sampling");
+    /// # Errors
+    /// [`SignalError::SpectrumLength`] for another number of rows, [`SignalError::LineNotFinite`].
+    pub fn from_lines(
+        sampling: Sampling,
+        mut lines: DMatrix<Complex<f64>>,
+    ) -> Result<Self, SignalError> {
+        let (got, expected) = (lines.nrows(), sampling.lines());
+        if got != expected {
+            return Err(SignalError::SpectrumLength { got, expected });
+        }
+        if let Some(at) = lines.iter().position(|z| !(z.re.is_finite() && z.im.is_finite())) {
+            return Err(SignalError::LineNotFinite { line: at % got, channel: at / got });
+        }
         for (n, mut row) in lines.row_iter_mut().enumerate() {
             if line_weight(sampling.len(), n) == 1.0 {
                 row.apply(|z| z.im = 0.0);
             }
         }
-        Self { sampling, lines }
+        Ok(Self { sampling, lines })
     }
 
     /// The period this is the spectrum of; the exact inverse of [`Spectrum::of`].
     ///
-    /// # Panics
-    /// If a line is not finite, or the lines are too large to be added up.
-    pub fn to_record(&self) -> Record {
+    /// # Errors
+    /// [`SignalError::TooLarge`] and [`SignalError::NotFinite`] if the lines add up to more than a
+    /// record may hold.
+    pub fn to_record(&self) -> Result<Record, SignalError> {
+        Record::new(self.sampling, self.samples())
+    }
+
+    /// The samples of the period, samples × channels.
+    pub(crate) fn samples(&self) -> DMatrix<f64> {
         let len = self.sampling.len();
         let plan = RealFftPlanner::new().plan_fft_inverse(len);
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
@@ -83,7 +98,7 @@ impl Spectrum {
                 .expect("DC and Nyquist are real");
             column.copy_from_slice(&output);
         }
-        Record::new(self.sampling, data).expect("finite lines of matching length")
+        data
     }
 
     /// The time axis of the period.
@@ -177,7 +192,7 @@ mod tests {
             for n in 0..spectrum.len() {
                 prop_assert!((spectrum.line(n, 0) - direct_sum(&x, n)).norm() < 1e-9);
             }
-            let back = spectrum.to_record();
+            let back = spectrum.to_record().unwrap();
             for (a, b) in back.channel(0).iter().zip(&x) {
                 prop_assert!((a - b).abs() < 1e-10);
             }

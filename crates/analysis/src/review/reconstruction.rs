@@ -2,7 +2,7 @@
 
 use mechid_force::{self as force, Channel, IdentifiedForce, Rule, Start, channel_errors};
 use mechid_model::ResponseQuantity;
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{Record, SignalError, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::AnalysisError;
@@ -49,7 +49,7 @@ impl Reconstruction {
         };
         let result = find(&request, &found.machine()?.uncertain, &motion(period)?)?;
         let measured = match &lines {
-            Some(lines) => on_lines(force, lines),
+            Some(lines) => on_lines(force, lines)?,
             None => force.clone(),
         };
         let errors = channel_errors(result.force.record(), &measured)?;
@@ -78,11 +78,11 @@ fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
 }
 
 /// What a period has on these lines.
-fn on_lines(period: &Record, lines: &[usize]) -> Record {
+fn on_lines(period: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let all = Spectrum::of(period);
     let mut kept = DMatrix::from_element(all.len(), all.channels(), Complex::ZERO);
     for &n in lines {
         kept.set_row(n, &all.lines().row(n));
     }
-    Spectrum::from_lines(period.sampling(), kept).to_record()
+    Spectrum::from_lines(period.sampling(), kept)?.to_record()
 }

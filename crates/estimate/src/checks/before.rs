@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_model::{Discretisation, Response, SecondOrderSystem};
+use mechid_model::{Discretisation, RealSchur, Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
 use mechid_signal::{Extent, Record, Spectrum};
 
@@ -141,7 +141,7 @@ fn step(rows: &Transitions, discretisation: Discretisation) -> Result<Finding, E
         }
         Err(other) => return Err(other),
     };
-    let eigenvalues = exact.complex_eigenvalues();
+    let eigenvalues = RealSchur::new(exact.clone())?.eigenvalues();
     let highest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
     let limit = if discretisation == Discretisation::Euler {
         let n = rows.dof();

@@ -1,5 +1,6 @@
 //! Instrumental variables: another measurement of the same motion rids least squares of its bias.
 
+use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Matrix, Parameter};
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -158,7 +159,7 @@ fn influence(
     let q = instruments.qr().q();
     let mut projected = q.tr_mul(regressors);
     projected.column_iter_mut().zip(&scale).for_each(|(mut column, s)| column /= *s);
-    let singular_values = projected.singular_values();
+    let singular_values = singular_values(projected.clone()).ok()?;
     let mut influence = projected.lu().solve(&q.transpose())?;
     influence.row_iter_mut().zip(&scale).for_each(|(mut row, s)| row /= *s);
     Some((influence, singular_values.max() / singular_values.min()))

@@ -1,5 +1,6 @@
 //! Averaged cross-spectra of forces and motions, and the responses they give.
 
+use mechid_model::linear_algebra::hermitian_eigen;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::ComplexMatrix;
@@ -49,7 +50,7 @@ impl CrossSpectra {
         let scaled =
             DMatrix::from_fn(inputs, inputs, |i, j| self.force[(i, j)] / (size[i] * size[j]));
         let eigenvalues = if size.min() > 0.0 {
-            scaled.clone().symmetric_eigenvalues()
+            hermitian_eigen(scaled.clone())?.eigenvalues
         } else {
             DVector::from_element(1, 0.0)
         };
@@ -76,7 +77,7 @@ impl CrossSpectra {
     }
 
     /// Per motion, the eigenvector of least power of the cross-spectra of forces and motion.
-    pub(super) fn hv(&self) -> ComplexMatrix {
+    pub(super) fn hv(&self) -> Result<ComplexMatrix, EstimateError> {
         let (outputs, inputs) = self.motion_force.shape();
         let mut h = DMatrix::zeros(outputs, inputs);
         for o in 0..outputs {
@@ -94,13 +95,13 @@ impl CrossSpectra {
                 };
                 s / (size(i) * size(j))
             });
-            let eigen = all.symmetric_eigen();
+            let eigen = hermitian_eigen(all)?;
             let least = eigen.eigenvectors.column(eigen.eigenvalues.imin());
             for i in 0..inputs {
                 // aᴴ z = 0 for the scaled z = (forces, motion).
                 h[(o, i)] = -(least[i] / least[inputs]).conj() * size(inputs) / size(i);
             }
         }
-        h
+        Ok(h)
     }
 }

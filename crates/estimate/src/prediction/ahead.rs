@@ -50,7 +50,7 @@ pub fn missing_force(
     }
     let (factor, way) = between.unwrap_or((1, Interpolation::Linear));
     let finer = refine(force, factor, way)?;
-    let step = Step::new(&system, finer.sampling().dt(), discretisation);
+    let step = Step::new(&system, finer.sampling().dt(), discretisation)?;
     // Of the interpolations only a Fourier series goes on after the last sample.
     let goes_on = between.is_none_or(|(_, way)| way == Interpolation::BandLimited);
     let (samples, dt) = (force.len(), force.sampling().dt());

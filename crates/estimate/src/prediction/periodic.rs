@@ -34,6 +34,7 @@ pub fn predict_periodic(
             quantity.set_row(n, &x.map(|z| z * factor).transpose());
         }
     }
-    let [x, v, a] = lines.map(|lines| Spectrum::from_lines(force.sampling(), lines).to_record());
-    Ok(Response::new(x, v, a)?)
+    let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
+    let [x, v, a] = lines.map(record);
+    Ok(Response::new(x?, v?, a?)?)
 }

@@ -1,5 +1,6 @@
 //! Where a machine started, from how it moved.
 
+use mechid_model::linear_algebra::svd;
 use mechid_model::{Discretisation, InitialState, Response, ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
@@ -148,7 +149,7 @@ impl StartFit {
                 length
             })
             .collect();
-        let svd = free.svd(true, true);
+        let svd = svd(free)?;
         let floor = UNSEEN * svd.singular_values.max();
         let mut found = svd.solve(&gap, floor).expect("both sides were computed");
         for (value, length) in found.iter_mut().zip(lengths) {

@@ -158,6 +158,7 @@ pub(super) fn regression(
     rows: &Transitions,
     discretisation: Discretisation,
 ) -> Result<Regression, EstimateError> {
+    rows.check_size()?;
     let n = rows.dof();
     let column = |kind: usize, at: usize| rows.columns(kind).column(at).into_owned();
     let state = |kind: usize| (0..2 * n).map(move |at| column(kind + at / n, at % n));

@@ -99,14 +99,13 @@ impl Transitions {
     /// Adds everything `other` has seen.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::Step`].
+    /// [`EstimateError::Size`], [`EstimateError::Step`], [`EstimateError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
         size("degrees of freedom", self.dof, other.dof)?;
         if (other.dt - self.dt).abs() > 1e-9 * self.dt {
             return Err(EstimateError::Step { expected: self.dt, got: other.dt });
         }
-        self.factor.merge(&other.factor);
-        Ok(())
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
     }
 
     /// Adds the pairs of one record with `factor − 1` intermediate points in every interval; the step
@@ -145,7 +144,7 @@ impl Transitions {
     /// through the logarithm.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewRows`]; [`EstimateError::NoLogarithm`] if the samples belong to no
+    /// [`EstimateError::TooFewRows`], [`EstimateError::Underflow`]; [`EstimateError::NoLogarithm`] if the samples belong to no
     /// continuous machine; and as [`crate::EquationOfMotion::solve`].
     ///
     /// # Source
@@ -200,6 +199,17 @@ impl Transitions {
                         if kind == 2 { after } else { after - value };
                 }
             }
+        }
+    }
+
+    /// An error if the squares of a quantity are too small to be told from 0.
+    pub(super) fn check_size(&self) -> Result<(), EstimateError> {
+        match self.factor.too_small() {
+            Some((at, norm)) if at < 3 * self.dof => {
+                let what = ["displacement", "velocity", "force"][at / self.dof];
+                Err(EstimateError::Underflow { what, column: at % self.dof, norm })
+            }
+            _ => Ok(()),
         }
     }
 

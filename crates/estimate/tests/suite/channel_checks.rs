@@ -51,7 +51,7 @@ fn later(record: &Record, samples: f64) -> Record {
     let turned = DMatrix::from_fn(spectrum.len(), spectrum.channels(), |n, c| {
         spectrum.line(n, c) * Complex::cis(-spectrum.omega(n) * samples * dt)
     });
-    Spectrum::from_lines(record.sampling(), turned).to_record()
+    Spectrum::from_lines(record.sampling(), turned).unwrap().to_record().unwrap()
 }
 
 fn late_response(response: &Response, samples: f64) -> Response {

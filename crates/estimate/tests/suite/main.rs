@@ -8,6 +8,7 @@ mod common;
 mod derivatives;
 mod equation_error;
 mod equation_of_motion;
+mod extremes;
 mod frequency_invariance;
 mod frf;
 mod logarithm;

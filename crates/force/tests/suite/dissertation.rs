@@ -5,6 +5,7 @@ use mechid_force::{continuous, discretised, spectrum_ratio, spurious_ratio};
 use mechid_integrate::{
     CentralDifference, Houbolt, Newmark, Scheme, WilsonTheta, integrate_periodic,
 };
+use mechid_model::linear_algebra::svd;
 use mechid_model::{Discretisation, KyxSign, Response, SecondOrderSystem, npi_sampling};
 use mechid_problems::{dissertation_bearing, dissertation_sdof};
 use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, Spectrum, lines};
@@ -45,7 +46,7 @@ fn euler_least_squares(
     let scales: Vec<f64> = rows.column_iter().map(|column| column.norm()).collect();
     let scaled = DMatrix::from_fn(len, rows.ncols(), |k, j| rows[(k, j)] / scales[j]);
     let next = DMatrix::from_fn(len, n, |k, i| v[((k + 1) % len, i)]);
-    let mut phi = scaled.svd(true, true).solve(&next, 0.0).unwrap();
+    let mut phi = svd(scaled).unwrap().solve(&next, 0.0).unwrap();
     for (mut row, scale) in phi.row_iter_mut().zip(&scales) {
         row /= *scale;
     }

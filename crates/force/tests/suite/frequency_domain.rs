@@ -47,7 +47,7 @@ fn harmonic(system: &SecondOrderSystem, forces: [f64; 2]) -> (Record, [Record; 3
             motion[2][(n, j)] = x[j] * i_omega * i_omega;
         }
     }
-    let record = |lines| Spectrum::from_lines(s, lines).to_record();
+    let record = |lines| Spectrum::from_lines(s, lines).unwrap().to_record().unwrap();
     (record(force), motion.map(record))
 }
 

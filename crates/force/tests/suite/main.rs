@@ -14,3 +14,4 @@ mod regularised;
 mod study;
 mod uncertainty;
 mod unexplained;
+mod unstable;

@@ -1,6 +1,7 @@
 //! Superposition, shifts in time, units, and what diagonal and modal forms have in common.
 
 use mechid_integrate::*;
+use mechid_model::linear_algebra::hermitian_eigen;
 use mechid_model::{InitialState, Response, Sdof, SecondOrderSystem};
 use mechid_problems::exact_foh;
 use mechid_signal::{Multisine, Phases, Record, Sampling};
@@ -179,7 +180,7 @@ fn modes_may_be_integrated_one_by_one() {
     let damping = DMatrix::identity(n, n) * 0.3 + &stiffness * 0.002;
     let system =
         SecondOrderSystem::new(DMatrix::identity(n, n), damping, stiffness.clone()).unwrap();
-    let eigen = stiffness.symmetric_eigen();
+    let eigen = hermitian_eigen(stiffness).unwrap();
     let force = force(Sampling::new(0.02, 300).unwrap(), n);
     let modal_force = force.data() * &eigen.eigenvectors;
     for scheme in schemes() {

@@ -1,6 +1,7 @@
 //! Measured orders of convergence against the exact answer.
 
 use mechid_integrate::*;
+use mechid_model::linear_algebra::exponential;
 use mechid_model::{InitialState, Response, SecondOrderSystem};
 use mechid_signal::Sampling;
 use nalgebra::{DMatrix, DVector};
@@ -31,7 +32,7 @@ fn exact(system: &SecondOrderSystem, initial: &InitialState, t: f64) -> [DVector
     for one in [2 * n, 2 * n + 2, 2 * n + 4] {
         z[one] = 1.0;
     }
-    let end = (&big * t).exp() * z;
+    let end = exponential(&(&big * t)).unwrap() * z;
     let slope = &big * &end;
     [end.rows(0, n).into(), end.rows(n, n).into(), slope.rows(n, n).into()]
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use crate::error::{finite, not_negative, positive};
+use crate::error::{finite, fits_in_memory, not_negative, positive};
 use crate::{Record, Sampling, SignalError};
 
 /// An ideal blow of given momentum, in the unit of the signal times seconds: N·s for a force.
@@ -39,6 +39,7 @@ impl Impulse {
             let high = sampling.time(last);
             return Err(SignalError::Range { what: "instant", value: self.at, low: 0.0, high });
         }
+        fits_in_memory(sampling.len(), 1)?;
         let mut force = vec![0.0; sampling.len()];
         force[nearest as usize] = self.momentum / sampling.dt();
         Record::from_channel(sampling, force)

@@ -1,6 +1,6 @@
 //! Maximum-length pseudo-random binary sequences.
 
-use crate::error::not_negative;
+use crate::error::{fits_in_memory, not_negative};
 use crate::{Record, Sampling, SignalError};
 
 /// Feedback taps of a shift register of maximum period, for orders 2 to 24; bit k − 1 is stage k.
@@ -105,6 +105,7 @@ impl Prbs {
     /// # Errors
     /// None for a sequence that exists; the signature is that of all excitations.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
+        fits_in_memory(sampling.len(), 1)?;
         let chips = self.chips();
         let level = |k: usize| chips[k / self.hold % chips.len()];
         Record::from_channel(sampling, (0..sampling.len()).map(level).collect())

@@ -1,6 +1,6 @@
 //! Random excitation.
 
-use crate::error::{band, below_nyquist, not_negative, within};
+use crate::error::{band, below_nyquist, fits_in_memory, not_negative, within};
 use crate::noise::{stream, white_channel};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
@@ -55,12 +55,13 @@ impl Random {
     /// [`SignalError::AboveNyquist`] for the upper end of the band, [`SignalError::EmptyBand`] if
     /// it holds no line, [`SignalError::NotFinite`] if the deviation is out of all bounds.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
+        fits_in_memory(sampling.len(), 1)?;
         let white = white_channel(sampling, 1.0, &mut stream(self.seed, 0));
         let whole = match self.band_hz {
             None => Record::from_channel(sampling, white)?,
             Some((low_hz, high_hz)) => {
                 let lines = band_lines(sampling, low_hz, high_hz)?;
-                keep_lines(&Record::from_channel(sampling, white)?, &lines)
+                keep_lines(&Record::from_channel(sampling, white)?, &lines)?
             }
         };
         let on = (self.on * sampling.len() as f64).round() as usize;
@@ -84,14 +85,14 @@ fn band_lines(sampling: Sampling, low_hz: f64, high_hz: f64) -> Result<Vec<usize
 
 /// White noise with all other lines removed, scaled so that the variance is expected unchanged:
 /// of `len` equal shares each line (with its mirror image) holds two.
-fn keep_lines(white: &Record, lines: &[usize]) -> Record {
+fn keep_lines(white: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let gain = (white.len() as f64 / (2 * lines.len()) as f64).sqrt();
     let spectrum = Spectrum::of(white);
     let mut kept = spectrum.lines() * nalgebra::Complex::from(0.0);
     for n in lines {
         kept[(*n, 0)] = spectrum.line(*n, 0) * gain;
     }
-    Spectrum::from_lines(white.sampling(), kept).to_record()
+    Spectrum::from_lines(white.sampling(), kept)?.to_record()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{Complex, DMatrix};
 
-use crate::{Record, Sampling, Spectrum};
+use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// Re Σ X_n exp(i n ω0 t), by Horner's rule.
 pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
@@ -16,7 +16,10 @@ pub(super) fn value(spectrum: &Spectrum, channel: usize, t: f64) -> f64 {
 
 /// The same period with at least as many samples, by a longer inverse transform; `None` if the
 /// new time axis is not that.
-pub(super) fn same_period(spectrum: &Spectrum, sampling: Sampling) -> Option<Record> {
+pub(super) fn same_period(
+    spectrum: &Spectrum,
+    sampling: Sampling,
+) -> Option<Result<Record, SignalError>> {
     let duration = spectrum.sampling().duration();
     let same = (sampling.duration() - duration).abs() <= 1e-12 * duration;
     if !same || sampling.len() < spectrum.sampling().len() {
@@ -26,5 +29,5 @@ pub(super) fn same_period(spectrum: &Spectrum, sampling: Sampling) -> Option<Rec
     // cosine like any other on the finer axis.
     let mut lines = DMatrix::zeros(sampling.lines(), spectrum.channels());
     lines.rows_mut(0, spectrum.len()).copy_from(spectrum.lines());
-    Some(Spectrum::from_lines(sampling, lines).to_record())
+    Some(Spectrum::from_lines(sampling, lines).and_then(|finer| finer.to_record()))
 }

@@ -31,6 +31,7 @@ mod spline;
 
 use nalgebra::DMatrix;
 
+use crate::error::{fits_in_memory, has_channel};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
 /// A way to find values between samples; compared in the [module documentation](self).
@@ -96,11 +97,10 @@ impl Interpolator {
     ///
     /// # Errors
     /// [`SignalError::Range`] if `t` is not between the first and the last sample; a period goes
-    /// on forever, so that [`Interpolation::BandLimited`] only asks for a finite `t`.
-    ///
-    /// # Panics
-    /// If there is no such channel.
+    /// on forever, so that [`Interpolation::BandLimited`] only asks for a finite `t`;
+    /// [`SignalError::NoSuchChannel`].
     pub fn value(&self, t: f64, channel: usize) -> Result<f64, SignalError> {
+        has_channel(channel, self.channels())?;
         match &self.pieces {
             Pieces::Fourier(spectrum) => {
                 crate::error::finite("time", t)?;
@@ -115,6 +115,13 @@ impl Interpolator {
                 let at = |k| (y[(k, channel)], d[(k, channel)]);
                 Ok(hermite(at(k), at(k + 1), u))
             }
+        }
+    }
+
+    fn channels(&self) -> usize {
+        match &self.pieces {
+            Pieces::Fourier(spectrum) => spectrum.channels(),
+            Pieces::Linear(y) | Pieces::Hermite(y, _) => y.ncols(),
         }
     }
 
@@ -146,17 +153,18 @@ fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
 /// as it does when a signal is sampled.
 ///
 /// # Errors
-/// As [`Interpolator::new`] and [`Interpolator::value`].
+/// As [`Interpolator::new`] and [`Interpolator::value`]; [`SignalError::Memory`].
 pub fn resample(
     record: &Record,
     sampling: Sampling,
     method: Interpolation,
 ) -> Result<Record, SignalError> {
+    fits_in_memory(sampling.len(), record.channels())?;
     let interpolator = Interpolator::new(record, method)?;
     if let Pieces::Fourier(spectrum) = &interpolator.pieces
         && let Some(resampled) = fourier::same_period(spectrum, sampling)
     {
-        return Ok(resampled);
+        return resampled;
     }
     let mut data = DMatrix::zeros(sampling.len(), record.channels());
     for (channel, mut column) in data.column_iter_mut().enumerate() {
@@ -173,7 +181,7 @@ pub fn resample(
 /// its last sample.
 ///
 /// # Errors
-/// As [`Interpolator::new`], and [`SignalError::TooFew`] if `factor` is 0.
+/// As [`resample`], and [`SignalError::TooFew`] if `factor` is 0.
 pub fn refine(
     record: &Record,
     factor: usize,
@@ -185,7 +193,7 @@ pub fn refine(
     }
     let intervals = match method {
         Interpolation::BandLimited => record.len().saturating_mul(factor),
-        _ => (record.len() - 1).saturating_mul(factor) + 1,
+        _ => (record.len() - 1).saturating_mul(factor).saturating_add(1),
     };
     let sampling = Sampling::new(record.sampling().dt() / factor as f64, intervals)?;
     resample(record, sampling, method)

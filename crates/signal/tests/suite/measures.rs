@@ -41,6 +41,7 @@ proptest! {
         prop_assume!(r[0] > 0.1);
         let matrix = DMatrix::from_fn(19, 19, |i, j| r[(19 + i - j) % 19]);
         // The least line has power 1/2 of at most 37; rounding leaves 1e-15 of it.
+        #[allow(clippy::disallowed_methods, reason = "mechid-signal has no linear algebra")]
         let rank = matrix.svd(false, false).rank(1e-6);
         let order = persistent_excitation_order(&Spectrum::of(&record(&x)), 0, 1e-9).unwrap();
         prop_assert_eq!(order, rank);
