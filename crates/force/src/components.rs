@@ -2,6 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::ForceError;
+
 /// One unknown each, by falling singular value: y_i = s_i f_i + noise.
 ///
 /// A component of a complex line stands for two real unknowns and has weight 2, so that white

@@ -137,7 +137,8 @@ mod tests {
     fn a_step_is_the_closed_form() {
         let (sdof, dt, force) = (Sdof::new(3.0, 0.8, 50.0).unwrap(), 0.13, [4.0, -7.0]);
         let (system, start) = (sdof.system(), dvector![0.02, dt * -0.3]);
-        let step = StateTransition::exact(&system, dt, &StateTransition::force_input(&system, dt)).unwrap();
+        let step = StateTransition::exact(&system, dt, &StateTransition::force_input(&system, dt))
+            .unwrap();
         let record = Record::from_channel(Sampling::new(dt, 2).unwrap(), force.to_vec()).unwrap();
         let held = sdof.held_force_response(&record, 0.02, -0.3).unwrap();
         let linear = sdof.linear_force_response(&record, 0.02, -0.3).unwrap();

@@ -1,11 +1,11 @@
 //! Machines whose free response grows, held to a bounded response by the force that is sought.
 
 use mechid_force::{
-    Discretisation, Ends, Extent, Filter, ForceError, Measurement, Noise, Quantity, Rule, Start,
-    Tuning, discretised, frequency_domain, kalman, regularised, relative_error,
+    Filter, ForceError, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, discretised,
+    frequency_domain, kalman, regularised, relative_error,
 };
-use mechid_model::{Response, SecondOrderSystem};
-use mechid_signal::{Record, Sampling};
+use mechid_model::{Discretisation, Response, ResponseQuantity, SecondOrderSystem};
+use mechid_signal::{Extent, Record, Sampling};
 use nalgebra::{DMatrix, dmatrix};
 
 const MASS: f64 = 25.0;
@@ -26,7 +26,7 @@ fn held_up(rate: f64, sampling: Sampling) -> (Measurement, Record) {
     };
     let force = Record::from_fn(sampling, |t| 1e-3 * MASS * (a(t) - rate * rate * x(t)));
     let seen = Record::from_fn(sampling, |t| 1e-3 * x(t)).unwrap();
-    (Measurement::of_all(Quantity::Displacement, seen), force.unwrap())
+    (Measurement::of_all(ResponseQuantity::Displacement, seen), force.unwrap())
 }
 
 const FILTERS: [Filter; 3] =
@@ -40,7 +40,7 @@ fn an_open_record_is_solved_or_refused_by_the_growth_over_it() {
         let (system, (seen, force)) = (falling(rate), held_up(rate, sampling));
         for start in [Start::FromRest, Start::InMotion] {
             for filter in FILTERS {
-                let extent = Extent::Open(start);
+                let extent = ForceUnknowns::Samples(start);
                 let found = regularised(&system, &seen, &[0], &extent, filter, &Noise::Unknown);
                 match found {
                     Ok(found) => {
@@ -93,11 +93,11 @@ fn a_whole_period_asks_for_no_stability() {
         .unwrap()
     };
     let force = wave(|w| MASS * (-w * w - 4e4));
-    let seen = Measurement::of_all(Quantity::Displacement, wave(|_| 1.0));
+    let seen = Measurement::of_all(ResponseQuantity::Displacement, wave(|_| 1.0));
     let found = frequency_domain(&system, &seen, &[0], &[2, 5], &Noise::Unknown).unwrap();
     assert!(relative_error(found.record(), &force).unwrap() < 1e-12);
     for filter in [Filter::Tikhonov(Rule::Likelihood), Filter::Shrinkage] {
-        let extent = Extent::PeriodLines(vec![2, 5]);
+        let extent = ForceUnknowns::Lines(vec![2, 5]);
         let found = regularised(&system, &seen, &[0], &extent, filter, &Noise::Unknown).unwrap();
         let error = relative_error(found.force.record(), &force).unwrap();
         assert!(error < 1e-6, "{filter:?}: {error}");
@@ -115,15 +115,15 @@ fn negative_damping_of_any_size_ends_in_a_force_or_an_error() {
         let system = SecondOrderSystem::new(dmatrix![MASS], dmatrix![c], dmatrix![1e6]).unwrap();
         for start in [Start::FromRest, Start::InMotion] {
             for filter in FILTERS {
-                let extent = Extent::Open(start);
+                let extent = ForceUnknowns::Samples(start);
                 let _ = regularised(&system, &seen, &[0], &extent, filter, &Noise::Unknown);
             }
             let _ = kalman(&system, &seen, &[0], start, &Tuning::Likelihood);
         }
         for discretisation in
-            [Discretisation::Taylor(8), Discretisation::ExactHeld, Discretisation::ExactLinear]
+            [Discretisation::Euler, Discretisation::ZeroOrderHold, Discretisation::FirstOrderHold]
         {
-            let found = discretised(&system, &response, discretisation, Ends::Open);
+            let found = discretised(&system, &response, discretisation, Extent::Open);
             let told = match &found {
                 Err(ForceError::StepTooLong { .. } | ForceError::Unstable { .. }) => true,
                 other => other.is_ok(),
