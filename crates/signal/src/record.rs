@@ -8,8 +8,7 @@ use crate::{Sampling, SignalError};
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
 /// Every value is finite and at most [`LARGEST`](Self::LARGEST): a record that exists can be computed
-/// with. Values are in any unit: whoever
-/// takes a record says in which, and what is derived from one here keeps it.
+/// with. Values are in any unit: whoever takes a record states which, and results in this crate keep it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     sampling: Sampling,
@@ -120,7 +119,7 @@ impl Record {
         &self.data
     }
 
-    /// The samples, leaving the time axis behind.
+    /// Returns the samples without the time axis.
     pub fn into_data(self) -> DMatrix<f64> {
         self.data
     }
@@ -138,7 +137,7 @@ impl Record {
         Ok(Self { sampling, data: self.data.rows(start, len).into_owned() })
     }
 
-    /// The same record with the mean of every channel taken away.
+    /// Returns the record with the mean of every channel subtracted.
     pub fn without_mean(&self) -> Self {
         let mut data = self.data.clone();
         for mut column in data.column_iter_mut() {
@@ -148,7 +147,7 @@ impl Record {
         Self { sampling: self.sampling, data }
     }
 
-    /// The mean over consecutive periods of `period` samples; a last, incomplete one is left out.
+    /// Returns the mean over consecutive periods of `period` samples; an incomplete last one is left out.
     ///
     /// # Errors
     /// [`SignalError::Window`] if the record is shorter than one period,
@@ -163,7 +162,7 @@ impl Record {
         Ok(mean)
     }
 
-    /// The record, `periods` times one after the other.
+    /// Returns the record repeated `periods` times.
     ///
     /// # Errors
     /// [`SignalError::Empty`] if `periods` is 0, [`SignalError::Memory`].
@@ -176,10 +175,10 @@ impl Record {
         Ok(Self { sampling, data })
     }
 
-    /// An error if `other` lies on another time axis (steps may differ by rounding only).
+    /// Checks that `other` has the same time axis (steps may differ by rounding only).
     ///
     /// # Errors
-    /// [`SignalError::SamplingMismatch`].
+    /// [`SignalError::SamplingMismatch`] if it has not.
     pub fn check_same_sampling(&self, other: &Self) -> Result<(), SignalError> {
         let (left, right) = (self.sampling, other.sampling);
         let same_dt = (left.dt() - right.dt()).abs() <= 1e-9 * left.dt();
