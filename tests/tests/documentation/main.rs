@@ -12,8 +12,18 @@ use std::path::{Path, PathBuf};
 use items::{Item, Source};
 
 /// The crates whose every item others call.
-const LIBRARIES: [&str; 9] =
-    ["signal", "model", "integrate", "estimate", "force", "io", "plot", "problems", "mechid"];
+const LIBRARIES: [&str; 10] = [
+    "signal",
+    "model",
+    "bearing",
+    "integrate",
+    "estimate",
+    "force",
+    "io",
+    "plot",
+    "problems",
+    "mechid",
+];
 
 fn folder(library: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates").join(library).join("src")
