@@ -12,8 +12,18 @@ use std::path::{Path, PathBuf};
 use items::{Item, Source};
 
 /// The crates whose every item others call.
-const LIBRARIES: [&str; 9] =
-    ["signal", "model", "integrate", "estimate", "force", "io", "plot", "problems", "mechid"];
+const LIBRARIES: [&str; 10] = [
+    "signal",
+    "model",
+    "bearing",
+    "integrate",
+    "estimate",
+    "force",
+    "io",
+    "plot",
+    "problems",
+    "mechid",
+];
 
 /// The crates whose summaries are plain; the others follow.
 const PLAIN: [&str; 4] = ["signal", "model", "plot", "problems"];
