@@ -95,12 +95,13 @@ pub fn triplets(
     entries: impl IntoIterator<Item = (usize, usize, f64)>,
 ) -> Result<CsrMatrix<f64>, ModelError> {
     let mut coo = CooMatrix::new(dof, dof);
-    for (row, column, value) in entries {
+    entries.into_iter().try_for_each(|(row, column, value)| {
         if row >= dof || column >= dof {
             return Err(ModelError::EntryOutside { row: row + 1, column: column + 1, dof });
         }
         coo.push(row, column, value);
-    }
+        Ok(())
+    })?;
     Ok(CsrMatrix::from(&coo))
 }
 
