@@ -12,7 +12,7 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
 pub struct Whole {
     /// Force, samples × degrees of freedom, in N.
     pub force: Gathered,
-    /// In the order of [`Block::motions`].
+    /// In the order of [`Block::responses`].
     pub motions: Vec<Gathered>,
     /// The mean period; nothing where the window is one period.
     pub mean: Option<Block>,
