@@ -12,6 +12,7 @@
 //! // The same machine under an unknown force.
 //! let force = mechid::reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
 //! println!("{force}");
+//! assert!(found.summary().fit.unexplained_motion < Some(0.01));
 //! # Ok::<(), mechid::analysis::AnalysisError>(())
 //! ```
 //!

@@ -64,7 +64,7 @@ pub enum SignalError {
         /// Channels.
         channels: usize,
     },
-    /// There is no such channel.
+    /// Channel that the record does not have.
     #[error("channel {} was asked for, there {} {channels}", channel + 1, if *channels == 1 { "is" } else { "are" })]
     NoSuchChannel {
         /// Channel, counted from 0.

@@ -1,4 +1,8 @@
 //! Results of the checks as values.
+//!
+//! Ratios, fractions, coherences, correlations, probabilities and numbers of samples are dimensionless;
+//! an eigenvalue of a transition is, too. What has the unit of a channel or of a parameter (N, m, m/s,
+//! m/s², kg, N·s/m, N/m) says so.
 
 use mechid_model::{Parameter, ResponseQuantity};
 
