@@ -41,21 +41,6 @@ pub enum SignalError {
         /// The value found, in the unit of the record.
         value: f64,
     },
-    /// A sample is so large that sums of its powers overflow.
-    #[error(
-        "sample {} of channel {} is {value}: values beyond {limit} cannot be squared and summed; \
-         use other units",
-        sample + 1, channel + 1,
-        value = told(*value), limit = told(crate::Record::LARGEST)
-    )]
-    TooLarge {
-        /// Sample, counted from 0.
-        sample: usize,
-        /// Channel, counted from 0.
-        channel: usize,
-        /// The value found, in the unit of the record.
-        value: f64,
-    },
     /// A record does not fit in memory.
     #[error("{} of {} do not fit in memory", counted(*channels, "channel"), counted(*samples, "sample"))]
     Memory {

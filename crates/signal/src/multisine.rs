@@ -165,7 +165,7 @@ impl Multisine {
     ///
     /// # Errors
     /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate,
-    /// [`SignalError::Memory`], [`SignalError::TooLarge`] for amplitudes beyond those of a record.
+    /// [`SignalError::Memory`], [`SignalError::NotFinite`] for amplitudes that overflow.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         self.spectrum(sampling)?.to_record()
     }

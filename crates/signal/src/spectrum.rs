@@ -77,8 +77,7 @@ impl Spectrum {
     /// Returns the period that has this spectrum; the exact inverse of [`Spectrum::of`].
     ///
     /// # Errors
-    /// [`SignalError::TooLarge`] and [`SignalError::NotFinite`] if the lines add up to more than a
-    /// record may hold.
+    /// [`SignalError::NotFinite`] if the lines add up to more than a number can hold.
     pub fn to_record(&self) -> Result<Record, SignalError> {
         Record::new(self.sampling, self.samples())
     }

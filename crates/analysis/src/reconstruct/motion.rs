@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mechid_force::{Channel, Measurement};
 use mechid_model::{Response, ResponseQuantity};
-use mechid_signal::{Record, Sampling, SignalError};
+use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
 use super::periods::{Scatter, Sums};
@@ -128,12 +128,7 @@ impl Recorded {
         advance: usize,
         take: &mut dyn FnMut(&Measurement) -> Result<(), AnalysisError>,
     ) -> Result<(), AnalysisError> {
-        let mut first = 0;
-        self.blocks(samples, advance, &mut |block| {
-            let chunk = self.measurement(block).map_err(|error| of_the_window(error, first))?;
-            first += advance;
-            take(&chunk)
-        })
+        self.blocks(samples, advance, &mut |block| take(&self.measurement(block)?))
     }
 
     /// The same, as samples × channels in SI units.
@@ -187,15 +182,4 @@ pub fn response(measured: &Measurement, dofs: usize, with_acceleration: bool) ->
         Record::new(record.sampling(), DMatrix::zeros(record.len(), dofs)).ok()?
     };
     Response::new(x, v, a).ok()
-}
-
-/// Returns an error with the sample that it names counted from the beginning of the window, not from
-/// that of the chunk beginning with sample `first`.
-fn of_the_window(error: AnalysisError, first: usize) -> AnalysisError {
-    match error {
-        AnalysisError::Signal(SignalError::TooLarge { sample, channel, value }) => {
-            SignalError::TooLarge { sample: first + sample, channel, value }.into()
-        }
-        other => other,
-    }
 }

@@ -254,7 +254,7 @@ fn nothing_is_left_of_a_file_begun_when_the_end_of_the_record_is_bad() {
     let call = "force rec.csv --system machine.json --displacement x --velocity v --acceleration a \
                 --output f.csv";
     for (bad, words) in
-        [("0,0,NaN", "rec.csv, line 269501"), ("1e305,0,0", "sample 269500 of channel 1 is 1e305")]
+        [("0,0,NaN", "rec.csv, line 269501"), ("1e305,0,0", "sample 269500 of channel 1 is inf")]
     {
         let time = lines[269_500].split(',').next().unwrap().to_owned();
         lines[269_500] = format!("{time},{bad}");
