@@ -116,6 +116,7 @@ impl Inspection<'_> {
         let mut inventory = file.inventory(&asked, instants)?;
         let (samples, open_line) = (inventory.samples, inventory.open_line);
         let sampling = inventory.sampling.take();
+        let of_file = std::mem::take(&mut inventory.remarks);
         let (mut shown, len, mut left_out) = self.shown(table, &asked, instants, inventory)?;
         let dt = self.step(&file, time, sampling, &mut left_out)?;
         let window = match len {
@@ -123,6 +124,7 @@ impl Inspection<'_> {
             len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
         };
         let mut summary = RecordSummary::begin(table, samples, window, dt, left_out, self.how);
+        summary.remarks.extend(of_file);
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
             doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
         }));

@@ -7,7 +7,7 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_io::{ReadOptions, RecordFile, Table, TimeAxis, Unit};
+use mechid_io::{Limits, ReadOptions, RecordFile, Table, TimeAxis, Unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -39,6 +39,9 @@ pub struct Reading {
     pub sample_rate_hz: Option<f64>,
     /// Constant to subtract from every channel.
     pub detrend: Detrend,
+    /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
+    /// `None`: 1.
+    pub limits_factor: Option<usize>,
 }
 
 /// Constant to subtract from a channel.
@@ -58,7 +61,8 @@ impl Reading {
     /// # Errors
     /// As [`RecordFile::open`].
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
-        let options = ReadOptions { skip_lines: self.skip_lines, ..ReadOptions::default() };
+        let limits = Limits::DEFAULT.times(self.limits_factor.unwrap_or(1));
+        let options = ReadOptions { skip_lines: self.skip_lines, limits };
         Ok(RecordFile::open(path, &options, rows)?)
     }
 
@@ -204,7 +208,7 @@ impl Measurement {
         let survey = file.survey(&time, &channels.used())?;
         let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
         let mut units = units;
-        units.remarks.extend(doubt);
+        units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let source = Source {
             name: file.head().file().to_owned(),
             path: Some(path.to_owned()),
