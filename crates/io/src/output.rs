@@ -148,7 +148,7 @@ impl BegunFile {
         }
     }
 
-    /// Whether it goes to standard output.
+    /// Returns whether it goes to standard output.
     pub fn is_for_standard_output(&self) -> bool {
         matches!(self.stage, Stage::StandardOutput)
     }

@@ -21,17 +21,17 @@ use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
 /// Number of columns drawn at most.
 pub const DRAWN_COLUMNS: usize = 8;
 
-/// How to inspect a record.
+/// Settings of an inspection.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InspectSettings {
     /// Columns to show, by name or number; empty: every column that holds numbers only.
     pub columns: Vec<String>,
-    /// Whether to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
+    /// `true` to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
     pub curves: bool,
 }
 
-/// What is in a record.
+/// Result of an inspection: columns, time axis and contents of a record.
 ///
 /// [`Display`](fmt::Display) gives it as a person reads it, `serde` the same for programs.
 #[derive(Debug)]

@@ -26,7 +26,7 @@ pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 /// Number of samples read at a time from a window that is not held in memory.
 pub const CHUNK_SAMPLES: usize = 1 << 16;
 
-/// How to read a record file.
+/// Settings for reading a record file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Reading {
@@ -85,7 +85,7 @@ pub struct RecordPlan {
     pub path: PathBuf,
     /// Columns of force and response.
     pub channels: Channels,
-    /// How to read the file.
+    /// Settings for reading the file.
     pub reading: Reading,
     /// Samples to use.
     pub window: Window,
@@ -187,7 +187,8 @@ impl Measurement {
         Self::open_with(path, channels, &Reading::default())
     }
 
-    /// As [`Measurement::open`], with a time axis, lines to skip or a mean to subtract.
+    /// Opens a record file as [`Measurement::open`] does, with a time axis, lines to skip or a mean to
+    /// subtract.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
