@@ -56,13 +56,13 @@ pub enum IntegrateError {
         /// The degree of freedom, counted from 0.
         index: usize,
     },
-    /// The forces in the middle of the steps do not lie on the time axis of the force.
+    /// The forces within the steps do not lie on the time axis of the force.
     #[error(
-        "the mid-step forces have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
+        "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
         got_dt = told(*got_dt), dt = told(*dt)
     )]
     MidStepSampling {
-        /// Samples of the mid-step forces.
+        /// Samples of the forces within the steps.
         got: usize,
         /// Their step, in seconds.
         got_dt: f64,
@@ -71,9 +71,9 @@ pub enum IntegrateError {
         /// Its step, in seconds.
         dt: f64,
     },
-    /// The scheme needs the force in the middle of the steps and was given samples alone.
+    /// The scheme needs the force at an instant within the steps and was given samples alone.
     #[error(
-        "{scheme} needs the force in the middle of each step: supply it, or choose held or linear"
+        "{scheme} needs the force within each step: supply it, or choose held or linear"
     )]
     MidStepMissing {
         /// The scheme's name.
@@ -147,6 +147,34 @@ pub enum IntegrateError {
         reciprocal_condition: f64,
         /// What rounding alone can make of it.
         rounding: f64,
+    },
+    /// The nonlinear equation of a step has no solution that Newton's method finds.
+    #[error(
+        "the nonlinear forces cannot be balanced at t = {time} s: Newton's method ends with \
+         accelerations that miss their equation by {residual:.1e} m/s²; take smaller steps",
+        time = told(*time)
+    )]
+    NotSolved {
+        /// Instant, in seconds.
+        time: f64,
+        /// What the accelerations miss their equation by, in m/s².
+        residual: f64,
+    },
+    /// The system has nonlinear forces, which are not possible here.
+    #[error("{what} is for linear systems, and this one has nonlinear forces")]
+    LinearOnly {
+        /// Scheme or analysis.
+        what: &'static str,
+    },
+    /// A scheme is for fewer degrees of freedom.
+    #[error("{scheme} is for at most {}, the system has {dof}", counted(*most, "degree of freedom"))]
+    TooManyDof {
+        /// Which scheme.
+        scheme: &'static str,
+        /// Degrees of freedom of the system.
+        dof: usize,
+        /// Most it takes.
+        most: usize,
     },
     /// The response grew beyond what a number can hold.
     #[error("the response overflows at sample {sample}, degree of freedom {component}")]

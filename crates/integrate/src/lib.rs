@@ -40,13 +40,19 @@
 //! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
 mod accuracy;
+mod bathe;
 mod central_difference;
+mod connection;
 mod driver;
 mod effective;
 mod error;
 mod force;
+mod generalised_alpha;
 mod houbolt;
+mod matrix_exponential;
 mod newmark;
+mod newton;
+mod nonlinear;
 mod period;
 mod periodic;
 mod run;
@@ -59,12 +65,17 @@ mod transition;
 mod wilson_theta;
 
 pub use accuracy::{Accuracy, accuracy};
+pub use bathe::{Bathe, SubStepForce};
 pub use central_difference::{CentralDifference, CentralDifferenceStart};
+pub use connection::{Connection, NonlinearElement};
 pub use driver::{SelectedDofs, integrate, integrate_function, integrate_selected};
 pub use error::IntegrateError;
 pub use force::SampledForce;
+pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
 pub use houbolt::{Houbolt, HouboltStart};
+pub use matrix_exponential::MatrixExponential;
 pub use newmark::Newmark;
+pub use nonlinear::{ForceFunction, NonlinearForce, NonlinearSystem, Tangents};
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};

@@ -1,6 +1,7 @@
 //! Systems that can only lose energy, and their highest frequencies.
 
 use mechid_model::Matrix;
+use mechid_model::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::csr::CsrMatrix;
 
@@ -173,8 +174,8 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         // M⁻¹ A q, then orthogonal to all before: twice is enough.
         let mut product = still.clone();
         match which {
-            Matrix::Damping => mass.solve(next.as_slice(), &still, &mut product),
-            _ => mass.solve(&still, next.as_slice(), &mut product),
+            Matrix::Damping => mass.solve(0.0, next.as_slice(), &still, &mut product)?,
+            _ => mass.solve(0.0, &still, next.as_slice(), &mut product)?,
         }
         next = -DVector::from_vec(product);
         diagonal.push(0.0);
@@ -194,7 +195,7 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         1 => beside[i.min(j)],
         _ => 0.0,
     });
-    let eigen = tridiagonal.symmetric_eigen();
+    let eigen = hermitian_eigen(tridiagonal)?;
     let at = eigen.eigenvalues.imax();
     let value = eigen.eigenvalues[at].max(0.0);
     let coordinates = eigen.eigenvectors.column(at);

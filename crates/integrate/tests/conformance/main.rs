@@ -5,6 +5,7 @@ mod charts;
 mod common;
 mod definitions;
 mod invariances;
+mod nonlinear;
 mod order;
 mod periodic;
 mod random_stability;

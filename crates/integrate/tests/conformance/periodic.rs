@@ -218,9 +218,14 @@ impl Stepper for CountedStepper {
         self.0.instants()
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         self.1.fetch_add(1, Ordering::Relaxed);
-        self.0.change(state, loads, change);
+        self.0.change(state, loads, change)
     }
 
     fn start(
