@@ -1,8 +1,8 @@
 //! Nonlinear springs and dampers between two degrees of freedom, or one and the ground.
 
+use crate::IntegrateError;
 use crate::nonlinear::{NonlinearForce, Tangents};
 use crate::scheme::check_parameter;
-use crate::IntegrateError;
 
 /// Where a nonlinear spring or damper is fitted; its extension e is the displacement of the first
 /// end less that of the second.

@@ -73,8 +73,10 @@ impl Equations {
                 SparseLu::new(&matrix, &sizes).map(Factored::Sparse)
             }
         };
-        let mut factored = factored.map_err(|smallest| {
-            IntegrateError::SingularEffectiveMass { scheme, dt, smallest }
+        let mut factored = factored.map_err(|smallest| IntegrateError::SingularEffectiveMass {
+            scheme,
+            dt,
+            smallest,
         })?;
         let newton = self.forces.as_ref().map(|forces| {
             let mut influence = DMatrix::zeros(self.dof(), forces.dofs().len());

@@ -72,9 +72,7 @@ pub enum IntegrateError {
         dt: f64,
     },
     /// The scheme needs the force at an instant within the steps and was given samples alone.
-    #[error(
-        "{scheme} needs the force within each step: supply it, or choose held or linear"
-    )]
+    #[error("{scheme} needs the force within each step: supply it, or choose held or linear")]
     MidStepMissing {
         /// The scheme's name.
         scheme: String,

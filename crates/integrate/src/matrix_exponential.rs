@@ -72,6 +72,7 @@ impl Scheme for MatrixExponential {
         if !system.nonlinear_forces().is_empty() {
             return Err(IntegrateError::LinearOnly { what: NAME });
         }
+        let mass = Equations::of(system).mass_only(NAME, dt)?;
         let [change, now, next] = match system.matrices() {
             Matrices::Dense(dense) => exponentials(dense, dt, self.linear)?,
             Matrices::Sparse(sparse) => {
@@ -85,7 +86,7 @@ impl Scheme for MatrixExponential {
             change,
             now,
             next,
-            mass: Equations::of(system).mass_only(NAME, dt)?,
+            mass,
             dt,
             linear: self.linear,
             new: vec![0.0; 2 * dof],

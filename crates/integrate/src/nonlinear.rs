@@ -73,10 +73,7 @@ impl<'a> NonlinearSystem<'a> {
     /// # Errors
     /// [`IntegrateError::DofOutside`] and [`IntegrateError::ForcedTwice`] if the force acts on degrees
     /// of freedom that the system has not, or on one of them twice.
-    pub fn with(
-        mut self,
-        force: impl NonlinearForce + 'static,
-    ) -> Result<Self, IntegrateError> {
+    pub fn with(mut self, force: impl NonlinearForce + 'static) -> Result<Self, IntegrateError> {
         let dof = self.dof();
         for (k, &index) in force.dofs().iter().enumerate() {
             if index >= dof {

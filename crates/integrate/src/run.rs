@@ -134,11 +134,7 @@ impl Run {
     ///
     /// # Source
     /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.
-    pub(crate) fn step(
-        &mut self,
-        table: &ForceTable<'_>,
-        k: usize,
-    ) -> Result<(), IntegrateError> {
+    pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) -> Result<(), IntegrateError> {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
         }

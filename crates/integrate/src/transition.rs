@@ -22,8 +22,7 @@ impl Transition {
     pub fn of(stepper: &mut dyn Stepper) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
         let (instants, zeros) = (stepper.instants(), vec![0.0; n]);
-        let still =
-            Loads { time: 0.0, now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
+        let still = Loads { time: 0.0, now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
         // Of a linear system no step fails.
         let mut change_of = |state: &[f64], loads: &Loads<'_>, change: &mut [f64]| {
             let _ = stepper.change(state, loads, change);

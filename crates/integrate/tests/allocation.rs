@@ -44,10 +44,8 @@ fn a_step_of_a_large_system_allocates_nothing() {
     let n = 300;
     let stiffness = band(n, &[(-7, -400.0), (-1, -900.0), (0, 3000.0), (1, -900.0), (7, -400.0)]);
     let shuffled = |i: usize| i * 7 % n;
-    let scattered = triplets(
-        n,
-        stiffness.triplet_iter().map(|(i, j, v)| (shuffled(i), shuffled(j), *v)),
-    );
+    let scattered =
+        triplets(n, stiffness.triplet_iter().map(|(i, j, v)| (shuffled(i), shuffled(j), *v)));
     for stiffness in [stiffness.clone(), scattered.unwrap()] {
         let (mass, damping) = (band(n, &[(0, 1.0)]), &stiffness * 1e-4);
         let linear = SparseSystem::new(mass, damping, stiffness).unwrap();
@@ -57,9 +55,10 @@ fn a_step_of_a_large_system_allocates_nothing() {
         });
         let gap = Connection::to_ground(2).gap(0.05, 3e3).unwrap();
         let nonlinear = NonlinearSystem::new(&linear).with(film).unwrap().with(gap).unwrap();
-        for (system, scheme) in schemes().iter().flat_map(|s| {
-            [&linear as &dyn System, &nonlinear].map(|system| (system, s))
-        }) {
+        for (system, scheme) in schemes()
+            .iter()
+            .flat_map(|s| [&linear as &dyn System, &nonlinear].map(|system| (system, s)))
+        {
             let mut stepper = scheme.prepare(system, 1e-3).unwrap();
             let (state, load) = (vec![0.1; stepper.state_len()], vec![1.0; n]);
             let mut change = state.clone();

@@ -53,7 +53,8 @@ fn grid(side: usize) -> SparseSystem {
     let mut entries = vec![];
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
         entries.push((at(i, j), at(i, j), 3800.0));
-        let neighbours = [(i + 1 < side).then(|| at(i + 1, j)), (j + 1 < side).then(|| at(i, j + 1))];
+        let neighbours =
+            [(i + 1 < side).then(|| at(i + 1, j)), (j + 1 < side).then(|| at(i, j + 1))];
         for next in neighbours.into_iter().flatten() {
             entries.extend([(at(i, j), next, -900.0), (next, at(i, j), -900.0)]);
         }
@@ -142,7 +143,9 @@ fn per_step(system: &dyn System, steps: usize, dofs: SelectedDofs<'_>) -> f64 {
 }
 
 fn sparse() {
-    println!("Newmark, force at one degree of freedom, response at two: µs per step, ms to prepare");
+    println!(
+        "Newmark, force at one degree of freedom, response at two: µs per step, ms to prepare"
+    );
     let scale = if is_tried_only() { 100 } else { 1 };
     for (kind, size, steps) in [
         ("chain", 1_000, 2_000),

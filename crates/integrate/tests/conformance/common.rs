@@ -24,9 +24,7 @@ pub fn schemes() -> Vec<Box<dyn Scheme>> {
         Box::new(RungeKutta4::LINEAR),
         Box::new(GeneralisedAlpha::new(0.8).unwrap()),
         Box::new(GeneralisedAlpha::new(0.0).unwrap()),
-        Box::new(
-            GeneralisedAlpha::new(0.5).unwrap().with_acceleration(AlphaAcceleration::Carried),
-        ),
+        Box::new(GeneralisedAlpha::new(0.5).unwrap().with_acceleration(AlphaAcceleration::Carried)),
         Box::new(GeneralisedAlpha::hilber_hughes_taylor(0.7).unwrap()),
         Box::new(GeneralisedAlpha::wood_bossak_zienkiewicz(0.5).unwrap()),
         Box::new(Bathe::HALVES),

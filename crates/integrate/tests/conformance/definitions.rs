@@ -44,7 +44,8 @@ fn close(left: &DVector<f64>, right: &DVector<f64>, scale: f64) -> bool {
 #[test]
 fn equilibrium_holds_at_every_sample_but_where_it_is_asked_for_elsewhere() {
     let elsewhere = |s: &dyn Scheme| {
-        s.name().starts_with("Wilson") || s.conventions().iter().any(|c| c.choice.contains("carried"))
+        s.name().starts_with("Wilson")
+            || s.conventions().iter().any(|c| c.choice.contains("carried"))
     };
     for scheme in schemes().iter().filter(|s| !elsewhere(s.as_ref())) {
         for dof in SIZES {
@@ -228,27 +229,23 @@ fn generalised_alpha_has_the_printed_parameters() {
 fn bathe_is_the_printed_composite() {
     for dof in SIZES {
         let (system, force, response) = run(&Bathe::HALVES, dof, true);
-        let factored = |q: f64| {
-            (system.mass() + system.damping() * q + system.stiffness() * (q * q)).lu()
-        };
+        let factored =
+            |q: f64| (system.mass() + system.damping() * q + system.stiffness() * (q * q)).lu();
         let (half, whole) = (factored(0.25 * DT), factored(DT / 3.0));
         for k in 0..LEN - 1 {
             let ([x, v, a], [xn, vn, an]) = (at(&response, k), at(&response, k + 1));
             let q = 0.25 * DT;
             let (vh, xh) = (&v + q * &a, &x + 2.0 * q * &v + q * q * &a);
             let middle = 0.5 * (load(&force, k) + load(&force, k + 1));
-            let am = half
-                .solve(&(middle - system.damping() * &vh - system.stiffness() * &xh))
-                .unwrap();
+            let am =
+                half.solve(&(middle - system.damping() * &vh - system.stiffness() * &xh)).unwrap();
             let (xm, vm) = (xh + q * q * &am, vh + q * &am);
             // The two differences solved for x' and ẋ' with ẍ' unknown.
             let q = DT / 3.0;
             let vh = (4.0 * &vm - &v) / 3.0;
             let xh = (4.0 * &xm - &x) / 3.0 + q * &vh;
             let an_ = whole
-                .solve(
-                    &(load(&force, k + 1) - system.damping() * &vh - system.stiffness() * &xh),
-                )
+                .solve(&(load(&force, k + 1) - system.damping() * &vh - system.stiffness() * &xh))
                 .unwrap();
             let (vn_, xn_) = (vh + q * &an_, xh + q * q * &an_);
             let size = x.norm() + DT * v.norm();

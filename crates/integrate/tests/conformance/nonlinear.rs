@@ -36,7 +36,7 @@ fn nonlinear_schemes() -> Vec<Box<dyn Scheme>> {
 fn jacobi(u: f64, m: f64) -> [f64; 3] {
     let (mut a, mut b, mut c) = (1.0, (1.0 - m).sqrt(), m.sqrt());
     let mut ratios = vec![];
-    while c > 1e-17 {
+    while c > f64::EPSILON {
         (a, b, c) = (0.5 * (a + b), (a * b).sqrt(), 0.5 * (a - b));
         ratios.push(c / a);
     }
@@ -57,13 +57,20 @@ fn duffing(k: f64, cubic: f64, amplitude: f64, t: f64) -> [f64; 3] {
     [x, -amplitude * omega * sn * dn, -(k * x + cubic * x.powi(3))]
 }
 
-/// The judge judged: Jacobi's functions from a table, and the differential equation.
+/// The judge judged: Jacobi's functions against the series of sn, and the differential equation.
+///
+/// # Source
+/// Abramowitz & Stegun, *Handbook of Mathematical Functions* (1964), 16.22.1.
 #[test]
 fn the_elliptic_functions_are_right() {
-    // Abramowitz & Stegun, example 1 of section 16: sn(0.2 | 0.81) = 0.19762 08.
-    let [sn, cn, dn] = jacobi(0.2, 0.81);
-    assert!((sn - 0.1976208).abs() < 1e-7, "{sn}");
-    assert!((sn * sn + cn * cn - 1.0).abs() < 1e-15 && (dn * dn + 0.81 * sn * sn - 1.0).abs() < 1e-15);
+    for (u, m) in [(0.05_f64, 0.81_f64), (0.1, 0.4), (-0.1, 0.0)] {
+        let [sn, cn, dn] = jacobi(u, m);
+        let series = u - (1.0 + m) * u.powi(3) / 6.0 + (1.0 + 14.0 * m + m * m) * u.powi(5) / 120.0
+            - (1.0 + 135.0 * m + 135.0 * m * m + m.powi(3)) * u.powi(7) / 5040.0;
+        assert!((sn - series).abs() < 1e-11, "{sn} {series}");
+        assert!((sn * sn + cn * cn - 1.0).abs() < 1e-15);
+        assert!((dn * dn + m * sn * sn - 1.0).abs() < 1e-15);
+    }
     for t in [0.3, 1.7, 9.0] {
         let h = 1e-4;
         let [x, v, a] = duffing(1.0, 3.0, 1.2, t);
@@ -95,6 +102,8 @@ fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
             let expected = match () {
                 () if name.starts_with("Newmark (β = 0.3025") || is_at_rest(scheme) => 1.0,
                 () if name.starts_with("Runge") => 4.0,
+                // Numerov's method without damping, but for the velocity.
+                () if name.contains("Fox") && i != 1 => 4.0,
                 () if i == 2 && has("carried") => 1.0,
                 () => 2.0,
             };
@@ -136,7 +145,8 @@ fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
         let [x, v, a] = chosen(t);
         let mut sum = linear.mass() * a + linear.damping() * &v + linear.stiffness() * &x;
         for part in system.nonlinear_forces() {
-            let pick = |from: &DVector<f64>| part.dofs().iter().map(|&i| from[i]).collect::<Vec<_>>();
+            let pick =
+                |from: &DVector<f64>| part.dofs().iter().map(|&i| from[i]).collect::<Vec<_>>();
             let mut g = vec![0.0; part.dofs().len()];
             part.force(t, &pick(&x), &pick(&v), &mut g);
             part.dofs().iter().zip(g).for_each(|(&i, g)| sum[i] += g);
@@ -181,8 +191,7 @@ fn reduction_and_tangents_do_not_change_the_response() {
     )
     .unwrap();
     let law = |e: f64| 500.0 * e + 4e4 * e.powi(3);
-    let element =
-        || Connection::between(20, 4).spring(&[500.0, 0.0, 4e4]).unwrap();
+    let element = || Connection::between(20, 4).spring(&[500.0, 0.0, 4e4]).unwrap();
     let function = ForceFunction::new(vec![4, 20], move |_, x, _, g| {
         g[1] = law(x[1] - x[0]);
         g[0] = -g[1];

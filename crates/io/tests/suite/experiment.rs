@@ -1,7 +1,9 @@
 //! Descriptions of experiments: what they mean, and what is said about wrong ones.
 
 use mechid_io::{
-    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, IoError, LoadBeyond, MiddleLoad, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad, SystemMatrices, read_covariance, read_system,
+    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, IoError, LoadBeyond,
+    MiddleLoad, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
+    SystemMatrices, read_covariance, read_system,
 };
 
 /// A description with these lines in place of the default ones.
