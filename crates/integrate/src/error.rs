@@ -146,6 +146,18 @@ pub enum IntegrateError {
         /// What rounding alone can make of it.
         rounding: f64,
     },
+    /// Newton's method finds no response of a nonlinear system that repeats with the force.
+    #[error(
+        "no response that repeats every {period} s is found from there: the best still changes by \
+         {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
+        period = told(*period)
+    )]
+    NoOrbit {
+        /// Period of the force, in seconds.
+        period: f64,
+        /// What is left of the gap, relative to the largest displacement, velocity or acceleration.
+        missed: f64,
+    },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
     #[error(
         "the nonlinear forces cannot be balanced at t = {time} s: Newton's method ends with \

@@ -1,5 +1,6 @@
-//! Direct time integration of M ẍ + C ẋ + K x = F: central difference, Houbolt, Wilson θ, Newmark
-//! and Runge–Kutta 4, with their conventions stated and their stability known.
+//! Direct time integration of M ẍ + C ẋ + K x = F, linear or with nonlinear forces: central
+//! difference, Houbolt, Wilson θ, Newmark, generalised-α, Bathe, Runge–Kutta 4 and the matrix
+//! exponential, with their conventions stated and their stability known.
 //!
 //! ```
 //! use mechid_integrate::{
@@ -33,8 +34,8 @@
 //! on them, too.
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
-//! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
-//! fail nor allocate; a [`System`] is dense or sparse. [`integrate()`] and [`integrate_periodic`] run
+//! does once what depends on the system and the step and gives a [`Stepper`], whose steps do
+//! not allocate; a [`System`] is dense or sparse, and a [`NonlinearSystem`] has forces besides. [`integrate()`] and [`integrate_periodic`] run
 //! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
 //! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
 //! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
@@ -53,6 +54,7 @@ mod matrix_exponential;
 mod newmark;
 mod newton;
 mod nonlinear;
+mod orbit;
 mod period;
 mod periodic;
 mod run;
@@ -76,6 +78,7 @@ pub use houbolt::{Houbolt, HouboltStart};
 pub use matrix_exponential::MatrixExponential;
 pub use newmark::Newmark;
 pub use nonlinear::{ForceFunction, NonlinearForce, NonlinearSystem, Tangents};
+pub use orbit::{PeriodicOrbit, periodic_orbit};
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};

@@ -166,7 +166,7 @@ impl StabilityArgs {
                 Box::new(WilsonTheta::new(self.theta)?),
             ),
             (
-                format!("generalised-α ρ∞ = {}", compact(self.rho_infinity, 6)),
+                format!("generalised-α {}", compact(self.rho_infinity, 6)),
                 Box::new(GeneralisedAlpha::new(self.rho_infinity)?),
             ),
             ("Bathe".into(), Box::new(Bathe::HALVES)),

@@ -6,6 +6,7 @@ mod common;
 mod definitions;
 mod invariances;
 mod nonlinear;
+mod orbit;
 mod order;
 mod periodic;
 mod random_stability;
