@@ -239,12 +239,13 @@ impl LocalNewton {
             let mut part = 1.0;
             self.a += &self.step;
             let mut now = self.evaluate(time);
-            while !(now <= missed || part <= LEAST_PART) {
+            let is_worse = |now: f64| now.is_nan() || now > missed;
+            while is_worse(now) && part > LEAST_PART {
                 part *= 0.5;
                 self.a.axpy(-part, &self.step, 1.0);
                 now = self.evaluate(time);
             }
-            if !(now <= missed) {
+            if is_worse(now) {
                 self.a.axpy(-part, &self.step, 1.0);
                 missed = self.evaluate(time);
                 break;

@@ -80,7 +80,8 @@ impl PeriodicOrbit {
 /// let force = Record::from_channel(sampling, (0..400).map(force).collect())?;
 /// let near = InitialState::new([0.9].to_vec().into(), [0.0].to_vec().into())?;
 /// let orbit = periodic_orbit(&Newmark::AVERAGE_ACCELERATION, &system, &force, &near, 0)?;
-/// assert!((orbit.response().displacement().channel(0)[0] - 1.0).abs() < 1e-4);
+/// let start = orbit.response().displacement().channel(0)[0];
+/// assert!((start - 1.0).abs() < 1e-3, "{start}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -114,7 +115,7 @@ pub fn periodic_orbit<'a>(
         let derivative = shooting.monodromy(&state)?;
         let step = shooting.newton_step(&derivative, &gap)?;
         monodromy = Some(derivative);
-        let Some((next, next_gap)) = shooting.nearer(&state, &step, missed)? else { break };
+        let Some([next, next_gap]) = shooting.nearer(&state, &step, missed)? else { break };
         (state, gap) = (next, next_gap);
     }
     let missed = shooting.missed(&gap);
@@ -237,7 +238,7 @@ impl Shooting<'_> {
         let factored = (DMatrix::identity(len, len) - derivative).lu();
         let smallest = factored.u().diagonal().abs().min();
         let rounding = DIFFERENCE * DIFFERENCE;
-        if !(smallest > rounding) {
+        if smallest.is_nan() || smallest <= rounding {
             let size = derivative.norm().max(1.0);
             return Err(IntegrateError::NoPeriodicState {
                 period: self.period(),
@@ -249,18 +250,18 @@ impl Shooting<'_> {
         Ok(factored.solve(gap).unwrap_or_else(|| DVector::zeros(len)))
     }
 
-    /// The largest part of `step` from `state` that leaves a smaller gap, and that gap.
+    /// The state after the largest part of `step` that leaves a smaller gap, and that gap.
     fn nearer(
         &mut self,
         state: &DVector<f64>,
         step: &DVector<f64>,
         missed: f64,
-    ) -> Result<Option<(DVector<f64>, DVector<f64>)>, IntegrateError> {
+    ) -> Result<Option<[DVector<f64>; 2]>, IntegrateError> {
         let mut part = 1.0;
         while part >= LEAST_PART {
             let next = state + step.component_mul(&self.scales) * part;
             match self.gap(&next) {
-                Ok(gap) if self.missed(&gap) < missed => return Ok(Some((next, gap))),
+                Ok(gap) if self.missed(&gap) < missed => return Ok(Some([next, gap])),
                 // Too far away for the equation of a step to have a solution.
                 Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
                 Err(other) => return Err(other),
