@@ -7,10 +7,10 @@ use crate::newmark::{motion, motion_mut, start_consistently};
 use crate::scheme::{check_parameter, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// What Bathe's scheme takes for the force at the end of its first sub-step.
+/// Force at the end of the first sub-step of Bathe's scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SubStepForce {
-    /// On the line from F(t) to F(t+Δt).
+    /// Linear from F(t) to F(t+Δt).
     #[default]
     Linear,
     /// The force itself, from a function of time or from samples supplied there.
@@ -55,7 +55,7 @@ impl Bathe {
         Ok(Self { rho, splitting, force: SubStepForce::Linear })
     }
 
-    /// The same scheme with another force at the end of the first sub-step.
+    /// Returns the scheme with another force at the end of the first sub-step.
     #[must_use]
     pub fn with_force(self, force: SubStepForce) -> Self {
         Self { force, ..self }

@@ -4,7 +4,7 @@ use crate::IntegrateError;
 use crate::nonlinear::{NonlinearForce, Tangents};
 use crate::scheme::check_parameter;
 
-/// Where a nonlinear spring or damper is fitted; its extension e is the displacement of the first
+/// Ends of a nonlinear spring or damper; its extension e is the displacement of the first
 /// end less that of the second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Connection {
@@ -13,17 +13,17 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Between a degree of freedom, counted from 0, and the ground.
+    /// Connects a degree of freedom, counted from 0, with the ground.
     pub fn to_ground(dof: usize) -> Self {
         Self { from: dof, to: None }
     }
 
-    /// Between two degrees of freedom, counted from 0.
+    /// Connects two degrees of freedom, counted from 0.
     pub fn between(from: usize, to: usize) -> Self {
         Self { from, to: Some(to) }
     }
 
-    /// A spring of force Σ kᵢ eⁱ, i from 1 to the number of `coefficients` kᵢ (N/mⁱ).
+    /// A spring of force Σ kᵢ eⁱ, with a list of `coefficients` kᵢ (N/mⁱ) from i = 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`] if a coefficient is not finite.
@@ -31,7 +31,7 @@ impl Connection {
         Ok(self.element(Law::Spring(finite("spring coefficient", coefficients)?)))
     }
 
-    /// A damper of force Σ cᵢ ėⁱ, i from 1 to the number of `coefficients` cᵢ (N·sⁱ/mⁱ).
+    /// A damper of force Σ cᵢ ėⁱ, with a list of `coefficients` cᵢ (N·sⁱ/mⁱ) from i = 1.
     ///
     /// # Errors
     /// [`IntegrateError::Parameter`] if a coefficient is not finite.

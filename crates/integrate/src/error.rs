@@ -1,4 +1,4 @@
-//! What can be wrong with an integration.
+//! Errors of an integration.
 
 use mechid_signal::{counted, told, told_to};
 
@@ -18,9 +18,9 @@ pub enum IntegrateError {
         least = told(*least), most = told(*most), value = told(*value)
     )]
     Parameter {
-        /// Which scheme.
+        /// Name of the scheme.
         scheme: &'static str,
-        /// Which parameter.
+        /// Name of the parameter.
         parameter: &'static str,
         /// Smallest value allowed; parameters of schemes are pure numbers.
         least: f64,
@@ -32,7 +32,7 @@ pub enum IntegrateError {
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
     #[error("{what} has {}, the system has {}", counted(*got, "component"), counted(*dof, "degree of freedom"))]
     Components {
-        /// What was given.
+        /// Name of the input.
         what: &'static str,
         /// Components found.
         got: usize,
@@ -64,11 +64,11 @@ pub enum IntegrateError {
     MidStepSampling {
         /// Samples of the forces within the steps.
         got: usize,
-        /// Their step, in seconds.
+        /// Step of the mid-step forces, in seconds.
         got_dt: f64,
         /// Samples of the force.
         expected: usize,
-        /// Its step, in seconds.
+        /// Step of the force, in seconds.
         dt: f64,
     },
     /// The scheme needs the force at an instant within the steps and was given samples alone.
@@ -83,7 +83,7 @@ pub enum IntegrateError {
         time = told(*time), value = told(*value)
     )]
     NotFinite {
-        /// What was given.
+        /// Name of the input.
         what: &'static str,
         /// Component, counted from 1.
         component: usize,
@@ -98,7 +98,7 @@ pub enum IntegrateError {
         dt = told(*dt)
     )]
     SingularEffectiveMass {
-        /// Which scheme.
+        /// Name of the scheme.
         scheme: &'static str,
         /// Time step, in seconds.
         dt: f64,
@@ -129,7 +129,7 @@ pub enum IntegrateError {
     NotAtRest {
         /// Component, counted from 1.
         component: usize,
-        /// Its velocity, in m/s.
+        /// Velocity, in m/s.
         velocity: f64,
     },
     /// No response repeats with the period of the force, or none that can be told from rounding.
@@ -143,7 +143,7 @@ pub enum IntegrateError {
         period: f64,
         /// Reciprocal condition of I − Φ, Φ being the free motion over one period.
         reciprocal_condition: f64,
-        /// What rounding alone can make of it.
+        /// Change that rounding alone can make.
         rounding: f64,
     },
     /// Newton's method finds no response of a nonlinear system that repeats with the force.
@@ -155,7 +155,7 @@ pub enum IntegrateError {
     NoOrbit {
         /// Period of the force, in seconds.
         period: f64,
-        /// What is left of the gap, relative to the largest displacement, velocity or acceleration.
+        /// Rest of the gap, relative to the largest displacement, velocity or acceleration.
         missed: f64,
     },
     /// The nonlinear equation of a step has no solution that Newton's method finds.
@@ -167,7 +167,7 @@ pub enum IntegrateError {
     NotSolved {
         /// Instant, in seconds.
         time: f64,
-        /// What the accelerations miss their equation by, in m/s².
+        /// Amount by which the accelerations miss their equation, in m/s².
         residual: f64,
     },
     /// The system has nonlinear forces, which are not possible here.
@@ -179,7 +179,7 @@ pub enum IntegrateError {
     /// A scheme is for fewer degrees of freedom.
     #[error("{scheme} is for at most {}, the system has {dof}", counted(*most, "degree of freedom"))]
     TooManyDof {
-        /// Which scheme.
+        /// Name of the scheme.
         scheme: &'static str,
         /// Degrees of freedom of the system.
         dof: usize,

@@ -7,10 +7,10 @@ use crate::newmark::start_consistently;
 use crate::scheme::{check_parameter, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// Which acceleration the generalised-α method returns.
+/// Acceleration that the generalised-α method returns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AlphaAcceleration {
-    /// That of the equation of motion at the sample, M ẍ = F − C ẋ − K x: second order. It costs a
+    /// Acceleration of the equation of motion at the sample, M ẍ = F − C ẋ − K x: second order. It costs a
     /// second solve.
     #[default]
     EquationOfMotion,
@@ -19,7 +19,7 @@ pub enum AlphaAcceleration {
     Carried,
 }
 
-/// Which parameters are derived from ρ∞.
+/// Rule by which the parameters follow from ρ∞.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Member {
     Generalised,
@@ -94,7 +94,7 @@ impl GeneralisedAlpha {
         Self { member, rho, alpha_m, alpha_f, acceleration: AlphaAcceleration::default() }
     }
 
-    /// The same scheme with another acceleration returned.
+    /// Returns the scheme with another acceleration returned.
     #[must_use]
     pub fn with_acceleration(self, acceleration: AlphaAcceleration) -> Self {
         Self { acceleration, ..self }

@@ -10,7 +10,7 @@ use crate::{IntegrateError, NonlinearForce, Tangents};
 /// largest.
 const TOLERANCE: f64 = 1e-12;
 
-/// The same where no step leads nearer, as a small extension between large displacements is rounded.
+/// Tolerance where no step leads nearer, as a small extension between large displacements is rounded.
 const ROUNDING: f64 = 1e-9;
 
 /// Largest number of Newton steps.
@@ -33,7 +33,7 @@ pub(crate) struct LocalForces {
 #[derive(Debug, Clone)]
 struct Member {
     force: Arc<dyn NonlinearForce>,
-    /// Its degrees of freedom among those of all.
+    /// Places of its degrees of freedom among those of all.
     at: Vec<usize>,
     x: Vec<f64>,
     v: Vec<f64>,
@@ -165,7 +165,7 @@ pub(crate) struct LocalNewton {
 }
 
 impl LocalNewton {
-    /// Of a scheme with the given γ̂ and β̂; `influence` is M̂⁻¹ at the degrees of freedom of
+    /// Prepares for a scheme with the given γ̂ and β̂; `influence` is M̂⁻¹ at the degrees of freedom of
     /// `forces`, n×p.
     pub(crate) fn new(
         forces: LocalForces,

@@ -25,12 +25,12 @@ pub trait NonlinearForce: fmt::Debug + Send + Sync {
     }
 }
 
-/// How a nonlinear force changes with displacement and velocity.
+/// Derivatives of a nonlinear force by displacement and velocity.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tangents {
-    /// ∂g/∂x, p×p, in N/m.
+    /// ∂g/∂x, p × p, in N/m.
     pub stiffness: DMatrix<f64>,
-    /// ∂g/∂ẋ, p×p, in N·s/m.
+    /// ∂g/∂ẋ, p × p, in N·s/m.
     pub damping: DMatrix<f64>,
 }
 

@@ -11,7 +11,7 @@ use crate::{IntegrateError, SampledForce, Scheme, System};
 /// velocity or acceleration.
 const CLOSED: f64 = 1e-11;
 
-/// The same where no step leads nearer.
+/// Tolerance where no step leads nearer.
 const ROUNDING: f64 = 1e-8;
 
 /// Largest number of Newton steps.
@@ -44,7 +44,7 @@ impl PeriodicOrbit {
         &self.multipliers
     }
 
-    /// Whether small disturbances die out: all multipliers lie within the unit circle.
+    /// Returns whether small disturbances die out: all multipliers lie within the unit circle.
     pub fn is_stable(&self) -> bool {
         self.multipliers.iter().all(|multiplier| multiplier.norm() < 1.0)
     }
@@ -199,7 +199,7 @@ impl Shooting<'_> {
         Ok(DVector::from_column_slice(&self.run.state))
     }
 
-    /// What the state changes by in a period, in parts of the scales.
+    /// Change of the state in a period, in parts of the scales.
     fn gap(&mut self, state: &DVector<f64>) -> Result<DVector<f64>, IntegrateError> {
         let end = self.pass(state, 0)?;
         Ok((end - state).component_div(&self.scales))
@@ -210,8 +210,8 @@ impl Shooting<'_> {
         gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
     }
 
-    /// How the state at the end of the period depends on that at its beginning, both in parts of the
-    /// scales.
+    /// Derivative of the state at the end of the period by that at its beginning, both in parts of
+    /// the scales.
     fn monodromy(&mut self, state: &DVector<f64>) -> Result<DMatrix<f64>, IntegrateError> {
         let len = state.len();
         let mut derivative = DMatrix::zeros(len, len);

@@ -1,4 +1,4 @@
-//! What a scheme is: parameters a user chooses, and the work prepared once from them.
+//! Schemes: parameters that a user chooses, and the work prepared once from them.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::{IntegrateError, System, stability};
 /// A choice on which programs that share a formula still differ; printed with every result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Convention {
-    /// What is chosen.
+    /// Name of the choice.
     pub what: &'static str,
     /// The choice in force.
     pub choice: &'static str,
@@ -25,8 +25,8 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// The conventions in force.
     fn conventions(&self) -> Vec<Convention>;
 
-    /// The instant within each step at which the force must be supplied, in parts of the step, a
-    /// pure number; none if its values at the samples are enough.
+    /// Instant within each step at which the force must be supplied, in parts of the step (a
+    /// pure number); none if its values at the samples are enough.
     fn inner_instant(&self) -> Option<f64> {
         None
     }
@@ -49,8 +49,8 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError>;
 
-    /// As [`prepare_unchecked`](Self::prepare_unchecked), but refuses a step `dt` (s) that makes
-    /// the motion of the system, without its nonlinear forces, grow. Wrap the scheme in
+    /// Prepares as [`prepare_unchecked`](Self::prepare_unchecked) does, but refuses a step `dt` (s)
+    /// that makes the motion of the system, without its nonlinear forces, grow. Wrap the scheme in
     /// [`AllowUnstable`] to go on all the same.
     ///
     /// # Errors
@@ -92,7 +92,7 @@ pub enum StableSteps {
     Frequencies(f64),
     /// Steps with |λ|Δt ≤ this pure number for every eigenvalue λ.
     Eigenvalues(f64),
-    /// Not known in closed form.
+    /// Limit that is not known in closed form.
     Unknown,
 }
 
@@ -141,7 +141,7 @@ impl Scheme for AllowUnstable<'_> {
     }
 }
 
-/// Where in a step from t to t + Δt a scheme looks at the force.
+/// Instant within a step from t to t + Δt at which a scheme reads the force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Instant {
     /// t
@@ -184,7 +184,7 @@ pub trait Stepper: Send {
     /// Length of the state, at least 3·n.
     fn state_len(&self) -> usize;
 
-    /// At which instants of a step the force is read.
+    /// Returns the instants of a step at which the force is read.
     fn instants(&self) -> &'static [Instant];
 
     /// Writes what the step adds to `state` into `change`: z(t + Δt) − z(t).

@@ -120,7 +120,7 @@ fn high_frequency_radius() -> f64 {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReturnedAcceleration {
-    /// From the equation of motion at each sample.
+    /// Acceleration of the equation of motion at each sample.
     #[default]
     EquationOfMotion,
     /// The one carried from step to step, of first order.
@@ -131,7 +131,7 @@ pub enum ReturnedAcceleration {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SubStepLoad {
-    /// On the line through both ends of the step.
+    /// Linear between both ends of the step.
     #[default]
     Linear,
     /// The excitation evaluated there.
@@ -144,7 +144,7 @@ pub enum SubStepLoad {
 pub enum HeldOrLinear {
     /// The value of the earlier sample.
     Held,
-    /// On the line through both samples.
+    /// Linear between both samples.
     Linear,
 }
 
@@ -164,7 +164,7 @@ pub enum MiddleLoad {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FirstDisplacements {
-    /// By the Taylor step with the consistent acceleration.
+    /// Taylor step with the consistent acceleration.
     #[default]
     Taylor,
     /// The displacement of the first sample: at rest until then.
@@ -175,10 +175,10 @@ pub enum FirstDisplacements {
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FirstSteps {
-    /// By Newmark's average acceleration.
+    /// Newmark's average acceleration.
     #[default]
     AverageAcceleration,
-    /// By central difference.
+    /// Central difference.
     CentralDifference,
     /// Displacements given in the description.
     Given {
@@ -193,9 +193,9 @@ pub enum FirstSteps {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadBeyond {
-    /// On the line through both ends of the step.
+    /// Force on the line through both ends of the step.
     #[default]
     Projected,
-    /// Between the samples around it.
+    /// Force between the samples around it.
     Interpolated,
 }
