@@ -212,6 +212,12 @@ fn every_scheme_simulates_what_it_says() {
         (r#""central-difference", "start": "rest""#, "central difference", 2),
         (r#""houbolt""#, "Houbolt", 2),
         (r#""wilson-theta", "theta": 1.4"#, "Wilson", 1),
+        (r#""generalised-alpha""#, "generalised-α (ρ∞ = 0.8)", 3),
+        (r#""hht-alpha", "rho_infinity": 0.9, "acceleration": "carried""#, "HHT-α", 3),
+        (r#""wbz-alpha", "rho_infinity": 0.9"#, "WBZ-α", 3),
+        (r#""bathe", "load": "exact""#, "Bathe (ρ∞ = 0, γ = 0.5)", 2),
+        (r#""rho-infinity-bathe", "rho_infinity": 0.5, "load": "exact""#, "Bathe (ρ∞ = 0.5", 2),
+        (r#""matrix-exponential", "load": "linear""#, "matrix exponential", 2),
         (r#""runge-kutta-4", "load": "linear""#, "Runge", 1),
     ] {
         let description = format!(

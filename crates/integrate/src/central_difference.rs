@@ -94,8 +94,13 @@ impl Stepper for CentralDifferenceStepper {
         self.inner.instants()
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
-        self.inner.change(state, loads, change);
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        self.inner.change(state, loads, change)
     }
 
     fn start(
@@ -117,7 +122,7 @@ impl Stepper for CentralDifferenceStepper {
         x.copy_from_slice(initial.displacement().as_slice());
         v.fill(0.0);
         a.copy_from_slice(&early[0]);
-        self.inner.effective.solve(v, x, a);
+        self.inner.effective.solve(0.0, v, x, a)?;
         for (v, a) in v.iter_mut().zip(a) {
             *v = 0.5 * self.inner.dt * *a;
         }

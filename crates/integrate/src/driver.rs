@@ -130,11 +130,8 @@ impl Sampled {
         force: &mut impl FnMut(f64, &mut [f64]),
     ) -> Result<Self, IntegrateError> {
         let samples = sample(dof, sampling, 0.0, force)?;
-        let middle = if scheme.needs_mid_step_force() {
-            Some(sample(dof, sampling, 0.5, force)?)
-        } else {
-            None
-        };
+        let inner = scheme.inner_instant().map(|part| sample(dof, sampling, part, force));
+        let middle = inner.transpose()?;
         Ok(Self { samples, middle })
     }
 
@@ -174,13 +171,13 @@ fn run(
     let dof = system.dof();
     initial.check_dof(dof)?;
     let sampling = table.sampling();
-    let mut run = Run::new(scheme.prepare(system, sampling.dt())?, sampling.dt());
+    let mut run = Run::new(scheme.prepare(system, sampling.dt())?, system, sampling.dt());
     let first = run.stepper().first();
     let mut motions = vec![vec![0.0; 3 * dof]; first + 1];
     run.start(initial, &table.early(first), &mut motions)?;
     for (k, values) in motions.iter().enumerate().take(sampling.len()) {
         motion.set(k, values);
     }
-    run.advance(table, first, (sampling.len() - 1).max(first), &mut motion);
+    run.advance(table, first, (sampling.len() - 1).max(first), &mut motion)?;
     motion.into_response(table)
 }

@@ -6,18 +6,25 @@ use mechid_model::{Matrix, SecondOrderSystem};
 use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut, Dyn, LU};
 use nalgebra_sparse::csr::CsrMatrix;
 
+use crate::newton::{LocalForces, LocalNewton};
 use crate::sparse::{Product, SparseLu, combination};
 use crate::{IntegrateError, System};
 
-/// The matrices of a system, in the form in which a step uses them.
+/// The equations of motion of a system, in the form in which a step uses them.
 #[derive(Debug, Clone)]
-pub(crate) enum Equations {
+pub(crate) struct Equations {
+    linear: Linear,
+    forces: Option<LocalForces>,
+}
+
+#[derive(Debug, Clone)]
+enum Linear {
     Dense(Arc<SecondOrderSystem>),
     Sparse(Arc<SparseEquations>),
 }
 
 #[derive(Debug)]
-pub(crate) struct SparseEquations {
+struct SparseEquations {
     mass: CsrMatrix<f64>,
     damping: CsrMatrix<f64>,
     stiffness: CsrMatrix<f64>,
@@ -27,20 +34,22 @@ pub(crate) struct SparseEquations {
 
 impl Equations {
     pub(crate) fn of(system: &dyn System) -> Self {
+        let forces = LocalForces::of(system.nonlinear_forces());
         let matrices = system.matrices();
         if let Some(dense) = matrices.dense() {
-            return Self::Dense(Arc::new(dense.clone()));
+            return Self { linear: Linear::Dense(Arc::new(dense.clone())), forces };
         }
         let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
             .map(|which| matrices.sparse(which).into_owned());
         let products = [&damping, &stiffness].map(Product::of);
-        Self::Sparse(Arc::new(SparseEquations { mass, damping, stiffness, products }))
+        let equations = SparseEquations { mass, damping, stiffness, products };
+        Self { linear: Linear::Sparse(Arc::new(equations)), forces }
     }
 
     pub(crate) fn dof(&self) -> usize {
-        match self {
-            Self::Dense(system) => system.dof(),
-            Self::Sparse(system) => system.mass.nrows(),
+        match &self.linear {
+            Linear::Dense(system) => system.dof(),
+            Linear::Sparse(system) => system.mass.nrows(),
         }
     }
 
@@ -52,9 +61,9 @@ impl Equations {
         gamma_hat: f64,
         beta_hat: f64,
     ) -> Result<Effective, IntegrateError> {
-        let factored = match self {
-            Self::Dense(system) => factor_dense(system, gamma_hat, beta_hat),
-            Self::Sparse(system) => {
+        let factored = match &self.linear {
+            Linear::Dense(system) => factor_dense(system, gamma_hat, beta_hat),
+            Linear::Sparse(system) => {
                 let terms = [
                     (1.0, &system.mass),
                     (gamma_hat, &system.damping),
@@ -64,10 +73,20 @@ impl Equations {
                 SparseLu::new(&matrix, &sizes).map(Factored::Sparse)
             }
         };
-        match factored {
-            Ok(factored) => Ok(Effective { equations: self.clone(), factored }),
-            Err(smallest) => Err(IntegrateError::SingularEffectiveMass { scheme, dt, smallest }),
-        }
+        let mut factored = factored.map_err(|smallest| IntegrateError::SingularEffectiveMass {
+            scheme,
+            dt,
+            smallest,
+        })?;
+        let newton = self.forces.as_ref().map(|forces| {
+            let mut influence = DMatrix::zeros(self.dof(), forces.dofs().len());
+            for (mut column, &at) in influence.column_iter_mut().zip(forces.dofs()) {
+                column[at] = 1.0;
+                factored.solve(column.as_mut_slice());
+            }
+            LocalNewton::new(forces.clone(), gamma_hat, beta_hat, influence)
+        });
+        Ok(Effective { linear: self.linear.clone(), factored, newton })
     }
 
     /// Factors M alone: the equation of motion solved for the acceleration.
@@ -81,14 +100,16 @@ impl Equations {
 
     /// One of M, C, K times `x`.
     pub(crate) fn times(&self, which: Matrix, x: &DVector<f64>) -> DVector<f64> {
-        match (self, which) {
-            (Self::Dense(system), _) => system.matrix(which) * x,
-            (Self::Sparse(system), Matrix::Mass) => &system.mass * x,
-            (Self::Sparse(system), Matrix::Damping) => &system.damping * x,
-            (Self::Sparse(system), Matrix::Stiffness) => &system.stiffness * x,
+        match (&self.linear, which) {
+            (Linear::Dense(system), _) => system.matrix(which) * x,
+            (Linear::Sparse(system), Matrix::Mass) => &system.mass * x,
+            (Linear::Sparse(system), Matrix::Damping) => &system.damping * x,
+            (Linear::Sparse(system), Matrix::Stiffness) => &system.stiffness * x,
         }
     }
+}
 
+impl Linear {
     /// `load` ← `load` − C v̂ − K x̂.
     fn subtract_forces(&self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
         match self {
@@ -110,10 +131,12 @@ impl Equations {
 ///
 /// Every implicit scheme writes displacement and velocity at its collocation instant as
 /// x̂ + β̂ a and v̂ + γ̂ a, known part plus unknown acceleration, and asks for equilibrium there.
+/// Nonlinear forces of the system are taken at that instant, too.
 #[derive(Debug)]
 pub(crate) struct Effective {
-    equations: Equations,
+    linear: Linear,
     factored: Factored,
+    newton: Option<LocalNewton>,
 }
 
 #[derive(Debug)]
@@ -122,17 +145,35 @@ enum Factored {
     Sparse(SparseLu),
 }
 
-impl Effective {
-    /// a = M̂⁻¹ (`load` − C v̂ − K x̂), in place of `load`.
-    pub(crate) fn solve(&mut self, v_hat: &[f64], x_hat: &[f64], load: &mut [f64]) {
-        self.equations.subtract_forces(v_hat, x_hat, load);
-        match &mut self.factored {
+impl Factored {
+    fn solve(&mut self, b: &mut [f64]) {
+        match self {
             // Cannot fail: the pivots were checked when M̂ was factored.
-            Factored::Dense(factored) => {
-                let n = load.len();
-                factored.solve_mut(&mut DVectorViewMut::from_slice(load, n));
+            Self::Dense(factored) => {
+                let n = b.len();
+                factored.solve_mut(&mut DVectorViewMut::from_slice(b, n));
             }
-            Factored::Sparse(factored) => factored.solve(load),
+            Self::Sparse(factored) => factored.solve(b),
+        }
+    }
+}
+
+impl Effective {
+    /// a = M̂⁻¹ (`load` − C v̂ − K x̂), in place of `load`; with nonlinear forces the solution of
+    /// M̂ a + g(x̂ + β̂ a, v̂ + γ̂ a, `time`) = `load` − C v̂ − K x̂, which Newton's method can fail to
+    /// find.
+    pub(crate) fn solve(
+        &mut self,
+        time: f64,
+        v_hat: &[f64],
+        x_hat: &[f64],
+        load: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        self.linear.subtract_forces(v_hat, x_hat, load);
+        self.factored.solve(load);
+        match &mut self.newton {
+            None => Ok(()),
+            Some(newton) => newton.correct(time, v_hat, x_hat, load),
         }
     }
 }

@@ -56,13 +56,13 @@ pub enum IntegrateError {
         /// The degree of freedom, counted from 0.
         index: usize,
     },
-    /// The forces in the middle of the steps do not lie on the time axis of the force.
+    /// The forces within the steps do not lie on the time axis of the force.
     #[error(
-        "the mid-step forces have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
+        "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
         got_dt = told(*got_dt), dt = told(*dt)
     )]
     MidStepSampling {
-        /// Samples of the mid-step forces.
+        /// Samples of the forces within the steps.
         got: usize,
         /// Step of the mid-step forces, in seconds.
         got_dt: f64,
@@ -71,10 +71,8 @@ pub enum IntegrateError {
         /// Step of the force, in seconds.
         dt: f64,
     },
-    /// The scheme needs the force in the middle of the steps and was given samples alone.
-    #[error(
-        "{scheme} needs the force in the middle of each step: supply it, or choose held or linear"
-    )]
+    /// The scheme needs the force at an instant within the steps and was given samples alone.
+    #[error("{scheme} needs the force within each step: supply it, or choose held or linear")]
     MidStepMissing {
         /// The scheme's name.
         scheme: String,
@@ -147,6 +145,46 @@ pub enum IntegrateError {
         reciprocal_condition: f64,
         /// Change that rounding alone can make.
         rounding: f64,
+    },
+    /// Newton's method finds no response of a nonlinear system that repeats with the force.
+    #[error(
+        "no response that repeats every {period} s is found from there: the best still changes by \
+         {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
+        period = told(*period)
+    )]
+    NoOrbit {
+        /// Period of the force, in seconds.
+        period: f64,
+        /// Rest of the gap, relative to the largest displacement, velocity or acceleration.
+        missed: f64,
+    },
+    /// The nonlinear equation of a step has no solution that Newton's method finds.
+    #[error(
+        "the nonlinear forces cannot be balanced at t = {time} s: Newton's method ends with \
+         accelerations that miss their equation by {residual:.1e} m/s²; take smaller steps",
+        time = told(*time)
+    )]
+    NotSolved {
+        /// Instant, in seconds.
+        time: f64,
+        /// Amount by which the accelerations miss their equation, in m/s².
+        residual: f64,
+    },
+    /// The system has nonlinear forces, which are not possible here.
+    #[error("{what} is for linear systems, and this one has nonlinear forces")]
+    LinearOnly {
+        /// Scheme or analysis.
+        what: &'static str,
+    },
+    /// A scheme is for fewer degrees of freedom.
+    #[error("{scheme} is for at most {}, the system has {dof}", counted(*most, "degree of freedom"))]
+    TooManyDof {
+        /// Name of the scheme.
+        scheme: &'static str,
+        /// Degrees of freedom of the system.
+        dof: usize,
+        /// Most it takes.
+        most: usize,
     },
     /// The response grew beyond what a number can hold.
     #[error("the response overflows at sample {sample}, degree of freedom {component}")]

@@ -149,7 +149,7 @@ fn check(scheme: &dyn Scheme, dof: usize, force: SampledForce<'_>) -> Result<(),
         return Err(IntegrateError::Components { what: "the force", got: samples.channels(), dof });
     }
     let Some(middle) = force.mid_step else {
-        if scheme.needs_mid_step_force() {
+        if scheme.inner_instant().is_some() {
             return Err(IntegrateError::MidStepMissing { scheme: scheme.name() });
         }
         return Ok(());

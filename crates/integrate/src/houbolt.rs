@@ -140,7 +140,12 @@ impl Stepper for HouboltStepper {
         &[Instant::Next]
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         let (n, dt) = (self.dof(), self.dt);
         for i in 0..n {
             let (w, u) = self.differences(state, i);
@@ -149,7 +154,8 @@ impl Stepper for HouboltStepper {
             self.v_hat[i] = u + 7.0 / 12.0 * dt * w;
             change[2 * n + i] = loads.next[i];
         }
-        self.effective.solve(&self.v_hat, &self.x_hat, &mut change[2 * n..3 * n]);
+        let acceleration = &mut change[2 * n..3 * n];
+        self.effective.solve(loads.time + dt, &self.v_hat, &self.x_hat, acceleration)?;
         for i in 0..n {
             let (w, u) = self.differences(state, i);
             let s_new = 0.5 * (change[2 * n + i] - w);
@@ -161,6 +167,7 @@ impl Stepper for HouboltStepper {
             change[2 * n + i] -= state[2 * n + i];
             change[3 * n + i] = s_new - state[3 * n + i];
         }
+        Ok(())
     }
 
     fn first(&self) -> usize {
@@ -180,12 +187,12 @@ impl Stepper for HouboltStepper {
         self.starter.start(initial, early, begin, &mut state[..3 * n])?;
         let mut now = begin[0].clone();
         for (k, change) in changes.iter_mut().enumerate() {
-            self.lead_step(k, &now, early, change);
+            self.lead_step(k, &now, early, change)?;
             now.iter_mut().zip(&*change).for_each(|(z, dz)| *z += dz);
             rest[k].copy_from_slice(&now);
         }
         if let HouboltStart::Given { .. } = self.start {
-            self.finish_given(&begin[0], early, rest);
+            self.finish_given(&begin[0], early, rest)?;
         }
         // u and w from the steps themselves, not from differences of the displacements.
         let (x, _, a) = motion(&rest[1], n);
@@ -204,21 +211,38 @@ impl Stepper for HouboltStepper {
 
 impl HouboltStepper {
     /// The change from sample `k` to `k + 1` of the starting procedure.
-    fn lead_step(&mut self, k: usize, now: &[f64], early: &[Vec<f64>], change: &mut [f64]) {
+    fn lead_step(
+        &mut self,
+        k: usize,
+        now: &[f64],
+        early: &[Vec<f64>],
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         if let HouboltStart::Given { at_dt, at_2dt } = &self.start {
             let next = [at_dt, at_2dt][k];
             for i in 0..next.len() {
                 change[i] = next[i] - now[i];
             }
-            return;
+            return Ok(());
         }
         let (now_load, next_load) = (&early[k], &early[k + 1]);
-        let loads = Loads { now: now_load, middle: now_load, next: next_load, beyond: next_load };
-        self.starter.change(now, &loads, change);
+        let loads = Loads {
+            time: k as f64 * self.dt,
+            now: now_load,
+            middle: now_load,
+            next: next_load,
+            beyond: next_load,
+        };
+        self.starter.change(now, &loads, change)
     }
 
     /// Velocities and accelerations at Δt and 2Δt when the displacements were given.
-    fn finish_given(&mut self, begin: &[f64], early: &[Vec<f64>], rest: &mut [Vec<f64>]) {
+    fn finish_given(
+        &mut self,
+        begin: &[f64],
+        early: &[Vec<f64>],
+        rest: &mut [Vec<f64>],
+    ) -> Result<(), IntegrateError> {
         let n = self.dof();
         let (first, second) = rest.split_at_mut(1);
         let (first, second) = (&mut first[0], &mut second[0]);
@@ -227,10 +251,11 @@ impl HouboltStepper {
             first[n + i] = (x2 - x0) / (2.0 * self.dt);
             second[n + i] = (3.0 * x2 - 4.0 * x1 + x0) / (2.0 * self.dt);
         }
-        for (sample, force) in [(first, &early[1]), (second, &early[2])] {
+        for (step, sample, force) in [(1.0, first, &early[1]), (2.0, second, &early[2])] {
             let (x, v, a) = motion_mut(sample, n);
             a.copy_from_slice(force);
-            self.starter.mass.solve(v, x, a);
+            self.starter.mass.solve(step * self.dt, v, x, a)?;
         }
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
-//! Direct time integration of M ẍ + C ẋ + K x = F: central difference, Houbolt, Wilson θ, Newmark
-//! and Runge–Kutta 4, with their conventions stated and their stability known.
+//! Direct time integration of M ẍ + C ẋ + K x = F, linear or with nonlinear forces: central
+//! difference, Houbolt, Wilson θ, Newmark, generalised-α, Bathe, Runge–Kutta 4 and the matrix
+//! exponential, with their conventions stated and their stability known.
 //!
 //! ```
 //! use mechid_integrate::{
@@ -33,20 +34,27 @@
 //! on them, too.
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
-//! does once what depends on the system and the step and gives a [`Stepper`], whose steps neither
-//! fail nor allocate; a [`System`] is dense or sparse. [`integrate()`] and [`integrate_periodic`] run
+//! does once what depends on the system and the step and gives a [`Stepper`], whose steps do
+//! not allocate; a [`System`] is dense or sparse, and a [`NonlinearSystem`] has forces besides. [`integrate()`] and [`integrate_periodic`] run
 //! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
 //! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
 //! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
 mod accuracy;
+mod bathe;
 mod central_difference;
+mod connection;
 mod driver;
 mod effective;
 mod error;
 mod force;
+mod generalised_alpha;
 mod houbolt;
+mod matrix_exponential;
 mod newmark;
+mod newton;
+mod nonlinear;
+mod orbit;
 mod period;
 mod periodic;
 mod run;
@@ -59,12 +67,18 @@ mod transition;
 mod wilson_theta;
 
 pub use accuracy::{Accuracy, accuracy};
+pub use bathe::{Bathe, SubStepForce};
 pub use central_difference::{CentralDifference, CentralDifferenceStart};
+pub use connection::{Connection, NonlinearElement};
 pub use driver::{SelectedDofs, integrate, integrate_function, integrate_selected};
 pub use error::IntegrateError;
 pub use force::SampledForce;
+pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
 pub use houbolt::{Houbolt, HouboltStart};
+pub use matrix_exponential::MatrixExponential;
 pub use newmark::Newmark;
+pub use nonlinear::{ForceFunction, NonlinearForce, NonlinearSystem, Tangents};
+pub use orbit::{PeriodicOrbit, periodic_orbit};
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};

@@ -3,7 +3,7 @@
 use mechid_model::InitialState;
 
 use crate::effective::{Effective, Equations};
-use crate::scheme::check_step;
+use crate::scheme::{check_parameter, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// Newmark's scheme: equilibrium at t + Δt with
@@ -41,15 +41,7 @@ impl Newmark {
     /// [`IntegrateError::Parameter`].
     pub fn new(beta: f64, gamma: f64) -> Result<Self, IntegrateError> {
         for (parameter, value) in [("β", beta), ("γ", gamma)] {
-            if !(0.0..=1.0).contains(&value) {
-                return Err(IntegrateError::Parameter {
-                    scheme: "Newmark",
-                    parameter,
-                    least: 0.0,
-                    most: 1.0,
-                    value,
-                });
-            }
+            check_parameter("Newmark", parameter, value, 0.0, 1.0)?;
         }
         Ok(Self { beta, gamma })
     }
@@ -152,7 +144,12 @@ impl Stepper for NewmarkStepper {
         &[Instant::Next]
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         let (n, dt, Newmark { beta, gamma }) = (self.dof(), self.dt, self.scheme);
         let (x, v, a) = motion(state, n);
         let (dx, dv, da) = motion_mut(change, n);
@@ -164,12 +161,13 @@ impl Stepper for NewmarkStepper {
             self.v_hat[i] = v[i] + dv[i];
         }
         da.copy_from_slice(&loads.next[..n]);
-        self.effective.solve(&self.v_hat, &self.x_hat, da);
+        self.effective.solve(loads.time + dt, &self.v_hat, &self.x_hat, da)?;
         for i in 0..n {
             dx[i] += beta * dt * dt * da[i];
             dv[i] += gamma * dt * da[i];
             da[i] -= a[i];
         }
+        Ok(())
     }
 
     fn start(
@@ -179,24 +177,25 @@ impl Stepper for NewmarkStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&mut self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state)?;
         motions[0].copy_from_slice(&state[..3 * self.dof()]);
         Ok(())
     }
 }
 
-/// `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, M ẍ = F − C ẋ − K x, into `state`.
+/// Writes `[x, ẋ, ẍ]` at t = 0 with the consistent acceleration, M ẍ = F − C ẋ − K x − g, into
+/// `state`.
 pub(crate) fn start_consistently(
     mass: &mut Effective,
     initial: &InitialState,
     force: &[f64],
     state: &mut [f64],
-) {
+) -> Result<(), IntegrateError> {
     let (x, v, a) = motion_mut(state, force.len());
     x.copy_from_slice(initial.displacement().as_slice());
     v.copy_from_slice(initial.velocity().as_slice());
     a.copy_from_slice(force);
-    mass.solve(v, x, a);
+    mass.solve(0.0, v, x, a)
 }
 
 /// The three parts of a motion in `n` degrees of freedom.

@@ -23,7 +23,8 @@ const CLOSED: f64 = 1e-13;
 /// all but nothing, leaves a gap, the gap is taken through the same solve and the pass repeated.
 ///
 /// # Errors
-/// Those of [`integrate`](crate::integrate()), and [`IntegrateError::NoPeriodicState`] if the free
+/// Those of [`integrate`](crate::integrate()); [`IntegrateError::LinearOnly`] if the system has
+/// nonlinear forces; and [`IntegrateError::NoPeriodicState`] if the free
 /// motion repeats too: a rigid body, or a scheme that sees an undamped mode exactly on a line.
 ///
 /// # Source
@@ -34,22 +35,25 @@ pub fn integrate_periodic<'a>(
     system: &dyn System,
     force: impl Into<SampledForce<'a>>,
 ) -> Result<Response, IntegrateError> {
+    if !system.nonlinear_forces().is_empty() {
+        return Err(IntegrateError::LinearOnly { what: "the periodic steady state" });
+    }
     let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
     let (samples, dof) = (table.sampling().len(), system.dof());
     let mut stepper = scheme.prepare(system, table.sampling().dt())?;
     let period = Period::of(&Transition::of(stepper.as_mut()), dof, table.sampling())?;
-    let mut run = Run::new(stepper, table.sampling().dt());
+    let mut run = Run::new(stepper, system, table.sampling().dt());
     let mut motion = Motion::zeros(samples, dof);
-    run.step(&table, samples - 1);
+    run.step(&table, samples - 1)?;
     run.restart(&period.at_rest(&run.state));
-    run.advance(&table, 0, samples, &mut motion);
+    run.advance(&table, 0, samples, &mut motion)?;
     let mut start = period.repeat(&run.state);
     let mut missed_before = f64::INFINITY;
     // The first pass yields the answer; more only where rounding over the period leaves a gap.
     for _ in 0..4 {
         run.restart(&start);
         motion.set(0, &start);
-        run.advance(&table, 0, samples, &mut motion);
+        run.advance(&table, 0, samples, &mut motion)?;
         let gap: Vec<f64> = run.state.iter().zip(&start).map(|(end, begin)| end - begin).collect();
         let correction = period.repeat(&gap);
         let missed = period.norm(&correction) / period.norm(&start);

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::force::ForceTable;
 use crate::transition::Transition;
-use crate::{IntegrateError, Loads, Stepper};
+use crate::{IntegrateError, Loads, Stepper, System};
 
 /// Displacement, velocity and acceleration, samples × observed degrees of freedom.
 #[derive(Debug)]
@@ -64,6 +64,7 @@ impl<'a> Motion<'a> {
 /// A stepper on its way through a force, with all the memory the way needs.
 pub(crate) struct Run {
     stepper: Box<dyn Stepper>,
+    dt: f64,
     transition: Option<Transition>,
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
@@ -77,14 +78,15 @@ pub(crate) struct Run {
 const FIXED_SIZE_DOF: usize = 2;
 
 impl Run {
-    pub(crate) fn new(mut stepper: Box<dyn Stepper>, dt: f64) -> Self {
+    pub(crate) fn new(mut stepper: Box<dyn Stepper>, system: &dyn System, dt: f64) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
-        let transition = (n <= FIXED_SIZE_DOF)
+        let linear = system.nonlinear_forces().is_empty();
+        let transition = (linear && n <= FIXED_SIZE_DOF)
             .then(|| Transition::of(stepper.as_mut()))
             .filter(|transition| resolves(transition, dt, n));
         let rows = [(); 4].map(|()| vec![0.0; n]);
         let [state, change, owed] = [(); 3].map(|()| vec![0.0; len]);
-        Self { stepper, transition, state, change, owed, rows }
+        Self { stepper, dt, transition, state, change, owed, rows }
     }
 
     /// Starts the stepper and keeps the state it starts in.
@@ -115,14 +117,15 @@ impl Run {
         from: usize,
         to: usize,
         motion: &mut Motion<'_>,
-    ) {
+    ) -> Result<(), IntegrateError> {
         let done = self.advance_fixed(table, from, to, motion);
         for k in done..to {
-            self.step(table, k);
+            self.step(table, k)?;
             if k + 1 < motion.parts[0].nrows() {
                 motion.set(k + 1, &self.state);
             }
         }
+        Ok(())
     }
 
     /// One step through the stepper itself, from sample `k`.
@@ -131,19 +134,20 @@ impl Run {
     ///
     /// # Source
     /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.
-    pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) {
+    pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) -> Result<(), IntegrateError> {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
         }
         let [now, middle, next, beyond] = &self.rows;
-        let loads = Loads { now, middle, next, beyond };
-        self.stepper.change(&self.state, &loads, &mut self.change);
+        let loads = Loads { time: k as f64 * self.dt, now, middle, next, beyond };
+        self.stepper.change(&self.state, &loads, &mut self.change)?;
         for ((z, dz), owed) in self.state.iter_mut().zip(&self.change).zip(&mut self.owed) {
             let add = dz + *owed;
             let sum = *z + add;
             *owed = add - (sum - *z);
             *z = sum;
         }
+        Ok(())
     }
 
     /// Takes as many steps as it can at fixed size; returns the step to go on with.
@@ -173,9 +177,11 @@ impl Run {
         match (state.len(), streams.len(), n) {
             (3, 1, 1) => fixed::<3, 1, 3>(transition, state, &streams, &mut columns, steps),
             (3, 2, 1) => fixed::<3, 2, 3>(transition, state, &streams, &mut columns, steps),
+            (4, 2, 1) => fixed::<4, 2, 3>(transition, state, &streams, &mut columns, steps),
             (4, 1, 1) => fixed::<4, 1, 3>(transition, state, &streams, &mut columns, steps),
             (6, 2, 2) => fixed::<6, 2, 6>(transition, state, &streams, &mut columns, steps),
             (6, 4, 2) => fixed::<6, 4, 6>(transition, state, &streams, &mut columns, steps),
+            (8, 4, 2) => fixed::<8, 4, 6>(transition, state, &streams, &mut columns, steps),
             (8, 2, 2) => fixed::<8, 2, 6>(transition, state, &streams, &mut columns, steps),
             _ => return from,
         }

@@ -62,8 +62,8 @@ impl Scheme for RungeKutta4 {
         StableSteps::Eigenvalues(HALF_DISC)
     }
 
-    fn needs_mid_step_force(&self) -> bool {
-        self.mid_step == MidStepForce::Supplied
+    fn inner_instant(&self) -> Option<f64> {
+        (self.mid_step == MidStepForce::Supplied).then_some(0.5)
     }
 
     fn prepare_unchecked(
@@ -98,8 +98,15 @@ struct RungeKuttaStepper {
 }
 
 impl RungeKuttaStepper {
-    /// The slopes at (x + h·v_stage, v + h·a_stage), the present stage's being in `self.v`, `self.a`.
-    fn stage(&mut self, x: &[f64], v: &[f64], h: f64, force: impl Fn(&Self, usize) -> f64) {
+    /// The slopes at `time` and (x + h·v_stage, v + h·a_stage), the present stage's being in
+    /// `self.v`, `self.a`.
+    fn stage(
+        &mut self,
+        (x, v): (&[f64], &[f64]),
+        h: f64,
+        time: f64,
+        force: impl Fn(&Self, usize) -> f64,
+    ) -> Result<(), IntegrateError> {
         for i in 0..x.len() {
             self.x[i] = x[i] + h * self.v[i];
             self.v[i] = v[i] + h * self.a[i];
@@ -107,7 +114,7 @@ impl RungeKuttaStepper {
         for i in 0..x.len() {
             self.a[i] = force(self, i);
         }
-        self.mass.solve(&self.v, &self.x, &mut self.a);
+        self.mass.solve(time, &self.v, &self.x, &mut self.a)
     }
 
     /// Adds `weight` times the present slopes.
@@ -135,8 +142,13 @@ impl Stepper for RungeKuttaStepper {
         }
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
-        let (n, dt) = (self.dof(), self.dt);
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        let (n, dt, time) = (self.dof(), self.dt, loads.time);
         let (x, v, a) = motion(state, n);
         let (dx, dv, da) = motion_mut(change, n);
         for i in 0..n {
@@ -150,21 +162,22 @@ impl Stepper for RungeKuttaStepper {
         }
         self.v.copy_from_slice(v);
         self.a.copy_from_slice(a);
-        self.stage(x, v, dt / 2.0, |s, i| s.middle[i]);
+        self.stage((x, v), dt / 2.0, time + dt / 2.0, |s, i| s.middle[i])?;
         self.add(dt / 3.0, dx, dv);
-        self.stage(x, v, dt / 2.0, |s, i| s.middle[i]);
+        self.stage((x, v), dt / 2.0, time + dt / 2.0, |s, i| s.middle[i])?;
         self.add(dt / 3.0, dx, dv);
-        self.stage(x, v, dt, |_, i| loads.next[i]);
+        self.stage((x, v), dt, time + dt, |_, i| loads.next[i])?;
         self.add(dt / 6.0, dx, dv);
         for i in 0..n {
             self.x[i] = x[i] + dx[i];
             self.v[i] = v[i] + dv[i];
         }
         da.copy_from_slice(&loads.next[..n]);
-        self.mass.solve(&self.v, &self.x, da);
+        self.mass.solve(time + dt, &self.v, &self.x, da)?;
         for i in 0..n {
             da[i] -= a[i];
         }
+        Ok(())
     }
 
     fn start(
@@ -174,7 +187,7 @@ impl Stepper for RungeKuttaStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&mut self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state)?;
         motions[0].copy_from_slice(state);
         Ok(())
     }

@@ -25,9 +25,10 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// The conventions in force.
     fn conventions(&self) -> Vec<Convention>;
 
-    /// Returns whether the force in the middle of each step must be supplied.
-    fn needs_mid_step_force(&self) -> bool {
-        false
+    /// Instant within each step at which the force must be supplied, in parts of the step (a
+    /// pure number); none if its values at the samples are enough.
+    fn inner_instant(&self) -> Option<f64> {
+        None
     }
 
     /// The steps at which the scheme is known to be stable.
@@ -48,8 +49,9 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError>;
 
-    /// Prepares as [`prepare_unchecked`](Self::prepare_unchecked) does, but refuses a step `dt` (s) that makes
-    /// the motion of the system grow. Wrap the scheme in [`AllowUnstable`] to go on all the same.
+    /// Prepares as [`prepare_unchecked`](Self::prepare_unchecked) does, but refuses a step `dt` (s)
+    /// that makes the motion of the system, without its nonlinear forces, grow. Wrap the scheme in
+    /// [`AllowUnstable`] to go on all the same.
     ///
     /// # Errors
     /// Those of [`prepare_unchecked`](Self::prepare_unchecked), and
@@ -61,7 +63,13 @@ pub trait Scheme: fmt::Debug + Send + Sync {
             prepare: &|system, dt| self.prepare_unchecked(system, dt),
             stable_steps: self.stable_steps(),
         };
-        scheme.refuse_unstable(system, dt, stepper.as_mut())?;
+        if system.nonlinear_forces().is_empty() {
+            scheme.refuse_unstable(system, dt, stepper.as_mut())?;
+        } else {
+            let linear = system.matrices();
+            let mut of_linear = self.prepare_unchecked(&linear, dt)?;
+            scheme.refuse_unstable(&linear, dt, of_linear.as_mut())?;
+        }
         Ok(stepper)
     }
 }
@@ -112,8 +120,8 @@ impl Scheme for AllowUnstable<'_> {
         self.0.conventions()
     }
 
-    fn needs_mid_step_force(&self) -> bool {
-        self.0.needs_mid_step_force()
+    fn inner_instant(&self) -> Option<f64> {
+        self.0.inner_instant()
     }
 
     fn stable_steps(&self) -> StableSteps {
@@ -138,7 +146,7 @@ impl Scheme for AllowUnstable<'_> {
 pub enum Instant {
     /// t
     Now,
-    /// t + Δt/2
+    /// t + Δt/2, or another instant within the step: [`Scheme::inner_instant`]
     Middle,
     /// t + Δt
     Next,
@@ -151,9 +159,11 @@ pub enum Instant {
 /// A scheme reads those of [`Stepper::instants`] only; the others may be anything.
 #[derive(Debug, Clone, Copy)]
 pub struct Loads<'a> {
+    /// t, in s, which nonlinear forces may depend on.
+    pub time: f64,
     /// F(t), in N, one entry per degree of freedom.
     pub now: &'a [f64],
-    /// F(t + Δt/2), likewise in N per degree of freedom.
+    /// F(t + Δt/2), or at another instant within the step, likewise in N per degree of freedom.
     pub middle: &'a [f64],
     /// F(t + Δt), likewise in N per degree of freedom.
     pub next: &'a [f64],
@@ -161,11 +171,12 @@ pub struct Loads<'a> {
     pub beyond: &'a [f64],
 }
 
-/// A scheme prepared for one system and one step: the linear map from one state to the next.
+/// A scheme prepared for one system and one step: the map from one state to the next, which is
+/// linear if the system is.
 ///
 /// The state at t begins with the motion at t, `[x, ẋ, ẍ]`, 3·n numbers at one and the same
-/// instant; what a scheme has to remember beyond that follows. Stepping neither fails nor
-/// allocates.
+/// instant; what a scheme has to remember beyond that follows. Stepping does not allocate, and fails
+/// only where a nonlinear equation cannot be solved.
 pub trait Stepper: Send {
     /// Degrees of freedom n.
     fn dof(&self) -> usize;
@@ -182,10 +193,19 @@ pub trait Stepper: Send {
     /// however small the step: near Δt = 0 the amplification matrix is I + O(Δt). The state is the
     /// scheme's own, in the units its documentation gives; loads are in N.
     ///
+    /// # Errors
+    /// [`IntegrateError::NotSolved`] if the system has nonlinear forces and Newton's method does not
+    /// converge; of a linear system a step does not fail.
+    ///
     /// # Panics
     /// If `state` or `change` is shorter than [`state_len`](Self::state_len), or a load that is
     /// read shorter than [`dof`](Self::dof).
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]);
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError>;
 
     /// The sample at which the scheme's own recurrence takes over from its starting procedure.
     fn first(&self) -> usize {
@@ -197,7 +217,8 @@ pub trait Stepper: Send {
     /// at each of these samples into `motions` and the state at the last of them into `state`.
     ///
     /// # Errors
-    /// [`IntegrateError::NotAtRest`] if the starting procedure chosen cannot take the velocity.
+    /// [`IntegrateError::NotAtRest`] if the starting procedure chosen cannot take the velocity;
+    /// [`IntegrateError::NotSolved`].
     fn start(
         &mut self,
         initial: &InitialState,
@@ -213,6 +234,20 @@ pub(crate) fn check_step(dt: f64) -> Result<f64, IntegrateError> {
         return Ok(dt);
     }
     Err(IntegrateError::TimeStep { dt })
+}
+
+/// `value`, if it is finite and between `least` and `most`.
+pub(crate) fn check_parameter(
+    scheme: &'static str,
+    parameter: &'static str,
+    value: f64,
+    least: f64,
+    most: f64,
+) -> Result<f64, IntegrateError> {
+    if value.is_finite() && (least..=most).contains(&value) {
+        return Ok(value);
+    }
+    Err(IntegrateError::Parameter { scheme, parameter, least, most, value })
 }
 
 /// An error at the first entry of `values` that is not finite.

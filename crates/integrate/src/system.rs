@@ -1,14 +1,23 @@
 //! The systems a scheme can step through, whatever the storage of their matrices.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use mechid_model::{Matrix, SecondOrderSystem, SparseSystem};
 use nalgebra_sparse::csr::CsrMatrix;
 
-/// A system M ẍ + C ẋ + K x = F that schemes can be prepared for.
+use crate::NonlinearForce;
+
+/// A system M ẍ + C ẋ + K x = F that schemes can be prepared for; with nonlinear forces
+/// M ẍ + C ẋ + K x + Σ g(x, ẋ, t) = F.
 pub trait System: Sync {
     /// The matrices M (kg), C (N·s/m) and K (N/m), each n×n, as they are stored.
     fn matrices(&self) -> Matrices<'_>;
+
+    /// The nonlinear forces g, none by default.
+    fn nonlinear_forces(&self) -> &[Arc<dyn NonlinearForce>] {
+        &[]
+    }
 
     /// Number of degrees of freedom n.
     fn dof(&self) -> usize {
@@ -37,6 +46,13 @@ impl System for SecondOrderSystem {
 impl System for SparseSystem {
     fn matrices(&self) -> Matrices<'_> {
         Matrices::Sparse(self)
+    }
+}
+
+/// The linear part of any system.
+impl System for Matrices<'_> {
+    fn matrices(&self) -> Matrices<'_> {
+        *self
     }
 }
 

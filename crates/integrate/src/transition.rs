@@ -17,23 +17,27 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// The map `stepper` performs. State `j` of 1 and all else 0 gives column j of D, a force of
+    /// The map `stepper` performs, prepared for a linear system. State `j` of 1 and all else 0 gives column j of D, a force of
     /// 1 N a column of B.
     pub fn of(stepper: &mut dyn Stepper) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
-        let zeros = vec![0.0; n];
-        let still = Loads { now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
+        let (instants, zeros) = (stepper.instants(), vec![0.0; n]);
+        let still = Loads { time: 0.0, now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
+        // Of a linear system no step fails.
+        let mut change_of = |state: &[f64], loads: &Loads<'_>, change: &mut [f64]| {
+            let _ = stepper.change(state, loads, change);
+        };
         let mut state = vec![0.0; len];
         let mut change = DMatrix::zeros(len, len);
         for j in 0..len {
             state[j] = 1.0;
             let column = &mut change.as_mut_slice()[j * len..(j + 1) * len];
-            stepper.change(&state, &still, column);
+            change_of(&state, &still, column);
             state[j] = 0.0;
         }
         let mut unit = vec![0.0; n];
         let mut loads = Vec::new();
-        for &instant in stepper.instants() {
+        for &instant in instants {
             let mut matrix = DMatrix::zeros(len, n);
             for j in 0..n {
                 unit[j] = 1.0;
@@ -44,7 +48,7 @@ impl Transition {
                     Instant::Next => &mut one.next,
                     Instant::Beyond => &mut one.beyond,
                 } = &unit;
-                stepper.change(&state, &one, &mut matrix.as_mut_slice()[j * len..(j + 1) * len]);
+                change_of(&state, &one, &mut matrix.as_mut_slice()[j * len..(j + 1) * len]);
                 unit[j] = 0.0;
             }
             loads.push((instant, matrix));

@@ -4,7 +4,7 @@ use mechid_model::InitialState;
 
 use crate::effective::{Effective, Equations};
 use crate::newmark::{motion, motion_mut, start_consistently};
-use crate::scheme::check_step;
+use crate::scheme::{check_parameter, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// Force at t + θΔt for Wilson's scheme.
@@ -38,15 +38,7 @@ impl WilsonTheta {
     /// # Errors
     /// [`IntegrateError::Parameter`] if θ < 1 or not finite.
     pub fn new(theta: f64) -> Result<Self, IntegrateError> {
-        if !(theta >= 1.0 && theta.is_finite()) {
-            return Err(IntegrateError::Parameter {
-                scheme: "Wilson θ",
-                parameter: "θ",
-                least: 1.0,
-                most: f64::INFINITY,
-                value: theta,
-            });
-        }
+        check_parameter("Wilson θ", "θ", theta, 1.0, f64::INFINITY)?;
         Ok(Self { theta, load: WilsonLoad::Projected })
     }
 
@@ -136,7 +128,12 @@ impl Stepper for WilsonStepper {
         }
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         let (n, dt, WilsonTheta { theta, load }) = (self.dof(), self.dt, self.scheme);
         let long = theta * dt;
         let (x, v, a) = motion(state, n);
@@ -150,12 +147,13 @@ impl Stepper for WilsonStepper {
             self.v_hat[i] = v[i] + 0.5 * long * a[i];
             da[i] = from[i] + weight * (to[i] - from[i]);
         }
-        self.effective.solve(&self.v_hat, &self.x_hat, da);
+        self.effective.solve(loads.time + long, &self.v_hat, &self.x_hat, da)?;
         for i in 0..n {
             da[i] = (da[i] - a[i]) / theta;
             dv[i] = dt * (a[i] + 0.5 * da[i]);
             dx[i] = dt * (v[i] + dt * (0.5 * a[i] + da[i] / 6.0));
         }
+        Ok(())
     }
 
     fn start(
@@ -165,7 +163,7 @@ impl Stepper for WilsonStepper {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError> {
-        start_consistently(&mut self.mass, initial, &early[0], state);
+        start_consistently(&mut self.mass, initial, &early[0], state)?;
         motions[0].copy_from_slice(state);
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use allocation_counter::measure;
 use mechid_integrate::*;
-use mechid_model::InitialState;
+use mechid_model::{InitialState, SparseSystem, band, triplets};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
@@ -15,6 +15,8 @@ fn schemes() -> Vec<Box<dyn Scheme>> {
         Box::new(WilsonTheta::new(1.4).unwrap().with_load(WilsonLoad::Interpolated)),
         Box::new(RungeKutta4::HELD),
         Box::new(RungeKutta4::LINEAR),
+        Box::new(GeneralisedAlpha::new(0.8).unwrap()),
+        Box::new(Bathe::HALVES),
     ]
 }
 
@@ -26,13 +28,47 @@ fn a_step_allocates_nothing() {
             let mut stepper = scheme.prepare(&system, 1e-3).unwrap();
             let (state, load) = (vec![0.1; stepper.state_len()], vec![1.0; dof]);
             let mut change = state.clone();
-            let loads = Loads { now: &load, middle: &load, next: &load, beyond: &load };
+            let loads = Loads { time: 0.0, now: &load, middle: &load, next: &load, beyond: &load };
             let counted = measure(|| {
                 for _ in 0..10 {
-                    stepper.change(&state, &loads, &mut change);
+                    stepper.change(&state, &loads, &mut change).unwrap();
                 }
             });
             assert_eq!(counted.count_total, 0, "{} n {dof}", scheme.name());
+        }
+    }
+}
+
+#[test]
+fn a_step_of_a_large_system_allocates_nothing() {
+    let n = 300;
+    let stiffness = band(n, &[(-7, -400.0), (-1, -900.0), (0, 3000.0), (1, -900.0), (7, -400.0)]);
+    let shuffled = |i: usize| i * 7 % n;
+    let scattered =
+        triplets(n, stiffness.triplet_iter().map(|(i, j, v)| (shuffled(i), shuffled(j), *v)));
+    for stiffness in [stiffness.clone(), scattered.unwrap()] {
+        let (mass, damping) = (band(n, &[(0, 1.0)]), &stiffness * 1e-4);
+        let linear = SparseSystem::new(mass, damping, stiffness).unwrap();
+        let film = ForceFunction::new(vec![4, 9], |t, x, v, g| {
+            g[0] = 50.0 * (x[0] - x[1]).powi(3) + 3.0 * v[0] + t.sin();
+            g[1] = -g[0];
+        });
+        let gap = Connection::to_ground(2).gap(0.05, 3e3).unwrap();
+        let nonlinear = NonlinearSystem::new(&linear).with(film).unwrap().with(gap).unwrap();
+        for (system, scheme) in schemes()
+            .iter()
+            .flat_map(|s| [&linear as &dyn System, &nonlinear].map(|system| (system, s)))
+        {
+            let mut stepper = scheme.prepare(system, 1e-3).unwrap();
+            let (state, load) = (vec![0.1; stepper.state_len()], vec![1.0; n]);
+            let mut change = state.clone();
+            let loads = Loads { time: 0.0, now: &load, middle: &load, next: &load, beyond: &load };
+            let counted = measure(|| {
+                for _ in 0..10 {
+                    stepper.change(&state, &loads, &mut change).unwrap();
+                }
+            });
+            assert_eq!(counted.count_total, 0, "{}", scheme.name());
         }
     }
 }

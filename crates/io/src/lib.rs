@@ -38,8 +38,8 @@ pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
 pub use escape::escaped;
 pub use experiment::{
-    Experiment, FirstDisplacements, FirstSteps, InitialMotion, Level, LoadBeyond, MiddleLoad,
-    Noise, PerDof, ResponseKind, SchemeChoice,
+    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level, LoadBeyond,
+    MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;

@@ -24,7 +24,7 @@
 //! | [`signal`] | time axes, records, spectra, multisines and other excitations |
 //! | [`model`] | M, C, K; modes and receptance |
 //! | [`bearing`] | journal bearings from their geometry: film force, coefficients, threshold of instability |
-//! | [`integrate`] | the response by five time-stepping schemes |
+//! | [`integrate`] | the response by time-stepping schemes, linear and nonlinear |
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |

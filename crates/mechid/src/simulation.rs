@@ -3,13 +3,14 @@
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
-    AllowUnstable, CentralDifference, CentralDifferenceStart, Convention, Houbolt, HouboltStart,
-    IntegrateError, Newmark, RungeKutta4, SampledForce, Scheme, WilsonLoad, WilsonTheta, integrate,
+    AllowUnstable, AlphaAcceleration, Bathe, CentralDifference, CentralDifferenceStart, Convention,
+    GeneralisedAlpha, Houbolt, HouboltStart, IntegrateError, MatrixExponential, Newmark,
+    RungeKutta4, SampledForce, Scheme, SubStepForce, WilsonLoad, WilsonTheta, integrate,
     integrate_periodic,
 };
 use mechid_io::{
-    Experiment, FirstDisplacements, FirstSteps, IoError, Level, LoadBeyond, MiddleLoad,
-    ResponseKind, SchemeChoice,
+    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, IoError, Level, LoadBeyond,
+    MiddleLoad, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
 use mechid_model::{ModelError, Response, SecondOrderSystem};
 use mechid_signal::{Record, SignalError, Spectrum, noise};
@@ -65,10 +66,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         Some(scheme) => {
             let unguarded = AllowUnstable(&**scheme);
             let scheme = if experiment.allow_unstable { &unguarded } else { &**scheme };
-            let middle = match scheme.needs_mid_step_force() {
-                true => Some(experiment.mid_step_force()?),
-                false => None,
-            };
+            let within = scheme.inner_instant();
+            let middle = within.map(|part| experiment.force_within_steps(part)).transpose()?;
             match experiment.response {
                 ResponseKind::Periodic if has_given_start(experiment) => {
                     return Err(SimulateError::GivenStartPeriodic);
@@ -208,6 +207,23 @@ fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, SimulateEr
                 LoadBeyond::Interpolated => WilsonLoad::Interpolated,
             }))
         }
+        SchemeChoice::GeneralisedAlpha { rho_infinity, acceleration } => {
+            returning(GeneralisedAlpha::new(*rho_infinity)?, *acceleration)
+        }
+        SchemeChoice::HhtAlpha { rho_infinity, acceleration } => {
+            returning(GeneralisedAlpha::hilber_hughes_taylor(*rho_infinity)?, *acceleration)
+        }
+        SchemeChoice::WbzAlpha { rho_infinity, acceleration } => {
+            returning(GeneralisedAlpha::wood_bossak_zienkiewicz(*rho_infinity)?, *acceleration)
+        }
+        SchemeChoice::Bathe { load } => Box::new(Bathe::HALVES.with_force(sub_step_force(*load))),
+        SchemeChoice::RhoInfinityBathe { rho_infinity, load } => {
+            Box::new(Bathe::new(*rho_infinity)?.with_force(sub_step_force(*load)))
+        }
+        SchemeChoice::MatrixExponential { load } => Box::new(match load {
+            HeldOrLinear::Held => MatrixExponential::HELD,
+            HeldOrLinear::Linear => MatrixExponential::LINEAR,
+        }),
         SchemeChoice::RungeKutta4 { load } => Box::new(match load {
             MiddleLoad::Held => RungeKutta4::HELD,
             MiddleLoad::Linear => RungeKutta4::LINEAR,
@@ -215,6 +231,20 @@ fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, SimulateEr
         }),
         _ => return Ok(None),
     }))
+}
+
+fn returning(scheme: GeneralisedAlpha, acceleration: ReturnedAcceleration) -> Box<dyn Scheme> {
+    Box::new(scheme.with_acceleration(match acceleration {
+        ReturnedAcceleration::EquationOfMotion => AlphaAcceleration::EquationOfMotion,
+        ReturnedAcceleration::Carried => AlphaAcceleration::Carried,
+    }))
+}
+
+fn sub_step_force(load: SubStepLoad) -> SubStepForce {
+    match load {
+        SubStepLoad::Linear => SubStepForce::Linear,
+        SubStepLoad::Exact => SubStepForce::Supplied,
+    }
 }
 
 fn with_middle<'a>(force: &'a Record, middle: Option<&'a Record>) -> SampledForce<'a> {

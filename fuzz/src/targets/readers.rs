@@ -246,7 +246,7 @@ fn described(path: &Path) -> Result<(), String> {
     told(experiment.system())?;
     told(experiment.initial_state())?;
     if experiment.samples() <= MOST_SAMPLES && experiment.periods <= 4 {
-        for force in [experiment.force(), experiment.mid_step_force()] {
+        for force in [experiment.force(), experiment.force_within_steps(0.5)] {
             if let Some(force) = told(force)? {
                 ensure(force.len() == experiment.samples(), "the force has another length")?;
             }

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use mechid::integrate::{
-    Accuracy, CentralDifference, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta, accuracy,
-    critical_step, spectral_radius,
+    Accuracy, Bathe, CentralDifference, GeneralisedAlpha, Houbolt, Newmark, RungeKutta4, Scheme,
+    WilsonTheta, accuracy, critical_step, spectral_radius,
 };
 use mechid::io::Experiment;
 use mechid::model::{Sdof, SecondOrderSystem};
@@ -55,6 +55,15 @@ pub struct StabilityArgs {
     /// θ of Wilson's scheme
     #[arg(long, default_value_t = 1.4, allow_negative_numbers = true, help_heading = "Schemes")]
     theta: f64,
+    /// ρ∞ of the generalised-α scheme, its spectral radius at very large steps
+    #[arg(
+        long = "rho-infinity",
+        value_name = "RADIUS",
+        default_value_t = 0.8,
+        allow_negative_numbers = true,
+        help_heading = "Schemes"
+    )]
+    rho_infinity: f64,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -156,6 +165,11 @@ impl StabilityArgs {
                 format!("Wilson θ = {}", compact(self.theta, 6)),
                 Box::new(WilsonTheta::new(self.theta)?),
             ),
+            (
+                format!("generalised-α {}", compact(self.rho_infinity, 6)),
+                Box::new(GeneralisedAlpha::new(self.rho_infinity)?),
+            ),
+            ("Bathe".into(), Box::new(Bathe::HALVES)),
             ("Runge–Kutta 4".into(), Box::new(RungeKutta4::LINEAR)),
         ])
     }

@@ -125,6 +125,11 @@ fn the_description_in_the_reference_is_one() {
         "central-difference",
         "houbolt",
         "wilson-theta",
+        "generalised-alpha",
+        "hht-alpha",
+        "bathe",
+        "rho-infinity-bathe",
+        "matrix-exponential",
         "runge-kutta-4",
     ] {
         assert!(description.contains(&format!("| `{name}`")), "{name}");

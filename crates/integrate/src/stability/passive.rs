@@ -174,8 +174,8 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         // M⁻¹ A q, then orthogonal to all before: twice is enough.
         let mut product = still.clone();
         match which {
-            Matrix::Damping => mass.solve(next.as_slice(), &still, &mut product),
-            _ => mass.solve(&still, next.as_slice(), &mut product),
+            Matrix::Damping => mass.solve(0.0, next.as_slice(), &still, &mut product)?,
+            _ => mass.solve(0.0, &still, next.as_slice(), &mut product)?,
         }
         next = -DVector::from_vec(product);
         diagonal.push(0.0);

@@ -101,9 +101,9 @@ fn houbolt_steps_like_the_printed_row() {
             (xs[0] - 3.0 * xs[1] + 3.0 * xs[2] - xs[3]) / (dt * dt),
         ];
         let none = [0.0];
-        let loads = Loads { now: &none, middle: &none, next: &none, beyond: &none };
+        let loads = Loads { time: 0.0, now: &none, middle: &none, next: &none, beyond: &none };
         let mut change = [0.0; 4];
-        stepper.change(&state, &loads, &mut change);
+        stepper.change(&state, &loads, &mut change).unwrap();
         assert!((xs[0] + change[0] - printed).abs() < 1e-13, "{zeta} {w}");
         // Velocity and acceleration are the printed differences of the new displacements.
         let x = [printed, xs[0], xs[1], xs[2]];
@@ -247,6 +247,65 @@ fn stability_limits_in_steps_per_period() {
     for scheme in [&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, &Houbolt::default()] {
         assert_eq!(limit(scheme), None, "{}", scheme.name());
     }
+}
+
+/// At very large steps ρ is ρ∞, by construction, of the schemes that have it as a parameter.
+#[test]
+fn the_spectral_radius_at_large_steps_is_the_parameter() {
+    let far = |scheme: &dyn Scheme| accuracy(scheme, 0.0, 1e7).unwrap().spectral_radius;
+    for rho in [0.0, 0.3, 0.5, 0.8, 1.0] {
+        let mut schemes: Vec<Box<dyn Scheme>> = vec![
+            Box::new(GeneralisedAlpha::new(rho).unwrap()),
+            Box::new(GeneralisedAlpha::wood_bossak_zienkiewicz(rho).unwrap()),
+            Box::new(Bathe::new(rho).unwrap()),
+        ];
+        if rho >= 0.5 {
+            schemes.push(Box::new(GeneralisedAlpha::hilber_hughes_taylor(rho).unwrap()));
+        }
+        for scheme in schemes {
+            let found = far(scheme.as_ref());
+            // A triple root moves by the third root of rounding, and of 1/Ω².
+            assert!((found - rho).abs() < 1e-4, "{}: {found}", scheme.name());
+        }
+    }
+    assert!(far(&Bathe::HALVES) < 1e-5);
+}
+
+/// Undamped, at Δt/T = 0.1: amplitude decay and period elongation from the characteristic
+/// polynomials, computed apart.
+#[test]
+fn anchors_of_the_schemes_with_numerical_damping() {
+    for (scheme, elongation, decay) in anchors() {
+        let found = accuracy(scheme.as_ref(), 0.0, 0.1).unwrap();
+        let (e, d) = (found.period_elongation.unwrap(), found.amplitude_decay.unwrap());
+        assert!((e - elongation).abs() < 1e-9, "{}: {e}", scheme.name());
+        assert!((d - decay).abs() < 1e-9, "{}: {d}", scheme.name());
+    }
+    let exact = accuracy(&MatrixExponential::LINEAR, 0.02, 0.3).unwrap();
+    assert!(exact.period_elongation.unwrap().abs() < 1e-14);
+    assert!(exact.amplitude_decay.unwrap().abs() < 1e-13);
+}
+
+/// Period elongation and amplitude decay at Δt/T = 0.1.
+fn anchors() -> Vec<(Box<dyn Scheme>, f64, f64)> {
+    vec![
+        (Box::new(GeneralisedAlpha::new(0.8).unwrap()), 0.033828405968, 0.000987678193),
+        // As Houbolt's scheme.
+        (Box::new(GeneralisedAlpha::new(0.0).unwrap()), 0.123205719568, 0.292133199285),
+        (
+            Box::new(GeneralisedAlpha::hilber_hughes_taylor(0.7).unwrap()),
+            0.043444712202,
+            0.019166580792,
+        ),
+        (
+            Box::new(GeneralisedAlpha::wood_bossak_zienkiewicz(0.5).unwrap()),
+            0.062243585856,
+            0.076716049695,
+        ),
+        (Box::new(Bathe::HALVES), 0.016179374365, 0.005130629683),
+        (Box::new(Bathe::new(0.6).unwrap()), 0.010766141343, 0.002314838226),
+        (Box::new(Bathe::new(0.0).unwrap()), 0.015714424134, 0.005437741449),
+    ]
 }
 
 #[test]

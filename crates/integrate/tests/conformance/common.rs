@@ -22,6 +22,15 @@ pub fn schemes() -> Vec<Box<dyn Scheme>> {
         Box::new(wilson.with_load(WilsonLoad::Interpolated)),
         Box::new(RungeKutta4::HELD),
         Box::new(RungeKutta4::LINEAR),
+        Box::new(GeneralisedAlpha::new(0.8).unwrap()),
+        Box::new(GeneralisedAlpha::new(0.0).unwrap()),
+        Box::new(GeneralisedAlpha::new(0.5).unwrap().with_acceleration(AlphaAcceleration::Carried)),
+        Box::new(GeneralisedAlpha::hilber_hughes_taylor(0.7).unwrap()),
+        Box::new(GeneralisedAlpha::wood_bossak_zienkiewicz(0.5).unwrap()),
+        Box::new(Bathe::HALVES),
+        Box::new(Bathe::new(0.6).unwrap()),
+        Box::new(MatrixExponential::HELD),
+        Box::new(MatrixExponential::LINEAR),
     ]
 }
 

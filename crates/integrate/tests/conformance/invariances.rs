@@ -237,8 +237,10 @@ fn small_steps_approach_the_exact_discretisation() {
                 // Factor 4 in the step: 4 for the schemes of first order, 16 for the others.
                 let ratio = coarse / fine;
                 let name = scheme.name();
+                // The matrix exponential of a linear force is the exact discretisation.
+                let exact = coarse.max(fine) < 1e-10;
                 assert!(
-                    fine < 0.05 && ratio > 3.5,
+                    exact || fine < 0.05 && ratio > 3.5,
                     "{name} n {dof} shift {shift}: {coarse:e} {fine:e}"
                 );
             }

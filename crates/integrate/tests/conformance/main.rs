@@ -5,6 +5,8 @@ mod charts;
 mod common;
 mod definitions;
 mod invariances;
+mod nonlinear;
+mod orbit;
 mod order;
 mod periodic;
 mod random_stability;

@@ -18,6 +18,8 @@ fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> 
     let mut stepper = scheme.prepare_unchecked(system, dt).unwrap();
     let transition = Transition::of(stepper.as_mut());
     let states = transition.change.nrows();
+    // Δt² of a displacement, Δt of a velocity: numbers of one size.
+    let units = DVector::from_fn(states, |i, _| dt.powi(2 - (i / n).min(2) as i32));
     let mut parts = [(); 3].map(|()| DMatrix::zeros(len, n));
     for line in 0..len {
         let turn = |k: usize| {
@@ -33,7 +35,9 @@ fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> 
         let half = std::f64::consts::PI * line as f64 / len as f64;
         let less_one = Complex::new(0.0, 2.0 * half.sin()) * Complex::from_polar(1.0, half);
         let matrix = DMatrix::from_diagonal_element(states, states, less_one)
-            - transition.change.map(Complex::from);
+            - DMatrix::from_fn(states, states, |i, j| {
+                Complex::from(transition.change[(i, j)] * units[j] / units[i])
+            });
         let mut rhs = DVector::zeros(states);
         for (instant, b) in &transition.loads {
             let shift = match instant {
@@ -44,7 +48,9 @@ fn by_lines(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> 
             };
             rhs += b.map(Complex::from) * &spectrum * shift;
         }
-        let state = matrix.lu().solve(&rhs).unwrap();
+        rhs.iter_mut().zip(&units).for_each(|(entry, unit)| *entry /= *unit);
+        let mut state = matrix.lu().solve(&rhs).unwrap();
+        state.iter_mut().zip(&units).for_each(|(entry, unit)| *entry *= *unit);
         for k in 0..len {
             for (p, part) in parts.iter_mut().enumerate() {
                 for c in 0..n {
@@ -218,9 +224,14 @@ impl Stepper for CountedStepper {
         self.0.instants()
     }
 
-    fn change(&mut self, state: &[f64], loads: &Loads<'_>, change: &mut [f64]) {
+    fn change(
+        &mut self,
+        state: &[f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
         self.1.fetch_add(1, Ordering::Relaxed);
-        self.0.change(state, loads, change);
+        self.0.change(state, loads, change)
     }
 
     fn start(

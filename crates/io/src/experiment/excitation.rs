@@ -193,20 +193,21 @@ enum Between {
 }
 
 impl Excitation {
-    /// The force over one period, in N; half a step later if `mid_step`, where it is known there.
+    /// The force over one period, in N; by a part of the step later if `within_step` says so, where
+    /// it is known there.
     pub fn sampled(
         &self,
         sampling: Sampling,
-        mid_step: bool,
+        within_step: Option<f64>,
         file: &str,
     ) -> Result<Vec<f64>, IoError> {
         let (samples, between) = self.force(sampling, file)?;
-        match between {
-            Between::Function(value) if mid_step => {
-                let instants = (0..sampling.len()).map(|k| (k as f64 + 0.5) * sampling.dt());
+        match (between, within_step) {
+            (Between::Function(value), Some(part)) => {
+                let instants = (0..sampling.len()).map(|k| (k as f64 + part) * sampling.dt());
                 Ok(instants.map(value).collect())
             }
-            Between::Unknown(what) if mid_step => Err(IoError::Description {
+            (Between::Unknown(what), Some(_)) => Err(IoError::Description {
                 file: file.into(),
                 what: format!(
                     "the scheme needs the force between samples, where {what} has none: choose load \

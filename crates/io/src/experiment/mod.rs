@@ -15,7 +15,10 @@ use serde::Deserialize;
 use self::excitation::Excitation;
 pub use self::noise::{Level, Noise};
 pub use self::response::{InitialMotion, PerDof, ResponseKind};
-pub use self::scheme::{FirstDisplacements, FirstSteps, LoadBeyond, MiddleLoad, SchemeChoice};
+pub use self::scheme::{
+    FirstDisplacements, FirstSteps, HeldOrLinear, LoadBeyond, MiddleLoad, ReturnedAcceleration,
+    SchemeChoice, SubStepLoad,
+};
 use crate::system::SystemDescription;
 use crate::{IoError, escaped, json};
 
@@ -126,15 +129,16 @@ impl Experiment {
     /// [`IoError::Description`] for a degree of freedom that the system does not have,
     /// [`IoError::LineOutside`], [`IoError::Signal`], and those of [`Experiment::system`].
     pub fn force(&self) -> Result<Record, IoError> {
-        self.sampled(false)
+        self.sampled(None)
     }
 
-    /// One period of the force at mid-step instants, in N: sample k is at t = (k + ½) Δt.
+    /// One period of the force at instants within the steps, in N: sample k is at
+    /// t = (k + `part`) Δt, `part` being a pure number.
     ///
     /// # Errors
-    /// As [`Experiment::force`].
-    pub fn mid_step_force(&self) -> Result<Record, IoError> {
-        self.sampled(true)
+    /// As [`Experiment::force`], and [`IoError::Description`] for a force that is unknown there.
+    pub fn force_within_steps(&self, part: f64) -> Result<Record, IoError> {
+        self.sampled(Some(part))
     }
 
     /// The initial state, of a response that is not periodic.
@@ -169,7 +173,7 @@ impl Experiment {
         given.values(dof).map_err(|got| self.wrong(wrong(got)))
     }
 
-    fn sampled(&self, mid_step: bool) -> Result<Record, IoError> {
+    fn sampled(&self, within_step: Option<f64>) -> Result<Record, IoError> {
         let dof = self.system()?.dof();
         let signal = |source| IoError::Signal { file: self.file.clone(), source };
         if self.periods == 0 {
@@ -196,7 +200,7 @@ impl Experiment {
                     excitation.dof
                 )));
             }
-            let part = excitation.sampled(sampling, mid_step, &self.file)?;
+            let part = excitation.sampled(sampling, within_step, &self.file)?;
             force.column_mut(excitation.dof - 1).iter_mut().zip(part).for_each(|(f, p)| *f += p);
         }
         Record::new(sampling, force).map_err(signal)

@@ -43,6 +43,54 @@ pub enum SchemeChoice {
         #[serde(default, deserialize_with = "json::word")]
         load: LoadBeyond,
     },
+    /// The generalised-α method.
+    GeneralisedAlpha {
+        /// ρ∞, spectral radius at very large steps, a pure number between 0 and 1, 0.8 by default.
+        #[serde(default = "high_frequency_radius")]
+        rho_infinity: f64,
+        /// The acceleration returned.
+        #[serde(default, deserialize_with = "json::word")]
+        acceleration: ReturnedAcceleration,
+    },
+    /// The HHT-α method.
+    HhtAlpha {
+        /// ρ∞, a pure number between 1/2 and 1, 0.8 by default.
+        #[serde(default = "high_frequency_radius")]
+        rho_infinity: f64,
+        /// The acceleration returned.
+        #[serde(default, deserialize_with = "json::word")]
+        acceleration: ReturnedAcceleration,
+    },
+    /// The WBZ-α method.
+    WbzAlpha {
+        /// ρ∞, a pure number between 0 and 1, 0.8 by default.
+        #[serde(default = "high_frequency_radius")]
+        rho_infinity: f64,
+        /// The acceleration returned.
+        #[serde(default, deserialize_with = "json::word")]
+        acceleration: ReturnedAcceleration,
+    },
+    /// Bathe's composite method with two equal sub-steps.
+    Bathe {
+        /// The force at the end of the first sub-step.
+        #[serde(default, deserialize_with = "json::word")]
+        load: SubStepLoad,
+    },
+    /// The ρ∞-Bathe method, sub-steps chosen for one effective matrix.
+    RhoInfinityBathe {
+        /// ρ∞, a pure number between 0 and 1, 0 by default.
+        #[serde(default)]
+        rho_infinity: f64,
+        /// The force at the end of the first sub-step.
+        #[serde(default, deserialize_with = "json::word")]
+        load: SubStepLoad,
+    },
+    /// Exact steps by the matrix exponential.
+    MatrixExponential {
+        /// The force between two samples.
+        #[serde(deserialize_with = "json::word")]
+        load: HeldOrLinear,
+    },
     /// The classical Runge-Kutta method of fourth order.
     #[serde(rename = "runge-kutta-4")]
     RungeKutta4 {
@@ -62,6 +110,42 @@ fn half() -> f64 {
 
 fn wilson() -> f64 {
     1.4
+}
+
+fn high_frequency_radius() -> f64 {
+    0.8
+}
+
+/// The acceleration that a generalised-α method returns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReturnedAcceleration {
+    /// Acceleration of the equation of motion at each sample.
+    #[default]
+    EquationOfMotion,
+    /// The one carried from step to step, of first order.
+    Carried,
+}
+
+/// The force at the end of the first sub-step, for Bathe's methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SubStepLoad {
+    /// Linear between both ends of the step.
+    #[default]
+    Linear,
+    /// The excitation evaluated there.
+    Exact,
+}
+
+/// The force between two samples, for the matrix exponential.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeldOrLinear {
+    /// The value of the earlier sample.
+    Held,
+    /// Linear between both samples.
+    Linear,
 }
 
 /// The force in the middle of a step, which the samples do not determine.

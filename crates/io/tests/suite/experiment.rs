@@ -1,8 +1,9 @@
 //! Descriptions of experiments: what they mean, and what is said about wrong ones.
 
 use mechid_io::{
-    Experiment, FirstDisplacements, FirstSteps, InitialMotion, IoError, LoadBeyond, MiddleLoad,
-    PerDof, ResponseKind, SchemeChoice, SystemMatrices, read_covariance, read_system,
+    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, IoError, LoadBeyond,
+    MiddleLoad, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
+    SystemMatrices, read_covariance, read_system,
 };
 
 /// A description with these lines in place of the default ones.
@@ -62,6 +63,29 @@ fn schemes_have_their_standard_parameters() {
         (
             r#"{ "name": "runge-kutta-4", "load": "linear" }"#,
             SchemeChoice::RungeKutta4 { load: MiddleLoad::Linear },
+        ),
+        (
+            r#"{ "name": "generalised-alpha", "acceleration": "carried" }"#,
+            SchemeChoice::GeneralisedAlpha {
+                rho_infinity: 0.8,
+                acceleration: ReturnedAcceleration::Carried,
+            },
+        ),
+        (
+            r#"{ "name": "hht-alpha", "rho_infinity": 0.7 }"#,
+            SchemeChoice::HhtAlpha {
+                rho_infinity: 0.7,
+                acceleration: ReturnedAcceleration::EquationOfMotion,
+            },
+        ),
+        (r#"{ "name": "bathe" }"#, SchemeChoice::Bathe { load: SubStepLoad::Linear }),
+        (
+            r#"{ "name": "rho-infinity-bathe", "load": "exact" }"#,
+            SchemeChoice::RhoInfinityBathe { rho_infinity: 0.0, load: SubStepLoad::Exact },
+        ),
+        (
+            r#"{ "name": "matrix-exponential", "load": "held" }"#,
+            SchemeChoice::MatrixExponential { load: HeldOrLinear::Held },
         ),
     ] {
         let text = description(SDOF, FORCE, &format!(r#", "scheme": {json}"#));
@@ -244,7 +268,7 @@ fn wrong_excitations_say_what_is_wrong() {
     assert!(e.contains("excitation: invalid type: integer `3`, expected a force or a list"), "{e}");
     let random = r#"{ "kind": "random", "standard_deviation": 1 }"#;
     let experiment = parse(&description(SDOF, random, "")).unwrap();
-    let e = experiment.mid_step_force().unwrap_err().to_string();
+    let e = experiment.force_within_steps(0.5).unwrap_err().to_string();
     assert!(e.contains("a random force has none: choose load held or linear"), "{e}");
 }
 

@@ -37,10 +37,12 @@ use mechid::analysis::text::{compact, significant, text_table};
 ///                 impulse    momentum in N·s, at_s
 ///                 half-sine  peak in N, start_s, duration_s
 ///
-///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, runge-kutta-4) and
-///               its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
+///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, generalised-alpha,
+///               hht-alpha, wbz-alpha, bathe, rho-infinity-bathe, matrix-exponential, runge-kutta-4)
+///               and its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
 ///               central-difference, {"given": {"at_dt": …, "at_2dt": …}} in m; theta, load:
-///               projected, interpolated; load: held, linear, exact)
+///               projected, interpolated; rho_infinity, acceleration: equation-of-motion, carried;
+///               rho_infinity, load: linear, exact; load: held, linear; load: held, linear, exact)
 ///
 ///   response    periodic (the steady state), from-rest, or {"from": {"displacement": …,
 ///               "velocity": …}} in m and m/s

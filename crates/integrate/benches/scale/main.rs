@@ -1,0 +1,255 @@
+//! Cost of a step and of its preparation where there are many degrees of freedom or nonlinear
+//! forces.
+//!
+//! Prints ns per step and ratios: to a loop written by hand for a chain, and to SciPy where
+//! `MECHID_BENCH_PYTHON` names a Python interpreter that has it.
+
+#![allow(clippy::print_stdout, reason = "a bench reports")]
+
+use std::hint::black_box;
+use std::io::Write;
+use std::process::{Command, Stdio};
+use std::time::Instant;
+
+use mechid_integrate::*;
+use mechid_model::{InitialState, SecondOrderSystem, SparseSystem, band, triplets};
+use mechid_signal::{Record, Sampling};
+use nalgebra::DMatrix;
+use nalgebra_sparse::csr::CsrMatrix;
+
+const DT: f64 = 1e-3;
+
+/// Whether every measurement is only to run once, as `cargo test` lets it.
+fn is_tried_only() -> bool {
+    !std::env::args().any(|word| word == "--bench")
+}
+
+/// Shortest of several runs, in seconds: what else the machine does only ever adds.
+fn seconds<T>(mut run: impl FnMut() -> T) -> f64 {
+    let mut once = || {
+        let begin = Instant::now();
+        black_box(run());
+        begin.elapsed().as_secs_f64()
+    };
+    let first = once();
+    if is_tried_only() {
+        return first;
+    }
+    let runs = (1.0 / first).clamp(3.0, 100.0) as usize;
+    (0..runs).map(|_| once()).fold(first, f64::min)
+}
+
+fn damped(stiffness: CsrMatrix<f64>) -> SparseSystem {
+    let mass = band(stiffness.nrows(), &[(0, 1.0)]);
+    SparseSystem::new(mass, &stiffness * 1e-4, stiffness).expect("regular")
+}
+
+fn chain(n: usize) -> SparseSystem {
+    damped(band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]))
+}
+
+fn grid(side: usize) -> SparseSystem {
+    let at = |i: usize, j: usize| i * side + j;
+    let mut entries = vec![];
+    for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+        entries.push((at(i, j), at(i, j), 3800.0));
+        let neighbours =
+            [(i + 1 < side).then(|| at(i + 1, j)), (j + 1 < side).then(|| at(i, j + 1))];
+        for next in neighbours.into_iter().flatten() {
+            entries.extend([(at(i, j), next, -900.0), (next, at(i, j), -900.0)]);
+        }
+    }
+    damped(triplets(side * side, entries).expect("inside"))
+}
+
+fn force(steps: usize) -> Record {
+    let values = (0..=steps).map(|k| (k as f64).sin()).collect();
+    Record::from_channel(Sampling::new(DT, steps + 1).expect("valid"), values).expect("finite")
+}
+
+/// Newmark on a chain as one would write it: three products, Thomas' algorithm, two sums.
+fn by_hand(n: usize, steps: usize) -> Vec<[f64; 2]> {
+    let (h, q) = (0.5 * DT, 0.25 * DT * DT);
+    let (off, diagonal) = (-900.0, 2000.0);
+    let scale = 1e-4 * h + q;
+    let (m_off, m_diagonal) = (scale * off, 1.0 + scale * diagonal);
+    let mut factor = vec![0.0; n];
+    let mut pivot = vec![m_diagonal; n];
+    for i in 1..n {
+        factor[i] = m_off / pivot[i - 1];
+        pivot[i] = m_diagonal - factor[i] * m_off;
+    }
+    let reciprocal: Vec<f64> = pivot.iter().map(|p| 1.0 / p).collect();
+    let [mut x, mut v, mut a, mut r] = [(); 4].map(|()| vec![0.0; n]);
+    let mut kept = Vec::with_capacity(steps);
+    for k in 0..steps {
+        for i in 0..n {
+            x[i] += DT * v[i] + q * a[i];
+            v[i] += h * a[i];
+        }
+        for i in 0..n {
+            let product = |y: &[f64]| {
+                let below = if i > 0 { y[i - 1] } else { 0.0 };
+                let above = if i + 1 < n { y[i + 1] } else { 0.0 };
+                off * (below + above) + diagonal * y[i]
+            };
+            r[i] = -1e-4 * product(&v) - product(&x);
+        }
+        r[0] += ((k + 1) as f64).sin();
+        for i in 1..n {
+            r[i] -= factor[i] * r[i - 1];
+        }
+        a[n - 1] = r[n - 1] * reciprocal[n - 1];
+        for i in (0..n - 1).rev() {
+            a[i] = (r[i] - m_off * a[i + 1]) * reciprocal[i];
+        }
+        for i in 0..n {
+            x[i] += q * a[i];
+            v[i] += h * a[i];
+        }
+        kept.push([x[0], x[n - 1]]);
+    }
+    kept
+}
+
+/// SciPy's seconds for the factorisation and for a step.
+fn scipy(kind: &str, size: usize, steps: usize) -> Option<[f64; 2]> {
+    let python = std::env::var("MECHID_BENCH_PYTHON").ok()?;
+    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/scale/scipy_steps.py");
+    let mut child = Command::new(python)
+        .arg(script)
+        .env("OMP_NUM_THREADS", "1")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .ok()?;
+    writeln!(child.stdin.take()?, "{kind} {size} {steps}").ok()?;
+    let answer = child.wait_with_output().ok()?.stdout;
+    let mut numbers = std::str::from_utf8(&answer).ok()?.split_whitespace().map(str::parse);
+    Some([numbers.next()?.ok()?, numbers.next()?.ok()?])
+}
+
+fn ours(system: &dyn System, force: &Record, dofs: SelectedDofs<'_>) -> mechid_model::Response {
+    let rest = InitialState::rest(system.dof());
+    let scheme = Newmark::AVERAGE_ACCELERATION;
+    integrate_selected(&AllowUnstable(&scheme), system, dofs, force, &rest).expect("stable")
+}
+
+/// Seconds of a step alone: a long record less a short one.
+fn per_step(system: &dyn System, steps: usize, dofs: SelectedDofs<'_>) -> f64 {
+    let (short, long) = (force(1), force(steps + 1));
+    let begin = seconds(|| ours(system, &short, dofs));
+    (seconds(|| ours(system, &long, dofs)) - begin) / steps as f64
+}
+
+fn sparse() {
+    println!(
+        "Newmark, force at one degree of freedom, response at two: µs per step, ms to prepare"
+    );
+    let scale = if is_tried_only() { 100 } else { 1 };
+    for (kind, size, steps) in [
+        ("chain", 1_000, 2_000),
+        ("chain", 10_000, 500),
+        ("chain", 100_000, 60),
+        ("grid", 100, 100),
+    ] {
+        let (size, steps) = ((size / scale).max(10), (steps / scale).max(3));
+        let system = if kind == "chain" { chain(size) } else { grid(size) };
+        let n = system.dof();
+        let dofs = SelectedDofs { forced: &[0], observed: &[0, n - 1] };
+        let step = per_step(&system, steps, dofs);
+        let scheme = Newmark::AVERAGE_ACCELERATION;
+        let prepare = seconds(|| scheme.prepare(&system, DT).expect("stable"));
+        let name = format!("{kind} of {n}");
+        println!("{name:<16} mechid      {:10.2} µs {:9.2} ms", 1e6 * step, 1e3 * prepare);
+        if kind == "chain" {
+            let hand = seconds(|| by_hand(n, steps)) / steps as f64;
+            println!("{name:<16} by hand     {:10.2} µs; mechid × {:.2}", 1e6 * hand, step / hand);
+        }
+        if let Some([factored, theirs]) = scipy(kind, size, steps) {
+            println!("{name:<16} SciPy       {:10.2} µs {:9.2} ms", 1e6 * theirs, 1e3 * factored);
+            println!(
+                "{name:<16} SciPy's step is {:.2} × ours; our preparation {:.2} × its factorisation and \
+                 100 steps",
+                theirs / step,
+                prepare / (factored + 100.0 * theirs)
+            );
+        }
+    }
+}
+
+/// Euler–Bernoulli beams in two planes, coupled by spinning: `n` degrees of freedom, 4 a node.
+fn rotor(n: usize) -> SparseSystem {
+    let nodes = n / 4;
+    let (length, stiff, heavy) = (0.1, 2e3, 0.5);
+    let element = [
+        [12.0, 6.0 * length, -12.0, 6.0 * length],
+        [6.0 * length, 4.0 * length * length, -6.0 * length, 2.0 * length * length],
+        [-12.0, -6.0 * length, 12.0, -6.0 * length],
+        [6.0 * length, 2.0 * length * length, -6.0 * length, 4.0 * length * length],
+    ];
+    let mut k = vec![];
+    for node in 0..nodes - 1 {
+        for plane in 0..2 {
+            let dof = |local: usize| 4 * (node + local / 2) + 2 * plane + local % 2;
+            for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
+                k.push((dof(i), dof(j), stiff * element[i][j]));
+            }
+        }
+    }
+    let (mut m, mut c) = (vec![], vec![]);
+    for node in 0..nodes {
+        for plane in 0..2 {
+            let at = 4 * node + 2 * plane;
+            m.extend([(at, at, heavy), (at + 1, at + 1, 1e-3 * heavy)]);
+            c.extend([(at, at, 0.5), (at + 1, at + 1, 1e-3)]);
+            k.push((at, at, 200.0));
+        }
+        let (first, second) = (4 * node + 1, 4 * node + 3);
+        c.extend([(first, second, 0.01), (second, first, -0.01)]);
+    }
+    let [m, c, k] = [m, c, k].map(|entries| triplets(4 * nodes, entries).expect("inside"));
+    SparseSystem::new(m, c, k).expect("regular")
+}
+
+fn nonlinear() {
+    let one = |v: f64| DMatrix::from_element(1, 1, v);
+    let linear = SecondOrderSystem::new(one(1.0), one(0.2), one(400.0)).expect("regular");
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1e5]).expect("finite");
+    let duffing = NonlinearSystem::new(&linear).with(cubic).expect("inside");
+    let steps = if is_tried_only() { 100 } else { 200_000 };
+    let (force_1, rest) = (force(steps), InitialState::rest(1));
+    println!("\nns per step, linear and with nonlinear forces");
+    let schemes: [(&str, Box<dyn Scheme>); 4] = [
+        ("Newmark", Box::new(Newmark::AVERAGE_ACCELERATION)),
+        ("generalised-α", Box::new(GeneralisedAlpha::new(0.8).expect("in range"))),
+        ("Bathe", Box::new(Bathe::HALVES)),
+        ("Runge-Kutta", Box::new(RungeKutta4::LINEAR)),
+    ];
+    for (name, scheme) in &schemes {
+        let of = |system: &dyn System| {
+            let once = || integrate(scheme.as_ref(), system, &force_1, &rest).expect("solved");
+            1e9 * seconds(once) / steps as f64
+        };
+        let (plain, hard) = (of(&linear), of(&duffing));
+        println!("Duffing, {name:<16} {plain:8.1} {hard:8.1}   × {:.2}", hard / plain);
+    }
+    let shaft = rotor(200);
+    let film = ForceFunction::new(vec![4, 6], |_, x, v, g| {
+        let gap = 1.0 - 1e6 * (x[0] * x[0] + x[1] * x[1]).min(0.9e-6);
+        let stiff = 50.0 / (gap * gap);
+        g[0] = stiff * (x[0] + 0.5 * x[1]) + 2.0 * v[0] / gap;
+        g[1] = stiff * (x[1] - 0.5 * x[0]) + 2.0 * v[1] / gap;
+    });
+    let floating = NonlinearSystem::new(&shaft).with(film).expect("inside");
+    let dofs = SelectedDofs { forced: &[100], observed: &[4, 6] };
+    let steps = if is_tried_only() { 10 } else { 20_000 };
+    let [plain, hard] =
+        [&shaft as &dyn System, &floating].map(|system| 1e9 * per_step(system, steps, dofs));
+    println!("a film on a rotor of 200, Newmark {plain:8.1} {hard:8.1}   × {:.2}", hard / plain);
+}
+
+fn main() {
+    sparse();
+    nonlinear();
+}

@@ -1,0 +1,140 @@
+//! Forces that are no linear functions of displacement and velocity: M ẍ + C ẋ + K x + g(x, ẋ, t) = F.
+
+use std::fmt;
+use std::sync::Arc;
+
+use nalgebra::DMatrix;
+
+use crate::{IntegrateError, Matrices, System};
+
+/// A force g(x, ẋ, t) that depends on the motion of p degrees of freedom and acts on them, on the
+/// left side of the equation of motion: a spring's g grows with x.
+pub trait NonlinearForce: fmt::Debug + Send + Sync {
+    /// The p degrees of freedom, counted from 0, none twice.
+    fn dofs(&self) -> &[usize];
+
+    /// Writes g (N, p entries) at `time` (s) for the displacements `x` (m, p entries) and
+    /// velocities `v` (m/s, p entries) of these degrees of freedom.
+    fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]);
+
+    /// Writes the tangents ∂g/∂x (N/m, p×p) and ∂g/∂ẋ (N·s/m, p×p) and returns true; false, as by
+    /// default, if they are to be formed by differences of the force.
+    fn tangents(&self, time: f64, x: &[f64], v: &[f64], tangents: &mut Tangents) -> bool {
+        let _ = (time, x, v, tangents);
+        false
+    }
+}
+
+/// Derivatives of a nonlinear force by displacement and velocity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tangents {
+    /// ∂g/∂x, p × p, in N/m.
+    pub stiffness: DMatrix<f64>,
+    /// ∂g/∂ẋ, p × p, in N·s/m.
+    pub damping: DMatrix<f64>,
+}
+
+/// A linear system with nonlinear forces: M ẍ + C ẋ + K x + Σ g(x, ẋ, t) = F.
+///
+/// Implicit schemes solve for the few degrees of freedom that the forces act on, by Newton's method;
+/// everything else is as linear as it was, so that a step costs little more. Stability is
+/// checked of the linear part alone.
+///
+/// ```
+/// use mechid_integrate::{Connection, Newmark, NonlinearSystem, integrate};
+/// use mechid_model::{InitialState, Sdof};
+/// use mechid_signal::{Record, Sampling};
+/// use nalgebra::dvector;
+///
+/// // Duffing's oscillator, ẍ + x + x³ = 0, let go at 1 m: its period is 4.7680 s, not 2π s.
+/// let linear = Sdof::new(1.0, 0.0, 1.0)?.system();
+/// let hardening = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0])?;
+/// let duffing = NonlinearSystem::new(&linear).with(hardening)?;
+/// let none = Record::from_channel(Sampling::new(4.768 / 400.0, 401)?, vec![0.0; 401])?;
+/// let start = InitialState::new(dvector![1.0], dvector![0.0])?;
+/// let response = integrate(&Newmark::AVERAGE_ACCELERATION, &duffing, &none, &start)?;
+/// assert!((response.displacement().channel(0)[400] - 1.0).abs() < 1e-3);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct NonlinearSystem<'a> {
+    linear: Matrices<'a>,
+    forces: Vec<Arc<dyn NonlinearForce>>,
+}
+
+impl<'a> NonlinearSystem<'a> {
+    /// The linear part, without forces as yet.
+    pub fn new(linear: &'a dyn System) -> Self {
+        Self { linear: linear.matrices(), forces: linear.nonlinear_forces().to_vec() }
+    }
+
+    /// The system with one force more.
+    ///
+    /// # Errors
+    /// [`IntegrateError::DofOutside`] and [`IntegrateError::ForcedTwice`] if the force acts on degrees
+    /// of freedom that the system has not, or on one of them twice.
+    pub fn with(mut self, force: impl NonlinearForce + 'static) -> Result<Self, IntegrateError> {
+        let dof = self.dof();
+        for (k, &index) in force.dofs().iter().enumerate() {
+            if index >= dof {
+                return Err(IntegrateError::DofOutside { index, dof });
+            }
+            if force.dofs()[..k].contains(&index) {
+                return Err(IntegrateError::ForcedTwice { index });
+            }
+        }
+        self.forces.push(Arc::new(force));
+        Ok(self)
+    }
+}
+
+impl System for NonlinearSystem<'_> {
+    fn matrices(&self) -> Matrices<'_> {
+        self.linear
+    }
+
+    fn nonlinear_forces(&self) -> &[Arc<dyn NonlinearForce>] {
+        &self.forces
+    }
+}
+
+/// A nonlinear force given as a function.
+///
+/// ```
+/// use mechid_integrate::{NonlinearForce, ForceFunction};
+///
+/// // A pendulum of 1 kg on 1 m: m g sin x, in place of the spring.
+/// let gravity = ForceFunction::new(vec![0], |_time, x, _v, g| g[0] = 9.81 * x[0].sin());
+/// let mut g = [0.0];
+/// gravity.force(0.0, &[0.1], &[0.0], &mut g);
+/// assert!((g[0] - 0.9794).abs() < 1e-4);
+/// ```
+pub struct ForceFunction<F> {
+    dofs: Vec<usize>,
+    function: F,
+}
+
+impl<F: Fn(f64, &[f64], &[f64], &mut [f64]) + Send + Sync> ForceFunction<F> {
+    /// `function(t, x, v, g)` writes the forces (N) on the p degrees of freedom `dofs`, counted from
+    /// 0, into `g`, for their displacements `x` (m) and velocities `v` (m/s) at t (s), p entries
+    /// each.
+    pub fn new(dofs: Vec<usize>, function: F) -> Self {
+        Self { dofs, function }
+    }
+}
+
+impl<F> fmt::Debug for ForceFunction<F> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ForceFunction").field("dofs", &self.dofs).finish_non_exhaustive()
+    }
+}
+
+impl<F: Fn(f64, &[f64], &[f64], &mut [f64]) + Send + Sync> NonlinearForce for ForceFunction<F> {
+    fn dofs(&self) -> &[usize] {
+        &self.dofs
+    }
+
+    fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
+        (self.function)(time, x, v, g);
+    }
+}

@@ -1,0 +1,376 @@
+//! Nonlinear forces, judged by closed forms.
+
+use mechid_integrate::*;
+use mechid_model::{InitialState, Sdof, SecondOrderSystem, SparseSystem, band};
+use mechid_signal::{Record, Sampling};
+use nalgebra::{DMatrix, DVector, dvector};
+
+use crate::common::*;
+
+fn still(dt: f64, len: usize, dof: usize) -> Record {
+    Record::new(Sampling::new(dt, len).unwrap(), DMatrix::zeros(len, dof)).unwrap()
+}
+
+fn oscillator(m: f64, c: f64, k: f64) -> SecondOrderSystem {
+    let one = |v: f64| DMatrix::from_element(1, 1, v);
+    SecondOrderSystem::new(one(m), one(c), one(k)).unwrap()
+}
+
+fn released(x: f64, v: f64) -> InitialState {
+    InitialState::new(dvector![x], dvector![v]).unwrap()
+}
+
+fn is_at_rest(scheme: &dyn Scheme) -> bool {
+    scheme.conventions().iter().any(|c| c.choice.contains("at rest"))
+}
+
+/// All schemes that take nonlinear systems.
+fn nonlinear_schemes() -> Vec<Box<dyn Scheme>> {
+    schemes().into_iter().filter(|s| s.name() != "matrix exponential").collect()
+}
+
+/// sn, cn, dn of u for the parameter m = k², by the descending Landen transformation.
+///
+/// # Source
+/// Abramowitz & Stegun, *Handbook of Mathematical Functions* (1964), section 16.4.
+fn jacobi(u: f64, m: f64) -> [f64; 3] {
+    let (mut a, mut b, mut c) = (1.0, (1.0 - m).sqrt(), m.sqrt());
+    let mut ratios = vec![];
+    while c > f64::EPSILON {
+        (a, b, c) = (0.5 * (a + b), (a * b).sqrt(), 0.5 * (a - b));
+        ratios.push(c / a);
+    }
+    let mut angle = f64::powi(2.0, ratios.len() as i32) * a * u;
+    for ratio in ratios.iter().rev() {
+        angle = 0.5 * (angle + (ratio * angle.sin()).asin());
+    }
+    let (sn, cn) = angle.sin_cos();
+    [sn, cn, (1.0 - m * sn * sn).sqrt()]
+}
+
+/// x, ẋ, ẍ of ẍ + k x + κ x³ = 0 released at x = `amplitude`: amplitude · cn(Ωt).
+fn duffing(k: f64, cubic: f64, amplitude: f64, t: f64) -> [f64; 3] {
+    let omega = (k + cubic * amplitude * amplitude).sqrt();
+    let m = 0.5 * cubic * amplitude * amplitude / (omega * omega);
+    let [sn, cn, dn] = jacobi(omega * t, m);
+    let x = amplitude * cn;
+    [x, -amplitude * omega * sn * dn, -(k * x + cubic * x.powi(3))]
+}
+
+/// The judge judged: Jacobi's functions against the series of sn, and the differential equation.
+///
+/// # Source
+/// Abramowitz & Stegun, *Handbook of Mathematical Functions* (1964), 16.22.1.
+#[test]
+fn the_elliptic_functions_are_right() {
+    for (u, m) in [(0.05_f64, 0.81_f64), (0.1, 0.4), (-0.1, 0.0)] {
+        let [sn, cn, dn] = jacobi(u, m);
+        let series = u - (1.0 + m) * u.powi(3) / 6.0 + (1.0 + 14.0 * m + m * m) * u.powi(5) / 120.0
+            - (1.0 + 135.0 * m + 135.0 * m * m + m.powi(3)) * u.powi(7) / 5040.0;
+        assert!((sn - series).abs() < 1e-11, "{sn} {series}");
+        assert!((sn * sn + cn * cn - 1.0).abs() < 1e-15);
+        assert!((dn * dn + m * sn * sn - 1.0).abs() < 1e-15);
+    }
+    for t in [0.3, 1.7, 9.0] {
+        let h = 1e-4;
+        let [x, v, a] = duffing(1.0, 3.0, 1.2, t);
+        let [ahead, behind] = [t + h, t - h].map(|t| duffing(1.0, 3.0, 1.2, t));
+        assert!(((ahead[0] - behind[0]) / (2.0 * h) - v).abs() < 1e-6 * v.abs().max(1.0));
+        assert!(((ahead[1] - behind[1]) / (2.0 * h) - a).abs() < 1e-6 * a.abs().max(1.0), "{x}");
+    }
+}
+
+#[test]
+fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
+    let linear = oscillator(1.0, 0.0, 1.0);
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
+    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let end = 3.0;
+    let truth = duffing(1.0, 3.0, 1.2, end);
+    for scheme in nonlinear_schemes() {
+        let (scheme, name) = (scheme.as_ref(), scheme.name());
+        let errors = |steps: usize| {
+            let none = still(end / steps as f64, steps + 1, 1);
+            let response = integrate(scheme, &system, &none, &released(1.2, 0.0)).unwrap();
+            let found = parts(&response).map(|part| part[(steps, 0)]);
+            std::array::from_fn::<f64, 3, _>(|i| (found[i] - truth[i]).abs())
+        };
+        let (coarse, fine) = (errors(400), errors(1600));
+        let has = |choice: &str| scheme.conventions().iter().any(|c| c.choice.contains(choice));
+        for i in 0..3 {
+            let order = (coarse[i] / fine[i]).log2() / 2.0;
+            let expected = match () {
+                () if name.starts_with("Newmark (β = 0.3025") || is_at_rest(scheme) => 1.0,
+                () if name.starts_with("Runge") => 4.0,
+                // Numerov's method without damping, but for the velocity.
+                () if name.contains("Fox") && i != 1 => 4.0,
+                () if i == 2 && has("carried") => 1.0,
+                () => 2.0,
+            };
+            assert!((order - expected).abs() < 0.15, "{name} {i}: {order} {coarse:?} {fine:?}");
+        }
+    }
+}
+
+/// Springs and dampers between the second and the fourth of five masses and a force that depends
+/// on time, for a response that was chosen beforehand: x = a sin(ωt + φ) in each.
+#[test]
+fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
+    let n = 5;
+    let linear = mechid_problems::random_stable(n, 3);
+    let on = Connection::between(1, 3);
+    let driven = ForceFunction::new(vec![3, 0], |t, x, v, g| {
+        g[0] = 20.0 * x[0] * x[1] * (3.0 * t).sin();
+        g[1] = 5.0 * v[0] * v[1] + 2.0 * t.cos();
+    });
+    let system = NonlinearSystem::new(&linear)
+        .with(on.spring(&[40.0, -30.0, 200.0]).unwrap())
+        .unwrap()
+        .with(on.damper(&[2.0, 0.0, 1.5]).unwrap())
+        .unwrap()
+        .with(on.friction(3.0, 0.5).unwrap())
+        .unwrap()
+        .with(driven)
+        .unwrap();
+    let chosen = |t: f64| -> [DVector<f64>; 3] {
+        let angle = |i: usize| ((1.0 + 0.7 * i as f64) * t + i as f64, 1.0 + 0.7 * i as f64);
+        let size = |i: usize| 0.5 - 0.1 * i as f64;
+        [
+            DVector::from_fn(n, |i, _| size(i) * angle(i).0.sin()),
+            DVector::from_fn(n, |i, _| size(i) * angle(i).1 * angle(i).0.cos()),
+            DVector::from_fn(n, |i, _| -size(i) * angle(i).1.powi(2) * angle(i).0.sin()),
+        ]
+    };
+    let force = |t: f64, f: &mut [f64]| {
+        let [x, v, a] = chosen(t);
+        let mut sum = linear.mass() * a + linear.damping() * &v + linear.stiffness() * &x;
+        for part in system.nonlinear_forces() {
+            let pick =
+                |from: &DVector<f64>| part.dofs().iter().map(|&i| from[i]).collect::<Vec<_>>();
+            let mut g = vec![0.0; part.dofs().len()];
+            part.force(t, &pick(&x), &pick(&v), &mut g);
+            part.dofs().iter().zip(g).for_each(|(&i, g)| sum[i] += g);
+        }
+        f.copy_from_slice(sum.as_slice());
+    };
+    let start = InitialState::new(chosen(0.0)[0].clone(), chosen(0.0)[1].clone()).unwrap();
+    let mut all = nonlinear_schemes();
+    all.push(Box::new(RungeKutta4::SUPPLIED));
+    for scheme in all.iter().filter(|s| !is_at_rest(s.as_ref())) {
+        let (scheme, name) = (scheme.as_ref(), scheme.name());
+        let has = |choice: &str| scheme.conventions().iter().any(|c| c.choice.contains(choice));
+        let error = |steps: usize| {
+            let sampling = Sampling::new(1.0 / steps as f64, steps + 1).unwrap();
+            let response = integrate_function(scheme, &system, sampling, &start, force).unwrap();
+            let end = response.displacement().data().row(steps).transpose();
+            (end - &chosen(1.0)[0]).norm()
+        };
+        let order = (error(500) / error(1000)).log2();
+        let expected = match () {
+            () if name.starts_with("Newmark (β = 0.3025") || has("held") => 1.0,
+            () if has("supplied") => 4.0,
+            () => 2.0,
+        };
+        assert!((order - expected).abs() < 0.15, "{name}: {order}");
+    }
+}
+
+/// The same force as an element with its tangents, as a function without, and over more degrees of
+/// freedom than it needs; on dense and on sparse matrices.
+#[test]
+fn reduction_and_tangents_do_not_change_the_response() {
+    let n = 30;
+    let chain = band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]);
+    let sparse = SparseSystem::new(band(n, &[(0, 1.0)]), &chain * 1e-3, chain).unwrap();
+    let dense = mechid_model::Matrix::Mass;
+    let matrix = |which| DMatrix::from(sparse.matrix(which));
+    let dense = SecondOrderSystem::new(
+        matrix(dense),
+        matrix(mechid_model::Matrix::Damping),
+        matrix(mechid_model::Matrix::Stiffness),
+    )
+    .unwrap();
+    let law = |e: f64| 500.0 * e + 4e4 * e.powi(3);
+    let element = || Connection::between(20, 4).spring(&[500.0, 0.0, 4e4]).unwrap();
+    let function = ForceFunction::new(vec![4, 20], move |_, x, _, g| {
+        g[1] = law(x[1] - x[0]);
+        g[0] = -g[1];
+    });
+    let wide = ForceFunction::new((0..n).collect(), move |_, x, _, g| {
+        g.fill(0.0);
+        g[20] = law(x[20] - x[4]);
+        g[4] = -g[20];
+    });
+    let systems: [(&str, NonlinearSystem<'_>); 4] = [
+        ("element", NonlinearSystem::new(&sparse).with(element()).unwrap()),
+        ("dense", NonlinearSystem::new(&dense).with(element()).unwrap()),
+        ("function", NonlinearSystem::new(&sparse).with(function).unwrap()),
+        ("wide", NonlinearSystem::new(&dense).with(wide).unwrap()),
+    ];
+    let force = force(Sampling::new(5e-3, 200).unwrap(), n);
+    for scheme in nonlinear_schemes() {
+        let scheme = scheme.as_ref();
+        let rest = InitialState::rest(n);
+        let [first, others @ ..] = &systems;
+        let truth = integrate(scheme, &first.1, &force, &rest).unwrap();
+        let plain = integrate(scheme, &sparse, &force, &rest).unwrap();
+        let apart = |one: &mechid_model::Response, other: &mechid_model::Response| {
+            (one.displacement().data() - other.displacement().data()).amax()
+                / one.displacement().data().amax()
+        };
+        assert!(apart(&truth, &plain) > 1e-3, "the force matters");
+        for (name, system) in others {
+            let found = integrate(scheme, system, &force, &rest).unwrap();
+            let gap = apart(&truth, &found);
+            assert!(gap < 1e-11, "{}, {name}: {gap:e}", scheme.name());
+        }
+    }
+}
+
+/// A linear spring as a nonlinear force is part of K.
+#[test]
+fn a_linear_spring_is_a_part_of_the_stiffness() {
+    let soft = Sdof::new(2.0, 0.3, 50.0).unwrap().system();
+    let stiff = Sdof::new(2.0, 0.5, 80.0).unwrap().system();
+    let on = Connection::to_ground(0);
+    let system = NonlinearSystem::new(&soft)
+        .with(on.spring(&[30.0]).unwrap())
+        .unwrap()
+        .with(on.damper(&[0.2]).unwrap())
+        .unwrap();
+    let force = force(Sampling::new(0.02, 500).unwrap(), 1);
+    for scheme in nonlinear_schemes() {
+        let scheme = scheme.as_ref();
+        let start = if is_at_rest(scheme) { InitialState::rest(1) } else { moving(1) };
+        let one = integrate(scheme, &system, &force, &start).unwrap();
+        let other = integrate(scheme, &stiff, &force, &start).unwrap();
+        for (one, other) in parts(&one).into_iter().zip(parts(&other)) {
+            assert!((one - other).amax() < 1e-10 * other.amax(), "{}", scheme.name());
+        }
+    }
+}
+
+/// Between two stops: straight lines, and half a sine at each of them.
+#[test]
+fn a_mass_between_stops_comes_back_in_time() {
+    let (clearance, stiffness, speed) = (0.1, 400.0, 2.0);
+    let free = oscillator(1.0, 0.0, 0.0);
+    let stops = Connection::to_ground(0).gap(clearance, stiffness).unwrap();
+    let system = NonlinearSystem::new(&free).with(stops).unwrap();
+    let period = 4.0 * clearance / speed + 2.0 * std::f64::consts::PI / f64::sqrt(stiffness);
+    let steps = 4000;
+    for scheme in nonlinear_schemes().iter().filter(|s| !is_at_rest(s.as_ref())) {
+        let none = still(period / f64::from(steps), steps as usize + 1, 1);
+        let response = integrate(scheme.as_ref(), &system, &none, &released(0.0, speed)).unwrap();
+        let x = response.displacement().channel(0);
+        let (end, most) = (x[steps as usize], response.displacement().column(0).amax());
+        let name = scheme.name();
+        // 1e-3 of the travel in a period is what first order leaves.
+        let first_order = name.starts_with("Newmark (β = 0.3025");
+        let near = if first_order { 5e-3 } else { 1e-4 };
+        assert!(end.abs() < near, "{name}: {end}");
+        let expected = clearance + speed / f64::sqrt(stiffness);
+        assert!((most / expected - 1.0).abs() < near, "{name}: {most}");
+    }
+}
+
+/// ẍ = −(μ/m) tanh(ẋ/w): sinh(ẋ/w) falls as e^{−μt/mw}. ẍ = −(c/m) ẋ² (forwards): 1/ẋ grows as ct/m.
+#[test]
+fn friction_and_drag_slow_a_mass_as_they_should() {
+    let free = oscillator(2.0, 0.0, 0.0);
+    let on = Connection::to_ground(0);
+    let (limit, width, speed, end) = (0.8, 0.2, 1.5, 4.0);
+    let rubbed = NonlinearSystem::new(&free).with(on.friction(limit, width).unwrap()).unwrap();
+    let dragged = NonlinearSystem::new(&free).with(on.damper(&[0.0, 0.6]).unwrap()).unwrap();
+    let rubbing = width * ((speed / width).sinh() * (-limit * end / (2.0 * width)).exp()).asinh();
+    let dragging = 1.0 / (1.0 / speed + 0.6 * end / 2.0);
+    for scheme in nonlinear_schemes().iter().filter(|s| !is_at_rest(s.as_ref())) {
+        for (system, truth) in [(&rubbed, rubbing), (&dragged, dragging)] {
+            let none = still(end / 2000.0, 2001, 1);
+            let response =
+                integrate(scheme.as_ref(), system, &none, &released(0.0, speed)).unwrap();
+            let found = response.velocity().channel(0)[2000];
+            let name = scheme.name();
+            let near = if name.starts_with("Newmark (β = 0.3025") { 3e-3 } else { 1e-4 };
+            assert!((found - truth).abs() < near * speed, "{name}: {found} {truth}");
+        }
+    }
+}
+
+#[test]
+fn the_energy_of_duffings_oscillator_does_not_drift() {
+    let linear = oscillator(1.0, 0.0, 1.0);
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
+    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    // The period of amplitude 1.2 is about 2.9 s; 500 of them.
+    let worst = |scheme: &dyn Scheme, dt: f64| {
+        let steps = (1450.0 / dt) as usize;
+        let none = still(dt, steps + 1, 1);
+        let response = integrate(scheme, &system, &none, &released(1.2, 0.0)).unwrap();
+        let [x, v] = [response.displacement(), response.velocity()].map(|r| r.channel(0));
+        let energy = |k: usize| 0.5 * v[k] * v[k] + 0.5 * x[k] * x[k] + 0.75 * x[k].powi(4);
+        let gap = |k: usize| (energy(k) / energy(0) - 1.0).abs();
+        let early = (0..steps / 50).map(gap).fold(0.0, f64::max);
+        let all = (0..=steps).map(gap).fold(0.0, f64::max);
+        (early, all)
+    };
+    for scheme in [&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, &CentralDifference::default()] {
+        let ((early, all), (_, fine)) = (worst(scheme, 0.02), worst(scheme, 0.01));
+        let name = scheme.name();
+        // It swings within each period, by as much at the end as at the beginning.
+        assert!(all < 1.05 * early && all < 2e-3, "{name}: {early:e} {all:e}");
+        assert!((all / fine - 4.0).abs() < 0.2, "{name}: {all:e} {fine:e}");
+    }
+    // Those that damp take energy away, those that do not must not add any by themselves.
+    let (_, lost) = worst(&GeneralisedAlpha::new(0.8).unwrap(), 0.02);
+    assert!(lost < 0.05, "{lost}");
+}
+
+#[test]
+fn what_newtons_method_cannot_solve_is_an_error() {
+    let free = oscillator(1.0, 0.0, 100.0);
+    // Dry friction with a jump: while it sticks no velocity balances the forces.
+    let sticking = ForceFunction::new(vec![0], |_, _, v, g| g[0] = 50.0 * v[0].signum());
+    let not_a_number = ForceFunction::new(vec![0], |t, _, _, g| g[0] = (0.25 - t).sqrt());
+    let force = force(Sampling::new(0.01, 100).unwrap(), 1);
+    let of = |scheme: &dyn Scheme, system: &NonlinearSystem<'_>| {
+        integrate(scheme, system, &force, &InitialState::rest(1))
+    };
+    let sticking = NonlinearSystem::new(&free).with(sticking).unwrap();
+    let not_a_number = NonlinearSystem::new(&free).with(not_a_number).unwrap();
+    for scheme in nonlinear_schemes() {
+        let (scheme, name) = (scheme.as_ref(), scheme.name());
+        let refused = of(scheme, &not_a_number).err();
+        // Explicit schemes hand the NaN on to the record, implicit ones find no solution.
+        match refused {
+            Some(IntegrateError::NotSolved { time, .. }) => {
+                assert!((0.24..0.29).contains(&time), "{name}: {time}");
+            }
+            Some(IntegrateError::Overflow { sample, .. }) => assert!((25..28).contains(&sample)),
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+    let refused = of(&Newmark::AVERAGE_ACCELERATION, &sticking);
+    assert!(matches!(refused, Err(IntegrateError::NotSolved { .. })), "{refused:?}");
+}
+
+#[test]
+fn what_is_for_linear_systems_refuses_others() {
+    let linear = oscillator(1.0, 0.1, 1.0);
+    let on = Connection::to_ground(0);
+    let system = NonlinearSystem::new(&linear).with(on.spring(&[1.0]).unwrap()).unwrap();
+    let refused = MatrixExponential::LINEAR.prepare(&system, 0.1).err();
+    assert!(matches!(refused, Some(IntegrateError::LinearOnly { .. })));
+    let force = still(0.1, 8, 1);
+    let refused = integrate_periodic(&Newmark::AVERAGE_ACCELERATION, &system, &force);
+    assert!(matches!(refused, Err(IntegrateError::LinearOnly { .. })));
+    let outside = Connection::between(0, 1).spring(&[1.0]).unwrap();
+    let refused = NonlinearSystem::new(&linear).with(outside).err();
+    assert_eq!(refused, Some(IntegrateError::DofOutside { index: 1, dof: 1 }));
+    let twice = Connection::between(0, 0).spring(&[1.0]).unwrap();
+    let refused = NonlinearSystem::new(&linear).with(twice).err();
+    assert_eq!(refused, Some(IntegrateError::ForcedTwice { index: 0 }));
+    // Stability is checked of the linear part.
+    let step = CentralDifference::default().prepare(&system, 2.1).err();
+    assert!(matches!(step, Some(IntegrateError::Unstable { .. })));
+}

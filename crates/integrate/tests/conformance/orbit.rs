@@ -1,0 +1,150 @@
+//! Periodic responses of nonlinear systems, judged by chosen responses, by Liouville's formula and
+//! by harmonic balance.
+
+use std::f64::consts::TAU;
+
+use mechid_integrate::*;
+use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_signal::{Record, Sampling};
+use nalgebra::{DMatrix, dvector};
+
+use crate::common::*;
+
+fn oscillator(m: f64, c: f64, k: f64) -> SecondOrderSystem {
+    let one = |v: f64| DMatrix::from_element(1, 1, v);
+    SecondOrderSystem::new(one(m), one(c), one(k)).unwrap()
+}
+
+fn released(x: f64, v: f64) -> InitialState {
+    InitialState::new(dvector![x], dvector![v]).unwrap()
+}
+
+fn one_period(omega: f64, len: usize, force: impl Fn(f64) -> f64) -> Record {
+    let sampling = Sampling::new(TAU / omega / len as f64, len).unwrap();
+    Record::from_channel(sampling, (0..len).map(|k| force(sampling.time(k))).collect()).unwrap()
+}
+
+/// ẍ + c ẋ + x + x³ = F with F such that x = cos 2t: found with the order of each scheme, and the
+/// product of the multipliers is e^(−cT), by Liouville's formula.
+#[test]
+fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
+    let (c, omega) = (0.4, 2.0);
+    let linear = oscillator(1.0, c, 1.0);
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0]).unwrap();
+    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let product = (-c * TAU / omega).exp();
+    for scheme in schemes().iter().filter(|s| s.name() != "matrix exponential") {
+        let (scheme, name) = (scheme.as_ref(), scheme.name());
+        let has = |choice: &str| scheme.conventions().iter().any(|c| c.choice.contains(choice));
+        if has("at rest") {
+            continue;
+        }
+        let errors = |len: usize| {
+            let force = one_period(omega, len, |t| {
+                let (s, x) = (omega * t).sin_cos();
+                (1.0 - omega * omega) * x - c * omega * s + x.powi(3)
+            });
+            let near = released(0.9, 0.1);
+            let orbit = periodic_orbit(scheme, &system, &force, &near, 0).unwrap();
+            let [x, v, _] = parts(orbit.response());
+            let largest = |found: &DMatrix<f64>, truth: &dyn Fn(f64) -> f64| {
+                let gap = |k: usize| (found[(k, 0)] - truth(force.sampling().time(k))).abs();
+                (0..len).map(gap).fold(0.0, f64::max)
+            };
+            let found: f64 = orbit.multipliers().iter().map(|m| m.norm()).product();
+            assert_eq!((orbit.multipliers().len(), orbit.is_stable()), (2, true), "{name}");
+            [
+                largest(x, &|t| (omega * t).cos()),
+                largest(v, &|t| -omega * (omega * t).sin()),
+                (found / product - 1.0).abs(),
+            ]
+        };
+        let (coarse, fine) = (errors(60), errors(120));
+        let order = if name.starts_with("Newmark (β = 0.3025") || has("held") { 1.0 } else { 2.0 };
+        for (coarse, fine) in coarse.into_iter().zip(fine).take(2) {
+            let found = (coarse / fine).log2();
+            assert!((found - order).abs() < 0.3, "{name}: {found} {coarse:e} {fine:e}");
+        }
+        // The damping of a scheme itself is part of the product: of third order, or of first.
+        assert!(fine[2] < if order == 1.0 { 0.2 } else { 0.01 }, "{name}: {:e}", fine[2]);
+    }
+}
+
+/// Where the resonance curve folds over there are three orbits, the middle one unstable; amplitudes
+/// from one-term harmonic balance, [(k − ω²)A + ¾k₃A³]² + (cωA)² = F².
+///
+/// # Source
+/// Nayfeh & Mook, *Nonlinear Oscillations* (1979), section 4.1.
+#[test]
+fn the_three_orbits_of_a_folded_resonance_are_found() {
+    let (c, k3, f, omega) = (0.05_f64, 0.05_f64, 0.3_f64, 1.2_f64);
+    let balance = |a: f64| {
+        let elastic = (1.0 - omega * omega) * a + 0.75 * k3 * a.powi(3);
+        elastic.powi(2) + (c * omega * a).powi(2) - f * f
+    };
+    let mut amplitudes = vec![];
+    let grid: Vec<f64> = (1..2000).map(|k| 0.002 * f64::from(k)).collect();
+    for ends in grid.windows(2).filter(|w| balance(w[0]) * balance(w[1]) <= 0.0) {
+        amplitudes.push(0.5 * (ends[0] + ends[1]));
+    }
+    assert_eq!(amplitudes.len(), 3, "{amplitudes:?}");
+    let linear = oscillator(1.0, c, 1.0);
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, k3]).unwrap();
+    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let force = one_period(omega, 200, |t| f * (omega * t).cos());
+    for (k, a) in amplitudes.into_iter().enumerate() {
+        // x = A cos(ωt − φ) with the phase that the balance leaves.
+        let elastic = (1.0 - omega * omega) * a + 0.75 * k3 * a.powi(3);
+        let phase = (c * omega * a).atan2(elastic);
+        let near = released(a * phase.cos(), a * omega * phase.sin());
+        for scheme in [&Newmark::AVERAGE_ACCELERATION as &dyn Scheme, &Houbolt::default()] {
+            let orbit = periodic_orbit(scheme, &system, &force, &near, 0).unwrap();
+            let found = orbit.response().displacement().column(0).amax();
+            assert!((found / a - 1.0).abs() < 0.03, "{}: {found} {a}", scheme.name());
+            let largest = orbit.multipliers()[0];
+            assert_eq!(orbit.is_stable(), k != 1, "{}: {largest}", scheme.name());
+            assert!(k != 1 || (largest.im == 0.0 && largest.re > 1.1), "{largest}");
+        }
+    }
+    // From rest the motion settles on the lower branch.
+    let settled =
+        periodic_orbit(&Newmark::AVERAGE_ACCELERATION, &system, &force, &released(0.0, 0.0), 40);
+    assert!(settled.unwrap().response().displacement().column(0).amax() < 1.0);
+}
+
+#[test]
+fn the_orbit_of_a_linear_system_is_its_periodic_response() {
+    let system = mechid_problems::random_stable(3, 5);
+    let force = force(Sampling::new(0.02, 64).unwrap(), 3);
+    for scheme in schemes() {
+        let scheme = scheme.as_ref();
+        let direct = integrate_periodic(scheme, &system, &force).unwrap();
+        let rest = InitialState::rest(3);
+        let orbit = periodic_orbit(scheme, &system, &force, &rest, 1).unwrap();
+        for (found, truth) in parts(orbit.response()).into_iter().zip(parts(&direct)) {
+            let gap = (found - truth).amax() / truth.amax();
+            assert!(gap < 1e-8, "{}: {gap:e}", scheme.name());
+        }
+    }
+}
+
+#[test]
+fn orbits_that_are_not_isolated_or_not_there_are_refused() {
+    let free = oscillator(1.0, 0.0, 0.0);
+    let scheme = Newmark::AVERAGE_ACCELERATION;
+    let of = |system: &dyn System| {
+        let force = one_period(1.0, 40, f64::cos);
+        periodic_orbit(&scheme, system, &force, &released(0.1, 0.0), 0)
+    };
+    let refused = of(&free);
+    assert!(matches!(refused, Err(IntegrateError::NoPeriodicState { .. })), "{refused:?}");
+    // A constant force that nothing balances.
+    let pushed = ForceFunction::new(vec![0], |_, _, v, g| g[0] = -1.0 + 0.1 * v[0].tanh());
+    let pushed = NonlinearSystem::new(&free).with(pushed).unwrap();
+    let refused = of(&pushed);
+    let none = matches!(
+        refused,
+        Err(IntegrateError::NoOrbit { .. } | IntegrateError::NoPeriodicState { .. })
+    );
+    assert!(none, "{refused:?}");
+}
