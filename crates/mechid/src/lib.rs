@@ -47,6 +47,8 @@ mod book {
     mod estimate {}
     #[doc = include_str!("../../../docs/book/src/theory/force.md")]
     mod force {}
+    #[doc = include_str!("../../../docs/book/src/choose/nonlinear.md")]
+    mod nonlinear {}
 }
 
 pub use mechid_analysis as analysis;
