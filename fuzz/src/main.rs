@@ -1,4 +1,4 @@
-//! A long run: `cargo run --release -p mechid-fuzz -- --cases 10000000`.
+//! A run as long as one likes: `cargo run --release -p mechid-fuzz -- --cases 10000000`.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "it talks to whoever runs it")]
 
 use std::process::ExitCode;

@@ -2,12 +2,12 @@
 
 use mechid_signal::{SignalError, measures};
 
-/// What the samples so far say together.
+/// Running statistics of the samples so far.
 #[derive(Debug, Clone, Copy)]
 pub struct Levels {
     samples: usize,
     sum: f64,
-    /// Of the samples over the peak: squares of large or small values leave the range of numbers.
+    /// Sum of squares of the samples over the peak: squares of large or small values leave the range of numbers.
     squares: f64,
     pub peak: f64,
     pub minimum: f64,

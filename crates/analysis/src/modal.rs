@@ -33,9 +33,9 @@ pub struct ModeRow {
     pub oscillates: bool,
     /// Real and imaginary part, in rad/s.
     pub eigenvalue: [f64; 2],
-    /// In Hz.
+    /// Damped frequency, in Hz.
     pub damped_frequency_hz: Uncertain,
-    /// In Hz.
+    /// Natural frequency, in Hz.
     pub natural_frequency_hz: Uncertain,
     /// Dimensionless.
     pub damping_ratio: Uncertain,

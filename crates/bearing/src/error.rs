@@ -33,7 +33,7 @@ pub enum BearingError {
         told(position[1])
     )]
     SingularFilm {
-        /// Position of the journal along the load and across, in clearances.
+        /// Position of the journal along the load and across over the clearance, a ratio each.
         position: [f64; 2],
     },
     /// The ends of the film did not settle within the iterations allowed.
@@ -49,7 +49,7 @@ pub enum BearingError {
         iterations: usize,
         /// Last change of an end of the film, in rad.
         change: f64,
-        /// Position of the journal along the load and across, in clearances.
+        /// Position of the journal along the load and across over the clearance, a ratio each.
         position: [f64; 2],
     },
     /// No equilibrium was found within the iterations allowed.
@@ -59,11 +59,11 @@ pub enum BearingError {
         sommerfeld = told(*sommerfeld)
     )]
     EquilibriumNotConverged {
-        /// Sommerfeld number asked for.
+        /// Sommerfeld number asked for, dimensionless.
         sommerfeld: f64,
         /// Iterations made.
         iterations: usize,
-        /// Length of the last step of the journal, in clearances.
+        /// Length of the last step of the journal over the clearance, a ratio.
         step: f64,
     },
     /// The covariance of the coefficients is not 8 × 8.

@@ -135,7 +135,8 @@ impl Threshold {
     /// Speed (rad/s) at which a rotor of `mass` (kg) per bearing becomes unstable, at the same load
     /// and Sommerfeld number; `None` if there is no critical mass.
     ///
-    /// At a constant Sommerfeld number k does not depend on speed and ω_w / Ω neither.
+    /// At a constant Sommerfeld number neither k nor ω_w / Ω depends on the speed. The relative
+    /// standard error of this speed is half that of the critical mass.
     ///
     /// # Errors
     /// [`BearingError::Parameter`] if the mass is not positive and finite.

@@ -12,6 +12,7 @@
 //! // The same machine under an unknown force.
 //! let force = mechid::reconstruct(&test, &found.machine()?, &Reconstruct::auto())?;
 //! println!("{force}");
+//! assert!(found.summary().fit.unexplained_motion < Some(0.01));
 //! # Ok::<(), mechid::analysis::AnalysisError>(())
 //! ```
 //!
@@ -22,6 +23,7 @@
 //! |---|---|
 //! | [`signal`] | time axes, records, spectra, multisines and other excitations |
 //! | [`model`] | M, C, K; modes and receptance |
+//! | [`bearing`] | journal bearings from their geometry: film force, coefficients, threshold of instability |
 //! | [`integrate`] | the response by five time-stepping schemes |
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
 //! | [`force`] | the unknown force from response and machine |
@@ -39,6 +41,8 @@ mod book {
     mod readme {}
     #[doc = include_str!("../../../docs/book/src/theory/index.md")]
     mod machine {}
+    #[doc = include_str!("../../../docs/book/src/theory/bearing.md")]
+    mod bearing {}
     #[doc = include_str!("../../../docs/book/src/theory/signal.md")]
     mod signal {}
     #[doc = include_str!("../../../docs/book/src/theory/integrate.md")]
@@ -58,6 +62,7 @@ pub use mechid_analysis::{
     Channels, Detrend, FrfSettings, Identified, Identify, InspectSettings, Machine, Measurement,
     Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify, inspect, reconstruct,
 };
+pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;
 pub use mechid_force as force;
 pub use mechid_integrate as integrate;

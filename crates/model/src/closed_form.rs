@@ -8,7 +8,7 @@ use crate::error::require;
 use crate::{ModelError, Response, Sdof};
 
 impl Sdof {
-    /// Free motion from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s).
+    /// Free response from x(0) = `x0` (m) and ẋ(0) = `v0` (m/s).
     ///
     /// With h the impulse response, x = x0 (ḣ + c/m h) + v0 h: oscillating, critically damped
     /// or creeping, without a seam between them.
@@ -29,7 +29,7 @@ impl Sdof {
         self.respond(sampling, |t| (self.free_motion(t, x0, v0), 0.0))
     }
 
-    /// Motion from `x0`, `v0` under a force switched on at t = 0: F(t) = `force` (N) for t ≥ 0.
+    /// Response from `x0`, `v0` to a force switched on at t = 0: F(t) = `force` (N) for t ≥ 0.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] if `force`, `x0` or `v0` is not finite,
@@ -54,7 +54,7 @@ impl Sdof {
         })
     }
 
-    /// Motion from `x0`, `v0` under F(t) = Re(`force` exp(iωt)), transient included.
+    /// Response from `x0`, `v0` to F(t) = Re(`force` exp(iωt)), transient included.
     ///
     /// A force F cos(ωt + φ) has `force` = F exp(iφ). Resonance needs no exception: without
     /// damping the amplitude grows in proportion to t. The error is of the order of ε
@@ -85,7 +85,7 @@ impl Sdof {
         })
     }
 
-    /// Steady motion under F(t) = Re(`force` exp(iωt)), after the transient has died out:
+    /// Steady-state response to F(t) = Re(`force` exp(iωt)), after the transient has died out:
     /// x = Re(`force` exp(iωt) / (k − ω²m + iωc)).
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl Sdof {
         })
     }
 
-    /// Impulse response h(t) for t ≥ 0, in m/(N·s): the motion after a unit impulse at rest.
+    /// Impulse response h(t) for t ≥ 0, in m/(N·s): the displacement after a unit impulse at rest.
     ///
     /// # Source
     /// Meirovitch (1975), impulse response of a damped single-degree-of-freedom system.
@@ -125,7 +125,7 @@ impl Sdof {
         phi_divided(k, a, b).re * t.powi(k as i32 + 1) / self.mass()
     }
 
-    /// x and ẋ at `t` of the free motion from `x0`, `v0`.
+    /// x and ẋ at `t` of the free response from `x0`, `v0`.
     pub(crate) fn free_motion(&self, t: f64, x0: f64, v0: f64) -> (f64, f64) {
         // Of real roots the first is the fast one: these two sums do not cancel.
         let [fast, slow] = self.poles();

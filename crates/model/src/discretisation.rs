@@ -1,4 +1,4 @@
-//! What is assumed of a force between its samples.
+//! Assumptions on a force between its samples.
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,4 @@
-//! What can be wrong with a model.
+//! Errors of models.
 
 use mechid_signal::{counted, told};
 
@@ -11,11 +11,11 @@ pub enum ModelError {
     /// A matrix is not square or not of the size of the mass matrix.
     #[error("the {matrix} matrix is {rows}×{columns}, expected {dof}×{dof}")]
     Shape {
-        /// Which matrix.
+        /// Matrix concerned.
         matrix: Matrix,
-        /// Its rows.
+        /// Number of its rows.
         rows: usize,
-        /// Its columns.
+        /// Number of its columns.
         columns: usize,
         /// Degrees of freedom expected.
         dof: usize,
@@ -26,7 +26,7 @@ pub enum ModelError {
         value = told(*value)
     )]
     NotFinite {
-        /// Which matrix.
+        /// Matrix concerned.
         matrix: Matrix,
         /// Row, counted from 1.
         row: usize,
@@ -59,25 +59,25 @@ pub enum ModelError {
     Channels {
         /// `"velocity"` or `"acceleration"`.
         quantity: &'static str,
-        /// Channels found.
+        /// Number of channels found.
         got: usize,
-        /// Channels of the displacement.
+        /// Number of channels of the displacement.
         expected: usize,
     },
     /// A scalar parameter is out of range.
     #[error("the {name} must be {requirement}, got {value}", value = told(*value))]
     Parameter {
-        /// What it is called.
+        /// Name of the parameter.
         name: &'static str,
-        /// What it should be.
+        /// Requirement that it does not meet.
         requirement: &'static str,
-        /// What was given, in the unit of the quantity.
+        /// Value given, in the unit of the quantity.
         value: f64,
     },
     /// Displacement and velocity of a state, or a state and a system, do not fit.
     #[error("the state has {} for {}", counted(*got, "entry"), counted(*dof, "degree of freedom"))]
     StateLength {
-        /// Entries found.
+        /// Number of entries found.
         got: usize,
         /// Degrees of freedom expected.
         dof: usize,
@@ -98,7 +98,7 @@ pub enum ModelError {
     /// A force record does not have one channel per degree of freedom.
     #[error("the force has {} for {}", counted(*got, "channel"), counted(*dof, "degree of freedom"))]
     ForceChannels {
-        /// Channels found.
+        /// Number of channels found.
         got: usize,
         /// Degrees of freedom.
         dof: usize,
@@ -130,17 +130,17 @@ pub enum ModelError {
     /// The eigenvalue or singular value iteration of a matrix did not converge.
     #[error("the eigenvalues or singular values of a {rows}×{columns} matrix did not converge")]
     NotConverged {
-        /// Rows of the matrix.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Number of its columns.
         columns: usize,
     },
     /// A matrix that must be square is not.
     #[error("a {rows}×{columns} matrix was given where a square one is needed")]
     NotSquare {
-        /// Rows of the matrix.
+        /// Number of rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Number of its columns.
         columns: usize,
     },
     /// An entry of a matrix to be decomposed is NaN or infinite.
@@ -163,11 +163,11 @@ pub enum ModelError {
     /// A word that names none of the choices.
     #[error("there is no {what} `{name}`: {known}")]
     UnknownName {
-        /// What was to be named.
+        /// Kind of thing to be named.
         what: &'static str,
         /// The word given.
         name: String,
-        /// The words there are.
+        /// Words that are known, separated by commas.
         known: &'static str,
     },
     /// An entry outside M, C and K.
@@ -176,7 +176,7 @@ pub enum ModelError {
         counted(*dof, "degree of freedom")
     )]
     NoSuchEntry {
-        /// Which matrix.
+        /// Matrix concerned.
         matrix: Matrix,
         /// Row, counted from 1.
         row: usize,
@@ -200,21 +200,21 @@ pub enum ModelError {
     /// A covariance has not one row and column per parameter.
     #[error("the covariance is {rows}×{columns} for {}", counted(*parameters, "parameter"))]
     CovarianceShape {
-        /// Its rows.
+        /// Number of its rows.
         rows: usize,
-        /// Its columns.
+        /// Number of its columns.
         columns: usize,
-        /// Parameters named.
+        /// Number of parameters named.
         parameters: usize,
     },
     /// A negative variance, or a covariance that is not finite.
     #[error(
-        "{parameter} has the variance {variance}, or a covariance that is not finite: \
-         leave out parameters that the data do not determine",
+        "{parameter} has the variance {variance} or a covariance that is not finite: \
+         leave out the parameters that the data do not determine",
         variance = told(*variance)
     )]
     Covariance {
-        /// Which parameter.
+        /// Parameter concerned.
         parameter: Parameter,
         /// The variance given, in the squared unit of the parameter.
         variance: f64,
@@ -222,7 +222,7 @@ pub enum ModelError {
     /// The same parameter was named twice.
     #[error("{parameter} is named twice")]
     RepeatedParameter {
-        /// Which parameter.
+        /// Parameter concerned.
         parameter: Parameter,
     },
     /// A text is no nonlinear term, or the term does not belong to the system.
@@ -262,7 +262,7 @@ fn names(dof: usize) -> String {
     }
 }
 
-/// `value` must be finite and satisfy `holds`, or it is named in an error.
+/// Returns an error that names `value` unless it is finite and `holds`.
 pub(crate) fn require(
     name: &'static str,
     value: f64,

@@ -20,7 +20,7 @@ impl SecondOrderSystem {
 
     /// Receptance H(ω) = D(ω)⁻¹, n×n, in m/N: X = H F for amplitudes of exp(iωt).
     ///
-    /// Entry (i, j) is the motion of degree of freedom i under a unit force on j.
+    /// Entry (i, j) is the displacement of degree of freedom i under a unit force on j.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] if ω is not finite,

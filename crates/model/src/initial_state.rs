@@ -1,4 +1,4 @@
-//! Where a motion starts.
+//! Displacement and velocity at the start of a response.
 
 use nalgebra::DVector;
 
@@ -31,7 +31,7 @@ impl InitialState {
         Ok(Self { displacement, velocity })
     }
 
-    /// Rest at the origin.
+    /// State of rest at the origin.
     pub fn rest(dof: usize) -> Self {
         Self { displacement: DVector::zeros(dof), velocity: DVector::zeros(dof) }
     }
@@ -51,10 +51,10 @@ impl InitialState {
         self.displacement.len()
     }
 
-    /// That the state fits a system of `dof` degrees of freedom.
+    /// Checks that the state fits a system of `dof` degrees of freedom.
     ///
     /// # Errors
-    /// [`ModelError::StateLength`] otherwise.
+    /// [`ModelError::StateLength`] if it does not.
     pub fn check_dof(&self, dof: usize) -> Result<(), ModelError> {
         let got = self.dof();
         if got == dof { Ok(()) } else { Err(ModelError::StateLength { got, dof }) }

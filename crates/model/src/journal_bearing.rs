@@ -1,11 +1,11 @@
-//! A rigid shaft in a hydrodynamic bearing, moving in two directions.
+//! A rigid shaft in a hydrodynamic bearing, with two degrees of freedom.
 
 use nalgebra::{DMatrix, dmatrix};
 
 use crate::error::require;
 use crate::{ModelError, SecondOrderSystem};
 
-/// How the coefficient Kyx enters the equation of the y direction.
+/// Sign of the coefficient Kyx in the equation of the y direction.
 ///
 /// Sources differ, and so do the eigenvalues: there is no default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -126,7 +126,7 @@ impl JournalBearing {
         self.film
     }
 
-    /// How Kyx enters.
+    /// Sign of Kyx.
     pub fn kyx_sign(&self) -> KyxSign {
         self.kyx_sign
     }

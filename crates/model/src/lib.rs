@@ -1,4 +1,4 @@
-//! Mechanical systems M ẍ + C ẋ + K x = F and what is known of them in closed form.
+//! Mechanical systems M ẍ + C ẋ + K x = F, linear or with nonlinear terms, and their closed forms.
 //!
 //! ```
 //! use mechid_model::{JournalBearing, KyxSign, OilFilm};
@@ -27,7 +27,7 @@
 //! | a system of many degrees of freedom | [`SparseSystem`] |
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
-//! | an exact motion of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
+//! | an exact response of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
 //! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
 //! | singular values, a matrix exponential | [`linear_algebra`] |

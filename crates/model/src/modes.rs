@@ -10,7 +10,7 @@ use crate::{ModelError, RealSchur, SecondOrderSystem};
 /// about √ε, what rounding makes of a defective pair.
 const REPEATED: f64 = 1e-7;
 
-/// A free motion x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
+/// A mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
 ///
 /// # Source
 /// Meirovitch (1975); Dissertation, Appendix E.
@@ -54,7 +54,7 @@ impl Mode {
         }
     }
 
-    /// Whether the eigenvalue has an imaginary part.
+    /// Returns whether the eigenvalue has an imaginary part.
     pub fn oscillates(&self) -> bool {
         self.eigenvalue.im > 0.0
     }

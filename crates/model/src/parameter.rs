@@ -1,4 +1,4 @@
-//! One entry of M, C or K, by its place and by its name.
+//! Entries of M, C and K, by place and by name.
 
 use std::fmt;
 

@@ -116,7 +116,7 @@ fn first_of_unreduced(h: &mut DMatrix<f64>, last: usize, norm: f64) -> usize {
 /// One double-shift step on rows and columns `start..=last`.
 fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, count: usize) {
     let (x, y, w) = if count.is_multiple_of(10) {
-        // An exceptional shift, of the size of the entries that refuse to vanish.
+        // An exceptional shift, of the size of the entries that do not converge.
         let size = h[(last, last - 1)].abs() + h[(last - 1, last - 2)].abs();
         (0.75 * size, 0.75 * size, -0.4375 * size * size)
     } else {
@@ -145,7 +145,7 @@ fn sweep(h: &mut DMatrix<f64>, q: &mut DMatrix<f64>, start: usize, last: usize, 
         reflect_columns(h, axis, k, width, (k + 4).min(last + 1));
         reflect_columns(q, axis, k, width, q.nrows());
         if k > start {
-            // What the reflection was made to clear, exactly.
+            // The entries that the reflection clears are exactly zero.
             h.view_mut((k + 1, k - 1), (width - 1, 1)).fill(0.0);
         }
     }

@@ -4,7 +4,7 @@ use mechid_signal::{Record, Sampling};
 
 use crate::{ModelError, ResponseQuantity};
 
-/// The motion of a system: three records on one time axis, one channel per degree of freedom.
+/// Response of a system: three records on one time axis, one channel per degree of freedom.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Response {
     displacement: Record,
@@ -48,7 +48,7 @@ impl Response {
         &self.acceleration
     }
 
-    /// One of the three, by name, in m, m/s or m/s²: samples × degrees of freedom.
+    /// Record of one quantity, in m, m/s or m/s²: samples × degrees of freedom.
     pub fn quantity(&self, which: ResponseQuantity) -> &Record {
         match which {
             ResponseQuantity::Displacement => &self.displacement,

@@ -1,4 +1,4 @@
-//! The quantity that a response was measured as.
+//! Displacement, velocity or acceleration.
 
 use std::fmt;
 use std::str::FromStr;

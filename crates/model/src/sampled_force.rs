@@ -5,7 +5,7 @@ use mechid_signal::Record;
 use crate::closed_form::{require_start, to_response};
 use crate::{ModelError, Response, Sdof};
 
-/// The exact motion over one step under a force that is straight within it:
+/// Exact response over one step to a force that is linear within it:
 ///
 /// ```text
 /// ┌ x ┐      ┌ x ┐     ┌ g₁ ┐       ┌ g₂ ┐
@@ -56,7 +56,7 @@ impl Sdof {
     /// # Errors
     /// [`ModelError::ForceChannels`] if the force has not one channel,
     /// [`ModelError::Parameter`] if `x0` or `v0` is not finite,
-    /// [`ModelError::Signal`] if an unstable motion overflows.
+    /// [`ModelError::Signal`] if an unstable response overflows.
     ///
     /// # Source
     /// Nigam & Jennings (1969), Bull. Seismological Society of America 59(2), 909–922, with the force
@@ -70,7 +70,7 @@ impl Sdof {
         self.sampled(force, x0, v0, |left, _| left)
     }
 
-    /// Response from `x0` (m), `v0` (m/s) to a force (N, one channel) on straight lines
+    /// Response from `x0` (m), `v0` (m/s) to a force (N, one channel) linear
     /// between samples.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ impl Sdof {
         self.sampled(force, x0, v0, |_, right| right)
     }
 
-    /// `end` tells from the values on the left and right what the force reaches within a step.
+    /// `end` gives the value of the force at the end of a step from its samples on the left and right.
     fn sampled(
         &self,
         force: &Record,

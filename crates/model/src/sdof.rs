@@ -80,7 +80,7 @@ impl Sdof {
         (self.stiffness / self.mass).sqrt()
     }
 
-    /// Damping that separates oscillating from creeping motion, 2√(k m), in N·s/m.
+    /// Critical damping 2√(k m), in N·s/m.
     pub fn critical_damping(&self) -> f64 {
         2.0 * (self.stiffness * self.mass).sqrt()
     }
@@ -90,7 +90,7 @@ impl Sdof {
         self.damping / self.critical_damping()
     }
 
-    /// Damped natural frequency ωn √(1 − ζ²), in rad/s; 0 when the motion does not oscillate.
+    /// Damped natural frequency ωn √(1 − ζ²), in rad/s; 0 if the free response does not oscillate.
     pub fn damped_frequency(&self) -> f64 {
         self.poles()[0].im
     }

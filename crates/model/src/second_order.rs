@@ -1,4 +1,4 @@
-//! The system every room computes with: M ẍ + C ẋ + K x = F.
+//! Linear systems M ẍ + C ẋ + K x = F.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 use crate::ModelError;
 use crate::linear_algebra::singular_values;
 
-/// Which of the three matrices of a [`SecondOrderSystem`].
+/// One of the three matrices of a [`SecondOrderSystem`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -99,7 +99,7 @@ impl SecondOrderSystem {
         {
             check(matrix, entries, dof)?;
         }
-        // Others factor M by LU: what passes here must not meet a vanishing pivot there.
+        // Solvers factor M by LU: a matrix that passes here must not have a vanishing pivot there.
         let factored = mass.clone().lu();
         let reciprocal_condition = reciprocal_condition(&mass, &factored);
         let invertible = factored.is_invertible();
@@ -129,7 +129,7 @@ impl SecondOrderSystem {
         &self.stiffness
     }
 
-    /// One of the three, by name, n×n, in kg, N·s/m or N/m.
+    /// One of the three matrices, n×n, in kg, N·s/m or N/m.
     pub fn matrix(&self, which: Matrix) -> &DMatrix<f64> {
         match which {
             Matrix::Mass => &self.mass,

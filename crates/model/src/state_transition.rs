@@ -34,7 +34,7 @@ use crate::{ModelError, SecondOrderSystem};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct StateTransition {
-    /// Φ, 2n×2n, a pure number.
+    /// Φ, 2n × 2n, a pure number.
     pub state: DMatrix<f64>,
     /// Γ₀, 2n × inputs, in m per unit of the input: effect of an input held over the step at its
     /// value at the start.
@@ -116,7 +116,10 @@ impl StateTransition {
         rate
     }
 
-    /// Input matrix B = Δt² M⁻¹, n×n, in m/N: the input is the force.
+    /// Returns the input matrix B = Δt² M⁻¹, n × n, in m/N: the input is the force.
+    ///
+    /// # Source
+    /// The state z = [x; Δt ẋ] of M ẍ + C ẋ + K x = F.
     pub fn force_input(system: &SecondOrderSystem, dt: f64) -> DMatrix<f64> {
         let unit = DMatrix::identity(system.dof(), system.dof());
         let solved = system.mass().clone().lu().solve(&unit);

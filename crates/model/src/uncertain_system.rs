@@ -1,4 +1,4 @@
-//! A system whose entries are known with an uncertainty.
+//! Systems whose entries are uncertain.
 
 use nalgebra::DMatrix;
 
@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_cannot_be_a_covariance_is_refused() {
+    fn invalid_covariances_are_refused() {
         let system = SecondOrderSystem::new(dmatrix![2.0], dmatrix![3.0], dmatrix![8.0]).unwrap();
         let k = Parameter::named("k", 1).unwrap();
         let of = |parameters: &[Parameter], covariance| {

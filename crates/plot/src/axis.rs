@@ -1,4 +1,4 @@
-//! Axes: what they show, in which unit, how they are divided.
+//! Axes: quantity, unit, scale and range.
 
 /// Division of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -51,8 +51,8 @@ impl Axis {
         Axis { scale: Scale::Log10, ..Axis::linear(label, unit) }
     }
 
-    /// Shows `low` to `high`, in the unit of the axis, instead of all points; what lies outside is
-    /// cut off.
+    /// Shows `low` to `high`, in the unit of the axis, instead of all points; points outside are
+    /// not drawn.
     #[must_use]
     pub fn range(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
@@ -87,7 +87,7 @@ pub(crate) struct Mapping {
 }
 
 impl Mapping {
-    /// `low` falls on `pixels.0` and `high` on `pixels.1`.
+    /// Mapping of `low` to `pixels.0` and of `high` to `pixels.1`.
     pub(crate) fn new(scale: Scale, (low, high): (f64, f64), pixels: (f64, f64)) -> Self {
         let origin = scale.forward(low);
         let slope = (pixels.1 - pixels.0) / (scale.forward(high) - origin);

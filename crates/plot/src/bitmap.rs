@@ -1,4 +1,4 @@
-//! From SVG to PNG with the embedded font.
+//! Rendering of SVG to PNG with the embedded font.
 
 use std::sync::{Arc, LazyLock};
 

@@ -26,7 +26,7 @@ impl Stroke {
     }
 }
 
-/// Which end of a text lies at its point.
+/// Part of a text that lies at its point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Anchor {
     /// The text starts there.
@@ -38,7 +38,7 @@ pub enum Anchor {
     End,
 }
 
-/// How a text looks.
+/// Look of a text.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TextStyle {
     /// Font size, px.
@@ -49,7 +49,7 @@ pub struct TextStyle {
     pub italic: bool,
     /// Colour.
     pub color: Color,
-    /// Which end lies at the point.
+    /// Part of the text that lies at the point.
     pub anchor: Anchor,
     /// Turned a quarter to the left, to be read from the right.
     pub vertical: bool,
@@ -68,25 +68,25 @@ impl TextStyle {
         }
     }
 
-    /// The same with another anchor.
+    /// Returns the style with another anchor.
     pub const fn anchored(mut self, anchor: Anchor) -> Self {
         self.anchor = anchor;
         self
     }
 
-    /// The same in another colour.
+    /// Returns the style in another colour.
     pub const fn colored(mut self, color: Color) -> Self {
         self.color = color;
         self
     }
 
-    /// The same in bold.
+    /// Returns the style in bold.
     pub const fn bold(mut self) -> Self {
         self.weight = Weight::Bold;
         self
     }
 
-    /// The same in italics.
+    /// Returns the style in italics.
     pub const fn italic(mut self) -> Self {
         self.italic = true;
         self
@@ -112,7 +112,7 @@ pub struct Canvas {
     height: f64,
     body: String,
     clips: usize,
-    /// What the ids of this document begin with.
+    /// Prefix of the ids in this document.
     ids: String,
 }
 
@@ -124,7 +124,7 @@ impl Canvas {
         sheet
     }
 
-    /// The same sheet with ids that begin with `ids` (letters, digits, `-`, `_`; others become `-`),
+    /// Returns the sheet with ids that begin with `ids` (letters, digits, `-`, `_`; others become `-`),
     /// to stand in one document with other sheets.
     #[must_use]
     pub fn with_ids(mut self, ids: &str) -> Self {
@@ -232,7 +232,7 @@ impl Canvas {
         let _ = writeln!(self.body, r#"<g opacity="{}">"#, num(opacity));
     }
 
-    /// Opens a group of which only the part inside a rectangle shows.
+    /// Opens a group that is clipped to a rectangle.
     pub fn open_clip(&mut self, corner: Point, size: Point) {
         let id = format!("{}clip{}", self.ids, self.clips);
         self.clips += 1;
@@ -248,7 +248,7 @@ impl Canvas {
         self.body.push_str("</g>\n");
     }
 
-    /// The document, with a title for readers who do not see it.
+    /// Returns the document, with a title for readers who do not see it.
     pub fn finish(self, title: &str) -> String {
         let (w, h) = (num(self.width), num(self.height));
         format!(
@@ -313,14 +313,14 @@ fn spans(text: &str, size: f64) -> String {
     out
 }
 
-/// A coordinate with at most two decimals: a hundredth of a pixel is finer than any print.
+/// A coordinate with at most two decimals: a hundredth of a pixel is finer than print resolves.
 fn num(value: f64) -> String {
     let rounded = (value * 100.0).round() / 100.0;
     // Adding zero turns −0 into 0, which Display would write as "-0".
     format!("{}", rounded + 0.0)
 }
 
-/// The text without its marks, for titles that know no runs.
+/// The text without its marks, for titles, which have no raised or lowered runs.
 fn unmarked(text: &str) -> String {
     runs(text).into_iter().map(|(_, run)| run).collect()
 }

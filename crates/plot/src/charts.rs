@@ -1,4 +1,4 @@
-//! The figures this project draws most often.
+//! Figures that are drawn often: records with spectra, Bode plots, sweeps, stability.
 
 use crate::axis::Axis;
 use crate::curve::{Curve, Reference};
@@ -41,7 +41,7 @@ impl<'a> Series<'a> {
         Series { name, x, y, slot: None }
     }
 
-    /// The same with the look of number `slot` of the cycle, wherever it stands.
+    /// Returns the series with the look of number `slot` of the cycle, wherever it stands.
     #[must_use]
     pub const fn slot(mut self, slot: usize) -> Self {
         self.slot = Some(slot);
@@ -69,9 +69,9 @@ pub fn time_and_spectrum(
 pub struct FrequencyResponse<'a> {
     /// Legend label.
     pub name: &'a str,
-    /// Frequencies, one for each point, in the unit the chart is told; positive.
+    /// Frequencies, one for each point, in the unit of the axis; positive.
     pub frequency: &'a [f64],
-    /// Magnitudes, one for each point, in the unit the chart is told; positive.
+    /// Magnitudes, one for each point, in the unit of the axis; positive.
     pub magnitude: &'a [f64],
     /// Phases, degrees.
     pub phase_deg: &'a [f64],
@@ -90,7 +90,7 @@ pub fn bode(
     let mut above = Panel::new(frequency.clone(), Axis::log10(magnitude.name, magnitude.unit));
     let mut below = Panel::new(frequency, Axis::linear("Phase", "°").step(45.0));
     for (slot, response) in measured.iter().enumerate() {
-        // One measurement is the reference everything is held against: black.
+        // A single measurement is the reference for all fits and is drawn in a neutral colour.
         let color =
             if measured.len() == 1 { Color::GREY } else { Color::CYCLE[slot % Color::CYCLE.len()] };
         let points = |label: &str, y: &[f64]| {
@@ -136,7 +136,7 @@ pub fn sweep_panel(
     }
 }
 
-/// A figure of one [`sweep_panel`], in the units of its axes.
+/// Figure of one [`sweep_panel`], in the units of its axes.
 pub fn sweep(
     title: &str,
     setting: Axis,
@@ -159,7 +159,7 @@ pub fn stability(title: &str, schemes: &[Series<'_>]) -> Figure {
     for scheme in schemes {
         panel = panel.curve(Curve::line(scheme.name, scheme.x, scheme.y));
     }
-    // An unstable scheme leaves the chart through its roof; what happens below the limit is what is compared.
+    // Clip unstable schemes; only ρ ≤ 1 is compared.
     panel.y = panel.y.range(0.0, 1.6);
     Figure::new(title).panel(panel)
 }

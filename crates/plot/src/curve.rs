@@ -2,7 +2,7 @@
 
 use crate::style::{Color, Dash, Marker, Style};
 
-/// How the points of a curve are drawn.
+/// Way in which the points of a curve are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Kind {
     Line,
@@ -14,7 +14,7 @@ pub(crate) enum Kind {
 
 /// One set of points with its look and its legend label.
 ///
-/// What is not said of the look follows the place of the curve in its panel:
+/// Parts of the look that are not set follow the place of the curve in its panel:
 /// the k-th curve has the k-th colour, dash and marker of the cycle.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
@@ -186,12 +186,12 @@ impl Reference {
         &self.label
     }
 
-    /// Where the line lies, in the unit of its axis.
+    /// Position of the line, in the unit of its axis.
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// Whether the line runs across at one ordinate, not up at one abscissa.
+    /// Returns whether the line is horizontal, at one ordinate, rather than vertical, at one abscissa.
     pub fn is_horizontal(&self) -> bool {
         self.horizontal
     }

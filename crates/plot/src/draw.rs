@@ -1,4 +1,4 @@
-//! Puts a laid-out figure on a sheet.
+//! Draws a laid-out figure on a sheet.
 
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Curve, Kind};
@@ -10,7 +10,7 @@ use crate::panel::Panel;
 use crate::style::{Color, LABEL_SIZE, PANEL_TITLE_SIZE, Resolved, TICK_SIZE, TITLE_SIZE};
 use crate::trace;
 
-/// Part of the font size from the baseline to the middle of a digit.
+/// Height of the middle of a digit above the baseline, as a fraction of the font size.
 const MIDDLE: f64 = 0.36;
 
 const GRID: Stroke = Stroke::solid(Color("#e0e0e0"), 0.8);
@@ -137,7 +137,7 @@ fn draw_stems(
 ) {
     let base = trace::stem_base(layout.maps, panel.y.scale, layout.y_range);
     let stems = trace::thin_stems(points, base);
-    // Hundreds of stems would run into one block.
+    // Hundreds of wide stems would merge into one block.
     let width = (layout.size.0 / stems.len() as f64 * 0.5).clamp(0.5, 1.3);
     for (x, y) in stems {
         sheet.line((x, base), (x, y), Stroke::solid(color, width));

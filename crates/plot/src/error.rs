@@ -1,8 +1,8 @@
-//! What can be wrong with a figure.
+//! Errors of figures.
 
 use std::path::PathBuf;
 
-/// Why a figure was not drawn.
+/// Reason for which a figure was not drawn.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlotError {
@@ -43,7 +43,7 @@ pub enum PlotError {
     NonFinite {
         /// Legend label of the curve.
         curve: String,
-        /// Which coordinate: `x` or `y`.
+        /// Coordinate concerned: `x` or `y`.
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
@@ -52,12 +52,12 @@ pub enum PlotError {
     },
     /// A logarithmic axis cannot show zero or a negative number.
     #[error(
-        "the curve \"{curve}\" has the {coordinate} coordinate {value} at point {index}, which a logarithmic axis cannot show"
+        "the curve \"{curve}\" has the {coordinate} coordinate {value} at point {index}, which a logarithmic axis cannot show: leave such points out or choose a linear axis"
     )]
     NotPositive {
         /// Legend label of the curve.
         curve: String,
-        /// Which coordinate: `x` or `y`.
+        /// Coordinate concerned: `x` or `y`.
         coordinate: char,
         /// Index of the point, from 0.
         index: usize,
@@ -84,20 +84,22 @@ pub enum PlotError {
     },
     /// The figure is too small for its axes and legends, or not of a finite size.
     #[error(
-        "{width} × {height} px is no size to draw in; the labels alone need {needed_width:.0} × {needed_height:.0} px"
+        "{width} × {height} px is too small or not finite; the labels alone need {needed_width:.0} × {needed_height:.0} px: choose a larger size"
     )]
     Size {
         /// Width of the figure, px.
         width: f64,
         /// Height of the figure, px.
         height: f64,
-        /// Least width, px.
+        /// Minimum width, px.
         needed_width: f64,
-        /// Least height, px.
+        /// Minimum height, px.
         needed_height: f64,
     },
     /// The bitmap asked for is empty or larger than 16,384 pixels a side.
-    #[error("a bitmap of {width} × {height} pixels cannot be made; from 1 to {limit} a side can")]
+    #[error(
+        "a bitmap of {width} × {height} pixels cannot be made: choose a scale that gives 1 to {limit} pixels a side"
+    )]
     BitmapSize {
         /// Width asked for, pixels.
         width: f64,
@@ -109,11 +111,11 @@ pub enum PlotError {
     /// The rasteriser refused a drawing.
     #[error("the drawing cannot be turned into a bitmap: {reason}")]
     Raster {
-        /// What the rasteriser says.
+        /// Message of the rasteriser.
         reason: String,
     },
     /// A file name that ends neither in `.svg` nor in `.png`.
-    #[error("{}: figures are saved as .svg or .png", path.display())]
+    #[error("{}: the file name must end in .svg or .png", path.display())]
     Extension {
         /// The file name.
         path: PathBuf,
@@ -123,7 +125,7 @@ pub enum PlotError {
     Write {
         /// The file name.
         path: PathBuf,
-        /// Why not.
+        /// Reason given by the file system.
         source: std::io::Error,
     },
 }

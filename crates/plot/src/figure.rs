@@ -35,7 +35,7 @@ impl Figure {
         self
     }
 
-    /// Stands the panels in this many columns instead of one.
+    /// Arranges the panels in this many columns instead of one.
     #[must_use]
     pub fn columns(mut self, columns: usize) -> Self {
         self.columns = columns.max(1);
@@ -50,7 +50,7 @@ impl Figure {
         self
     }
 
-    /// One legend above all panels instead of one in each.
+    /// Puts one legend above all panels instead of one in each.
     /// It shows each label once, with the look it has where it first occurs.
     #[must_use]
     pub fn shared_legend(mut self) -> Self {
@@ -58,7 +58,7 @@ impl Figure {
         self
     }
 
-    /// Makes the whole figure this large, px, instead of what suits its panels.
+    /// Makes the whole figure this large, px, instead of the size that suits its panels.
     #[must_use]
     pub fn size(mut self, width: f64, height: f64) -> Self {
         self.size = Some((width, height));

@@ -1,4 +1,4 @@
-//! Where everything in a figure stands.
+//! Positions of everything in a figure.
 
 use crate::axis::{Mapping, TINY};
 use crate::canvas::Point;
@@ -11,7 +11,7 @@ use crate::text::{Weight, text_width};
 use crate::ticks::{Ticks, ticks};
 use crate::trace::{self, Mappings, Segment};
 
-/// Pixels in the width or height of a figure, at most: more overflow on a short axis.
+/// Largest width or height of a figure, px: more would overflow on a short axis.
 const LARGEST: f64 = 1e9;
 
 /// Length of a tick and the distance of its label.
@@ -23,10 +23,10 @@ const PANEL_TITLE: f64 = 21.0;
 const FACTOR: f64 = 15.0;
 const CAPTION: f64 = LABEL_SIZE + 9.0;
 const BETWEEN: f64 = 16.0;
-/// Least frame a panel can be read in.
+/// Smallest readable frame of a panel.
 const LEAST_FRAME: Point = (60.0, 40.0);
 
-/// Where the legend of one panel stands.
+/// Position of the legend of one panel.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Place {
     Nowhere,
@@ -43,9 +43,9 @@ pub(crate) struct PanelLayout {
     pub(crate) y_range: (f64, f64),
     pub(crate) x_ticks: Ticks,
     pub(crate) y_ticks: Ticks,
-    /// Whether ticks and caption of the abscissa are written under this panel.
+    /// True if ticks and caption of the abscissa are written under this panel.
     pub(crate) labels_x: bool,
-    /// Whether the panel's title is written above it.
+    /// True if the title of the panel is written above it.
     pub(crate) titled: bool,
     /// Centre line of the ordinate's caption.
     pub(crate) y_caption: f64,
@@ -53,7 +53,7 @@ pub(crate) struct PanelLayout {
     pub(crate) place: Place,
 }
 
-/// A figure with all its places.
+/// A figure with all its positions.
 #[derive(Debug, Clone)]
 pub(crate) struct Layout {
     pub(crate) size: Point,
@@ -127,12 +127,12 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// Whether the abscissa of a panel is labelled: always, or only under the lowest of its column.
+    /// Returns whether the abscissa of a panel is labelled: with shared abscissae only the lowest of a column.
     fn labels_x(&self, index: usize) -> bool {
         !self.figure.share_x || index + self.columns >= self.figure.panels.len()
     }
 
-    /// Whether a panel's title is written: a title that repeats the one of the panel above is not.
+    /// Returns whether the title of a panel is written: not if it repeats the title of the panel above.
     fn titled(&self, index: usize) -> bool {
         let title = |index: usize| &self.figure.panels[index].title;
         let repeated = self.figure.share_x
@@ -353,7 +353,7 @@ fn x_ticks(panel: &Panel, (low, high): (f64, f64), width: f64) -> Ticks {
     }
 }
 
-/// Everything a legend must not hide.
+/// Lines and points that a legend must not hide.
 fn footprint(
     panel: &Panel,
     maps: Mappings,

@@ -1,4 +1,4 @@
-//! Legends: what stands in them and where they hide nothing.
+//! Legends: their entries, and places where they hide no curve.
 
 use crate::canvas::{Anchor, Canvas, Point, Stroke, TextStyle};
 use crate::curve::{Kind, Reference};
@@ -17,7 +17,7 @@ const BETWEEN: f64 = 20.0;
 const PADDING: f64 = 7.0;
 const TEXT: f64 = LABEL_SIZE - 1.0;
 
-/// What an entry shows beside its label.
+/// Sample that an entry shows beside its label.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Sample {
     Curve(Kind, Resolved),
@@ -96,7 +96,7 @@ pub(crate) fn box_size(entries: &[Entry]) -> Point {
     (indent(entries) + widest + 2.0 * PADDING, ROW * entries.len() as f64 + 2.0 * PADDING - 4.0)
 }
 
-/// The corner, inside the frame from `corner` of `size`, at which a box of `legend` hides none of `drawn`.
+/// The corner, inside the frame from `corner` of `size`, at which a box of size `legend` hides none of `drawn`; `None` if there is none.
 pub(crate) fn free_place(
     corner: Point,
     size: Point,

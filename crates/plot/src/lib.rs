@@ -1,6 +1,6 @@
 //! Drawings of records, spectra, frequency responses and sweeps, as SVG and PNG.
 //!
-//! A [`Figure`] describes what is to be seen: panels, axes with units, curves, reference lines.
+//! A [`Figure`] is a description: panels, axes with units, curves, reference lines.
 //! Drawing it is a pure function: the same description gives the same bytes on every machine,
 //! because widths come from the metrics of an embedded font (Noto Sans, SIL Open Font License) and no font of the system is looked up.
 //!
@@ -25,14 +25,14 @@
 //! # Ok::<(), mechid_plot::PlotError>(())
 //! ```
 //!
-//! [`charts`] holds the figures drawn most often; [`Canvas`] is the sheet beneath, for sketches that are no plots.
+//! [`charts`] holds the figures drawn most often; [`Canvas`] is the sheet beneath, for sketches other than plots.
 //!
-//! Text is shaped and bitmaps are made by `resvg`. The axes are our own: of the plotting crates looked at,
-//! none lined up the frames of stacked panels, kept legends off the curves and wrote exponents at once.
+//! Text is shaped and bitmaps are made by `resvg`. The axes are our own: no plotting crate was found that
+//! aligns the frames of stacked panels, keeps legends off the curves and writes exponents.
 //!
-//! What the reader of a figure may count on: a palette for colour-blind readers with a dash and a marker for each colour,
+//! Every figure has a palette for colour-blind readers with a dash and a marker for each colour,
 //! legends that hide no curve, the same look for the same method in every figure, ticks at round numbers,
-//! and axes of stacked panels that line up.
+//! and aligned axes of stacked panels.
 
 mod axis;
 mod bitmap;

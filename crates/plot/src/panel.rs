@@ -1,17 +1,17 @@
-//! Panels: a pair of axes with what is drawn in them.
+//! Panels: a pair of axes with curves and reference lines.
 
 use crate::axis::{Axis, Scale, padded};
 use crate::curve::{Curve, Kind, Reference};
 use crate::error::PlotError;
 use crate::style::Resolved;
 
-/// Where the legend of a panel stands.
+/// Place of the legend of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Legend {
     /// Inside where it hides nothing; above the panel if there is no such place.
     #[default]
     Auto,
-    /// Above the panel.
+    /// Outside, above the panel.
     Above,
     /// Nowhere.
     Hidden,
@@ -116,7 +116,7 @@ impl Panel {
         let slot = |curve: &Curve| {
             curve.slot.unwrap_or_else(|| {
                 let own = next;
-                // A band takes the look of the line that follows it.
+                // A band has the look of the line that follows it.
                 next += usize::from(curve.kind != Kind::Band);
                 own
             })

@@ -1,4 +1,4 @@
-//! From the description of a figure to documents and files.
+//! Rendering of figures to documents and files.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::layout::Layout;
 use crate::save;
 
 impl Figure {
-    /// The figure as an SVG document.
+    /// Returns the figure as an SVG document.
     ///
     /// # Errors
     /// A panel or a curve without points, coordinates an axis cannot show, or a size without room to draw in.
@@ -19,7 +19,7 @@ impl Figure {
         self.svg("", &self.title)
     }
 
-    /// The figure as an SVG element to stand in an HTML document beside others: its ids begin with `ids`,
+    /// Returns the figure as an SVG element for an HTML document beside others: its ids begin with `ids`,
     /// different for each, and `label` is its name for readers who do not see it.
     ///
     /// # Errors
@@ -36,7 +36,7 @@ impl Figure {
         Ok(sheet.finish(label))
     }
 
-    /// The figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.
+    /// Returns the figure as a PNG file with `scale` pixels for each px of the drawing; 2 suits screens and slides, 4 print.
     ///
     /// # Errors
     /// As [`Figure::to_svg`], and a scale that leads to an empty or an overlarge bitmap.
@@ -44,14 +44,15 @@ impl Figure {
         bitmap::svg_to_png(&self.to_svg()?, scale)
     }
 
-    /// Saves the figure as SVG or, at two pixels per px, as PNG, as the ending of `path` says.
+    /// Saves the figure as SVG or, at two pixels per px, as PNG, by the extension of `path`.
     ///
-    /// The file appears whole or not at all: it is written beside its place and then renamed.
+    /// The file is written completely or not at all: a temporary file beside it is renamed.
     ///
     /// # Errors
-    /// As [`Figure::to_svg`], another ending than `.svg` or `.png`, and what the file system refuses.
+    /// As [`Figure::to_svg`]; [`PlotError::Extension`] unless the extension is `.svg` or `.png`,
+    /// [`PlotError::Write`] if the file cannot be written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), PlotError> {
-        // The ending is judged before the work of drawing.
+        // Check the extension before drawing.
         let format = save::Format::of(path.as_ref())?;
         save::write(path.as_ref(), format, &self.to_svg()?)
     }

@@ -1,4 +1,4 @@
-//! Files that appear whole or not at all.
+//! Files that are written completely or not at all.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::error::PlotError;
 /// Pixels of a saved bitmap for each px of the drawing.
 const SAVED_SCALE: f64 = 2.0;
 
-/// What a file name asks for.
+/// File format, chosen by the extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Format {
     Svg,
@@ -27,10 +27,11 @@ impl Format {
     }
 }
 
-/// Saves an SVG document as it is or, at two pixels per px, as PNG, as the ending of `path` says.
+/// Saves an SVG document as it is or, at two pixels per px, as PNG, by the extension of `path`.
 ///
 /// # Errors
-/// Another ending than `.svg` or `.png`, a document that is not SVG, and what the file system refuses.
+/// [`PlotError::Extension`] unless the extension is `.svg` or `.png`, [`PlotError::Raster`] for a
+/// document that is not SVG, [`PlotError::Write`] if the file cannot be written.
 pub fn save_svg(path: impl AsRef<Path>, svg: &str) -> Result<(), PlotError> {
     write(path.as_ref(), Format::of(path.as_ref())?, svg)
 }
@@ -43,7 +44,7 @@ pub(crate) fn write(path: &Path, format: Format, svg: &str) -> Result<(), PlotEr
     replace(path, &bytes).map_err(|source| PlotError::Write { path: path.to_owned(), source })
 }
 
-/// Writes beside the target and renames, so that no reader meets half a file.
+/// Writes a temporary file beside the target and renames it, so that no reader sees an incomplete file.
 fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -1,4 +1,4 @@
-//! Colours, dashes and markers that stay apart for colour-blind readers and in grey print.
+//! Colours, dashes and markers that colour-blind readers and grey print can distinguish.
 
 /// Font size of captions and legends, px.
 pub(crate) const LABEL_SIZE: f64 = 13.0;
@@ -30,12 +30,12 @@ impl Color {
     pub const BLACK: Color = Color("#000000");
     /// Dark grey: frames and tick labels.
     pub const DARK: Color = Color("#333333");
-    /// Middle grey: what stays in the background.
+    /// Middle grey: the background.
     pub const GREY: Color = Color("#808080");
     /// White: the paper.
     pub const WHITE: Color = Color("#ffffff");
 
-    /// Curve colours in the order they are handed out. The palette's yellow is left out: it vanishes on white paper.
+    /// Curve colours in the order of the curves of a panel. The palette's yellow is left out: it vanishes on white paper.
     ///
     /// # Source
     /// M. Okabe and K. Ito, *Color Universal Design* (2008).
@@ -106,7 +106,7 @@ impl Marker {
     ];
 }
 
-/// How one curve looks: what is left `None` follows the curve's place in its panel.
+/// Look of one curve: parts that are `None` follow the place of the curve in its panel.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Style {
     pub(crate) color: Option<Color>,
@@ -115,7 +115,7 @@ pub(crate) struct Style {
     pub(crate) width: Option<f64>,
 }
 
-/// A style with nothing left open.
+/// A style with every part set.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Resolved {
     pub(crate) color: Color,
@@ -125,7 +125,7 @@ pub(crate) struct Resolved {
 }
 
 impl Style {
-    /// The style of the curve handed out as number `slot`.
+    /// Style of curve number `slot` of a panel.
     pub(crate) fn resolve(self, slot: usize) -> Resolved {
         Resolved {
             color: self.color.unwrap_or(Color::CYCLE[slot % Color::CYCLE.len()]),

@@ -15,8 +15,8 @@ pub enum Weight {
     Bold,
 }
 
-/// Family names offered to a viewer: the embedded font first, then near relations, then any sans serif.
-/// [`Canvas::text`](crate::Canvas::text) states each text's length, so another font changes letters but no layout.
+/// Family names offered to a viewer: the embedded font first, then similar fonts, then any sans serif.
+/// [`Canvas::text`](crate::Canvas::text) states each text's length, so another font changes the letters and not the layout.
 pub(crate) const FAMILY: &str =
     "Noto Sans, Open Sans, Segoe UI, Roboto, Helvetica Neue, Arial, sans-serif";
 
@@ -29,10 +29,10 @@ static REGULAR: LazyLock<Option<FontRef<'static>>> =
 static BOLD: LazyLock<Option<FontRef<'static>>> =
     LazyLock::new(|| FontRef::new(notosans::BOLD_TTF).ok());
 
-/// Size of a raised or lowered run, as a part of the text's.
+/// Size of a raised or lowered run, as a fraction of the size of the text.
 pub(crate) const SCRIPT_SIZE: f64 = 0.72;
 
-/// Where a run of text stands.
+/// Height of a run of text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Level {
     Base,
@@ -40,7 +40,7 @@ pub(crate) enum Level {
     Lowered,
 }
 
-/// Cuts `10^{−3}` and `K_{xx}` into runs; a mark without its closing brace is ordinary text.
+/// Splits `10^{−3}` and `K_{xx}` into runs; a mark without its closing brace is ordinary text.
 pub(crate) fn runs(text: &str) -> Vec<(Level, &str)> {
     let mut found = Vec::new();
     let (mut rest, mut searched) = (text, 0);

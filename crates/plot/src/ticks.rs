@@ -1,4 +1,4 @@
-//! Where ticks lie and what they say.
+//! Positions and labels of ticks.
 
 use crate::axis::Scale;
 
@@ -22,10 +22,10 @@ pub(crate) fn ticks(scale: Scale, low: f64, high: f64, wanted: f64, step: Option
 }
 
 fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
-    // A step that would crowd the axis is not a step the caller can have meant.
+    // A step that gives more than forty labels is not used.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
-        .unwrap_or_else(|| telling_step(low, high, nice_step((high - low) / wanted)));
+        .unwrap_or_else(|| step_of_two_ticks(low, high, nice_step((high - low) / wanted)));
     let exponent = common_exponent(low.abs().max(high.abs()));
     let unit = 10f64.powi(exponent);
     let decimals = decimals(step / unit);
@@ -47,9 +47,9 @@ fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
     (first, (last - first).max(-1.0) as usize + 1)
 }
 
-/// `step`, or one of the next finer ones if it leaves less than two ticks: a single one does not say
-/// how long the axis is.
-fn telling_step(low: f64, high: f64, step: f64) -> f64 {
+/// Returns `step`, or one of the next finer ones if it gives fewer than two ticks: a single tick does
+/// not show the length of the axis.
+fn step_of_two_ticks(low: f64, high: f64, step: f64) -> f64 {
     let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
     finer.take(3).find(|step| multiples(low, high, *step).1 >= 2).unwrap_or(step)
 }

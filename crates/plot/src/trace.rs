@@ -1,4 +1,4 @@
-//! Curves as pixels: mapped, thinned out, and felt for by legends.
+//! Curves as pixels: mapped, thinned out, and tested for collisions with legends.
 
 use std::collections::HashSet;
 
@@ -14,7 +14,7 @@ pub(crate) struct Mappings {
     pub(crate) y: Mapping,
 }
 
-/// Pixels of the points `(x, y)`. Values far outside the panel are pulled to where a viewer still computes exactly.
+/// Pixels of the points `(x, y)`. Values far outside the panel are limited to what a viewer computes exactly.
 pub(crate) fn map(maps: Mappings, x: &[f64], y: &[f64]) -> Vec<Point> {
     const FAR: f64 = 1e5;
     let pixel = |map: Mapping, value: f64| map.pixel(value).clamp(-FAR, FAR);
@@ -29,10 +29,10 @@ pub(crate) fn stem_base(maps: Mappings, scale: Scale, range: (f64, f64)) -> f64 
     }
 }
 
-/// Leaves of each column of pixels the first, the lowest, the highest and the last point of a line.
+/// Keeps the first, the lowest, the highest and the last point of a line in each column of pixels.
 ///
 /// The drawn line is the same to within a pixel, and a record of a million samples stays a small file.
-/// Lines that run back in x, and lines with few points, are left alone.
+/// Lines that run back in x, and lines with few points, are kept as they are.
 pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     if are_few(&points, width) || points.windows(2).any(|pair| pair[1].0 < pair[0].0) {
         return points;
@@ -59,12 +59,12 @@ pub(crate) fn thin_out(points: Vec<Point>, width: f64) -> Vec<Point> {
     kept
 }
 
-/// Whether these are no more points than a line keeps in a panel of this width, in px.
+/// Returns whether these are no more points than a line keeps in a panel of this width, in px.
 fn are_few(points: &[Point], width: f64) -> bool {
     points.len() as f64 <= 4.0 * width
 }
 
-/// Leaves one of the points that fall on the same cell, the first: the others would not be seen. A
+/// Keeps the first of the points that fall on the same cell: the others would be hidden. A
 /// cell is half a pixel wide and high, and where many points make a cloud as large as a marker of
 /// this radius, in px.
 pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<Point> {
@@ -74,7 +74,7 @@ pub(crate) fn thin_markers(points: Vec<Point>, width: f64, radius: f64) -> Vec<P
     points.into_iter().filter(|(x, y)| taken.insert((place(*x), place(*y)))).collect()
 }
 
-/// Leaves of the stems that follow one another on the same half pixel of width the longest.
+/// Keeps the longest of consecutive stems on the same half pixel of width.
 pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
     let longer = |a: &&Point, b: &&Point| (a.1 - base).abs().total_cmp(&(b.1 - base).abs());
     points
@@ -83,10 +83,10 @@ pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
         .collect()
 }
 
-/// A straight piece of something drawn.
+/// A straight segment of a drawing.
 pub(crate) type Segment = (Point, Point);
 
-/// Everything a curve draws, as straight pieces; a marker is a piece without length.
+/// All that a curve draws, as straight segments; a marker is a segment without length.
 pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Segment> {
     let chain = |points: Vec<Point>| -> Vec<Segment> {
         let points = thin_out(points, width);
@@ -108,7 +108,7 @@ pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) ->
     }
 }
 
-/// Whether a straight piece has a point in the rectangle from `low` to `high`.
+/// Returns whether a segment has a point in the rectangle from `low` to `high`.
 ///
 /// # Source
 /// Y.-D. Liang and B. A. Barsky, "A new concept and method for line clipping", ACM Transactions on

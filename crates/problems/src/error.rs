@@ -1,4 +1,4 @@
-//! What a judge cannot answer.
+//! Errors of problems without an answer.
 
 use mechid_model::ModelError;
 use mechid_signal::SignalError;
@@ -7,11 +7,11 @@ use mechid_signal::SignalError;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ProblemError {
-    /// No motion of the period of the force exists, or it is not the only one.
+    /// No periodic response exists, or it is not unique.
     #[error(
-        "no unique periodic motion over {period} s \
+        "no unique periodic response over {period} s \
          (reciprocal condition of I − Φᴺ about {reciprocal_condition:.1e}): \
-         an eigenvalue stands undamped on a line of the period, or grows beyond double precision"
+         an undamped eigenvalue lies on a spectral line of the period, or the response overflows"
     )]
     NoPeriodicMotion {
         /// Period of the force, in seconds.
@@ -19,7 +19,7 @@ pub enum ProblemError {
         /// Smallest singular value of I − Φᴺ relative to 1 + ‖Φᴺ‖.
         reciprocal_condition: f64,
     },
-    /// The step holds so many radians that no digit of the motion would be left.
+    /// The step is so long for the system that no digit of the response would be right.
     #[error("a step of {dt} s is too long for this system: (ω dt)² is about {scale:.1e}")]
     StepTooLong {
         /// Time step, in seconds.

@@ -1,4 +1,4 @@
-//! Responses to a sampled force without discretisation error: the judges of everything else.
+//! Responses to a sampled force without discretisation error: the reference solutions of the tests.
 //!
 //! A sampled force is a motion only once it is said what happens between the samples:
 //!
@@ -47,7 +47,7 @@ pub fn exact_foh(
     from_start(system, force, start, Between::Linear)
 }
 
-/// The periodic motion under a force held between samples, one period (samples × dof, in N).
+/// Periodic response to a force held between samples, one period (samples × dof, in N).
 ///
 /// # Errors
 /// [`ProblemError::NoPeriodicMotion`] if there is none or more than one, else as [`exact_zoh`].
@@ -58,7 +58,7 @@ pub fn exact_zoh_periodic(
     periodic(system, force, Between::Held)
 }
 
-/// The periodic motion under a force linear between samples, one period (samples × dof, in N).
+/// Periodic response to a force linear between samples, one period (samples × dof, in N).
 ///
 /// # Errors
 /// As [`exact_zoh_periodic`].
@@ -69,7 +69,7 @@ pub fn exact_foh_periodic(
     periodic(system, force, Between::Linear)
 }
 
-/// The periodic motion under the band-limited force through the samples of one period:
+/// Periodic response to the band-limited force through the samples of one period:
 /// each line n of the response is receptance at n·ω0 times line n of the force.
 ///
 /// At Nyquist (even length) the samples show only the cosine of the force; that is what acts.
@@ -103,7 +103,7 @@ pub fn exact_harmonic_periodic(
     Ok(Response::new(x?, v?, a?)?)
 }
 
-/// Response from `start` to the band-limited force: the periodic motion and the free decay of
+/// Response from `start` to the band-limited force: the periodic response and the free decay of
 /// the difference between `start` and it.
 ///
 /// # Errors
@@ -175,7 +175,7 @@ fn periodic(
     Ok(run(&transition, force, start)?.0)
 }
 
-/// The motion at every sample, and the state one step after the last, under the first force again.
+/// Response at every sample, and the state one step after the last sample, where the first force acts again.
 fn run(
     transition: &Transition,
     force: &Record,

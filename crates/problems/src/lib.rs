@@ -1,4 +1,4 @@
-//! Named systems with known answers, and exact responses to judge everything else by.
+//! Named systems with known answers, and exact responses: the reference solutions of the tests.
 //!
 //! Nothing here is borrowed from an integrator or an estimator: a sampled force is answered
 //! through the matrix exponential or through the receptance, see [`exact`].

@@ -1,4 +1,4 @@
-//! Random systems that are stable by proof, not by trial.
+//! Random systems that are stable by construction.
 
 use mechid_model::SecondOrderSystem;
 use nalgebra::{DMatrix, DVector};

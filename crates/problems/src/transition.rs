@@ -1,4 +1,4 @@
-//! The exact motion over one time step.
+//! Exact response over one time step.
 
 use mechid_model::linear_algebra::exponential;
 use mechid_model::{ModelError, SecondOrderSystem};
@@ -6,12 +6,12 @@ use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::ProblemError;
 
-/// What the force does between two samples.
+/// Course of the force between two samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Between {
     /// Held at the value of the left sample.
     Held,
-    /// On the straight line from one sample to the next.
+    /// Linear from one sample to the next.
     Linear,
 }
 
@@ -67,7 +67,7 @@ impl Transition {
         Ok(Self { phi: block(0, 2 * n), from_left, from_right, mass, system: system.clone(), dt })
     }
 
-    /// One step: what `state` becomes under the forces at its two ends.
+    /// State after one step from `state` under the forces at its two ends.
     pub(crate) fn step(
         &self,
         state: &DVector<f64>,

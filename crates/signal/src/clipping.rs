@@ -1,34 +1,35 @@
-//! Whether an amplifier or a converter has cut a channel off.
+//! Channels that an amplifier or a converter has clipped.
 
-/// What [`clipping`] finds.
+/// Level at which a channel is clipped, as [`clipping`] finds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipping {
-    /// The level at which the channel is cut off, in its unit.
+    /// Level at which the channel is clipped, in its unit.
     pub level: f64,
-    /// Samples there, in rows of three or more.
+    /// Number of samples at that level, in runs of three or more.
     pub samples: usize,
 }
 
-/// So many equal samples in a row are no peak between two samples.
-const ROW: usize = 3;
+/// Least length of a run of equal samples: the peak of a smooth signal makes shorter ones.
+const RUN: usize = 3;
 
-/// A smooth peak that rests on one step of a converter for [`ROW`] samples has fallen by less than
-/// four of them one sample further; a cut falls off as fast as the signal moves.
+/// Least jump, in steps of the converter, at the end of a clipped run. A smooth peak that stays on one
+/// step for [`RUN`] samples has fallen by less than four steps one sample later; a clipped signal leaves
+/// its limit as fast as it changes.
 const STEEP: f64 = 6.0;
 
-/// A channel that stands at one end for more than this part of the time rests there.
+/// A channel that is at one of its extremes for more than this fraction of the time is at rest there.
 const AT_REST: f64 = 0.5;
 
-/// One that, where it does not rest, stands at its ends for more than this part switches between them
-/// on purpose.
+/// A channel that, outside of its rest, is at its extremes for more than this fraction of the time is a
+/// two-level signal.
 const SWITCHED: f64 = 0.9;
 
-/// The level at which a channel, in any unit, was cut off: it stays there exactly, several times
-/// three samples or more in a row or once, and comes and leaves at an angle. Of two such levels the
-/// one with more samples; nothing if there is none.
+/// Returns the level at which a channel, in any unit, is clipped: its minimum or maximum, if runs of
+/// three or more samples have exactly that value and a run begins or ends with a jump. If both are, the
+/// level with more samples; `None` if the channel is not clipped.
 ///
-/// Peaks of a coarse converter, signals of two levels (binary sequences, steps), steps held for
-/// several samples, and the value at which a channel rests are not taken for it.
+/// Peaks through a coarse converter, two-level signals (binary sequences, steps), values held for
+/// several samples, and a value at which the channel rests do not count as clipping.
 ///
 /// ```
 /// use mechid_signal::clipping;
@@ -53,36 +54,36 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
     if time(&cut) > SWITCHED * (all - time(&rests)) {
         return None;
     }
-    let rows = steep_rows(samples);
-    let in_rows = |level: f64| rows.iter().filter(|row| row.0 == level).map(|row| row.1).sum();
-    let at_ends = rows.iter().filter(|row| row.0 == low || row.0 == high).count();
-    if rows.len() >= 2 * at_ends {
+    let runs = steep_runs(samples);
+    let in_runs = |level: f64| runs.iter().filter(|run| run.0 == level).map(|run| run.1).sum();
+    let at_ends = runs.iter().filter(|run| run.0 == low || run.0 == high).count();
+    if runs.len() >= 2 * at_ends {
         return None;
     }
     cut.into_iter()
-        .map(|(level, _)| Clipping { level, samples: in_rows(level) })
+        .map(|(level, _)| Clipping { level, samples: in_runs(level) })
         .filter(|cut| cut.samples > 0)
         .max_by_key(|cut| cut.samples)
 }
 
-/// Value and length of every row of equal samples that begins or ends with a jump.
-fn steep_rows(samples: &[f64]) -> Vec<(f64, usize)> {
+/// Value and length of every run of equal samples that begins or ends with a jump.
+fn steep_runs(samples: &[f64]) -> Vec<(f64, usize)> {
     // No two levels of a converter are nearer than its step.
     let mut levels = samples.to_vec();
     levels.sort_unstable_by(f64::total_cmp);
     let steps = levels.windows(2).map(|x| x[1] - x[0]).filter(|step| *step > 0.0);
     let steep = STEEP * steps.fold(f64::INFINITY, f64::min);
-    let (mut rows, mut first) = (Vec::new(), 0);
-    for row in samples.chunk_by(|a, b| a == b) {
-        let (value, end) = (row[0], first + row.len());
+    let (mut runs, mut first) = (Vec::new(), 0);
+    for run in samples.chunk_by(|a, b| a == b) {
+        let (value, end) = (run[0], first + run.len());
         let before = first.checked_sub(1).map(|k| samples[k]);
         let sides = [before, samples.get(end).copied()];
-        if row.len() >= ROW && sides.into_iter().flatten().any(|x| (x - value).abs() > steep) {
-            rows.push((value, row.len()));
+        if run.len() >= RUN && sides.into_iter().flatten().any(|x| (x - value).abs() > steep) {
+            runs.push((value, run.len()));
         }
         first = end;
     }
-    rows
+    runs
 }
 
 #[cfg(test)]
@@ -109,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_off_is_found_on_either_side_and_after_a_converter() {
+    fn clipping_is_found_on_either_side_and_after_a_converter() {
         for seed in 0..20 {
             let x = noisy(seed);
             let peak = x.iter().fold(0.0_f64, |peak, x| peak.max(x.abs()));
@@ -133,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_cut_off_is_left_alone() {
+    fn signals_that_are_not_clipped_are_left_alone() {
         for seed in 0..50 {
             let x = noisy(seed);
             for step in [1e-12, 0.001, 0.03, 0.3] {

@@ -1,43 +1,43 @@
-//! Which lines of a periodic signal are driven, and which carry noise.
+//! Excited lines of a periodic signal, told from its noise.
 
 use nalgebra::DMatrix;
 
 use crate::{Record, SignalError, Spectrum, lines};
 
-/// A driven line carries at least this part of the strongest one: far above rounding and
-/// quantisation, far below any line that somebody meant to drive.
+/// Least amplitude of a driven line, as a fraction of the strongest one: far above rounding and
+/// quantisation, far below any line that is driven on purpose.
 const EXCITED: f64 = 1e-3;
 
-/// A signal whose strongest line is below this part of its peak value does not move at all: what its
-/// spectrum shows is the rounding of a constant.
+/// A signal whose strongest line is below this fraction of its peak value is constant: its spectrum
+/// shows rounding only.
 const ROUNDING: f64 = 1e-12;
 
-/// Chance that any line at all of a record is taken for driven by mistake.
+/// Probability that any undriven line of a record counts as driven.
 const LEVEL: f64 = 1e-3;
 
-/// Lines to either side by whose scatter the noise of a line is judged.
+/// Number of lines to either side whose scatter gives the noise level of a line.
 const NEIGHBOURS: usize = 16;
 
-/// So many lines at least are the noise of a single period.
+/// Least number of lines that are the noise of a single period.
 const NOISE_LINES: usize = 16;
 
-/// Amplitudes of driven lines stand above those of the noise of a single period by this factor at
-/// least: the amplitudes of noise itself leave no such gap.
+/// Least ratio of the amplitudes of driven lines to those of the noise of a single period: noise itself
+/// has no such gap in its amplitudes.
 const GAP: f64 = 3.0;
 
-/// The lines of consecutive periods of `period` samples, DC and Nyquist apart, that at least one
-/// channel drives; none if no channel varies.
+/// Returns the lines of consecutive periods of `period` samples, DC and Nyquist excluded, that at least
+/// one channel drives; none if no channel varies.
 ///
-/// A driven line carries a thousandth of the strongest one or more, and stands out of the noise:
+/// A driven line has at least a thousandth of the amplitude of the strongest one, and exceeds the noise:
 ///
-/// - Of several periods the noise is what changes from one to the next. The periodic part is held
-///   against the median scatter of the 33 lines around it by Fisher's test, at a level of 0.1 % for
-///   all lines of the record together.
-/// - Of a single period the noise is the weakest 16 lines or more, if there is a gap above them: a
-///   factor of 3 in amplitude that no line falls into.
+/// - In several periods the noise is the part that changes from one to the next. The periodic part is
+///   compared with the median scatter of the 33 lines around it by Fisher's test, at a level of 0.1 %
+///   for all lines of the record together.
+/// - In a single period the noise is the weakest 16 lines or more, if there is a gap above them: a
+///   factor of 3 in amplitude without any line.
 ///
-/// Where these lines hold less than half of the power of each channel, as where the excitation is
-/// random or the period another one, all lines above a thousandth count.
+/// Where these lines hold less than half of the power of each channel, because the excitation is
+/// random or the period is another, all lines above a thousandth count.
 ///
 /// # Errors
 /// As [`Record::period_mean`].
@@ -85,7 +85,7 @@ fn scatter(record: &Record, mean: &Record, channel: usize) -> Result<Vec<f64>, S
     Ok(lines::full(mean.sampling()).iter().map(variance).collect())
 }
 
-/// The amplitudes that the mean over `count` periods must reach at lines of this scatter.
+/// Least amplitudes of driven lines in the mean over `count` periods of this scatter.
 fn above_scatter(scatter: &[f64], count: usize) -> Vec<f64> {
     let noise = |at: usize| {
         let around = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(scatter.len());
@@ -101,7 +101,7 @@ fn above_scatter(scatter: &[f64], count: usize) -> Vec<f64> {
     (0..scatter.len()).map(|at| noise(at).sqrt()).collect()
 }
 
-/// What Fisher's F of 2 and `freedom` degrees of freedom exceeds with this probability: its
+/// Value that Fisher's F of 2 and `freedom` degrees of freedom exceeds with this probability; the
 /// distribution function is 1 − (1 + 2F/ν)^(−ν/2).
 fn fisher(probability: f64, freedom: f64) -> f64 {
     0.5 * freedom * (probability.powf(-2.0 / freedom) - 1.0)

@@ -1,4 +1,4 @@
-//! What can be wrong with a signal.
+//! Errors of signals.
 
 use crate::{Sampling, counted, told};
 
@@ -22,9 +22,9 @@ pub enum SignalError {
     Length {
         /// Channel, counted from 0.
         channel: usize,
-        /// Samples given.
+        /// Number of samples given.
         got: usize,
-        /// Samples expected.
+        /// Number of samples expected.
         expected: usize,
     },
     /// A sample is NaN or infinite.
@@ -41,21 +41,6 @@ pub enum SignalError {
         /// The value found, in the unit of the record.
         value: f64,
     },
-    /// A sample is so large that sums of its powers overflow.
-    #[error(
-        "sample {} of channel {} is {value}: values beyond {limit} cannot be squared and summed; \
-         use other units",
-        sample + 1, channel + 1,
-        value = told(*value), limit = told(crate::Record::LARGEST)
-    )]
-    TooLarge {
-        /// Sample, counted from 0.
-        sample: usize,
-        /// Channel, counted from 0.
-        channel: usize,
-        /// The value found, in the unit of the record.
-        value: f64,
-    },
     /// A record does not fit in memory.
     #[error("{} of {} do not fit in memory", counted(*channels, "channel"), counted(*samples, "sample"))]
     Memory {
@@ -64,7 +49,7 @@ pub enum SignalError {
         /// Channels.
         channels: usize,
     },
-    /// There is no such channel.
+    /// Channel that the record does not have.
     #[error("channel {} was asked for, there {} {channels}", channel + 1, if *channels == 1 { "is" } else { "are" })]
     NoSuchChannel {
         /// Channel, counted from 0.
@@ -89,13 +74,13 @@ pub enum SignalError {
         channel: usize,
     },
     /// A window does not lie inside the record.
-    #[error("samples {} to {end} were asked for, the record has {len}", start + 1)]
+    #[error("samples {} to {end} were requested, but the record has {len}", start + 1)]
     Window {
         /// First sample asked for, counted from 0.
         start: usize,
-        /// One past the last sample asked for.
+        /// Index after the last sample asked for.
         end: usize,
-        /// Samples in the record.
+        /// Number of samples in the record.
         len: usize,
     },
     /// Two records that must share a time axis do not.
@@ -104,11 +89,11 @@ pub enum SignalError {
         left_dt = told(*left_dt), right_dt = told(*right_dt)
     )]
     SamplingMismatch {
-        /// Samples of the first record.
+        /// Number of samples of the first record.
         left_len: usize,
         /// Step of the first record, in seconds.
         left_dt: f64,
-        /// Samples of the second record.
+        /// Number of samples of the second record.
         right_len: usize,
         /// Step of the second record, in seconds.
         right_dt: f64,
@@ -135,11 +120,11 @@ pub enum SignalError {
     /// A list that must have one entry per line has another length.
     #[error("{} but {got} {what}", counted(*lines, "line"))]
     PerLine {
-        /// What the list holds.
+        /// Name of the entries.
         what: &'static str,
         /// Number of lines.
         lines: usize,
-        /// Entries given.
+        /// Number of entries given.
         got: usize,
     },
     /// A line at or above half the sampling rate cannot be sampled.
@@ -147,7 +132,7 @@ pub enum SignalError {
     Nyquist {
         /// The line.
         line: usize,
-        /// Samples per period.
+        /// Number of samples per period.
         len: usize,
     },
     /// A quantity that must be finite and not negative is not.
@@ -187,7 +172,8 @@ pub enum SignalError {
     },
     /// A band must have its lower end at or above zero and below its upper end.
     #[error(
-        "a band from {low_hz} Hz to {high_hz} Hz is none",
+        "the band from {low_hz} Hz to {high_hz} Hz is empty: its lower end must be at least 0 and below \
+         its upper end",
         low_hz = told(*low_hz), high_hz = told(*high_hz)
     )]
     Band {
@@ -198,7 +184,7 @@ pub enum SignalError {
     },
     /// No spectral line lies in the band.
     #[error(
-        "no line lies between {low_hz} Hz and {high_hz} Hz, they stand every {spacing_hz} Hz",
+        "no spectral line lies between {low_hz} Hz and {high_hz} Hz: the lines are {spacing_hz} Hz apart",
         low_hz = told(*low_hz), high_hz = told(*high_hz), spacing_hz = told(*spacing_hz)
     )]
     EmptyBand {
@@ -219,29 +205,31 @@ pub enum SignalError {
         what: &'static str,
         /// The value given, in the unit of the quantity.
         value: f64,
-        /// Least value allowed, in the same unit.
+        /// Minimum allowed, in the same unit.
         low: f64,
-        /// Greatest value allowed, in the same unit.
+        /// Maximum allowed, in the same unit.
         high: f64,
     },
     /// Too few samples or lines for what was asked.
     #[error("{what} needs at least {least}, got {got}")]
     TooFew {
-        /// What was asked, and what it needs.
+        /// Task, and the kind of thing it needs.
         what: &'static str,
-        /// How many it needs.
+        /// Number needed.
         least: usize,
-        /// How many there are.
+        /// Number given.
         got: usize,
     },
     /// Several inputs must excite the same lines.
-    #[error("input {} has other lines than input 1", input + 1)]
+    #[error("input {} excites other lines than input 1: all inputs must excite the same lines", input + 1)]
     DifferentLines {
         /// The input, counted from 0.
         input: usize,
     },
     /// A Hadamard matrix of this order is not available.
-    #[error("no Hadamard matrix of order {order}: take a power of two, or the DFT matrix")]
+    #[error(
+        "there is no Hadamard matrix of order {order}: choose a power of two, or the DFT matrix"
+    )]
     HadamardOrder {
         /// The order asked for.
         order: usize,
@@ -254,7 +242,7 @@ pub enum SignalError {
     },
 }
 
-/// `value`, if it is finite and not negative.
+/// Returns `value` if it is finite and not negative.
 pub(crate) fn not_negative(what: &'static str, value: f64) -> Result<f64, SignalError> {
     if value >= 0.0 && value.is_finite() {
         return Ok(value);
@@ -262,7 +250,7 @@ pub(crate) fn not_negative(what: &'static str, value: f64) -> Result<f64, Signal
     Err(SignalError::Negative { what, value })
 }
 
-/// `value`, if it is finite and positive.
+/// Returns `value` if it is finite and positive.
 pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, SignalError> {
     if value > 0.0 && value.is_finite() {
         return Ok(value);
@@ -270,7 +258,7 @@ pub(crate) fn positive(what: &'static str, value: f64) -> Result<f64, SignalErro
     Err(SignalError::NotPositive { what, value })
 }
 
-/// `value`, if it lies between `low` and `high`, ends included.
+/// Returns `value` if it lies between `low` and `high`, ends included.
 pub(crate) fn within(
     what: &'static str,
     value: f64,
@@ -283,7 +271,7 @@ pub(crate) fn within(
     Err(SignalError::Range { what, value, low, high })
 }
 
-/// A frequency in Hz, if it lies below half the sampling rate.
+/// Returns a frequency in Hz if it lies below half the sampling rate.
 pub(crate) fn below_nyquist(frequency_hz: f64, sampling: Sampling) -> Result<f64, SignalError> {
     let nyquist_hz = sampling.nyquist_hz();
     if frequency_hz < nyquist_hz {
@@ -292,7 +280,7 @@ pub(crate) fn below_nyquist(frequency_hz: f64, sampling: Sampling) -> Result<f64
     Err(SignalError::AboveNyquist { frequency_hz, nyquist_hz })
 }
 
-/// A band in Hz, if 0 ≤ low < high, both finite.
+/// Returns a band in Hz if 0 ≤ low < high, both finite.
 pub(crate) fn band(low_hz: f64, high_hz: f64) -> Result<(f64, f64), SignalError> {
     if low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite() {
         return Ok((low_hz, high_hz));
@@ -300,7 +288,7 @@ pub(crate) fn band(low_hz: f64, high_hz: f64) -> Result<(f64, f64), SignalError>
     Err(SignalError::Band { low_hz, high_hz })
 }
 
-/// `value`, if it is finite.
+/// Returns `value` if it is finite.
 pub(crate) fn finite(what: &'static str, value: f64) -> Result<f64, SignalError> {
     if value.is_finite() {
         return Ok(value);

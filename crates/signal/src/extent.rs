@@ -1,4 +1,4 @@
-//! Whether a record is one whole period.
+//! Open records and whole periods.
 
 use std::fmt;
 

@@ -23,9 +23,8 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 //!
-//! Everything in `mechid` that has a time axis is a [`Record`] on a [`Sampling`],
-//! and everything that has a frequency axis is a [`Spectrum`], whose scaling is
-//! stated once, in [`spectrum`].
+//! Sampled signals are [`Record`]s on a [`Sampling`]; their complex amplitudes are a [`Spectrum`], whose
+//! scaling is stated once, in [`spectrum`].
 //!
 //! | Wanted | Where |
 //! |---|---|
@@ -34,8 +33,9 @@
 //! | uncorrelated inputs | [`multi_input`] |
 //! | impact, noise, sweep, binary sequence | [`excitation`] |
 //! | crest factor, flatness, order of excitation | [`measures`] |
-//! | whether a record repeats, and how well | [`repetition()`] |
-//! | whether a channel was cut off | [`clipping()`] |
+//! | mean, level and extremes of samples that are not all held | [`RunningStatistics`] |
+//! | the period of a record that repeats | [`repetition()`] |
+//! | the level at which a channel is clipped | [`clipping()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 
@@ -56,6 +56,7 @@ mod repetition;
 pub mod resample;
 mod sampling;
 pub mod spectrum;
+mod statistics;
 mod told;
 
 pub use clipping::{Clipping, clipping};
@@ -71,4 +72,5 @@ pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
+pub use statistics::RunningStatistics;
 pub use told::{counted, ordinal, told, told_to};

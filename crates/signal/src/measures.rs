@@ -108,7 +108,7 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     let mut padded = DMatrix::zeros(period, 1);
     padded.as_mut_slice()[..x.len()].copy_from_slice(x);
     let Ok(record) = Record::new(sampling, padded) else {
-        // What is not finite correlates to nothing finite.
+        // Samples that are not finite have no finite correlation.
         return vec![f64::NAN; x.len()];
     };
     // With one-sided amplitudes X_n the correlation has the lines |X_n|²/2, but |X_n|² where a
@@ -195,7 +195,7 @@ pub struct Band {
     pub high_hz: f64,
 }
 
-/// From the first to the last line within `drop_db` (dB) of the strongest, DC left out of both.
+/// Band from the first to the last line within `drop_db` (dB) of the strongest, DC excluded.
 ///
 /// # Errors
 /// [`SignalError::Negative`] for the drop, [`SignalError::Silent`] for a signal without power

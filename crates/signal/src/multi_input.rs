@@ -32,7 +32,7 @@ impl Mixing {
     }
 }
 
-/// As many experiments as inputs: element `[e][k]` is the signal of input `k` in experiment `e`.
+/// Returns as many experiments as inputs: element `[e][k]` is the signal of input `k` in experiment `e`.
 ///
 /// With U_ek the complex amplitude of a line, the inputs are orthogonal:
 ///

@@ -100,7 +100,7 @@ impl Multisine {
         Self::new(lines, amplitudes, Phases::Given(phases))
     }
 
-    /// The lines, rising.
+    /// Lines of the multisine, rising.
     pub fn lines(&self) -> &[usize] {
         &self.lines
     }
@@ -165,7 +165,7 @@ impl Multisine {
     ///
     /// # Errors
     /// [`SignalError::Nyquist`] if the last line is at or above half the sampling rate,
-    /// [`SignalError::Memory`], [`SignalError::TooLarge`] for amplitudes beyond those of a record.
+    /// [`SignalError::Memory`], [`SignalError::NotFinite`] for amplitudes that overflow.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         self.spectrum(sampling)?.to_record()
     }
@@ -238,7 +238,7 @@ fn check_amplitudes(amplitudes: &[f64]) -> Result<(), SignalError> {
     for a in amplitudes {
         not_negative("amplitude", *a)?;
     }
-    // Twice, for what a transform adds up on its way.
+    // Twice, for the sums within a transform.
     not_negative("sum of all amplitudes", 2.0 * amplitudes.iter().sum::<f64>())?;
     Ok(())
 }

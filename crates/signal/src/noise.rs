@@ -11,7 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::error::{finite, fits_in_memory, not_negative, positive, within};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
-/// How strong a disturbance is.
+/// Level of a disturbance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NoiseLevel {
     /// Standard deviation, in the unit of the signal, the same in every channel.
@@ -23,7 +23,7 @@ pub enum NoiseLevel {
 }
 
 impl NoiseLevel {
-    /// The standard deviation this means for a signal.
+    /// Standard deviation at this level for a signal.
     fn deviation(self, record: &Record, channel: usize) -> Result<f64, SignalError> {
         let per_rms = match self {
             Self::StandardDeviation(std) => return not_negative("standard deviation", std),
@@ -38,10 +38,10 @@ impl NoiseLevel {
     }
 }
 
-/// How the power of a disturbance is spread over frequency.
+/// Distribution of the power of a disturbance over frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Colour {
-    /// Evenly up to Nyquist; samples are independent.
+    /// Constant density up to Nyquist; samples are independent.
     White,
     /// Power density proportional to 1/f^`exponent`: 1 is pink, 2 brown (a drift), −2 violet (a
     /// differentiated signal). The lowest frequency is half a cycle per record.
@@ -56,7 +56,7 @@ pub enum Colour {
     },
 }
 
-/// White Gaussian noise of a given standard deviation, in the unit of the record that is to come,
+/// White Gaussian noise of a given standard deviation, in the unit of the record to be made,
 /// independent between channels.
 ///
 /// # Errors
@@ -70,7 +70,7 @@ pub fn white(
     coloured(sampling, channels, standard_deviation, Colour::White, seed)
 }
 
-/// Gaussian noise of a given standard deviation, in the unit of the record that is to come, and
+/// Gaussian noise of a given standard deviation, in the unit of the record to be made, and
 /// colour, independent between channels.
 ///
 /// The deviation is that of the process: a single record scatters about it, the more the fewer
@@ -137,7 +137,7 @@ pub fn add(
     Record::new(record.sampling(), data)
 }
 
-/// Steepest power law: beyond it one line is all there is.
+/// Largest exponent of a power law: beyond it a single line has all the power.
 const MOST_EXPONENT: f64 = 10.0;
 
 /// White noise shaped in frequency, from a period twice as long: noise does not close on itself
@@ -164,7 +164,7 @@ fn power_law(
     Ok(shaped.channel(0)[..sampling.len()].to_vec())
 }
 
-/// The stationary first-order process, stepped exactly.
+/// The stationary first-order process, with exact steps.
 fn low_pass(
     sampling: Sampling,
     corner_hz: f64,

@@ -7,10 +7,10 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::{SignalError, error::finite};
 
-/// How the phases φ_n of a multisine Σ A_n cos(n ω0 t + φ_n) are chosen.
+/// Choice of the phases φ_n of a multisine Σ A_n cos(n ω0 t + φ_n).
 #[derive(Debug, Clone, PartialEq)]
 pub enum Phases {
-    /// Schroeder's law for the power spectrum at hand, see [`schroeder`].
+    /// Schroeder's law for the power spectrum of the multisine, see [`schroeder`].
     Schroeder,
     /// Schroeder's law with phases 0 or π only, see [`schroeder_binary`]; N is one more than
     /// the number of the last line, so lines 1 … Nt/2 − 1 have the dissertation's N = Nt/2.
@@ -20,7 +20,7 @@ pub enum Phases {
         /// Seed of the generator.
         seed: u64,
     },
-    /// All zero: the worst crest factor there is, an impulse train.
+    /// All zero: the largest possible crest factor, an impulse train.
     Zero,
     /// Given by the caller in rad, one per line.
     Given(Vec<f64>),

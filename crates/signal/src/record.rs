@@ -7,9 +7,7 @@ use crate::{Sampling, SignalError};
 
 /// Samples × channels on one uniform time axis; a channel is a contiguous column.
 ///
-/// Every value is finite and at most [`LARGEST`](Self::LARGEST): a record that exists can be computed
-/// with. Values are in any unit: whoever
-/// takes a record says in which, and what is derived from one here keeps it.
+/// Every value is finite: a record that exists can be computed with. Values are in any unit: whoever takes a record states which, and results in this crate keep it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
     sampling: Sampling,
@@ -17,15 +15,11 @@ pub struct Record {
 }
 
 impl Record {
-    /// Largest modulus of a sample, in the unit of the record: sums of fourth powers stay finite.
-    pub const LARGEST: f64 = 1e70;
-
     /// A record from a matrix of `sampling.len()` rows and one column per channel.
     ///
     /// # Errors
     /// [`SignalError::Length`] if the rows do not match the sampling,
-    /// [`SignalError::NotFinite`] at the first NaN or infinity, [`SignalError::TooLarge`] at the
-    /// first sample beyond [`LARGEST`](Self::LARGEST).
+    /// [`SignalError::NotFinite`] at the first NaN or infinity.
     pub fn new(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
         if data.nrows() != sampling.len() {
             return Err(SignalError::Length {
@@ -37,11 +31,7 @@ impl Record {
         if let Some(at) = first_unusable(data.as_slice()) {
             let (channel, sample) = (at / data.nrows(), at % data.nrows());
             let value = data[(sample, channel)];
-            return Err(if value.is_finite() {
-                SignalError::TooLarge { sample, channel, value }
-            } else {
-                SignalError::NotFinite { sample, channel, value }
-            });
+            return Err(SignalError::NotFinite { sample, channel, value });
         }
         Ok(Self { sampling, data })
     }
@@ -120,7 +110,7 @@ impl Record {
         &self.data
     }
 
-    /// The samples, leaving the time axis behind.
+    /// Returns the samples without the time axis.
     pub fn into_data(self) -> DMatrix<f64> {
         self.data
     }
@@ -138,7 +128,7 @@ impl Record {
         Ok(Self { sampling, data: self.data.rows(start, len).into_owned() })
     }
 
-    /// The same record with the mean of every channel taken away.
+    /// Returns the record with the mean of every channel subtracted.
     pub fn without_mean(&self) -> Self {
         let mut data = self.data.clone();
         for mut column in data.column_iter_mut() {
@@ -148,7 +138,7 @@ impl Record {
         Self { sampling: self.sampling, data }
     }
 
-    /// The mean over consecutive periods of `period` samples; a last, incomplete one is left out.
+    /// Returns the mean over consecutive periods of `period` samples; an incomplete last one is left out.
     ///
     /// # Errors
     /// [`SignalError::Window`] if the record is shorter than one period,
@@ -163,7 +153,7 @@ impl Record {
         Ok(mean)
     }
 
-    /// The record, `periods` times one after the other.
+    /// Returns the record repeated `periods` times.
     ///
     /// # Errors
     /// [`SignalError::Empty`] if `periods` is 0, [`SignalError::Memory`].
@@ -176,10 +166,10 @@ impl Record {
         Ok(Self { sampling, data })
     }
 
-    /// An error if `other` lies on another time axis (steps may differ by rounding only).
+    /// Checks that `other` has the same time axis (steps may differ by rounding only).
     ///
     /// # Errors
-    /// [`SignalError::SamplingMismatch`].
+    /// [`SignalError::SamplingMismatch`] if it has not.
     pub fn check_same_sampling(&self, other: &Self) -> Result<(), SignalError> {
         let (left, right) = (self.sampling, other.sampling);
         let same_dt = (left.dt() - right.dt()).abs() <= 1e-9 * left.dt();
@@ -195,12 +185,12 @@ impl Record {
     }
 }
 
-/// Position of the first NaN, infinity or value beyond [`Record::LARGEST`].
+/// Position of the first NaN or infinity.
 ///
 /// Block by block without a branch inside, so that a sound record is checked at the speed of memory.
 fn first_unusable(values: &[f64]) -> Option<usize> {
     const BLOCK: usize = 1024;
-    let usable = |v: &f64| v.abs() <= Record::LARGEST;
+    let usable = |v: &f64| v.is_finite();
     let sound = |block: &[f64]| block.iter().fold(true, |sound, v| sound & usable(v));
     let block = values.chunks(BLOCK).position(|block| !sound(block))?;
     let at = values[block * BLOCK..].iter().position(|v| !usable(v))?;
@@ -257,8 +247,6 @@ mod tests {
         let e = Record::new(Sampling::new(0.1, 3000).unwrap(), long).unwrap_err();
         let value = f64::NEG_INFINITY;
         assert_eq!(e, SignalError::NotFinite { sample: 2500, channel: 1, value });
-        let e = Record::from_channels(s, &[[1.0, -1e71]]).unwrap_err();
-        assert_eq!(e, SignalError::TooLarge { sample: 1, channel: 0, value: -1e71 });
     }
 
     #[test]

@@ -1,11 +1,11 @@
-//! Whether a record repeats, and after how many samples.
+//! Periods of records that repeat.
 
 use crate::measures::aperiodic_autocorrelation;
 
-/// What [`repetition`] finds.
+/// Period of a record and how well it repeats, as [`repetition`] finds it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Repetition {
-    /// Samples in one period.
+    /// Number of samples of one period.
     pub period: usize,
     /// RMS difference of samples one period apart, over √2 times the RMS of the samples about their
     /// mean: 0 if they repeat exactly, 1 for white noise, and the noise-to-signal ratio for a
@@ -13,31 +13,31 @@ pub struct Repetition {
     pub mismatch: f64,
 }
 
-/// Signals that differ more from period to period do not count as periodic: noise of a tenth, whose
-/// mismatch scatters, does no harm.
+/// Largest mismatch of a periodic signal: noise of a tenth of the RMS value, whose mismatch scatters,
+/// stays below it.
 const WORST: f64 = 0.125;
 
-/// Lags of the same quality differ by this factor at most in the square of the mismatch.
+/// Largest ratio of the squared mismatches of lags that are equally good.
 const ALIKE: f64 = 2.0;
 
-/// A slow signal resembles itself up to the first lag at which the square of the mismatch is this
-/// many times that of [`WORST`]: more than any two lags of the same quality differ.
+/// A slow signal resembles itself up to the first lag at which the squared mismatch is this many times
+/// that of [`WORST`]: more than the ratio of any two equally good lags.
 const APART: f64 = 2.0 * ALIKE;
 
-/// Squared mismatch that rounding in the Fourier transforms leaves of one that is zero.
+/// Squared mismatch that rounding in the Fourier transforms makes of zero.
 const ROUNDING: f64 = 1e-12;
 
-/// The shortest whole number of samples after which a signal, in any unit, repeats, if it does so
-/// at least once in full and better than to an eighth of its RMS value.
+/// Returns the smallest number of samples after which a signal, in any unit, repeats, if it does so at
+/// least once in full and to better than an eighth of its RMS value.
 ///
-/// What is said holds of the whole record: samples two, three and more periods apart, as long as
-/// every sample has such a partner, are alike, too, to √2 eighths of the RMS value. And it is no
-/// decay: a free vibration also resembles itself after each of its cycles, only weaker, and a
-/// modulated one stronger or weaker in turn. There d, the difference of samples one period apart, is
-/// a part of their sum s; noise leaves a difference that has nothing to do with the sum. So in every
-/// period d is fitted by the terms κs (the same shape, larger or smaller) and τs′ (the same a
-/// fraction of a sample later, for a period need not be a whole number of samples); if κs
-/// makes more than half of what τs′ leaves of d, nothing repeats.
+/// The whole record must repeat: samples two, three and more periods apart, as long as every sample has
+/// such a partner, also agree to √2 eighths of the RMS value. A decay does not count: a free vibration
+/// resembles itself after each of its cycles, only weaker, and a modulated one alternately stronger and
+/// weaker. There d, the difference of samples one period apart, is proportional to their sum s, while
+/// noise leaves a difference that is independent of the sum. So in every period d is fitted by the terms
+/// κs (the same shape, larger or smaller) and τs′ (the same shape a fraction of a sample later, for a
+/// period need not be a whole number of samples); if κs explains more than half of the part of d that
+/// τs′ does not, the record does not repeat.
 ///
 /// A signal that changes slowly also resembles itself a few samples later; lags up to the first at
 /// which it does not are left out. A period that is no whole number of samples is not found, but a
@@ -63,7 +63,7 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
         return None;
     }
     let differences = squared_mismatches(&centred);
-    // Behind the lags at which a slow signal resembles itself.
+    // The first lag beyond those at which a slow signal resembles itself.
     let apart = (1..differences.len()).find(|lag| differences[*lag] > APART * WORST * WORST)?;
     let best = differences[apart..].iter().copied().fold(f64::INFINITY, f64::min);
     if best > WORST * WORST {
@@ -79,8 +79,8 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
     (!grows_or_decays(&centred, period)).then_some(found)
 }
 
-/// Of every run of lags that are `alike`, from `first` on, the one with the least difference: around
-/// the period a slow signal resembles itself, too.
+/// Lags of the minima of the difference, one for each run of lags that are `alike`, from `first` on:
+/// a slow signal resembles itself also at the lags around its period.
 fn valleys(
     differences: &[f64],
     first: usize,
@@ -95,16 +95,15 @@ fn valleys(
     })
 }
 
-/// Pairs of samples that say how much of a difference is growth: of fewer, two terms would explain
-/// any difference.
+/// Least number of pairs of samples in a fit of growth: two terms would explain any difference of
+/// fewer.
 const PAIRS: usize = 20;
 
-/// A growth that makes less than this part of the difference is none: what is left of it beside the
-/// shift may be rounding alone.
+/// Least fraction of the difference that counts as growth: a smaller one may be rounding.
 const LEAST_GROWTH: f64 = 0.01;
 
-/// Whether more than half of the difference of samples one period apart is the same shape larger or
-/// smaller, in each period by an amount of its own.
+/// Returns whether more than half of the difference of samples one period apart is the same shape,
+/// larger or smaller, in each period by a factor of its own.
 fn grows_or_decays(x: &[f64], period: usize) -> bool {
     let (early, late) = (&x[..x.len() - period], &x[period..]);
     let sum: Vec<f64> = early.iter().zip(late).map(|(a, b)| b + a).collect();
@@ -136,12 +135,12 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The square of the mismatch for the lags 0 … ⌊N/2⌋, by way of the autocorrelation: to rounding.
+/// Squared mismatch for the lags 0 … ⌊N/2⌋, from the autocorrelation: exact to rounding.
 fn squared_mismatches(x: &[f64]) -> Vec<f64> {
     let len = x.len();
     let products = aperiodic_autocorrelation(x);
     let total: f64 = x.iter().map(|v| v * v).sum();
-    // Squares left out at the end and at the beginning.
+    // Sums of the squares left out at the end and at the beginning.
     let (mut end, mut beginning) = (0.0, 0.0);
     let mut all = Vec::with_capacity(len / 2 + 1);
     for lag in 0..=len / 2 {
@@ -154,7 +153,7 @@ fn squared_mismatches(x: &[f64]) -> Vec<f64> {
     all
 }
 
-/// The same for one lag, without the cancellation.
+/// Mismatch for one lag, without cancellation.
 fn mismatch(x: &[f64], lag: usize) -> f64 {
     let (early, late) = (&x[..x.len() - lag], &x[lag..]);
     let difference: f64 = early.iter().zip(late).map(|(a, b)| (a - b).powi(2)).sum();
@@ -201,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Of slow periods, too, whose samples resemble their neighbours as well as those of the next one.
+    /// Slow periods included, whose samples resemble their neighbours as well as those of the next period.
     #[test]
     fn noise_of_a_tenth_hides_no_period() {
         for (period, periods) in [(64, 3), (100, 12), (257, 7), (1024, 8)] {

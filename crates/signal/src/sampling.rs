@@ -53,7 +53,7 @@ impl Sampling {
         self.len
     }
 
-    /// The same step with another number of samples.
+    /// Returns a time axis with the same step and another number of samples.
     ///
     /// # Errors
     /// [`SignalError::Empty`] if `len` is 0.

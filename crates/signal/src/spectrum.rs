@@ -1,4 +1,4 @@
-//! One-sided complex amplitudes of a periodic record, and back.
+//! One-sided complex amplitudes of a periodic record, and the way back.
 //!
 //! The convention, everywhere in `mechid`: for one period of N samples x_k,
 //!
@@ -74,11 +74,10 @@ impl Spectrum {
         Ok(Self { sampling, lines })
     }
 
-    /// The period this is the spectrum of; the exact inverse of [`Spectrum::of`].
+    /// Returns the period that has this spectrum; the exact inverse of [`Spectrum::of`].
     ///
     /// # Errors
-    /// [`SignalError::TooLarge`] and [`SignalError::NotFinite`] if the lines add up to more than a
-    /// record may hold.
+    /// [`SignalError::NotFinite`] if the lines add up to more than a number can hold.
     pub fn to_record(&self) -> Result<Record, SignalError> {
         Record::new(self.sampling, self.samples())
     }

@@ -27,7 +27,7 @@ pub fn told_to(value: f64, decimals: usize) -> impl fmt::Display {
     ToldTo(value, decimals)
 }
 
-/// So many things: the number and, of anything but one, their plural.
+/// Number of things, with their plural for anything but one.
 ///
 /// ```
 /// use mechid_signal::counted;

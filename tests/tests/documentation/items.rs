@@ -36,6 +36,12 @@ pub enum Kind {
     Field(Box<Type>),
     /// A type; its fields are items of their own.
     Type,
+    /// A variant of a public enum; its fields are items of their own.
+    Variant,
+    /// A constant, in a module or of a type.
+    Constant,
+    /// The head of a file.
+    Head,
 }
 
 /// A public item with what is said about it.
@@ -117,6 +123,7 @@ impl Source {
         let mut types = BTreeMap::new();
         let mut found = Vec::new();
         for module in &self.modules {
+            found.extend((!module.docs.is_empty()).then(|| Item::head(module)));
             for item in &module.items {
                 self.declared(module, item, &mut types, &mut found);
             }
@@ -142,6 +149,9 @@ impl Source {
             is_public(vis) && (module.open || self.exported.contains(&name.to_string()))
         };
         match item {
+            syn::Item::Const(own) if reached(&own.vis, &own.ident) => {
+                found.push(Item::new(module, &own.ident, &own.attrs, "", Kind::Constant));
+            }
             syn::Item::Fn(function) if reached(&function.vis, &function.sig.ident) => {
                 let (signature, body) = (function.sig.clone(), Some(function.block.clone()));
                 let kind = Kind::Function { signature: Box::new(signature), body, of: None };
@@ -157,12 +167,20 @@ impl Source {
                 types.insert(own.ident.to_string(), docs(&own.attrs));
                 found.push(Item::new(module, &own.ident, &own.attrs, "", Kind::Type));
                 for variant in &own.variants {
+                    found.push(Item::new(
+                        module,
+                        &variant.ident,
+                        &variant.attrs,
+                        "",
+                        Kind::Variant,
+                    ));
                     let said = docs(&variant.attrs) + &message(&variant.attrs);
                     fields(module, &variant.fields, &said, false, found);
                 }
             }
             syn::Item::Trait(own) if reached(&own.vis, &own.ident) => {
                 let said = docs(&own.attrs);
+                found.push(Item::new(module, &own.ident, &own.attrs, "", Kind::Type));
                 for method in &own.items {
                     let TraitItem::Fn(method) = method else { continue };
                     let (signature, body) = (method.sig.clone(), method.default.clone());
@@ -181,6 +199,11 @@ impl Source {
 }
 
 impl Item {
+    fn head(module: &Module) -> Self {
+        let (docs, around, file) = (module.docs.clone(), String::new(), module.docs.clone());
+        Self { place: format!("{}:1", module.file), docs, around, file, kind: Kind::Head }
+    }
+
     fn new(
         module: &Module,
         name: &syn::Ident,
@@ -213,6 +236,11 @@ fn methods(
     let name = own.path.segments.last().unwrap().ident.to_string();
     let (None, Some(said)) = (&block.trait_, types.get(&name)) else { return };
     for method in &block.items {
+        if let ImplItem::Const(own) = method
+            && is_public(&own.vis)
+        {
+            found.push(Item::new(module, &own.ident, &own.attrs, said, Kind::Constant));
+        }
         let ImplItem::Fn(method) = method else { continue };
         if is_public(&method.vis) {
             let kind = Kind::Function {

@@ -12,17 +12,30 @@ use std::path::{Path, PathBuf};
 use items::{Item, Source};
 
 /// The crates whose every item others call.
-const LIBRARIES: [&str; 9] =
-    ["signal", "model", "integrate", "estimate", "force", "io", "plot", "problems", "mechid"];
+const LIBRARIES: [&str; 10] = [
+    "signal",
+    "model",
+    "bearing",
+    "integrate",
+    "estimate",
+    "force",
+    "io",
+    "plot",
+    "problems",
+    "mechid",
+];
+
+/// The crates whose summaries are plain; the others follow.
+const PLAIN: [&str; 4] = ["signal", "model", "plot", "problems"];
 
 fn folder(library: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates").join(library).join("src")
 }
 
-/// Places of the items of some crates that break a rule.
-fn breaches(breaks: impl Fn(&Item) -> bool) -> Vec<String> {
+/// Places of the items of these crates that break a rule.
+fn breaches(libraries: &[&str], breaks: impl Fn(&Item) -> bool) -> Vec<String> {
     let mut found = Vec::new();
-    for library in LIBRARIES {
+    for library in libraries {
         let items = Source::of(&folder(library)).items();
         assert!(items.len() > 5, "{library} has {} public items", items.len());
         let wrong = items.iter().filter(|item| breaks(item));
@@ -38,22 +51,28 @@ fn none(found: &[String], what: &str) {
 
 #[test]
 fn what_can_fail_says_how() {
-    none(&breaches(rules::hides_its_errors), "public functions without `# Errors`");
+    none(&breaches(&LIBRARIES, rules::hides_its_errors), "public functions without `# Errors`");
 }
 
 #[test]
 fn what_computes_says_after_whom() {
-    none(&breaches(rules::hides_its_source), "public functions without `# Source`");
+    none(&breaches(&LIBRARIES, rules::hides_its_source), "public functions without `# Source`");
+}
+
+#[test]
+fn summaries_begin_with_a_verb_or_a_noun() {
+    let found = breaches(&PLAIN, rules::begins_with_a_fragment);
+    none(&found, "public items whose summary begins with a fragment");
 }
 
 #[test]
 fn numbers_have_units() {
-    none(&breaches(rules::hides_its_units), "public items without a unit");
+    none(&breaches(&LIBRARIES, rules::hides_its_units), "public items without a unit");
 }
 
 #[test]
 fn lists_and_matrices_have_shapes() {
-    none(&breaches(rules::hides_its_shape), "public items without a shape");
+    none(&breaches(&LIBRARIES, rules::hides_its_shape), "public items without a shape");
 }
 
 /// What `cargo test --doc` runs there does something, and says what must come out.
@@ -102,6 +121,18 @@ fn the_rules_tell_good_from_bad() {
         #[cfg(test)] mod tests { pub fn tested() -> Result<f64, E> { Ok(1.0) } }";
     assert_eq!(read(hidden).len(), 0);
     assert_eq!(read(&format!("pub use a::unseen; {hidden}")).len(), 1);
+    for (docs, fragment) in [
+        ("What the filter leaves.", true),
+        ("Whether it is so.", true),
+        ("Of each channel the level.", true),
+        ("Returns whether it is so.", false),
+        ("`If` as a keyword.", false),
+        ("Φ, 2n×2n.", false),
+        ("Level of each channel.", false),
+    ] {
+        let items = read(&format!("/// {docs}\npub const LEVEL: f64 = 1.0;"));
+        assert_eq!(rules::begins_with_a_fragment(&items[0]), fragment, "{docs}");
+    }
     // What is only told on, converted or compared needs no source.
     for plain in ["self.dt", "1.0 / self.dt", "if self.dt > x { x } else { self.dt }"] {
         let text =

@@ -38,6 +38,81 @@ pub fn hides_its_shape(item: &Item) -> bool {
     carries_some(item, shaped) && !says(item, SHAPES)
 }
 
+/// A summary begins with a verb in the third person ("Returns …") or with a noun of the field: a
+/// question, a pronoun, a conjunction or a preposition is the beginning of a fragment.
+pub fn begins_with_a_fragment(item: &Item) -> bool {
+    let word = item.docs.split(|c: char| !c.is_alphabetic() && c != '\'').find(|w| !w.is_empty());
+    // A formula, a symbol or a name in code is a noun.
+    let is_word = item.docs.trim_start().starts_with(|c: char| c.is_alphabetic());
+    is_word && word.is_some_and(|word| FRAGMENTS.contains(&word))
+}
+
+/// First words of fragments.
+const FRAGMENTS: &[&str] = &[
+    "Above",
+    "After",
+    "Also",
+    "And",
+    "Anything",
+    "As",
+    "At",
+    "Because",
+    "Before",
+    "Behind",
+    "Below",
+    "Beside",
+    "Between",
+    "But",
+    "By",
+    "Everything",
+    "From",
+    "How",
+    "If",
+    "In",
+    "Into",
+    "It",
+    "Its",
+    "Like",
+    "Likewise",
+    "Neither",
+    "Nor",
+    "Not",
+    "Nothing",
+    "Of",
+    "On",
+    "Or",
+    "Out",
+    "Over",
+    "Since",
+    "So",
+    "Something",
+    "Such",
+    "That",
+    "Their",
+    "Them",
+    "Then",
+    "There",
+    "These",
+    "They",
+    "This",
+    "Those",
+    "Thus",
+    "To",
+    "Under",
+    "Until",
+    "Up",
+    "What",
+    "When",
+    "Where",
+    "Whether",
+    "Which",
+    "While",
+    "Who",
+    "Why",
+    "With",
+    "Without",
+];
+
 /// Words of which one stands for a unit, or for none.
 const UNITS: &[&str] = &[
     "N",
@@ -109,7 +184,7 @@ fn has_section(docs: &str, heading: &str) -> bool {
 
 fn carries_some(item: &Item, carries: impl Fn(&Type) -> bool) -> bool {
     match &item.kind {
-        Kind::Type => false,
+        Kind::Type | Kind::Variant | Kind::Constant | Kind::Head => false,
         Kind::Field(ty) => carries(ty),
         Kind::Function { signature, .. } => types(signature).iter().any(|ty| carries(ty)),
     }

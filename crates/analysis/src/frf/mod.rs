@@ -99,7 +99,7 @@ pub enum Weight {
     Hamming,
     /// The least leakage, a wider peak.
     Blackman,
-    /// No weighting, for bursts that begin and end at rest.
+    /// Equal weights, for bursts that begin and end at rest.
     Rectangular,
 }
 
@@ -153,7 +153,7 @@ impl Segmentation {
 #[derive(Debug)]
 pub(crate) struct Responses {
     pub frf: Frf,
-    /// Of a segment.
+    /// Lines of a segment.
     pub lines: Lines,
     /// Degrees of freedom a force acts on, counted from 0.
     pub driven: Vec<usize>,
@@ -161,7 +161,7 @@ pub(crate) struct Responses {
 }
 
 impl Responses {
-    /// From the forces that act to the first kind of motion measured, on the lines that `choose`
+    /// Estimates them from the forces that act to the first kind of response measured, on the lines that `choice`
     /// finds in a segment of the force.
     pub fn of(
         recorded: &Windowed,
@@ -184,7 +184,7 @@ impl Responses {
     }
 }
 
-/// From the forces that act to the first kind of motion measured, on some lines of a segment, over all
+/// Averages from the forces that act to the first kind of response, on some lines of a segment, over all
 /// of the window.
 pub(crate) fn average(
     recorded: &Windowed,

@@ -12,7 +12,7 @@ use super::{FrfSettings, Responses};
 use crate::measurement::Block;
 use crate::text::{compact, paragraph, significant, text_table};
 
-/// Everything `mechid frf` has to say.
+/// Frequency responses with coherence and standard errors.
 #[derive(Debug, Serialize)]
 pub struct FrfTable {
     /// The record.
@@ -27,7 +27,7 @@ pub struct FrfTable {
     pub estimator: &'static str,
     /// Segments that were averaged.
     pub segments: SegmentRow,
-    /// What the motion was measured as.
+    /// Measured quantity of the response.
     pub quantity: String,
     /// SI unit.
     pub unit: &'static str,
@@ -37,22 +37,22 @@ pub struct FrfTable {
     pub responses: Vec<Response>,
     /// Coherence, one per response.
     pub coherence: Vec<Coherence>,
-    /// What to know of the numbers.
+    /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: FrfSettings,
 }
 
-/// How the record was cut.
+/// Segments of a record.
 #[derive(Debug, Serialize)]
 pub struct SegmentRow {
     /// Number of samples.
     pub samples: usize,
-    /// From the start of one to that of the next.
+    /// Number of samples from the start of one to that of the next.
     pub hop: usize,
-    /// Nothing for whole periods.
+    /// `None` for whole periods.
     pub window: Option<&'static str>,
-    /// How many independent segments the averages are worth.
+    /// Equivalent number of independent averages.
     pub averages: f64,
 }
 
@@ -71,7 +71,7 @@ pub struct Response {
     pub magnitude: Vec<f64>,
     /// Phase, in degrees.
     pub phase_deg: Vec<f64>,
-    /// Of the magnitude: of real and imaginary part alike, √(E|ΔH|²/2).
+    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2).
     pub standard_error: Vec<f64>,
 }
 
@@ -215,7 +215,7 @@ impl Response {
         }
     }
 
-    /// Where the magnitude is largest, and how large.
+    /// Returns index and value of the largest magnitude.
     fn peak(&self) -> (usize, f64) {
         let larger = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         self.magnitude.iter().copied().enumerate().fold((0, 0.0), larger)

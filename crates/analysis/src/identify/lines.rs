@@ -15,9 +15,9 @@ pub enum LineChoice {
     /// Every line at which the force exceeds its noise.
     #[default]
     Driven,
-    /// Those of them in a frequency band.
+    /// Such lines within a frequency band.
     Band(Band),
-    /// These lines, whatever the force.
+    /// Given lines, whatever the force.
     Lines(LineSpec),
 }
 

@@ -26,7 +26,7 @@ use crate::frf::{Estimator, Segmentation};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Identify {
-    /// What is fitted: spectra, averaged frequency responses, or samples.
+    /// Data that are fitted: spectra, averaged frequency responses, or samples.
     pub fit: Fit,
     /// Spectral lines to use, of spectra and frequency responses.
     pub lines: LineChoice,
@@ -34,7 +34,7 @@ pub struct Identify {
     pub mass: KnownMass,
 }
 
-/// What is fitted, and how.
+/// Data that are fitted, and the estimator.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "domain", rename_all = "kebab-case")]
 pub enum Fit {
@@ -132,9 +132,9 @@ impl Between {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Derivatives {
-    /// By the spectrum of whole periods.
+    /// Multiplication of the lines of whole periods by iω.
     Spectral,
-    /// By a sliding polynomial.
+    /// A sliding polynomial.
     SavitzkyGolay {
         /// Number of samples in the window, odd.
         window: usize,

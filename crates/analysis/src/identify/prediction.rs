@@ -1,4 +1,4 @@
-//! What the machine found does under a measured force.
+//! The response of the identified system to a measured force.
 
 use mechid_estimate::{EstimateError, fitted_start, predict, predict_periodic};
 use mechid_model::Discretisation;
@@ -10,12 +10,12 @@ use mechid_signal::Record;
 use crate::AnalysisError;
 use crate::measurement::Block;
 
-/// How a record is predicted, in keeping with how the machine was found.
+/// Kind of prediction of a record, in keeping with how the machine was identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Prediction {
-    /// In the steady state under whole periods of a band-limited force, means apart.
+    /// Steady state under whole periods of a band-limited force, means subtracted.
     Steady,
-    /// From sample to sample.
+    /// Step from sample to sample.
     Sampled {
         /// Assumption on the force between samples.
         discretisation: Discretisation,
@@ -24,7 +24,7 @@ pub enum Prediction {
     },
 }
 
-/// One kind of motion, measured and predicted.
+/// One kind of response, measured and predicted.
 #[derive(Debug)]
 pub struct Compared {
     /// Kind of response.
@@ -36,8 +36,8 @@ pub struct Compared {
 }
 
 impl Prediction {
-    /// Every motion measured, as far as it is held, beside the one predicted. An open record starts
-    /// where its motion is met best.
+    /// Returns every response measured, as far as it is held, beside the one predicted. An open record
+    /// starts from the state that fits it best.
     pub fn predict(
         self,
         system: &SecondOrderSystem,
@@ -83,7 +83,7 @@ impl Prediction {
     }
 }
 
-/// Why there is no prediction.
+/// Returns the reason why there is no prediction.
 pub fn failed(
     reason: EstimateError,
     system: &SecondOrderSystem,
@@ -95,13 +95,13 @@ pub fn failed(
     }
 }
 
-/// The rate, in 1/s, at which the free motion grows; nothing if it does not.
+/// Returns the rate, in 1/s, at which the free response grows; `None` if it does not.
 fn growth(system: &SecondOrderSystem) -> Option<f64> {
     let eigenvalues = system.eigenvalues().ok()?;
     eigenvalues.iter().map(|l| l.re).filter(|rate| *rate > 0.0).max_by(f64::total_cmp)
 }
 
-/// One kind of motion of a response.
+/// Returns one quantity of a response.
 pub fn channels(response: &Response, kind: ResponseQuantity) -> &Record {
     match kind {
         ResponseQuantity::Displacement => response.displacement(),

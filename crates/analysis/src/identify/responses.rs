@@ -90,7 +90,7 @@ fn found(
     }
 }
 
-/// What the fit leaves of one record; `rows` are those of all records together.
+/// Returns the findings after the fit of one record; `rows` are those of all records together.
 fn looked_at(
     held: &Block,
     r: &Responses,

@@ -18,7 +18,7 @@ use crate::AnalysisError;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
 impl SampleFit {
-    /// How much of a record must be held: all of it where every sample needs all others.
+    /// Returns how much of a record must be held: all of it where every sample needs all others.
     pub fn hold(&self) -> Hold {
         match (self.derivatives, self.refine.map(|refine| refine.interpolation)) {
             (Some(Derivatives::Spectral), _) => Hold::Whole,
@@ -67,12 +67,12 @@ impl SampleFit {
         })
     }
 
-    /// What a window is as far as it is held.
+    /// Returns the extent of the samples that are held.
     fn extent_of(&self, held: &Block) -> Extent {
         if held.held_to().is_some() { Extent::Open } else { self.extent() }
     }
 
-    /// With what was seen before the fit, whether a period that is not held whole is one, by its last
+    /// Adds to the findings before the fit whether a period that is not held whole is one, by its last
     /// samples.
     fn with_seam(
         &self,
@@ -174,7 +174,7 @@ impl SampleFit {
         })
     }
 
-    /// What is looked at beside the residual.
+    /// Returns the findings beside those on the residual.
     fn at_samples_after(
         &self,
         p: &Prepared,

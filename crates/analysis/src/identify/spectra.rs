@@ -32,17 +32,17 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
-    /// What was looked at before the fit, record by record.
+    /// Findings before the fit, record by record.
     pub before: Vec<Vec<Finding>>,
-    /// What was looked at after the fit beside the residuals, record by record.
+    /// Findings after the fit beside those on the residuals, record by record.
     pub after: Vec<Vec<Finding>>,
-    /// What the fit leaves of each record; empty where that is not a row of samples.
+    /// Residual of each record; empty where it is not a row of samples.
     pub residuals: Vec<Residual>,
-    /// How the machine found is made to move under a measured force.
+    /// Kind of prediction of the response to a measured force.
     pub prediction: Prediction,
     /// Residual power against that of the noise, where the noise is known.
     pub misfit: Option<Misfit>,
-    /// How it was done, where that is not plain.
+    /// Remarks on how the fit was done.
     pub remarks: Vec<String>,
 }
 
@@ -51,7 +51,7 @@ pub struct Fitted {
 pub struct Misfit {
     /// Ratio of residual power to noise power.
     pub ratio: f64,
-    /// What the noise was known from.
+    /// Source of the noise level.
     pub noise: &'static str,
 }
 
@@ -62,12 +62,12 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// What a fit leaves of a record.
+/// Residual of a fit.
 #[derive(Debug)]
 pub struct Residual {
     /// Residual, samples × degrees of freedom.
     pub left: Record,
-    /// What it is left of, to tell rounding from noise.
+    /// The fitted signal, used to tell rounding from noise.
     pub fitted: Record,
     /// Force, samples × degrees of freedom, in N.
     pub force: Record,
@@ -128,7 +128,7 @@ struct Found {
     remark: Option<String>,
 }
 
-/// What a method makes of the spectra, of which `data` are the means.
+/// Returns the estimate of a method from the spectra, of which `data` are the means.
 fn found(
     spectra: &[Spectra],
     data: &FrequencyData,
@@ -181,7 +181,7 @@ fn together(
     Ok(all)
 }
 
-/// All periods of a record, a chunk at a time.
+/// Returns all periods of a record, read chunk by chunk.
 pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, AnalysisError> {
     let Block { force, period, periods, .. } = &recorded.held;
     let kind = recorded.held.response().1;
@@ -192,7 +192,7 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(all)
 }
 
-/// What is left against the noise of the periods, if these are several.
+/// Returns the misfit against the noise of the periods, if there are several.
 fn of_noise(
     periods: &RepeatedPeriods,
     estimate: &Estimate,
@@ -210,7 +210,7 @@ fn weighted(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
     }
 }
 
-/// How the noise of so many periods is averaged over the lines; nothing if it does not show.
+/// Returns how the noise of `periods` periods is averaged over the lines; `None` for one period.
 fn pooling(periods: usize) -> Option<Pooling> {
     match periods {
         0 | 1 => None,
@@ -219,7 +219,7 @@ fn pooling(periods: usize) -> Option<Pooling> {
     }
 }
 
-/// What to say of weights from so many periods.
+/// Returns the remark on weights from `periods` periods.
 fn of_pooling(periods: usize) -> Option<String> {
     match periods {
         0 | 1 => Some(
@@ -232,7 +232,7 @@ fn of_pooling(periods: usize) -> Option<String> {
     }
 }
 
-/// What to say of the motions that spectra leave aside.
+/// Returns the remark on kinds of response that are not used.
 pub fn one_motion_of(measured: &Block) -> Vec<String> {
     let unused = measured.responses().len() > 1;
     let kind = measured.response().1;

@@ -1,4 +1,4 @@
-//! What an identification found, for people and for programs.
+//! The result of an identification.
 
 use std::fmt;
 use std::path::Path;
@@ -22,7 +22,7 @@ use crate::text::{compact, paragraph, significant, text_table};
 /// Level of the confidence intervals.
 pub const CONFIDENCE: f64 = 0.95;
 
-/// Everything `mechid identify` has to say.
+/// Result of an identification: numbers, checks and remarks.
 #[derive(Debug, Serialize)]
 pub struct IdentificationSummary {
     /// The record.
@@ -44,15 +44,15 @@ pub struct IdentificationSummary {
     pub parameters: Vec<ParameterRow>,
     /// Modes, by rising frequency.
     pub modes: Vec<ModeRow>,
-    /// How well the model explains the record.
+    /// Quality of the fit.
     pub fit: FitRow,
     /// Every record, the first included.
     pub records: Vec<RecordRow>,
-    /// What was looked at before and after the fit.
+    /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
-    /// How much of a record that was not fitted is predicted.
+    /// Prediction of a record that was not fitted.
     pub validation: Option<Validation>,
-    /// What the user should know before believing the numbers.
+    /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// M, C and K, as `mechid force --system` and others read them back.
     pub system: SystemMatrices,
@@ -107,7 +107,7 @@ pub struct LinesUsed {
 pub struct Uncertain {
     /// Value, in its unit.
     pub value: f64,
-    /// Nothing for a value that is known.
+    /// `None` for a value that is known.
     pub standard_error: Option<f64>,
     /// Confidence interval; `None` for a value that is known.
     pub interval: Option<[f64; 2]>,
@@ -146,7 +146,7 @@ pub struct ModeRow {
     pub damping_ratio: Uncertain,
 }
 
-/// How well the model explains the record.
+/// Quality of a fit.
 #[derive(Debug, Serialize)]
 pub struct FitRow {
     /// RMS of the residual over RMS of what was fitted: the force, or with maximum likelihood the
@@ -434,7 +434,7 @@ fn digits(value: f64, error: f64) -> usize {
     if ratio.is_finite() { (ratio.floor() as i32 + 3).clamp(3, 12) as usize } else { 6 }
 }
 
-/// What a residual that is no noise can come from, where another method would leave less.
+/// Returns the remark on a residual of least squares that is not noise.
 pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);

@@ -1,4 +1,4 @@
-//! How much of a record the identified system predicts.
+//! Prediction of a record by the identified system, in per cent.
 
 use mechid_estimate::{StartFit, fit_percent, predict};
 use mechid_model::Discretisation;
@@ -25,7 +25,7 @@ pub struct Validation {
     pub channels: Vec<Share>,
 }
 
-/// How much of one channel is predicted.
+/// Predicted part of one channel.
 #[derive(Debug, Serialize)]
 pub struct Share {
     /// Quantity that was measured.
@@ -113,7 +113,7 @@ impl Validation {
         })
     }
 
-    /// As a person reads it.
+    /// Returns the result as a person reads it.
     pub fn text(&self) -> String {
         let (first, last) = (self.first_sample, self.last_sample);
         let several = self.channels.iter().any(|share| share.degree_of_freedom > 1);
@@ -131,7 +131,7 @@ impl Validation {
     }
 }
 
-/// How much of each motion of an open record is predicted, in per cent: one pass finds where it
+/// Returns the predicted part of each response of an open record, in per cent: one pass finds where it
 /// started, another follows it from there.
 fn in_stretches(
     recorded: &Windowed,

@@ -1,4 +1,4 @@
-//! What can be said of one channel.
+//! Measures of one channel.
 
 use std::f64::consts::TAU;
 
@@ -21,7 +21,7 @@ pub struct Channel {
     pub column: usize,
     /// Name.
     pub name: String,
-    /// What the file says of it beyond its name.
+    /// Further description in the file.
     pub about: String,
     /// Mean, in the unit of the channel.
     pub mean: f64,
@@ -35,11 +35,11 @@ pub struct Channel {
     pub minimum: f64,
     /// Largest sample, in the unit of the channel.
     pub maximum: f64,
-    /// Nothing if it was not cut off.
+    /// `None` if it was not clipped.
     pub clipping: Option<Cut>,
     /// The strongest lines of the spectrum, the strongest first.
     pub spectrum_peaks: Vec<SpectrumPeak>,
-    /// Nothing if it does not repeat.
+    /// `None` if it does not repeat.
     pub period: Option<Period>,
     /// Whether lines and period were looked for.
     #[serde(skip)]
@@ -51,13 +51,13 @@ pub struct Channel {
 pub struct SpectrumPeak {
     /// Frequency, in cycles per sample.
     pub cycles_per_sample: f64,
-    /// Nothing without a time axis.
+    /// `None` without a time axis.
     pub frequency_hz: Option<f64>,
-    /// Of the sine, in the unit of the channel.
+    /// Amplitude of the sine, in the unit of the channel.
     pub amplitude: f64,
 }
 
-/// Where an amplifier or a converter has cut a channel off.
+/// Clipping of a channel by an amplifier or a converter.
 #[derive(Debug, Serialize)]
 pub struct Cut {
     /// In the unit of the channel.
@@ -66,25 +66,25 @@ pub struct Cut {
     pub samples: usize,
 }
 
-/// After how long a channel repeats.
+/// Period after which a channel repeats.
 #[derive(Debug, Serialize)]
 pub struct Period {
     /// Number of samples.
     pub samples: usize,
-    /// Nothing without a time axis.
+    /// `None` without a time axis.
     pub seconds: Option<f64>,
     /// RMS difference from one period to the next, over √2 times the RMS about the mean.
     pub mismatch: f64,
 }
 
-/// What is gathered of a channel, block by block.
+/// Statistics of a channel, gathered block by block.
 #[derive(Debug, Default)]
 pub struct Gathered {
     levels: Levels,
     /// The first samples, which are looked at together; none where nothing is looked for.
     held: Vec<f64>,
     mean_of_held: f64,
-    /// What a picture shows over time; nothing if none is drawn.
+    /// Extreme values over time; `None` if no picture is drawn.
     extremes: Option<Extremes>,
 }
 
@@ -95,12 +95,12 @@ pub struct Measured {
     pub channel: Channel,
     /// Amplitude spectrum.
     pub lines: AmplitudeSpectrum,
-    /// Nothing if it is not drawn.
+    /// `None` if it is not drawn.
     pub extremes: Option<Extremes>,
 }
 
 impl Gathered {
-    /// Nothing yet of a channel that may be drawn, over a window of so many samples.
+    /// Starts with no sample of a channel that may be drawn, over a window of `window` samples.
     pub fn of(window: usize, drawn: bool) -> Self {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }

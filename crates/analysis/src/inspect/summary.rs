@@ -11,7 +11,7 @@ use super::channel::{Channel, Cut, Period, SpectrumPeak};
 use super::measured::Span;
 use crate::text::{compact, significant, text_table};
 
-/// What is in a record.
+/// Inventory of a record.
 #[derive(Debug, Serialize)]
 pub struct RecordSummary {
     /// The record.
@@ -22,17 +22,17 @@ pub struct RecordSummary {
     pub columns: usize,
     /// Samples that most columns have.
     pub samples: usize,
-    /// Nothing if no column can be shown.
+    /// `None` if no column can be shown.
     pub window: Option<WindowRow>,
-    /// Nothing without a time axis.
+    /// `None` without a time axis.
     pub sampling: Option<SamplingRow>,
     /// Channels, one each.
     pub channels: Vec<Channel>,
     /// Single numbers in the file.
     pub scalars: Vec<Scalar>,
-    /// What else the file says.
+    /// Further remarks of the file.
     pub remarks: Vec<String>,
-    /// Columns not shown, and why.
+    /// Columns not shown, each with the reason.
     pub left_out: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: InspectSettings,

@@ -17,7 +17,7 @@ pub fn are_enough_for(method: Method, request: &Request) -> bool {
     !request.periodic && matches!(method, Method::Continuous | Method::Discretised)
 }
 
-/// What is done with a chunk, the force on it, and those of its samples that count.
+/// Callback for a chunk, the force on it, and the range of its samples that count.
 pub type Take<'a> =
     dyn FnMut(&Measurement, &IdentifiedForce, Range<usize>) -> Result<(), AnalysisError> + 'a;
 

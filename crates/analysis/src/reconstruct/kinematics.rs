@@ -16,14 +16,14 @@ struct Pair {
     by_rate: f64,
 }
 
-/// All such pairs of a record.
+/// Consistency of displacement, velocity and acceleration channels of a record.
 #[derive(Debug)]
 pub struct KinematicConsistency(Vec<Pair>);
 
-/// Less alike than this, noise may have made the difference.
+/// Correlation below which noise may have made the difference.
 const ALIKE: f64 = 0.7;
 
-/// A ratio that no sampling makes: the trapezoidal rule is as far out with 2.4 samples per period.
+/// Ratio that no sampling makes: the trapezoidal rule is as far out with 2.4 samples per period.
 const ANOTHER_UNIT: f64 = 3.0;
 
 impl KinematicConsistency {
@@ -57,7 +57,7 @@ impl KinematicConsistency {
         }
     }
 
-    /// Of each pair that does not belong together, how much larger the one is than it should be.
+    /// Returns a remark for each pair that does not belong together.
     pub fn remarks(&self, columns: &[String]) -> Vec<String> {
         let told = |pair: &Pair| {
             let alike = pair.product / (pair.changes * pair.by_rate).sqrt();

@@ -16,7 +16,7 @@ use super::options::Method;
 use crate::AnalysisError;
 use crate::text::significant;
 
-/// Everything the user said about the reconstruction.
+/// Settings of a reconstruction, resolved for a record.
 pub struct Request {
     pub method: Method,
     /// Degrees of freedom with an unknown force, counted from 0.
@@ -38,7 +38,7 @@ pub struct Found {
     pub how: How,
 }
 
-/// How a force was found.
+/// Method of a reconstruction and what it chose.
 pub struct How {
     pub method: &'static str,
     /// Why this method.
@@ -47,9 +47,9 @@ pub struct How {
     pub counts_noise: bool,
     /// Parameters that were chosen, with their units.
     pub chosen: Vec<(String, f64, &'static str)>,
-    /// What the force leaves of each measured channel; nothing where nothing is left over.
+    /// Unexplained part of each measured channel; `None` where there is no surplus channel.
     pub unexplained: Option<Vec<Unexplained>>,
-    /// What to beware of.
+    /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
 }
 
@@ -170,7 +170,7 @@ fn motion_noise(
 }
 
 impl How {
-    /// How [`equation`] finds it.
+    /// Describes the method of [`equation`].
     pub fn of_equation(method: Method, why: String, request: &Request) -> Self {
         let method = if method == Method::Continuous {
             "equation of motion, sample by sample"
@@ -258,10 +258,10 @@ fn filtered(
     Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
 }
 
-/// Less of a motion than this on the lines of the force says that it has another cause.
+/// Part of the power of a response on the lines of the force below which it has another cause.
 const FEW: f64 = 0.5;
 
-/// Tells of the channel of which the lines given hold least, if that is little: they may have been
+/// Returns a remark on the channel of which the lines given hold least, if that is little: they may have been
 /// counted in another period than that of the window.
 fn elsewhere(motion: &Measurement, request: &Request) -> Option<String> {
     let lines = request.lines.as_deref().filter(|_| request.periodic)?;

@@ -51,7 +51,7 @@ pub struct Reconstructed {
     lines: Option<Vec<usize>>,
 }
 
-/// Some samples of a force, as they are found.
+/// Consecutive samples of a force, as they are found.
 #[derive(Debug)]
 pub struct ForceChunk<'a> {
     /// Time axis of the whole force.

@@ -32,7 +32,7 @@ pub struct Recorded {
 /// The samples of a window, or of its mean period.
 pub struct Held {
     pub motion: Measurement,
-    /// How the periods differ from their mean, one per channel; nothing where there is one period.
+    /// Scatter of the periods about their mean, one per channel; `None` where there is one period.
     pub scatter: Option<Vec<Scatter>>,
 }
 
@@ -68,17 +68,17 @@ impl Recorded {
         Ok(Self { source, columns, forces, channels, window, sampling, periods })
     }
 
-    /// How messages call the file.
+    /// Returns the name of the record in messages.
     pub fn file(&self) -> &str {
         &self.source.name
     }
 
-    /// What each channel was called.
+    /// Returns the column of each channel.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
 
-    /// Levels stated of the columns, in their units, as the held samples have them: in SI units, and
+    /// Returns the levels stated of the columns, in their units, as the held samples have them: in SI units, and
     /// of the mean of periods.
     pub fn levels(&self, stated: &[f64]) -> Vec<f64> {
         let mean = (self.periods as f64).sqrt();
@@ -88,12 +88,12 @@ impl Recorded {
             .collect()
     }
 
-    /// Which columns were in other than SI units, and whether the time may be.
+    /// Returns the remarks on units and time.
     pub fn unit_remarks(&self) -> &[String] {
         &self.source.units.remarks
     }
 
-    /// All of the window, or its mean period.
+    /// Returns all of the window, or its mean period.
     pub fn hold(&self) -> Result<Held, AnalysisError> {
         let period = self.sampling.len();
         let mut mean = DMatrix::zeros(period, self.channels.len());

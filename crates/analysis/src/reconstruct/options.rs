@@ -33,7 +33,7 @@ pub enum Method {
     /// Equation of motion, sample by sample: displacement, velocity and acceleration of every degree
     /// of freedom.
     Continuous,
-    /// From each sample to the next, the force linear between them: displacement and velocity.
+    /// Exact step from each sample to the next, the force linear between them: displacement and velocity.
     Discretised,
     /// Dynamic stiffness, line by line: whole periods.
     FrequencyDomain,
@@ -58,7 +58,7 @@ pub enum ParameterRule {
     Gcv,
     /// Corner of the L-curve.
     LCurve,
-    /// This parameter.
+    /// A given parameter.
     Given(f64),
 }
 

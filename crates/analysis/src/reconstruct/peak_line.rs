@@ -27,7 +27,7 @@ pub struct PeakLine {
 }
 
 impl PeakLine {
-    /// Nothing yet of a force with this time axis, on so many channels.
+    /// Starts with no sample of a force with this time axis and this number of channels.
     pub fn new(sampling: Sampling, channels: usize, periodic: bool) -> Result<Self, AnalysisError> {
         let samples = sampling.len();
         let pieces = if periodic { 1 } else { samples.div_ceil(IN_MEMORY_SAMPLES) };
@@ -36,7 +36,7 @@ impl PeakLine {
         Ok(Self { samples, piece, pieces, done: 0, held, first: 0, power })
     }
 
-    /// How many pieces it is looked at in.
+    /// Returns the number of pieces that the spectrum is averaged over.
     pub fn pieces(&self) -> usize {
         self.pieces
     }
@@ -94,7 +94,7 @@ impl PeakLine {
         (line as f64 * self.piece.line_spacing_hz(), (power / self.pieces as f64).sqrt())
     }
 
-    /// Of a long open record, what the strongest line is.
+    /// Returns the remark on the strongest line of a long open record.
     pub fn remark(&self) -> Option<String> {
         (self.pieces > 1).then(|| {
             format!(

@@ -5,7 +5,7 @@ use mechid_force::Unexplained;
 use super::motion::{Held, Recorded};
 use crate::text::significant;
 
-/// How the periods of a channel differ from their mean.
+/// Scatter of the periods of a channel about their mean.
 #[derive(Debug, Clone, Copy)]
 pub struct Scatter {
     /// Standard deviation, in the SI unit of the channel.
@@ -18,7 +18,7 @@ pub struct Scatter {
 #[derive(Debug, Clone, Default)]
 pub struct Sums {
     squares: f64,
-    /// Of each sample and the next of its period.
+    /// Sum of the products of each sample and the next of its period.
     products: f64,
     last: f64,
 }
@@ -36,7 +36,7 @@ impl Sums {
         }
     }
 
-    /// What of them is not in the mean of so many periods.
+    /// Returns the scatter about the mean of `periods` periods.
     pub fn about(&self, mean: &[f64], periods: usize) -> Scatter {
         let all = periods as f64;
         let in_mean: f64 = mean.iter().map(|m| m * m).sum();
@@ -53,11 +53,11 @@ impl Sums {
 /// Periods that differ less than this share of their mean count as alike.
 const ALIKE: f64 = 0.1;
 
-/// White noise is not as like itself from one sample to the next, and the motion of a machine that
+/// Correlation from one sample to the next that white noise does not reach, and the response of a machine that
 /// is sampled five times a period or more is.
 const NOT_WHITE: f64 = 0.3;
 
-/// Tells of the channel whose periods differ most from their mean, if they do.
+/// Returns a remark on the channel whose periods differ most from their mean, if they do.
 pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     let record = held.motion.record();
     let samples = record.len();
@@ -75,7 +75,7 @@ pub fn remark(recorded: &Recorded, held: &Held) -> Option<String> {
     ))
 }
 
-/// What differs from period to period is noise that no force and no machine explains: where none is
+/// Adds the scatter of the periods as noise that no force and no machine explains: where none is
 /// stated, it says what the mean of the periods may leave.
 pub fn tell_noise(unexplained: Option<&mut Vec<Unexplained>>, recorded: &Recorded, held: &Held) {
     let (Some(channels), Some(scatter)) = (unexplained, &held.scatter) else { return };

@@ -10,7 +10,7 @@ use super::options::Reconstruct;
 use super::unexplained::Measured;
 use crate::text::{compact, significant, text_table};
 
-/// Everything `mechid force` has to say.
+/// Result of a force reconstruction: numbers and remarks.
 #[derive(Debug, Serialize)]
 pub struct ForceSummary {
     /// The record.
@@ -37,7 +37,7 @@ pub struct ForceSummary {
     pub channels: Vec<Measured>,
     /// Forces, one per degree of freedom.
     pub forces: Vec<ForceRow>,
-    /// What to know of the numbers.
+    /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: Reconstruct,

@@ -1,4 +1,4 @@
-//! What the forces found leave of the motion that was measured.
+//! The part of the measured response that the identified forces do not explain.
 
 use mechid_force::{Rule, Start, Unexplained};
 use serde::Serialize;
@@ -17,12 +17,12 @@ pub struct Measured {
     /// RMS of what is left over that of the motion; nothing where as many forces are sought as
     /// channels were measured, or where nothing was compared.
     pub unexplained: Option<f64>,
-    /// What noise and the machine's uncertainty may leave, likewise; nothing where the noise is not
+    /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the noise is not
     /// known apart from the fit.
     pub expected: Option<f64>,
 }
 
-/// So many times what noise and machine may leave is too much: noise alone leaves three times its
+/// Factor over what noise and machine may leave that is too much: noise alone leaves three times its
 /// level of one complex line once in e⁹ times, of more lines more rarely.
 const TOO_MUCH: f64 = 3.0;
 
@@ -49,7 +49,7 @@ impl Measured {
             .collect()
     }
 
-    /// As a line of a report.
+    /// Returns the channel as a line of text.
     pub fn text(&self) -> Option<String> {
         let share = percent(self.unexplained?);
         let expected = self.expected.map(|share| format!(", expected {}", percent(share)));
@@ -74,7 +74,7 @@ fn percent(share: f64) -> String {
     format!("{} %", significant(100.0 * share, 2))
 }
 
-/// What to say where more is left than should be.
+/// Returns a remark where more is left than noise and machine may leave.
 pub fn remark(
     measured: &[Measured],
     unexplained: Option<&[Unexplained]>,
@@ -104,7 +104,7 @@ pub fn remark(
     ))
 }
 
-/// What may leave motion unexplained.
+/// Returns the possible causes of an unexplained response.
 fn causes(request: &Request, dofs: usize) -> Vec<String> {
     let mut causes = Vec::new();
     if request.forced.len() < dofs {

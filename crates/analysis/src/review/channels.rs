@@ -1,4 +1,4 @@
-//! What is in the channels that were used.
+//! Levels of the columns that were used.
 
 use mechid_signal::measures;
 
@@ -7,7 +7,7 @@ use crate::measurement::{Block, Channels};
 
 /// One column of the record, over the window.
 pub struct Channel {
-    /// As the user called the column.
+    /// Name of the column, as the user gave it.
     pub column: String,
     /// Quantity that was measured.
     pub quantity: &'static str,
@@ -21,14 +21,14 @@ pub struct Channel {
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// Nothing for a channel of zeros.
+    /// `None` for a channel of zeros.
     pub crest_factor: Option<f64>,
     /// RMS of what differs from period to period over RMS of what repeats, both without their mean;
     /// nothing for one period.
     pub scatter: Option<f64>,
 }
 
-/// What is below this share of the level is what rounding leaves of zero.
+/// Share of the level below which a number is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// The columns in the order force, displacement, velocity, acceleration.
@@ -68,7 +68,7 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
     found
 }
 
-/// How much of a channel, whose mean period varies by `level`, does not repeat.
+/// Returns the part of a channel, whose mean period varies by `level`, that does not repeat.
 fn scatter(all: &Gathered, channel: usize, level: f64) -> Option<f64> {
     let share = all.scatter(channel)? / level;
     (level > 0.0).then_some(if share > ROUNDING { share } else { 0.0 })

@@ -15,19 +15,19 @@ pub struct Excitation {
     pub dof: usize,
     /// Peak over RMS.
     pub crest_factor: f64,
-    /// Nothing for a force that does not vary.
+    /// `None` for a force that does not vary.
     pub peak_factor: Option<f64>,
     /// Lines driven.
     pub lines: usize,
     /// Band of the lines driven.
     pub band: Option<Band>,
-    /// Of the lines driven.
+    /// Spectral flatness of the driven lines.
     pub flatness: Option<f64>,
     /// Order of persistent excitation.
     pub order: usize,
 }
 
-/// Of every force that is not zero throughout, in one period.
+/// Returns the measures of every force that is not zero throughout, in one period.
 pub fn excitations(force: &Record) -> Result<Vec<Excitation>, AnalysisError> {
     let spectrum = Spectrum::of(force);
     let floor = 10f64.powf(-DROP_DB / 20.0);

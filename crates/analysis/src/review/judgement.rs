@@ -1,4 +1,4 @@
-//! What speaks for the numbers, and what against them.
+//! Evidence for and against the numbers.
 
 use mechid_estimate::checks::{Subject, Verdict};
 
@@ -14,7 +14,7 @@ const OVERSTATED: f64 = 0.5;
 /// A prediction of another record below this fit, in per cent, leaves as much as it explains.
 const POOR_FIT: f64 = 50.0;
 
-/// What the reader should know before believing the numbers, the worst first.
+/// Returns the evidence against the numbers, the worst first.
 pub fn doubts(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.found.summary();
     let mut doubts = found_out(&report.checks, Verdict::Bad);
@@ -53,7 +53,7 @@ fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
     sentences.into_iter().map(|(_, sentence)| sentence).collect()
 }
 
-/// What gives cause to believe them.
+/// Returns the evidence for the numbers.
 pub fn merits(contents: &Review<'_>) -> Vec<String> {
     let report = &contents.found.summary();
     let good = report.checks.iter().filter(|check| !check.is_conspicuous());
@@ -103,7 +103,7 @@ pub fn was_fitted(contents: &Review<'_>) -> bool {
     })
 }
 
-/// How well another record is predicted: the poorest channel, in per cent and in words.
+/// Returns how well another record is predicted: the poorest channel, in per cent and in words.
 fn predicted(contents: &Review<'_>) -> impl Iterator<Item = (f64, String)> {
     let validation = contents.found.summary().validation.iter();
     validation.filter_map(|validation| {

@@ -1,4 +1,4 @@
-//! Everything that a report page shows of an identification, computed.
+//! The computed content of a report page.
 
 pub mod channels;
 pub mod excitation;
@@ -20,7 +20,7 @@ use crate::identify::lines::choose_lines;
 use crate::identify::prediction::{Compared, Prediction};
 use crate::measurement::{Block, Windowed};
 
-/// Everything that a page shows.
+/// Computed content of a page.
 pub struct Review<'a> {
     /// The identification.
     pub found: &'a Identified,
@@ -32,7 +32,7 @@ pub struct Review<'a> {
     pub validation: Vec<Compared>,
 }
 
-/// What a page shows of one record.
+/// Computed content of a page for one record.
 pub struct RecordReview<'a> {
     /// The record.
     pub recorded: &'a Windowed,

@@ -25,12 +25,12 @@ const EXPLAINED: f64 = 0.5;
 pub struct Receptance {
     /// Receptance, line by line.
     pub data: FrequencyData,
-    /// Where the receptance comes from.
+    /// Origin of the receptance, in words.
     pub origin: String,
 }
 
 impl Receptance {
-    /// What was fitted in the frequency domain; otherwise that of whole periods, or averaged over
+    /// Returns the data fitted in the frequency domain; otherwise those of whole periods, or averaged over
     /// segments of open records.
     ///
     /// # Errors

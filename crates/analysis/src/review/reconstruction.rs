@@ -17,7 +17,7 @@ pub struct Reconstruction {
     pub method: &'static str,
     /// Reconstructed force.
     pub found: IdentifiedForce,
-    /// In the frequency domain its mean period, on the lines used alone.
+    /// Measured force; in the frequency domain its mean period, on the lines used alone.
     pub measured: Record,
     /// Degrees of freedom on which a force acts, counted from 0.
     pub forced: Vec<usize>,
@@ -77,7 +77,7 @@ fn motion(source: &Block) -> Result<force::Measurement, AnalysisError> {
     Ok(force::Measurement::new(record, channels)?)
 }
 
-/// What a period has on these lines.
+/// Returns the part of a period on these lines.
 fn on_lines(period: &Record, lines: &[usize]) -> Result<Record, SignalError> {
     let all = Spectrum::of(period);
     let mut kept = DMatrix::from_element(all.len(), all.channels(), Complex::ZERO);

@@ -1,4 +1,4 @@
-//! What the identified machine leaves of a measured motion.
+//! Residual of the measured response after the identified system's prediction.
 
 use mechid_estimate::checks::{Correlation, cross_correlation, whiteness};
 use mechid_signal::{Record, measures};
@@ -10,14 +10,14 @@ use crate::identify::prediction::Compared;
 use crate::identify::spectra;
 use crate::measurement::Block;
 
-/// What is below this share of the motion is rounding.
+/// Share of the response below which a residual is rounding.
 const ROUNDING: f64 = 1e-12;
 
 /// Measured and predicted motion of one record, and whether what the fit leaves is noise.
 pub struct Residual {
     /// Every kind of motion measured.
     pub compared: Vec<Compared>,
-    /// Of each channel that the fit leaves; none where it leaves no row of samples.
+    /// Correlations of each residual channel; empty where the fit leaves no row of samples.
     pub correlations: Vec<Correlations>,
     /// The first kind of motion in the mean period, where there are several.
     pub mean: Option<Compared>,
@@ -29,12 +29,12 @@ pub struct Correlations {
     pub own: Correlation,
     /// Lags over which noise on the motion correlates it.
     pub span: usize,
-    /// With each force that acts, by its degree of freedom counted from 0.
+    /// Cross-correlation with each force that acts, by its degree of freedom counted from 0.
     pub forces: Vec<(usize, Correlation)>,
 }
 
 impl Residual {
-    /// Of the record at this place, as far as it is held, and of its mean period.
+    /// Computes it for the record with this index, as far as it is held, and for its mean period.
     ///
     /// # Errors
     /// If the machine has no such motion.

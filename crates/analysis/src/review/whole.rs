@@ -1,4 +1,4 @@
-//! What is said of all samples of a window, however long it is: gathered in one pass.
+//! Levels, histories and mean period of all samples of a window, gathered in one pass.
 
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -8,23 +8,23 @@ use crate::extremes::Extremes;
 use crate::levels::Levels;
 use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
 
-/// All samples of a window.
+/// Statistics of all samples of a window.
 pub struct Whole {
     /// Force, samples × degrees of freedom, in N.
     pub force: Gathered,
-    /// In the order of [`Block::motions`].
+    /// In the order of [`Block::responses`].
     pub motions: Vec<Gathered>,
     /// The mean period; nothing where the window is one period.
     pub mean: Option<Block>,
 }
 
-/// All samples of the channels of one quantity.
+/// Statistics of the channels of one quantity.
 #[derive(Debug)]
 pub struct Gathered {
-    /// Of each channel.
+    /// Levels of each channel.
     pub levels: Vec<Levels>,
     periods: Option<Periods>,
-    /// Of each channel, where not all samples are held.
+    /// Extreme values of each channel, where not all samples are held.
     extremes: Vec<Extremes>,
 }
 
@@ -129,16 +129,16 @@ impl Gathered {
 #[derive(Debug)]
 struct Periods {
     sums: DMatrix<f64>,
-    /// Of what differs from the mean so far, over the scale: squares of the samples themselves would
+    /// Sum of squares about the mean so far, over the scale: squares of the samples themselves would
     /// lose it.
     squares: DMatrix<f64>,
-    /// Of each channel: squares of large or small values leave the range of numbers.
+    /// Scale of each channel: squares of large or small values leave the range of numbers.
     scales: Vec<f64>,
     samples: usize,
 }
 
 impl Periods {
-    /// None yet of `period` samples; `held` are some samples of the channels.
+    /// Starts with no period of `period` samples; `held` are some samples of the channels.
     fn new(period: usize, held: &Record) -> Self {
         let none = DMatrix::zeros(period, held.channels());
         let scale = |c: usize| Some(held.column(c).amax()).filter(|peak| *peak > 0.0);

@@ -48,7 +48,7 @@ impl Estimator {
         matches!(self, Estimator::LeastSquares | Estimator::MaximumLikelihood)
     }
 
-    /// How much of a record must be held.
+    /// Returns how much of a record must be held.
     pub(crate) fn hold(self) -> Hold {
         if self.is_of_spectra() { Hold::Periods } else { Hold::Samples(0) }
     }
@@ -59,7 +59,7 @@ impl Estimator {
     }
 }
 
-/// All that an estimator needs of the samples it has seen.
+/// Sums that an estimator needs of the samples it has seen.
 #[derive(Debug)]
 pub enum Gathered {
     /// Steps from sample to sample.
@@ -71,7 +71,7 @@ pub enum Gathered {
 }
 
 impl Gathered {
-    /// Nothing yet of samples that begin like these; `period` of them are one of so many `periods`.
+    /// Starts with no samples; they begin like these, and `period` of them are one of so many `periods`.
     pub fn new(
         estimator: Estimator,
         beginning: &Samples<'_>,
@@ -143,7 +143,7 @@ pub struct Decimated {
 }
 
 impl Decimated {
-    /// Nothing yet of a record of which this is held.
+    /// Starts with no sample of a record of which this is held.
     ///
     /// # Errors
     /// [`AnalysisError::DecimatedPeriod`] if one of several periods is no whole number of the samples

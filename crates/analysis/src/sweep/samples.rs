@@ -36,7 +36,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Those of a record, taken as open from sample to sample.
+    /// Returns the samples of a record, taken as open.
     pub fn measured(measured: &'a Block) -> Self {
         let motions = measured.responses().into_iter();
         Self {
@@ -62,7 +62,7 @@ impl<'a> Samples<'a> {
         self.map(|record| Ok(record.window(record.len() - 1, 1)?))
     }
 
-    /// These and then those of a later chunk.
+    /// Returns these samples followed by those of a later chunk.
     pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, AnalysisError> {
         let join = |own, later| Ok::<_, AnalysisError>(Cow::Owned(joined(own, later)?));
         let pairs = self.motions.iter().zip(&later.motions);
@@ -88,7 +88,7 @@ impl<'a> Samples<'a> {
         (self.motions[0].0, &self.motions[0].1)
     }
 
-    /// All three motions.
+    /// Returns displacement, velocity and acceleration.
     ///
     /// # Errors
     /// As [`Samples::motion`].

@@ -1,4 +1,4 @@
-//! What a sweep found, for people and for programs.
+//! The result of a sweep.
 
 use std::fmt;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use crate::AnalysisError;
 use crate::identify::summary::{CONFIDENCE, Uncertain};
 use crate::text::{compact, paged_table, paragraph, significant, text_table};
 
-/// Everything `mechid sweep` has to say.
+/// Result of a sweep: estimates and errors at every setting.
 #[derive(Debug, Serialize)]
 pub struct SweepSummary {
     /// The experiment or record.
@@ -25,7 +25,7 @@ pub struct SweepSummary {
     pub setting: Kind,
     /// Number of samples in a period.
     pub samples_per_period: usize,
-    /// In Hz; `None` for a record without a reference.
+    /// Natural frequency, in Hz; `None` for a record without a reference.
     pub natural_frequency_hz: Option<f64>,
     /// Level of the intervals.
     pub confidence: f64,
@@ -35,13 +35,13 @@ pub struct SweepSummary {
     pub best_setting: f64,
     /// The same, where the settings are NPI.
     pub best_npi: Option<f64>,
-    /// What to know of the numbers.
+    /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: SweepSettings,
 }
 
-/// What came out at one setting.
+/// Result at one setting.
 #[derive(Debug, Serialize)]
 pub struct Point {
     /// The setting.
@@ -57,7 +57,7 @@ pub struct Point {
     pub error: Option<f64>,
     /// Parameters, one each.
     pub parameters: Vec<SweptParameter>,
-    /// Why there is no estimate.
+    /// Reason why there is no estimate; `None` if there is one.
     pub failure: Option<String>,
 }
 
@@ -78,10 +78,10 @@ pub struct SweptParameter {
     pub true_value: Option<f64>,
 }
 
-/// What went wrong at a setting, or at all that take the same samples.
+/// Failure at a setting, or at all that take the same samples.
 pub type Failure = Arc<AnalysisError>;
 
-/// Why a setting gave no estimate.
+/// Returns the reason why a setting gave no estimate.
 pub fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
     match &point.outcome {
         Ok(found) => found.system().err().map(|reason| reason.to_string()),

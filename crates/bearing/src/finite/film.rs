@@ -79,7 +79,8 @@ impl Film {
             let at = |&z: &f64| {
                 let below = self.axial[1..last].iter().take_while(|&&node| node <= z).count();
                 let part = (z - self.axial[below]) / (self.axial[below + 1] - self.axial[below]);
-                known[below] + part * (known[below + 1] - known[below])
+                let front = known[below] + part * (known[below + 1] - known[below]);
+                front.clamp(self.pad.edges[0], self.pad.edges[1])
             };
             axial[..mesh.across].iter().map(at).collect::<Vec<_>>()
         });

@@ -105,3 +105,25 @@ fn long_bearings_tend_to_sommerfeld() {
     let limit = std::array::from_fn(|i| 2.0 * longer[i] - shorter[i]);
     assert!(distance(&limit, &expected) < 0.004, "{limit:?} {expected:?}");
 }
+
+/// From light loads to heavy ones, short bearings to long, an equilibrium is found, and it turns
+/// into the load as the load grows.
+#[test]
+fn equilibria_are_found_over_the_range_of_practice() {
+    let elliptical = |preload: f64| Bore::elliptical(preload, 0.35).unwrap();
+    let bores = [Bore::plain(), elliptical(0.0), elliptical(0.25), elliptical(0.5)];
+    for bore in bores {
+        for ratio in [0.1, 0.5, 1.0, 3.0] {
+            let bearing = FiniteBearing::new(bore.clone(), ratio).unwrap();
+            let bearing = bearing.with_mesh(Mesh { along: 32, across: 8 }).unwrap();
+            let mut before = f64::INFINITY;
+            for k in 0..8 {
+                // S (L/D)² tells short bearings apart, S long ones.
+                let sommerfeld = 30.0 * 0.3_f64.powi(k) / f64::min(ratio * ratio, 1.0);
+                let found = bearing.equilibrium(sommerfeld).unwrap();
+                assert!(found.attitude() < before && found.attitude() > 0.0, "{bearing:?}");
+                before = found.attitude();
+            }
+        }
+    }
+}

@@ -6,3 +6,4 @@ mod naive;
 mod published;
 mod short_bearing;
 mod threshold;
+mod whirl;

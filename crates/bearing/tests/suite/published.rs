@@ -71,6 +71,45 @@ fn places_of_the_journal_agree_with_lund_and_thomsen() {
     }
 }
 
+/// The table of `theory/bearing.md` of the book, line by line.
+#[test]
+fn the_table_of_the_book_is_from_a_run() {
+    let page = include_str!("../../../../docs/book/src/theory/bearing.md");
+    let mut table = String::from(
+        "| Bearing | L/D | S | | ε | φ | Kxx | Kxy | Kyx | Kyy | Bxx | Bxy | Byy | % |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for row in rows() {
+        let (name, numbers) = row.name.split_once(" L/D = ").unwrap();
+        let (ratio, sommerfeld) = numbers.split_once(" S = ").unwrap();
+        let name = if name == "elliptical" { "E" } else { "TG" };
+        let c = row.ours.coefficients();
+        let [[kxx, kxy], [kyx, kyy]] = c.stiffness;
+        let [[bxx, bxy], [byx, byy]] = c.damping;
+        let stiffness = [kxx, kxy, kyx, kyy];
+        let damping = [bxx, 0.5 * (bxy + byx), byy];
+        let cells = |stiffness: &[f64], damping: &[f64]| {
+            let all = stiffness.iter().chain(damping);
+            all.map(|value| format!(" {value:.2} |")).collect::<String>().replace('-', "−")
+        };
+        let worst =
+            deviation(&stiffness, &row.stiffness).max(deviation(&damping, &row.damping)) * 100.0;
+        table += &format!(
+            "| {name} | {ratio} | {sommerfeld} | printed | {:.3} | {:.2} |{} |\n",
+            row.eccentricity,
+            row.attitude,
+            cells(&row.stiffness, &row.damping),
+        );
+        table += &format!(
+            "| | | | ours | {:.3} | {:.2} |{} {worst:.1} |\n",
+            row.ours.eccentricity(),
+            row.ours.attitude().to_degrees(),
+            cells(&stiffness, &damping).replace("−0.00", "0.00"),
+        );
+    }
+    assert!(page.contains(&table), "the page should have\n{table}");
+}
+
 /// A worked size: forward to a film with units and back.
 #[test]
 fn units_go_there_and_back() {

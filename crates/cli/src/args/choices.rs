@@ -117,7 +117,7 @@ choice! {
         Hamming,
         /// The least leakage, a wider peak
         Blackman,
-        /// No weighting, for bursts that begin and end at rest
+        /// Equal weights, for bursts that begin and end at rest
         Rectangular,
     }
 }

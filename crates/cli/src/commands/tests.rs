@@ -101,5 +101,5 @@ fn value_name(arg: &Arg) -> String {
 #[test]
 fn the_exit_codes_are_documented() {
     let help = Cli::command().render_long_help().to_string();
-    assert!(help.contains("Exit codes:\n  0  success\n  2  every failure"), "{help}");
+    assert!(help.contains("Exit codes:\n  0    success\n  2    every failure"), "{help}");
 }

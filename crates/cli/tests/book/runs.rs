@@ -5,6 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::Duration;
 
 use mdbook_driver::MDBook;
 use serde_json::Value;
@@ -47,7 +48,7 @@ impl Run {
                     // Others read the files in the repository meanwhile.
                     program.arg("--out").arg(made.path());
                 }
-                said(&mut program).map(drop)
+                said(program).map(drop)
             }
             Run::Install(folder) => install(root, folder, made.path()),
             Run::Book(folder) => build_book(&root.join(folder), made.path()),
@@ -66,7 +67,7 @@ impl Programs {
                 build.arg(format!("--{kind}")).arg(name);
             }
         }
-        let told = said(&mut build).unwrap();
+        let told = said(build).unwrap();
         let made = told.lines().filter_map(|line| {
             let message: Value = serde_json::from_str(line).ok()?;
             let (path, target) = (message["executable"].as_str()?, &message["target"]);
@@ -82,10 +83,14 @@ impl Programs {
     }
 }
 
+/// A command of the pages that takes longer than this is stopped and named.
+const LONGEST: Duration = Duration::from_mins(10);
+
 /// What a command prints, which must be something, and its exit code 0.
-fn said(command: &mut Command) -> Result<String, String> {
+fn said(command: Command) -> Result<String, String> {
+    let mut command = assert_cmd::Command::from_std(command);
     let Output { status, stdout, stderr } =
-        command.output().map_err(|error| format!("{command:?}: {error}"))?;
+        command.timeout(LONGEST).output().map_err(|error| format!("{command:?}: {error}"))?;
     if !status.success() || stdout.is_empty() {
         return Err(format!("{command:?}: {status}: {}", String::from_utf8_lossy(&stderr)));
     }
@@ -107,7 +112,9 @@ fn install(root: &Path, folder: &str, to: &Path) -> Result<(), String> {
         return Err(String::from_utf8_lossy(&stderr).into_owned());
     }
     let say = |program: &Path| {
-        said(Command::new(program).current_dir(root).args(["info", "examples/machine.csv"]))
+        let mut command = Command::new(program);
+        command.current_dir(root).args(["info", "examples/machine.csv"]);
+        said(command)
     };
     let (installed, tested) =
         (say(&to.join("bin/mechid"))?, say(Path::new(env!("CARGO_BIN_EXE_mechid")))?);

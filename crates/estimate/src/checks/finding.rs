@@ -1,4 +1,8 @@
 //! Results of the checks as values.
+//!
+//! Ratios, fractions, coherences, correlations, probabilities and numbers of samples are dimensionless;
+//! an eigenvalue of a transition is, too. What has the unit of a channel or of a parameter (N, m, m/s,
+//! m/s², kg, N·s/m, N/m) says so.
 
 use mechid_model::{Parameter, ResponseQuantity};
 
@@ -42,12 +46,12 @@ pub enum Finding {
     },
     /// Curvature of the response from the last sample of a period to the first.
     Seam {
-        /// Curvature there over the RMS curvature inside, largest channel.
+        /// Curvature there over the RMS curvature inside, largest channel (pure number).
         ratio: f64,
     },
     /// Deviation of single periods of the response from their mean.
     PeriodScatter {
-        /// Largest RMS deviation of a period over the RMS of the response.
+        /// Largest RMS deviation of a period over the RMS of the response (pure number).
         fraction: f64,
     },
     /// The force does not repeat after the claimed period.
@@ -62,7 +66,7 @@ pub enum Finding {
     HighestMode {
         /// Natural frequency, in Hz.
         frequency_hz: f64,
-        /// Samples per period of that mode.
+        /// Samples per period of that mode (pure number).
         samples_per_period: f64,
         /// What the step or the band must suit.
         #[cfg_attr(feature = "serde", serde(flatten))]
@@ -70,16 +74,16 @@ pub enum Finding {
     },
     /// The transition from sample to sample has no real logarithm: the step is too long for a mode.
     NoLogarithm {
-        /// Eigenvalue of the transition matrix, zero or negative.
+        /// Eigenvalue of the transition matrix, zero or negative (pure number).
         eigenvalue: f64,
     },
     /// Multiple coherence of the responses over the lines.
     Coherence {
-        /// Median over lines and responses.
+        /// Median over lines and responses (pure number).
         median: f64,
-        /// Minimum.
+        /// Minimum (pure number).
         minimum: f64,
-        /// Number of independent averages.
+        /// Number of independent averages (pure number).
         averages: f64,
     },
     /// A channel was cut off by an amplifier or a converter.
@@ -111,17 +115,17 @@ pub enum Finding {
         quantity: ResponseQuantity,
         /// The higher derivative.
         derivative: ResponseQuantity,
-        /// Change of `quantity` over the change that `derivative` predicts; 1 if they agree.
+        /// Change of `quantity` over the change that `derivative` predicts; 1 if they agree (pure number).
         gain: f64,
     },
     /// The forces take power out of the machine.
     PowerFlow {
-        /// Mean power into the machine over the apparent power, negative.
+        /// Mean power into the machine over the apparent power, negative (pure number).
         fraction: f64,
     },
     /// Force and response are shifted in time.
     Delay {
-        /// Delay of the response, in samples.
+        /// Delay of the response, in samples (pure number).
         samples: f64,
         /// Delay of the response, in s.
         seconds: f64,
@@ -138,14 +142,14 @@ pub enum Finding {
         parameter: Parameter,
         /// Its value by least squares, in the unit of the parameter.
         estimate: f64,
-        /// Its value with neighbouring samples as instruments.
+        /// Its value with neighbouring samples as instruments (unit of the parameter).
         instrumental: f64,
-        /// Standard error of `estimate`.
+        /// Standard error of `estimate` (unit of the parameter).
         standard_error: f64,
     },
     /// Residual power against the power of the noise.
     Misfit {
-        /// Residual power over its expectation for noise alone.
+        /// Residual power over its expectation for noise alone (pure number).
         ratio: f64,
         /// Probability that noise alone leaves more.
         #[cfg_attr(feature = "serde", serde(flatten))]
@@ -193,10 +197,10 @@ pub enum Finding {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PValue {
-    /// Of this test alone.
+    /// Of this test alone (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "p_value"))]
     pub raw: f64,
-    /// Adjusted for the number of tests made on the same fit; as `raw` before that.
+    /// Adjusted for the number of tests made on the same fit; as `raw` before that (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "adjusted_p_value"))]
     pub adjusted: f64,
 }
@@ -213,9 +217,9 @@ pub enum PeriodFault {
     Neighbour {
         /// Number of samples after which it repeats best.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force.
+        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
         mismatch: f64,
-        /// The same after the claimed period.
+        /// The same after the claimed period (pure number).
         claimed_mismatch: f64,
     },
     /// It returns after the claimed period except in one place: samples are missing or too many.
@@ -223,14 +227,14 @@ pub enum PeriodFault {
         /// The sample that does not follow, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
         sample: usize,
-        /// RMS difference elsewhere, over the RMS of the force.
+        /// RMS difference elsewhere, over the RMS of the force (pure number).
         mismatch: f64,
     },
     /// It repeats after a number of samples of which the claimed one is no multiple.
     Other {
         /// Number of samples after which it repeats.
         period: usize,
-        /// RMS difference from one such period to the next, over the RMS of the force.
+        /// RMS difference from one such period to the next, over the RMS of the force (pure number).
         mismatch: f64,
         /// Number of samples of the force.
         samples: usize,
@@ -251,7 +255,7 @@ pub enum ModeLimit {
     BetweenSamples,
     /// Transition by Euler's rule.
     Euler {
-        /// Relative error of the state matrix by that rule.
+        /// Relative error of the state matrix by that rule (pure number).
         bias: f64,
     },
     /// Lines of the spectrum.
@@ -352,7 +356,7 @@ pub struct CorrelationTest {
 pub struct NoiseSpan {
     /// Number of lags.
     pub lags: usize,
-    /// Autocorrelation at lag 1.
+    /// Autocorrelation at lag 1 (pure number).
     pub first_coefficient: f64,
     /// Numbers of the test beyond those lags.
     pub beyond: CorrelationTest,

@@ -38,25 +38,28 @@ impl ChannelPhase {
     /// m/s or m/s²; samples × channels).
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if the records have not the same time axis.
+    /// [`EstimateError::Signal`] if the records have not the same time axis, or overflow.
     pub fn correct(
         &self,
         force: &Record,
         response: &Record,
     ) -> Result<(Record, Record), EstimateError> {
         force.check_same_sampling(response)?;
-        Ok((self.turn(force, 0, false), self.turn(response, 1, false)))
+        Ok((self.turn(force, 0, false)?, self.turn(response, 1, false)?))
     }
 
     /// A response, predicted from a corrected force, as the channel would show it (samples ×
     /// channels, in its unit).
-    pub fn as_measured(&self, response: &Record) -> Record {
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] if the samples add up to more than a number can hold.
+    pub fn as_measured(&self, response: &Record) -> Result<Record, EstimateError> {
         self.turn(response, 1, true)
     }
 
-    fn turn(&self, record: &Record, which: usize, back: bool) -> Record {
+    fn turn(&self, record: &Record, which: usize, back: bool) -> Result<Record, EstimateError> {
         if *self == Self::default() {
-            return record.clone();
+            return Ok(record.clone());
         }
         let spectrum = Spectrum::of(record);
         let mut lines = spectrum.lines().clone();
@@ -67,7 +70,7 @@ impl ChannelPhase {
             let factor = if back { factor.conj() } else { factor };
             row.iter_mut().for_each(|line| *line *= factor);
         }
-        Spectrum::from_lines(record.sampling(), lines).to_record()
+        Ok(Spectrum::from_lines(record.sampling(), lines)?.to_record()?)
     }
 }
 

@@ -10,7 +10,6 @@ use super::equation_error::weighted;
 use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
 use super::{SteadyExperiments, Weighting};
-use crate::checks::{Check, Subject, Verdict};
 use crate::frequency_domain::{Lines, Pooling, RepeatedPeriods};
 use crate::{EstimateError, LeastSquares, Unknowns};
 
@@ -249,13 +248,6 @@ impl Distortion {
     /// noise.
     pub fn kind(&self) -> Option<&Kind> {
         self.kinds.first().filter(|kind| kind.p_value < SIGNIFICANT)
-    }
-
-    /// The same as a check, whose number is the part of the force that a linear model leaves.
-    pub fn check(&self) -> Check {
-        let verdict = if self.kind().is_some() { Verdict::Doubtful } else { Verdict::Good };
-        let (subject, value) = (Subject::Linearity, self.linear_leaves);
-        Check { subject, verdict, value, text: self.to_string() }
     }
 }
 

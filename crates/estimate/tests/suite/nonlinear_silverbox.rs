@@ -41,7 +41,7 @@ fn two_terms_explain_the_schroeder_record() {
     // Before any model: what kind of nonlinearity.
     let unknowns = Unknowns::unknown_mass(1).unwrap();
     let seen = distortion(&lines, &force, &response, DISPLACEMENT, &unknowns).unwrap();
-    let text = seen.check().text;
+    let text = seen.to_string();
     assert!(text.contains("cubic stiffness") && text.contains("(hardening)"), "{text}");
     assert!(seen.even.is_some_and(|level| level.db < -30.0), "{seen:?}");
 
@@ -80,7 +80,7 @@ fn rmse(
     let whole = |channel| part(record, channel, 0, record.len());
     let (force, _) = channels.correct(&whole(0), &whole(1)).unwrap();
     let found = predict(system, &force, Extent::Open, &InitialState::rest(1)).unwrap();
-    let shown = channels.as_measured(found.displacement());
+    let shown = channels.as_measured(found.displacement()).unwrap();
     which.map(|q| {
         let samples = start_of(q)..start_of(q) + REALISATION;
         let squares = samples.map(|k| (record.data()[(k, 1)] - shown.data()[(k, 0)]).powi(2));

@@ -1,6 +1,7 @@
 //! Systems that can only lose energy, and their highest frequencies.
 
 use mechid_model::Matrix;
+use mechid_model::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::csr::CsrMatrix;
 
@@ -194,7 +195,7 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
         1 => beside[i.min(j)],
         _ => 0.0,
     });
-    let eigen = tridiagonal.symmetric_eigen();
+    let eigen = hermitian_eigen(tridiagonal)?;
     let at = eigen.eigenvalues.imax();
     let value = eigen.eigenvalues[at].max(0.0);
     let coordinates = eigen.eigenvectors.column(at);

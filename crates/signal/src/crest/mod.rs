@@ -17,7 +17,7 @@ use p_norm::PNorm;
 /// does: between 32 samples per interval a sine at the highest line rises by 0.1 % at most.
 const STAGES: [(&[i32], usize); 2] = [(&[16, 32, 64], 8), (&[128, 256, 512, 1024], 32)];
 
-/// Largest turn of the given phases before the first start, as a fraction of a full one.
+/// Largest change of the given phases before the first start, as a fraction of 2π.
 const NUDGE: f64 = 1e-2;
 
 /// Multiple of the mean curvature the first step is damped by.
@@ -59,7 +59,7 @@ impl Default for CrestSearch {
 }
 
 impl CrestSearch {
-    /// The multisine with the best phases found; lines and amplitudes are untouched, and the
+    /// Returns the multisine with the best phases found; lines and amplitudes are untouched, and the
     /// crest factor never rises.
     ///
     /// # Errors

@@ -4,16 +4,16 @@ use nalgebra::{Cholesky, DVector};
 
 use super::p_norm::{Derivatives, PNorm, norm};
 
-/// Steps allowed per exponent; far more than are ever needed.
+/// Maximum number of steps per exponent; far more than are ever needed.
 const MAX_STEPS: usize = 400;
 
 /// Two successive steps that gain less than this fraction of the norm end an exponent.
 const LEAST_GAIN: f64 = 1e-5;
 
-/// Above this damping the norm is stationary to rounding.
+/// Largest damping; beyond it the norm is stationary to rounding.
 const MOST_DAMPING: f64 = 1e6;
 
-/// Up to this many lines the Hessian is formed and factored, with more it is only applied; about
+/// Largest number of lines for which the Hessian is formed and factored; with more it is only applied; about
 /// here the two cost the same.
 const MOST_DENSE: usize = 400;
 
@@ -21,7 +21,7 @@ const MOST_DENSE: usize = 400;
 const CG_TOLERANCE: f64 = 0.05;
 const MOST_CG: usize = 60;
 
-/// Phases and what follows from them.
+/// Phases, with the norm and its derivatives there.
 pub(super) struct Point {
     pub(super) phases: Vec<f64>,
     signal: Vec<f64>,
@@ -36,7 +36,7 @@ impl Point {
     }
 }
 
-/// Brings ‖x‖_p down from given phases; `damping` is handed from one exponent to the next.
+/// Reduces ‖x‖_p from given phases; `damping` is handed from one exponent to the next.
 pub(super) fn minimise(objective: &PNorm, phases: Vec<f64>, p: i32, damping: &mut f64) -> Vec<f64> {
     let mut point = Point::new(objective, phases, p);
     let mut small_gains = 0;
@@ -62,7 +62,7 @@ fn step(objective: &PNorm, from: &Point, p: i32, damping: &mut f64) -> Option<Po
     let hessian = (from.phases.len() <= MOST_DENSE).then(|| derivatives.hessian());
     while *damping < MOST_DAMPING {
         let added = *damping * scale;
-        // Where the damped norm is not convex there is no step, and the damping grows.
+        // The damping grows where the damped norm is not convex.
         let step = match &hessian {
             Some(hessian) => {
                 let mut damped = hessian.clone();

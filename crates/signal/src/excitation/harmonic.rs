@@ -1,4 +1,4 @@
-//! One frequency.
+//! Excitation at one frequency.
 
 use std::f64::consts::TAU;
 

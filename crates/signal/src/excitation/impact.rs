@@ -1,11 +1,11 @@
-//! Hammer blows.
+//! Hammer impacts.
 
 use std::f64::consts::PI;
 
 use crate::error::{finite, fits_in_memory, not_negative, positive};
 use crate::{Record, Sampling, SignalError};
 
-/// An ideal blow of given momentum, in the unit of the signal times seconds: N·s for a force.
+/// An ideal impact of given momentum, in the unit of the signal times seconds: N·s for a force.
 ///
 /// Sampled, it is one sample of momentum / Δt, the one nearest to its instant.
 ///
@@ -18,7 +18,7 @@ pub struct Impulse {
 }
 
 impl Impulse {
-    /// A blow of `momentum` at `at` seconds.
+    /// An impact of `momentum` at `at` seconds.
     ///
     /// # Errors
     /// [`SignalError::Infinite`] for the momentum, [`SignalError::Negative`] for the instant.
@@ -28,7 +28,7 @@ impl Impulse {
         Ok(Self { momentum, at })
     }
 
-    /// The sampled blow.
+    /// The sampled impact.
     ///
     /// # Errors
     /// [`SignalError::Range`] if its instant lies beyond the last sample.
@@ -46,7 +46,7 @@ impl Impulse {
     }
 }
 
-/// A blow in the shape of half a sine, as an instrumented hammer gives it:
+/// An impact in the shape of half a sine, as an instrumented hammer gives it:
 /// F(t) = F_max sin(π (t − t_0) / d) for t_0 ≤ t ≤ t_0 + d, zero elsewhere.
 ///
 /// # Source
@@ -59,7 +59,7 @@ pub struct HalfSine {
 }
 
 impl HalfSine {
-    /// A blow of given peak (N), start and duration in seconds.
+    /// An impact of given peak (N), start and duration in seconds.
     ///
     /// # Errors
     /// [`SignalError::Negative`] for the peak or the start, [`SignalError::NotPositive`] for the
@@ -71,7 +71,7 @@ impl HalfSine {
         Ok(Self { peak, start, duration })
     }
 
-    /// Its momentum ∫ F dt = 2 F_max d / π, in N·s.
+    /// Momentum ∫ F dt = 2 F_max d / π, in N·s.
     pub fn momentum(&self) -> f64 {
         2.0 * self.peak * self.duration / PI
     }
@@ -82,7 +82,7 @@ impl HalfSine {
         if (0.0..=1.0).contains(&passed) { self.peak * (PI * passed).sin() } else { 0.0 }
     }
 
-    /// The sampled blow; what lies beyond the last sample is cut off.
+    /// The sampled impact; the part beyond the last sample is left out.
     ///
     /// # Errors
     /// None for a blow that exists; the signature is that of all excitations.

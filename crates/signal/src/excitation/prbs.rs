@@ -78,7 +78,7 @@ impl Prbs {
         Ok(Self { order, amplitude, hold })
     }
 
-    /// One period in samples, (2ⁿ − 1) · hold.
+    /// Number of samples of one period, (2ⁿ − 1) · hold.
     pub fn period(&self) -> usize {
         ((1usize << self.order) - 1).saturating_mul(self.hold)
     }

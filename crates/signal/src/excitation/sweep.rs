@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use crate::error::{below_nyquist, not_negative, positive, within};
 use crate::{Record, Sampling, SignalError};
 
-/// How the frequency of a sweep runs from one end to the other.
+/// Law by which the frequency of a sweep runs from one end to the other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SweepLaw {
     /// f(t) = f_0 + (f_1 − f_0) t/T: the same time per Hz.
@@ -69,7 +69,7 @@ impl Sweep {
         }
     }
 
-    /// Cycles passed since the start, ∫ f dt.
+    /// Number of cycles since the start, ∫ f dt.
     fn cycles(&self, t: f64) -> f64 {
         let rate = (self.end_hz / self.start_hz).ln() / self.duration;
         match self.law {
@@ -96,7 +96,7 @@ impl Sweep {
         }
     }
 
-    /// The sampled sweep; what lies beyond the last sample is cut off.
+    /// The sampled sweep; the part beyond the last sample is left out.
     ///
     /// # Errors
     /// [`SignalError::AboveNyquist`] if either end is at or above half the sampling rate.

@@ -34,7 +34,7 @@ use nalgebra::DMatrix;
 use crate::error::{fits_in_memory, has_channel};
 use crate::{Record, Sampling, SignalError, Spectrum};
 
-/// A way to find values between samples; compared in the [module documentation](self).
+/// Method of interpolation between samples; compared in the [module documentation](self).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -51,14 +51,14 @@ pub enum Interpolation {
     BandLimited,
 }
 
-/// A record made ready to be asked for values between its samples.
+/// A record prepared for values between its samples.
 #[derive(Debug, Clone)]
 pub struct Interpolator {
     sampling: Sampling,
     pieces: Pieces,
 }
 
-/// What the values are computed from.
+/// Data that the values are computed from.
 #[derive(Debug, Clone)]
 enum Pieces {
     Linear(DMatrix<f64>),
@@ -147,7 +147,7 @@ fn hermite((y0, d0): (f64, f64), (y1, d1): (f64, f64), u: f64) -> f64 {
     y0 + u * (d0 + u * (c2 + u * c3))
 }
 
-/// The record at the instants of another time axis, both beginning at t = 0.
+/// Returns the record at the instants of another time axis, both beginning at t = 0.
 ///
 /// Nothing is filtered: with a longer step, what lies above the new Nyquist frequency folds back,
 /// as it does when a signal is sampled.
@@ -175,7 +175,7 @@ pub fn resample(
     Record::new(sampling, data)
 }
 
-/// The record with `factor − 1` further instants in every interval.
+/// Returns the record with `factor − 1` further instants in every interval.
 ///
 /// A period keeps its duration and has `factor` times as many samples; any other record ends with
 /// its last sample.

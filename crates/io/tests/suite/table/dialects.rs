@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use mechid_io::{DecimalSign, IoError, Place, Table, TimeAxis};
+use mechid_io::{DecimalSign, IoError, Place, Table};
 use proptest::prelude::*;
 
 use super::table;
@@ -141,13 +141,17 @@ proptest! {
     fn fields_are_those_of_the_csv_crate(
         fields in prop::collection::vec("[a,;\" \n#]{0,6}", 2..12),
     ) {
-        let mut text = String::from("0,0,0,0\n1,1,1,1\n");
+        // By these the delimiter is detected.
+        let mut text = "0,0,0,0\n".repeat(9);
         for pair in fields.chunks_exact(2) {
             // Quoted by hand, rightly or wrongly.
             writeln!(text, "7,{},\"{}\",9", pair[0].replace('\n', ""), pair[1]).unwrap();
         }
         let rows = by_csv(&text, b',');
-        prop_assume!(rows.iter().all(|row| row.len() == 4));
+        // Others are refused, one as the next.
+        if rows.iter().any(|row| row.len() != 4) {
+            return Ok(());
+        }
         let table = Table::parse("a.csv", text.as_bytes()).unwrap();
         prop_assert_eq!(table.len(), rows.len());
         for (column, first) in [(1, "1"), (2, "2"), (3, "3"), (4, "4")] {
@@ -208,10 +212,10 @@ fn a_long_file_is_read_to_the_last_bit() {
             writeln!(text, "{k}{delimiter}{x:e}{delimiter}{y}{delimiter}{z:?}").unwrap();
         }
         let table = table(&text);
-        let record = table.record(&TimeAxis::Column("t"), &["x", "y", "z"]).unwrap();
+        let columns = ["x", "y", "z"].map(|name| table.column(name).unwrap());
         for k in 0..30_000_u64 {
             for c in 0..3 {
-                let read = record.channel(c as usize)[k as usize];
+                let read = columns[c as usize][k as usize];
                 assert_eq!(read.to_bits(), value(3 * k + c).to_bits(), "{k} {c}");
             }
         }

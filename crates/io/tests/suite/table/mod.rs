@@ -352,8 +352,7 @@ proptest! {
         let sampling = Sampling::new(1e-3, values.len()).unwrap();
         let text = csv_text(sampling, &[(name.clone(), &values)]);
         let table = Table::parse("a.csv", text.as_bytes()).unwrap();
-        let record = table.record(&TimeAxis::Column("1"), &[&name]).unwrap();
-        for (back, value) in record.channel(0).iter().zip(&values) {
+        for (back, value) in table.column(&name).unwrap().iter().zip(&values) {
             prop_assert_eq!(back.to_bits(), value.to_bits());
         }
     }
