@@ -230,7 +230,7 @@ pub enum ModelError {
     Term {
         /// The text of the term.
         text: String,
-        /// Why not.
+        /// Reason of the refusal.
         reason: String,
     },
     /// Two nonlinear terms have one name.

@@ -17,6 +17,11 @@ use crate::EstimateError;
 /// # Source
 /// Ours. The odd polynomial is the series of any filter's phase about zero frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct ChannelPhase {
     /// Delay of the force, in s.
     pub delay: f64,

@@ -15,6 +15,7 @@ use crate::{EstimateError, LeastSquares, Unknowns};
 
 /// Response on lines without force, against that on lines with force.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Level {
     /// Ratio of the RMS on these lines, less what noise puts there, to that on the driven lines, in
     /// dB; −∞ if there is no more than noise.

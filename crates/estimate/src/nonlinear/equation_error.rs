@@ -262,8 +262,8 @@ impl Fit {
                 scores.push(blocks, &parts);
             }
             let count = scores.count();
-            if let Some(covariance) = scores.covariance(inverse) {
-                return (covariance, StandardErrors::Blocks(count), count - 1);
+            if let Some((covariance, freedom)) = scores.covariance(inverse) {
+                return (covariance, StandardErrors::Blocks(count), freedom);
             }
         }
         let square: f64 = residuals

@@ -369,8 +369,8 @@ impl<'a> Problem<'a> {
                 scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
             }
             let count = scores.count();
-            if let Some(covariance) = scores.covariance(inverse) {
-                return (covariance, StandardErrors::Blocks(count), count - 1);
+            if let Some((covariance, freedom)) = scores.covariance(inverse) {
+                return (covariance, StandardErrors::Blocks(count), freedom);
             }
         }
         let square: f64 = (0..n)

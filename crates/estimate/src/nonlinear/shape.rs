@@ -11,6 +11,11 @@ use crate::frequency_domain::levenberg_marquardt::{SumOfSquares, minimise};
 
 /// Which constants are searched for, besides the parameters that enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
 pub struct ShapeConstants {
     /// Constants inside the laws of terms, such as b of a saturating damper; the search starts from
     /// those given.

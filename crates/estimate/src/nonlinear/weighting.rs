@@ -6,6 +6,11 @@ use super::equations::Equations;
 
 /// What the size of the equation error is taken to be over the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
 pub enum Weighting {
     /// The one of the others that makes the residual likeliest.
     #[default]

@@ -28,13 +28,13 @@ pub trait Law: fmt::Debug + Send + Sync {
         Vec::new()
     }
 
-    /// The same law with other constants, one for each of [`Law::constants`] and in its unit; `None`
+    /// Returns the same law with other constants, one for each of [`Law::constants`] and in its unit; `None`
     /// where they are out of range.
     fn with_constants(&self, _values: &[f64]) -> Option<Arc<dyn Law>> {
         None
     }
 
-    /// Whether the force does not depend on the response at all.
+    /// Returns true if the force does not depend on the response at all.
     fn is_constant(&self) -> bool {
         false
     }
@@ -43,7 +43,7 @@ pub trait Law: fmt::Debug + Send + Sync {
 /// A constant inside a force law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Constant {
-    /// Its letter in the expression.
+    /// Letter in the expression.
     pub name: &'static str,
     /// SI unit.
     pub unit: &'static str,
@@ -143,7 +143,7 @@ pub struct SaturatingDamping {
 }
 
 impl SaturatingDamping {
-    /// With the velocity b (m/s) at which it bends.
+    /// Saturating damper with the velocity b (m/s) at which it bends.
     ///
     /// # Errors
     /// [`ModelError::Parameter`] unless b is positive and finite.

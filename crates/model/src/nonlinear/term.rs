@@ -112,17 +112,17 @@ impl Term {
         &self.name
     }
 
-    /// Where the force acts.
+    /// Returns the coordinate of the force.
     pub fn coordinate(&self) -> Coordinate {
         self.coordinate
     }
 
-    /// How the force depends on displacement and velocity.
+    /// Returns the law by which the force depends on displacement and velocity.
     pub fn law(&self) -> &dyn Law {
         &*self.law
     }
 
-    /// The same term with other constants in its law, in their units, one for each of
+    /// Returns the same term with other constants in its law, in their units, one for each of
     /// [`Law::constants`]; `None` where they are out of range.
     pub fn with_constants(&self, values: &[f64]) -> Option<Self> {
         Some(Self { law: self.law.with_constants(values)?, ..self.clone() })
@@ -224,12 +224,12 @@ impl Terms {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Returns true if there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// These terms and one more.
+    /// Adds one more term.
     ///
     /// # Errors
     /// [`ModelError::RepeatedTerm`] if its name is taken.
@@ -239,7 +239,7 @@ impl Terms {
         Self::new(all)
     }
 
-    /// That the terms belong to a system of `dof` degrees of freedom.
+    /// Checks that the terms belong to a system of `dof` degrees of freedom.
     ///
     /// # Errors
     /// [`ModelError::Term`] if one of them names another degree of freedom, or has the name of an
