@@ -15,7 +15,7 @@ use crate::measurement::channels::ABSENT;
 use crate::measurement::{Block, Measurement};
 use crate::text::{significant, text_table};
 
-/// How to predict a response.
+/// Settings of a prediction.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Predict {
@@ -44,7 +44,7 @@ pub struct PredictionSummary {
     pub last_sample: usize,
     /// First sample that counts in the errors, counted from 1.
     pub first_judged: usize,
-    /// Whether the response is the steady state of whole periods.
+    /// True for the steady state of whole periods.
     pub steady: bool,
     /// Errors of the channels measured.
     pub channels: Vec<PredictionError>,

@@ -1,9 +1,8 @@
 //! What can go wrong between the command line and the result.
 
 use mechid::analysis::AnalysisError;
+use mechid::io::IoError;
 use mechid::signal::counted;
-
-use crate::options;
 
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +19,7 @@ pub enum CliError {
     Plot(#[from] mechid::plot::PlotError),
     /// A file cannot be read, understood or written.
     #[error(transparent)]
-    Io(#[from] mechid::io::IoError),
+    Io(#[from] IoError),
     /// An option without its object.
     #[error("{option} {why}")]
     MisplacedOption {
@@ -82,12 +81,16 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Returns the message, with the settings that the analysis names spelled as options.
-    pub fn message(&self) -> String {
+    /// Returns the message; `spelled` writes the settings that the analysis names as options.
+    pub fn message(&self, spelled: impl Fn(&str) -> String) -> String {
         match self {
+            Self::Io(error @ IoError::TooLarge { .. })
+            | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { .. })) => {
+                format!("{error}; if the record is really so large, use --raise-limits")
+            }
             // A file's own words stay as they are.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),
-            Self::Analysis(error) => options::spelled(&error.to_string()),
+            Self::Analysis(error) => spelled(&error.to_string()),
             other => other.to_string(),
         }
     }

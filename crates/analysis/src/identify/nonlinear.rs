@@ -49,12 +49,12 @@ impl std::str::FromStr for Nonlinear {
     }
 }
 
-/// What a fit with nonlinear terms found.
+/// Result of a fit with nonlinear terms.
 #[derive(Debug)]
 pub struct WithTerms {
     /// The estimate.
     pub found: NonlinearEstimate,
-    /// What spoke against a linear system in the first record, before any model.
+    /// Evidence against a linear system in the first record, before any model.
     pub distortion: Distortion,
 }
 
@@ -74,7 +74,7 @@ pub struct NonlinearSummary {
     /// Number of blocks of time whose scatter gives the standard errors; `None` if the residual was
     /// taken as white.
     pub blocks: Option<usize>,
-    /// What spoke against a linear system in the first record, before any model.
+    /// Evidence against a linear system in the first record, before any model.
     pub distortion: DistortionRow,
 }
 

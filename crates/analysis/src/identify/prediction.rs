@@ -64,7 +64,11 @@ pub struct Compared {
 impl Prediction {
     /// Returns every response measured, as far as it is held, beside the one predicted. An open record
     /// starts from the state that fits it best.
-    pub fn predict(self, model: &Model, measured: &Block) -> Result<Vec<Compared>, AnalysisError> {
+    pub(crate) fn predict(
+        self,
+        model: &Model,
+        measured: &Block,
+    ) -> Result<Vec<Compared>, AnalysisError> {
         let motions = measured.responses();
         let response =
             self.response(model, measured).map_err(|reason| failed(reason, model, measured))?;

@@ -1,4 +1,4 @@
-//! Whether a system is linear at the level it is driven at, before any model of it.
+//! Distortion: evidence against a linear system at the level of the force, before any model of it.
 
 use std::fmt;
 
@@ -26,14 +26,14 @@ pub struct Level {
     pub over_noise: Option<f64>,
 }
 
-/// How much a term of one kind explains of what a linear model leaves of the force.
+/// Share of the residual of a linear model that a term of one kind explains.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Kind {
     /// The term.
     pub term: Term,
-    /// In words, such as `cubic stiffness of x1`.
+    /// Name in words, such as `cubic stiffness of x1`.
     pub name: String,
-    /// Its coefficient if it is the only one, in the unit of the term.
+    /// Coefficient if the term is the only one, in the unit of the term.
     pub coefficient: f64,
     /// Part of the squared equation error of a linear model that it explains, a ratio.
     pub explained: f64,
@@ -41,7 +41,7 @@ pub struct Kind {
     pub p_value: f64,
 }
 
-/// What speaks against a linear system in steady periods.
+/// Evidence against a linear system in steady periods.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Distortion {
     /// Level on even lines, where odd ones alone are driven: even nonlinearities, such as x².

@@ -14,7 +14,7 @@ use super::weighting::{Weighting, Weights};
 use crate::estimate::Findings;
 use crate::{Direction, Estimate, EstimateError, LeastSquares, Uncertain, Unknowns};
 
-/// How [`equation_error`] weights its rows, and which constants it searches for.
+/// Settings of [`equation_error`]: weighting of the rows, and constants to search for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct EquationErrorOptions {
     /// Weighting of the rows.

@@ -1,4 +1,4 @@
-//! What an identification of a nonlinear system found.
+//! The result of an identification of a nonlinear system.
 
 use std::fmt;
 
@@ -20,13 +20,13 @@ pub struct NamedParameter {
     pub found: Uncertain,
 }
 
-/// Where the standard errors come from.
+/// Origin of the standard errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StandardErrors {
-    /// From the scatter of the scores over this many blocks of time: they hold for a residual of any
+    /// Scatter of the scores over this many blocks of time: the errors hold for a residual of any
     /// colour, and where the model misses part of the response.
     Blocks(usize),
-    /// From the size of the weighted residual, taken as white: the record is too short for blocks.
+    /// Size of the weighted residual, taken as white: the record is too short for blocks.
     White,
 }
 
@@ -66,7 +66,7 @@ impl NonlinearEstimate {
         &self.terms
     }
 
-    /// Everything estimated: free entries of M, C and K, coefficients of terms, shape constants.
+    /// Returns every parameter estimated: free entries of M, C and K, coefficients of terms, shape constants.
     pub fn parameters(&self) -> &[NamedParameter] {
         &self.parameters
     }
@@ -97,7 +97,7 @@ impl NonlinearEstimate {
         self.weighting
     }
 
-    /// Where the standard errors come from.
+    /// Returns the origin of the standard errors.
     pub fn standard_errors(&self) -> StandardErrors {
         self.standard_errors
     }

@@ -23,7 +23,7 @@ pub struct SteppedRecord {
     pub force: Record,
     /// Response, samples × degrees of freedom, in m, m/s or m/s².
     pub response: Record,
-    /// Whether the force goes on periodically, or the record is all there is of it.
+    /// Extent of the record: a whole period of a force that repeats, or open.
     pub extent: Extent,
 }
 

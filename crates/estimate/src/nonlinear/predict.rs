@@ -1,4 +1,4 @@
-//! What a nonlinear system does under a measured force.
+//! Response of a nonlinear system to a measured force.
 
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
 use mechid_signal::{Extent, Record};

@@ -1,4 +1,4 @@
-//! Which nonlinear terms the data ask for.
+//! Selection of the nonlinear terms that the data ask for.
 
 use mechid_model::{Term, Terms};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -9,7 +9,7 @@ use super::shape::{Shape, ShapeConstants};
 use super::{SteadyExperiments, Weighting};
 use crate::{EstimateError, LeastSquares, Unknowns};
 
-/// What decides whether a term is added.
+/// Criterion by which a term is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Criterion {
     /// The extended Bayesian information criterion: the misfit must fall by more than its
@@ -32,7 +32,7 @@ pub enum Criterion {
 /// The terms that were chosen, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
-    /// Those that were given, and those added, in their order.
+    /// Terms given, and those added, in their order.
     pub terms: Terms,
     /// The way there: the first without any candidate, then with each term that was added.
     pub steps: Vec<SelectionStep>,

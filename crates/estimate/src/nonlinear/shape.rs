@@ -9,7 +9,7 @@ use super::experiments::Columns;
 use crate::EstimateError;
 use crate::frequency_domain::levenberg_marquardt::{SumOfSquares, minimise};
 
-/// Which constants are searched for, besides the parameters that enter linearly.
+/// Constants to search for, besides the parameters that enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",

@@ -1,10 +1,10 @@
-//! How the rows of the equation error are weighted.
+//! Weights of the rows of the equation error.
 
 use nalgebra::{Complex, DMatrix};
 
 use super::equations::Equations;
 
-/// What the size of the equation error is taken to be over the lines.
+/// Assumed size of the equation error over the lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(
     feature = "serde",
@@ -17,8 +17,8 @@ pub enum Weighting {
     Automatic,
     /// Equally large on all lines of an equation of motion: noise that is white as a force.
     WhiteForce,
-    /// As large as makes it equal on all lines as a response of the linear part: what the model misses
-    /// is where the response is.
+    /// Equally large on all lines as a response of the linear part: what the model misses is where the
+    /// response is.
     Response,
     /// Smooth over the lines: the residual's own spectrum, averaged over neighbouring lines and all
     /// experiments.
