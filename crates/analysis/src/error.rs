@@ -293,6 +293,17 @@ pub enum AnalysisError {
         /// The names there can be.
         known: String,
     },
+    /// The machine has nonlinear terms, which the analysis cannot take.
+    #[error(
+        "{file}: this machine has nonlinear terms ({terms}); a force is reconstructed with a linear \
+         machine only"
+    )]
+    NonlinearMachine {
+        /// The file of the machine.
+        file: String,
+        /// Terms of the machine.
+        terms: String,
+    },
     /// A record has no such sampling rate.
     #[error(
         "a record of {own_hz} Hz has no samples at {rate_hz} Hz: its rates are {own_hz} Hz divided by \

@@ -30,6 +30,7 @@
 //! | What is the response per unit force? | [`frf()`] | [`FrfSettings`] | [`FrfTable`] |
 //! | What machine is this? | [`identify()`] | [`Identify`] | [`Identified`] |
 //! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
+//! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
@@ -46,6 +47,7 @@ mod levels;
 mod machine;
 pub mod measurement;
 pub mod modal;
+pub mod predict;
 pub mod reconstruct;
 pub mod review;
 pub mod sweep;
@@ -55,9 +57,10 @@ pub use error::AnalysisError;
 pub use frf::{FrfSettings, FrfTable, Segmentation, frf};
 pub use identify::{Identified, Identify, identify};
 pub use inspect::{InspectSettings, Inspected, inspect};
-pub use machine::Machine;
+pub use machine::{Machine, NonlinearPart};
 pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Window};
 pub use mechid_model::ResponseQuantity;
 pub use modal::ModalSummary;
+pub use predict::{Predict, Predicted, predict};
 pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};
 pub use sweep::{SweepSettings, SweepSummary, sweep_experiment, sweep_record};

@@ -2,9 +2,11 @@
 
 use std::path::Path;
 
+use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, identified_modes};
-use mechid_io::{ParameterCovariance, input_name, read_covariance, read_system};
-use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_io::{ParameterCovariance, input_name, read_covariance, read_nonlinear, read_system};
+use mechid_model::{NonlinearSystem, Parameter, SecondOrderSystem, Terms, UncertainSystem};
+use nalgebra::DMatrix;
 
 use crate::AnalysisError;
 
@@ -17,13 +19,24 @@ pub struct Machine {
     pub uncertain: UncertainSystem,
     /// Degrees of freedom of the variance behind the covariance.
     pub degrees_of_freedom: usize,
+    /// The system with its nonlinear terms; `None` for a linear one.
+    pub nonlinear: Option<NonlinearPart>,
+}
+
+/// A system with nonlinear terms, as its channels show it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NonlinearPart {
+    /// M, C and K with the terms and their coefficients.
+    pub system: NonlinearSystem,
+    /// Delay and phase that the channels add.
+    pub channels: ChannelPhase,
 }
 
 impl Machine {
     /// Takes a system as exactly known.
     pub fn known(system: SecondOrderSystem) -> Self {
         let uncertain = UncertainSystem::exact(system);
-        Self { name: "the system".into(), uncertain, degrees_of_freedom: 0 }
+        Self { name: "the system".into(), uncertain, degrees_of_freedom: 0, nonlinear: None }
     }
 
     /// Takes what was identified, with the covariance of its parameters.
@@ -35,11 +48,13 @@ impl Machine {
             name: "the identified system".into(),
             uncertain: estimate.uncertain_system()?,
             degrees_of_freedom: estimate.degrees_of_freedom(),
+            nonlinear: None,
         })
     }
 
     /// Reads the `system` of a JSON file (`-`: of standard input) and, if it is there, its
-    /// `covariance`: the description of an experiment, or the result of an identification.
+    /// `covariance` and its `nonlinear` terms: the description of an experiment, or the result of an
+    /// identification.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read, [`AnalysisError::UnknownParameter`] if the
@@ -47,16 +62,47 @@ impl Machine {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
         let (name, system) = (input_name(path), read_system(path)?);
+        let nonlinear = match read_nonlinear(path)? {
+            None => None,
+            Some(read) => {
+                let [delay, cubic, quintic] = read.channels();
+                let channels = ChannelPhase { delay, cubic, quintic };
+                let system = NonlinearSystem::new(system.clone(), read.terms, read.coefficients)?;
+                Some(NonlinearPart { system, channels })
+            }
+        };
         let Some(found) = read_covariance(path)? else {
-            return Ok(Self { name, ..Self::known(system) });
+            return Ok(Self { name, nonlinear, ..Self::known(system) });
+        };
+        let found = match &nonlinear {
+            None => found,
+            Some(part) => of_linear_part(&found, part.system.terms()),
         };
         let parameters = parameters(&name, &system, &found)?;
         let degrees_of_freedom = found.degrees_of_freedom;
         let uncertain = UncertainSystem::new(system, parameters, found.matrix())?;
-        Ok(Self { name, uncertain, degrees_of_freedom })
+        Ok(Self { name, uncertain, degrees_of_freedom, nonlinear })
     }
 
-    /// Returns M, C and K.
+    /// Returns an error for a system with nonlinear terms, which the analysis would leave out.
+    pub(crate) fn require_linear(&self) -> Result<(), AnalysisError> {
+        let Some(part) = &self.nonlinear else { return Ok(()) };
+        let (file, terms) = (self.name.clone(), part.system.terms().to_string());
+        Err(AnalysisError::NonlinearMachine { file, terms })
+    }
+
+    /// Returns the system with its nonlinear terms, none for a linear one, and what its channels add.
+    pub(crate) fn with_terms(&self) -> Result<NonlinearPart, AnalysisError> {
+        match &self.nonlinear {
+            Some(part) => Ok(part.clone()),
+            None => Ok(NonlinearPart {
+                system: NonlinearSystem::new(self.system().clone(), Terms::none(), Vec::new())?,
+                channels: ChannelPhase::default(),
+            }),
+        }
+    }
+
+    /// Returns M, C and K; of a nonlinear system, the linear part.
     pub fn system(&self) -> &SecondOrderSystem {
         self.uncertain.system()
     }
@@ -74,6 +120,20 @@ impl Machine {
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, AnalysisError> {
         Ok(identified_modes(&self.uncertain, self.degrees_of_freedom)?)
     }
+}
+
+/// Returns the covariance of the entries of M, C and K alone.
+fn of_linear_part(all: &ParameterCovariance, terms: &Terms) -> ParameterCovariance {
+    let nonlinear = |name: &str| {
+        let term = name.split('.').next().unwrap_or(name);
+        ["delay", "p3", "p5"].contains(&name) || terms.iter().any(|t| t.name() == term)
+    };
+    let kept: Vec<usize> =
+        (0..all.parameters.len()).filter(|at| !nonlinear(&all.parameters[*at])).collect();
+    let names = kept.iter().map(|at| all.parameters[*at].clone()).collect();
+    let entry = |row: usize, column: usize| all.matrix[kept[row]][kept[column]];
+    let matrix = DMatrix::from_fn(kept.len(), kept.len(), entry);
+    ParameterCovariance::new(names, &matrix, all.degrees_of_freedom)
 }
 
 /// Returns the parameters of the system that a covariance names.

@@ -4,6 +4,7 @@ use std::fmt;
 
 use mechid_estimate::IdentifiedMode;
 use mechid_io::SystemMatrices;
+use mechid_model::Terms;
 use serde::Serialize;
 
 use crate::AnalysisError;
@@ -20,6 +21,9 @@ pub struct ModalSummary {
     pub degrees_of_freedom: usize,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
+    /// Nonlinear terms that modes of small amplitudes leave out, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonlinear_terms: Option<Terms>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ModeRow>,
     /// M, C and K.
@@ -65,6 +69,7 @@ impl ModalSummary {
             file: machine.name.clone(),
             degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
+            nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system.terms().clone()),
             modes: rows.collect::<Result<_, _>>()?,
             system: SystemMatrices::from(machine.system()),
         })
@@ -106,10 +111,15 @@ impl ModalSummary {
         let (dof, modes) = (self.degrees_of_freedom, self.modes.len());
         let plural = |count: usize| if count == 1 { "" } else { "s" };
         let freedom = if dof == 1 { "degree" } else { "degrees" };
+        let small = self
+            .nonlinear_terms
+            .iter()
+            .map(|terms| format!("\nmodes of small amplitudes; the nonlinear terms are {terms}"));
         format!(
-            "{}: {dof} {freedom} of freedom, {modes} mode{}\n\n{}\n{}",
+            "{}: {dof} {freedom} of freedom, {modes} mode{}{}\n\n{}\n{}",
             self.file,
             plural(modes),
+            small.collect::<String>(),
             self.mode_table(),
             self.shape_table()
         )

@@ -130,6 +130,17 @@ fn json_for_a_record() {
 }
 
 #[test]
+fn nonlinear_terms_that_cannot_be() {
+    identify(&good(), "--nonlinear k3", &["`name: expression`"]);
+    identify(&good(), "--nonlinear k3:x2^3", &["k3: x2^3", "degrees of freedom"]);
+    let misplaced = ["--nonlinear belongs to --domain frequency"];
+    identify(&good(), "--nonlinear k3:x^3 --domain time", &misplaced);
+    let not_periods = ["--nonlinear: nonlinear terms are fitted to spectra of whole periods"];
+    identify(&good(), "--nonlinear k3:x^3 --from-frf h1 --segment 16", &not_periods);
+    identify(&good(), "--search phase", &["--nonlinear"]);
+}
+
+#[test]
 fn empty_record() {
     identify("", "", &["a.csv holds no data: it is empty"]);
     identify("time,force,x\n", "", &["a.csv holds no data: there is a header and nothing below"]);

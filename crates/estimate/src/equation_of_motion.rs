@@ -281,7 +281,7 @@ impl Group {
     }
 }
 
-fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
+pub(crate) fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
     let own = unknowns.free().into_iter().filter(|p| p.row() == equation);
     let parameters: Vec<String> = own.map(|p| p.to_string()).collect();
     EstimateError::OnlyRatios { dof: equation + 1, parameters: parameters.join(", ") }

@@ -177,6 +177,27 @@ pub enum EstimateError {
         /// The period, in seconds.
         period: f64,
     },
+    /// A mode is too fast to be stepped from sample to sample.
+    #[error(
+        "the fastest mode turns at {rate:.3e} rad/s, too fast for samples {dt:.3e} s apart: leave out \
+         degrees of freedom without mass of their own, or sample faster"
+    )]
+    TooStiff {
+        /// Modulus of its eigenvalue, in rad/s.
+        rate: f64,
+        /// Sampling interval, in s.
+        dt: f64,
+    },
+    /// A computed response grows beyond all bounds.
+    #[error(
+        "the response of the nonlinear system grows beyond all bounds within {}: its spring or damper \
+         turns negative at that amplitude",
+        counted(*len, "sample")
+    )]
+    Diverged {
+        /// Samples of the record.
+        len: usize,
+    },
     /// The motion from sample to sample belongs to no continuous machine.
     #[error(
         "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \

@@ -119,6 +119,11 @@ impl LeastSquares {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
     }
 
+    /// The triangle of \[A | B\], which has the Gram matrix of all rows so far.
+    pub(crate) fn triangle(&self) -> &DMatrix<f64> {
+        self.factor.r()
+    }
+
     /// The least-squares solution of all rows so far; more rows may follow.
     ///
     /// Columns are scaled to unit length, the triangle is solved by QR, and by a truncated

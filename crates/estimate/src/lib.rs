@@ -35,6 +35,7 @@ mod least_squares;
 mod logarithm;
 mod modal;
 mod noise_spectrum;
+pub mod nonlinear;
 mod prediction;
 mod quasi_triangular;
 mod sweep;

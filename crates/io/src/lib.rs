@@ -47,5 +47,5 @@ pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };
 pub use standard::{input_name, is_standard_output, output_name};
-pub use system::{SystemMatrices, read_system};
+pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

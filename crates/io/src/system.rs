@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use mechid_model::SecondOrderSystem;
+use mechid_model::{SecondOrderSystem, Terms};
 use mechid_signal::counted;
 use nalgebra::DMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
@@ -46,6 +46,48 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
     }
     let (file, described) = json::read::<Described>(path.as_ref())?;
     described.system.system(&file)
+}
+
+/// Nonlinear terms beside a system: the `nonlinear` of the report that `mechid identify --json` prints,
+/// which [`read_nonlinear`] reads back.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+pub struct NonlinearDescription {
+    /// Terms as they are written, such as `k3: x1^3`.
+    pub terms: Terms,
+    /// Coefficients, one for each term, in its unit.
+    pub coefficients: Vec<f64>,
+    #[serde(default)]
+    channels: ChannelDescription,
+}
+
+/// Delay and phase that the channels add.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(default)]
+struct ChannelDescription {
+    delay: f64,
+    cubic: f64,
+    quintic: f64,
+}
+
+impl NonlinearDescription {
+    /// Returns the delay of the force channel, in s, and the cubic and quintic term of the phase that all
+    /// channels add, in rad; zero where the file has none.
+    pub fn channels(&self) -> [f64; 3] {
+        let ChannelDescription { delay, cubic, quintic } = self.channels;
+        [delay, cubic, quintic]
+    }
+}
+
+/// Reads the nonlinear terms in a JSON file (`-`: standard input), if it has any.
+///
+/// # Errors
+/// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`].
+pub fn read_nonlinear(path: impl AsRef<Path>) -> Result<Option<NonlinearDescription>, IoError> {
+    #[derive(Deserialize)]
+    struct Described {
+        nonlinear: Option<NonlinearDescription>,
+    }
+    Ok(json::read::<Described>(path.as_ref())?.1.nonlinear)
 }
 
 /// M with C and K, or (one degree of freedom) the mass with natural frequency and damping ratio.

@@ -51,6 +51,8 @@ mod book {
     mod estimate {}
     #[doc = include_str!("../../../docs/book/src/theory/force.md")]
     mod force {}
+    #[doc = include_str!("../../../docs/book/src/choose/nonlinear.md")]
+    mod nonlinear {}
 }
 
 pub use mechid_analysis as analysis;
@@ -58,7 +60,8 @@ pub use mechid_analysis::identify::LineChoice;
 pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, MaximumLikelihood};
 pub use mechid_analysis::{
     Channels, Detrend, FrfSettings, Identified, Identify, InspectSettings, Machine, Measurement,
-    Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify, inspect, reconstruct,
+    Predict, Predicted, Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify,
+    inspect, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -225,6 +225,28 @@ pub enum ModelError {
         /// Parameter concerned.
         parameter: Parameter,
     },
+    /// A text is no nonlinear term, or the term does not belong to the system.
+    #[error("`{text}` is not usable as a nonlinear term: {reason}")]
+    Term {
+        /// The text of the term.
+        text: String,
+        /// Reason of the refusal.
+        reason: String,
+    },
+    /// Two nonlinear terms have one name.
+    #[error("two nonlinear terms are called `{name}`")]
+    RepeatedTerm {
+        /// The name.
+        name: String,
+    },
+    /// Nonlinear terms do not have one finite coefficient each.
+    #[error("{} for {}: one finite number for each", counted(*got, "coefficient"), counted(*terms, "nonlinear term"))]
+    Coefficients {
+        /// Coefficients found.
+        got: usize,
+        /// Terms.
+        terms: usize,
+    },
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),

@@ -1,4 +1,4 @@
-//! Linear mechanical systems M ẍ + C ẋ + K x = F and their closed-form responses.
+//! Mechanical systems M ẍ + C ẋ + K x = F, linear or with nonlinear terms, and their closed forms.
 //!
 //! ```
 //! use mechid_model::{JournalBearing, KyxSign, OilFilm};
@@ -33,6 +33,7 @@
 //! | singular values, a matrix exponential | [`linear_algebra`] |
 //! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
+//! | springs and dampers that are not linear | [`NonlinearSystem`], [`Terms`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
 
 mod closed_form;
@@ -44,6 +45,7 @@ mod initial_state;
 mod journal_bearing;
 pub mod linear_algebra;
 mod modes;
+mod nonlinear;
 mod parameter;
 mod real_schur;
 mod response;
@@ -63,6 +65,10 @@ pub use error::ModelError;
 pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
 pub use modes::Mode;
+pub use nonlinear::{
+    Constant, Coordinate, Law, NonlinearSystem, Power, QuadraticDamping, SaturatingDamping, Term,
+    Terms,
+};
 pub use parameter::Parameter;
 pub use real_schur::RealSchur;
 pub use response::Response;

@@ -3,7 +3,9 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use crate::{Matrix, ModelError, Parameter, SecondOrderSystem, UncertainSystem};
+use crate::{
+    Matrix, ModelError, NonlinearSystem, Parameter, SecondOrderSystem, Terms, UncertainSystem,
+};
 
 /// M (kg), C (N·s/m) and K (N/m) as rows of numbers.
 #[derive(Serialize, Deserialize)]
@@ -72,6 +74,33 @@ impl TryFrom<UncertainForm> for UncertainSystem {
         };
         let covariance = matrix(&form.covariance, parameters).map_err(wrong)?;
         Self::new(form.system, named, covariance)
+    }
+}
+
+/// A linear system, its nonlinear terms as they are written, and their coefficients.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct NonlinearForm {
+    system: SecondOrderSystem,
+    terms: Terms,
+    coefficients: Vec<f64>,
+}
+
+impl From<NonlinearSystem> for NonlinearForm {
+    fn from(system: NonlinearSystem) -> Self {
+        Self {
+            terms: system.terms().clone(),
+            coefficients: system.coefficients().to_vec(),
+            system: system.linear().clone(),
+        }
+    }
+}
+
+impl TryFrom<NonlinearForm> for NonlinearSystem {
+    type Error = ModelError;
+
+    fn try_from(form: NonlinearForm) -> Result<Self, ModelError> {
+        Self::new(form.system, form.terms, form.coefficients)
     }
 }
 

@@ -5,6 +5,7 @@
 //! | `options` | settings, as values |
 //! | `lines`, `mass` | spectral lines to use; known masses |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
+//! | `nonlinear` | whole periods with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
 //! | `checks` | checks before and after a fit, in order |
@@ -15,6 +16,7 @@ pub mod checks;
 mod derivatives;
 pub mod lines;
 pub mod mass;
+pub mod nonlinear;
 pub mod options;
 pub mod prediction;
 mod responses;
@@ -25,6 +27,7 @@ pub mod validation;
 
 use std::fmt;
 
+use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::SecondOrderSystem;
 use serde::{Serialize, Serializer};
@@ -32,10 +35,11 @@ use serde::{Serialize, Serializer};
 use self::checks::CheckRow;
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
+pub use self::nonlinear::Nonlinear;
 pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Refinement, ResponseFit, SampleFit,
 };
-use self::prediction::{Compared, Prediction};
+use self::prediction::{Compared, Model, Prediction};
 use self::spectra::Fitted;
 use self::summary::IdentificationSummary;
 pub use self::validation::{Validation, ValidationWindow};
@@ -95,6 +99,7 @@ impl Identify {
     /// Returns how much of a record must be held in memory to fit it.
     pub(crate) fn hold(&self) -> Hold {
         match &self.fit {
+            Fit::Spectra { .. } if self.nonlinear.is_some() => Hold::Whole,
             Fit::Spectra { .. } => Hold::Periods,
             Fit::Responses(how) => how.segments.hold(),
             Fit::Samples(how) => how.hold(),
@@ -102,6 +107,14 @@ impl Identify {
     }
 
     fn fitted(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+        if let Some(how) = &self.nonlinear {
+            let Fit::Spectra { method } = &self.fit else {
+                let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
+                           and `from_frf` out";
+                return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
+            };
+            return nonlinear::fit(records, unknowns, &self.lines, *method, how);
+        }
         match &self.fit {
             Fit::Spectra { method } => spectra::fit(records, unknowns, &self.lines, *method),
             Fit::Responses(how) => responses::fit(records, unknowns, &self.lines, how),
@@ -116,12 +129,26 @@ impl Identified {
         &self.summary
     }
 
-    /// Returns the estimate of M, C and K with its covariance.
+    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part,
+    /// whose modes are those of small amplitudes.
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate
     }
 
-    /// Returns the identified system.
+    /// Returns the estimate with nonlinear terms; `None` for a linear system.
+    pub fn nonlinear(&self) -> Option<&NonlinearEstimate> {
+        self.fitted.nonlinear.as_ref().map(|fitted| &fitted.found)
+    }
+
+    /// Returns the identified system with its nonlinear terms, if it has any.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    pub fn model(&self) -> Result<Model, AnalysisError> {
+        self.fitted.model()
+    }
+
+    /// Returns the identified system; with nonlinear terms, its linear part.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
@@ -135,7 +162,10 @@ impl Identified {
     /// # Errors
     /// As [`Identified::system`].
     pub fn machine(&self) -> Result<Machine, AnalysisError> {
-        Machine::of_estimate(&self.fitted.estimate)
+        Ok(Machine {
+            nonlinear: self.fitted.nonlinear_part()?,
+            ..Machine::of_estimate(&self.fitted.estimate)?
+        })
     }
 
     /// Returns every check, those before the fit first.
@@ -187,7 +217,7 @@ impl Identified {
             let file = record.held.file.clone();
             return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
         }
-        let validation = Validation::of(&record, &self.system()?, prediction)?;
+        let validation = Validation::of(&record, &self.model()?, prediction)?;
         Ok((validation, record.into_held()))
     }
 
@@ -224,7 +254,7 @@ impl Identified {
     /// # Errors
     /// [`AnalysisError::Diverges`] if the identified system is unstable.
     pub fn compared(&self) -> Result<Vec<Compared>, AnalysisError> {
-        self.fitted.prediction.predict(&self.system()?, &self.records[0].held)
+        self.fitted.prediction.predict(&self.model()?, &self.records[0].held)
     }
 
     /// Returns how the response of the identified system to a record is predicted.

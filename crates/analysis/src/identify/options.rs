@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::lines::LineChoice;
 use super::mass::KnownMass;
+use super::nonlinear::Nonlinear;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
 
@@ -32,6 +33,9 @@ pub struct Identify {
     pub lines: LineChoice,
     /// Known masses.
     pub mass: KnownMass,
+    /// Nonlinear springs and dampers, fitted to the spectra of whole periods; `None`: a linear system.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonlinear: Option<Nonlinear>,
 }
 
 /// Data that are fitted, and the estimator.
@@ -230,6 +234,12 @@ impl Identify {
         Self { lines, ..self }
     }
 
+    /// Fits nonlinear springs and dampers, too.
+    #[must_use]
+    pub fn nonlinear(self, nonlinear: Nonlinear) -> Self {
+        Self { nonlinear: Some(nonlinear), ..self }
+    }
+
     /// Takes these masses as known.
     #[must_use]
     pub fn mass(self, mass: KnownMass) -> Self {
@@ -292,6 +302,7 @@ mod tests {
             Identify::responses(Estimator::Hv, Segmentation::default()),
             Identify { fit: Fit::Samples(samples), ..Identify::default() }
                 .mass("2.5,unknown".parse().unwrap()),
+            Identify::default().nonlinear("k3: x1^3, c2: |v1| v1".parse().unwrap()),
         ];
         for how in all {
             let saved = serde_json::to_string(&how).unwrap();

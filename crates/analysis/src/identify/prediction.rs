@@ -1,14 +1,16 @@
 //! The response of the identified system to a measured force.
 
+use mechid_estimate::nonlinear::{self, ChannelPhase};
 use mechid_estimate::{EstimateError, fitted_start, predict, predict_periodic};
 use mechid_model::Discretisation;
 use mechid_model::ResponseQuantity;
-use mechid_model::{InitialState, Response, SecondOrderSystem};
-use mechid_signal::Extent;
-use mechid_signal::Record;
+use mechid_model::{InitialState, NonlinearSystem, Response, SecondOrderSystem};
+use mechid_signal::{Extent, Record, Spectrum};
+use nalgebra::{Complex, DVector};
 
 use crate::AnalysisError;
 use crate::measurement::Block;
+use crate::predict::shown;
 
 /// Kind of prediction of a record, in keeping with how the machine was identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +24,30 @@ pub enum Prediction {
         /// Extent of the window.
         extent: Extent,
     },
+}
+
+/// System that predicts a response.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Model {
+    /// M, C and K alone.
+    Linear(SecondOrderSystem),
+    /// M, C and K with nonlinear terms.
+    Nonlinear {
+        /// The system.
+        system: NonlinearSystem,
+        /// Delay and phase that the channels add.
+        channels: ChannelPhase,
+    },
+}
+
+impl Model {
+    /// Returns M, C and K.
+    pub fn linear(&self) -> &SecondOrderSystem {
+        match self {
+            Self::Linear(system) => system,
+            Self::Nonlinear { system, .. } => system.linear(),
+        }
+    }
 }
 
 /// One kind of response, measured and predicted.
@@ -40,12 +66,12 @@ impl Prediction {
     /// starts from the state that fits it best.
     pub(crate) fn predict(
         self,
-        system: &SecondOrderSystem,
+        model: &Model,
         measured: &Block,
     ) -> Result<Vec<Compared>, AnalysisError> {
         let motions = measured.responses();
         let response =
-            self.response(system, measured).map_err(|reason| failed(reason, system, measured))?;
+            self.response(model, measured).map_err(|reason| failed(reason, model, measured))?;
         let compared = |(kind, record): (ResponseQuantity, &Record)| {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
             match self {
@@ -61,11 +87,13 @@ impl Prediction {
         Ok(motions.into_iter().map(compared).collect())
     }
 
-    fn response(
-        self,
-        system: &SecondOrderSystem,
-        measured: &Block,
-    ) -> Result<Response, EstimateError> {
+    fn response(self, model: &Model, measured: &Block) -> Result<Response, EstimateError> {
+        let system = match model {
+            Model::Linear(system) => system,
+            Model::Nonlinear { system, channels } => {
+                return steady_state(system, *channels, measured);
+            }
+        };
         let (force, rest) = (&measured.force, InitialState::rest(system.dof()));
         match self {
             Prediction::Steady => predict_periodic(system, force),
@@ -83,13 +111,50 @@ impl Prediction {
     }
 }
 
-/// Returns the reason why there is no prediction.
-pub fn failed(
-    reason: EstimateError,
-    system: &SecondOrderSystem,
+/// Returns the steady state of a nonlinear system under the mean period of the measured force, as the
+/// channels show it, repeated for every period held. Of several steady states it is the one nearest to
+/// the measured response.
+pub(crate) fn steady_state(
+    system: &NonlinearSystem,
+    channels: ChannelPhase,
     measured: &Block,
-) -> AnalysisError {
-    match growth(system) {
+) -> Result<Response, EstimateError> {
+    let (motion, kind) = measured.response();
+    let period = measured.period;
+    let (force, motion) = (measured.force.period_mean(period)?, motion.period_mean(period)?);
+    let (force, motion) = channels.correct(&force, &motion)?;
+    let start = periodic_start(&motion, kind)?;
+    let found = nonlinear::predict(system, &force, Extent::WholePeriod, &start)?;
+    shown(&found, channels, measured.force.len() / period)
+}
+
+/// Returns displacement and velocity at the first sample of a period of a response.
+fn periodic_start(motion: &Record, kind: ResponseQuantity) -> Result<InitialState, EstimateError> {
+    let spectrum = Spectrum::of(motion);
+    // The highest line of an even number of samples has no derivative.
+    let lines = motion.len().div_ceil(2);
+    let first = usize::from(kind != ResponseQuantity::Displacement);
+    let at_zero = |order: i32| {
+        let one = |channel: usize| -> f64 {
+            let line = |n: usize| {
+                let factor = Complex::new(0.0, spectrum.omega(n)).powi(order);
+                let scale = if first == 0 {
+                    Complex::from(1.0)
+                } else {
+                    kind.per_displacement(spectrum.omega(n)).inv()
+                };
+                (spectrum.lines()[(n, channel)] * scale * factor).re
+            };
+            (first..lines).map(line).sum()
+        };
+        DVector::from_iterator(motion.channels(), (0..motion.channels()).map(one))
+    };
+    Ok(InitialState::new(at_zero(0), at_zero(1))?)
+}
+
+/// Returns the reason why there is no prediction.
+pub fn failed(reason: EstimateError, model: &Model, measured: &Block) -> AnalysisError {
+    match growth(model.linear()) {
         Some(rate) => AnalysisError::Diverges { file: measured.file.clone(), rate },
         None => reason.into(),
     }

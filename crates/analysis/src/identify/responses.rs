@@ -10,7 +10,7 @@ use mechid_signal::Extent;
 
 use super::lines::LineChoice;
 use super::options::{Method, ResponseFit};
-use super::prediction::Prediction;
+use super::prediction::{Model, Prediction};
 use super::spectra::{Fitted, Misfit, one_motion_of, steady_residuals};
 use super::summary::LinesUsed;
 use crate::AnalysisError;
@@ -54,7 +54,11 @@ pub fn fit(
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,
-        residuals: if periodic { steady_residuals(records, &found)? } else { Vec::new() },
+        residuals: if periodic {
+            steady_residuals(records, &Model::Linear(found.system()?))?
+        } else {
+            Vec::new()
+        },
         prediction: match periodic {
             true => Prediction::Steady,
             false => Prediction::Sampled {
@@ -65,6 +69,7 @@ pub fn fit(
         misfit,
         remarks: one_motion_of(&records[0].held),
         estimate: found,
+        nonlinear: None,
     })
 }
 

@@ -173,6 +173,7 @@ impl SampleFit {
             residuals: residuals.collect::<Result<_, _>>()?,
             prediction: self.prediction(Discretisation::FirstOrderHold),
             misfit: None,
+            nonlinear: None,
             remarks: self.remarks(prepared, &estimate),
             estimate,
         })
@@ -239,6 +240,7 @@ impl SampleFit {
             residuals,
             prediction: self.prediction(discretisation),
             misfit: None,
+            nonlinear: None,
             remarks: self.remarks(prepared, &estimate),
             estimate,
         })

@@ -12,9 +12,11 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
 
 use super::lines::{LineChoice, choose_lines};
+use super::nonlinear::WithTerms;
 use super::options::Method;
-use super::prediction::Prediction;
+use super::prediction::{Model, Prediction};
 use crate::AnalysisError;
+use crate::machine::NonlinearPart;
 use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
 
 /// An estimate and how it came about.
@@ -26,8 +28,10 @@ pub struct Fitted {
     pub estimator: &'static str,
     /// Spectra were fitted by least squares, where another method allows for noise.
     pub least_squares: bool,
-    /// Estimate with its uncertainty.
+    /// Estimate with its uncertainty; with nonlinear terms, of the linear part.
     pub estimate: Estimate,
+    /// Estimate with nonlinear terms, if there are any.
+    pub nonlinear: Option<WithTerms>,
     /// Real equations used, of each degree of freedom.
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
@@ -112,9 +116,10 @@ pub(super) fn fit(
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        residuals: steady_residuals(records, &estimate)?,
+        residuals: steady_residuals(records, &Model::Linear(estimate.system()?))?,
         prediction: Prediction::Steady,
         misfit,
+        nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
         estimate,
     })
@@ -243,13 +248,12 @@ pub fn one_motion_of(measured: &Block) -> Vec<String> {
 /// is taken away, means apart.
 pub fn steady_residuals(
     records: &[Windowed],
-    estimate: &Estimate,
+    model: &Model,
 ) -> Result<Vec<Residual>, AnalysisError> {
-    let system = estimate.system()?;
     let mut residuals = Vec::new();
     for Windowed { held: measured, .. } in records {
         let motion = measured.response().0.without_mean();
-        let predicted = Prediction::Steady.predict(&system, measured)?.swap_remove(0).predicted;
+        let predicted = Prediction::Steady.predict(model, measured)?.swap_remove(0).predicted;
         residuals.push(Residual {
             left: Record::new(motion.sampling(), motion.data() - predicted.data())?,
             fitted: motion,
@@ -261,6 +265,26 @@ pub fn steady_residuals(
 }
 
 impl Fitted {
+    /// Returns the identified system.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    pub fn model(&self) -> Result<Model, AnalysisError> {
+        Ok(match self.nonlinear_part()? {
+            None => Model::Linear(self.estimate.system()?),
+            Some(NonlinearPart { system, channels }) => Model::Nonlinear { system, channels },
+        })
+    }
+
+    /// Returns the identified system with its nonlinear terms, if it has any.
+    ///
+    /// # Errors
+    /// As [`Fitted::model`].
+    pub(super) fn nonlinear_part(&self) -> Result<Option<NonlinearPart>, AnalysisError> {
+        let Some(WithTerms { found, .. }) = &self.nonlinear else { return Ok(None) };
+        Ok(Some(NonlinearPart { system: found.system()?, channels: found.channels() }))
+    }
+
     /// Residual of the equations over their right-hand sides, all degrees of freedom together.
     pub fn nrmse(&self) -> f64 {
         let each = self.estimate.residual_nrmse();
@@ -276,6 +300,11 @@ impl Fitted {
         &self,
         system: &SecondOrderSystem,
     ) -> Result<Option<f64>, AnalysisError> {
+        if let Some(WithTerms { found, .. }) = &self.nonlinear {
+            let each = found.unexplained();
+            let mean = each.iter().map(|part| part * part).sum::<f64>() / each.len() as f64;
+            return Ok(Some(mean.sqrt()));
+        }
         let Some((_, data)) = &self.frequency else { return Ok(None) };
         let (mut left, mut all) = (0.0, 0.0);
         for (row, omega) in data.omega().iter().enumerate() {

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
+use mechid_estimate::{self as estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
 use mechid_signal::counted;
@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::CONSPICUOUS;
 use super::checks::{self, CheckRow, When};
+use super::nonlinear::NonlinearSummary;
 use super::options::Identify;
 use super::prediction::Prediction;
 use super::spectra::Fitted;
@@ -42,7 +43,10 @@ pub struct IdentificationSummary {
     pub confidence: f64,
     /// Parameters, one each.
     pub parameters: Vec<ParameterRow>,
-    /// Modes, by rising frequency.
+    /// Nonlinear terms, if there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonlinear: Option<NonlinearSummary>,
+    /// Modes, by rising frequency; with nonlinear terms, of small amplitudes.
     pub modes: Vec<ModeRow>,
     /// Quality of the fit.
     pub fit: FitRow,
@@ -187,6 +191,7 @@ impl IdentificationSummary {
             lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
             confidence: CONFIDENCE,
             parameters: parameters(fitted)?,
+            nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
             fit: FitRow {
                 nrmse: fitted.nrmse(),
@@ -194,14 +199,17 @@ impl IdentificationSummary {
                 misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
                 condition_number: estimate.condition(),
                 equations: fitted.equations,
-                unknowns: estimate.parameters().len(),
+                unknowns: match &fitted.nonlinear {
+                    Some(all) => all.found.parameters().len(),
+                    None => estimate.parameters().len(),
+                },
             },
             records: records.iter().map(row).collect(),
             checks: checks::rows(fitted, &records)?,
             validation: None,
             remarks: Vec::new(),
             system: SystemMatrices::from(&system),
-            covariance: covariance(estimate),
+            covariance: covariance(fitted),
             analysis: how.clone(),
         };
         let looked_at = records.iter().filter_map(|record| {
@@ -222,11 +230,12 @@ impl IdentificationSummary {
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         if let Some(part) = self.fit.unexplained_motion.filter(|part| *part > CONSPICUOUS) {
+            let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
             doubts.push(format!(
-            "the linear model leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \
+                "the {model} leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \
              degree of freedom more, or a record that is not periodic",
-            100.0 * part
-        ));
+                100.0 * part
+            ));
         }
         for p in self.parameters.iter().filter(|p| p.row == p.column && p.estimate.value < 0.0) {
             doubts.push(format!("{} is negative: no passive machine has that", p.name));
@@ -240,6 +249,10 @@ impl IdentificationSummary {
         text.push('\n');
         text += &self.parameter_table();
         text.push('\n');
+        if let Some(nonlinear) = &self.nonlinear {
+            text += &nonlinear.text();
+            text.push('\n');
+        }
         text += &self.mode_table();
         text.push('\n');
         text += &self.fit_lines();
@@ -305,6 +318,9 @@ impl IdentificationSummary {
                 n => format!("; {n} lines, {} to {} ({low} to {high} Hz)", l.first, l.last),
             };
         }
+        if let Some(nonlinear) = &self.nonlinear {
+            text += &format!("\nnonlinear terms: {}", nonlinear.terms);
+        }
         text + "\n"
     }
 
@@ -316,11 +332,18 @@ impl IdentificationSummary {
             row.push(p.unit.into());
             rows.push(row);
         }
+        for p in self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters) {
+            let mut row = vec![p.name.clone()];
+            row.extend(p.estimate.cells());
+            row.push(p.unit.clone());
+            rows.push(row);
+        }
         text_table(&rows)
     }
 
     fn mode_table(&self) -> String {
-        let mut rows = vec![self.header("mode")];
+        let small = self.nonlinear.is_some();
+        let mut rows = vec![self.header(if small { "mode of small amplitude" } else { "mode" })];
         for (number, mode) in (1..).zip(&self.modes) {
             let mut add = |name: String, value: &Uncertain, unit: &str| {
                 let mut row = vec![name];
@@ -348,10 +371,9 @@ impl IdentificationSummary {
             vec!["equations / unknowns".into(), format!("{} / {}", fit.equations, fit.unknowns)],
         ];
         if let Some(unexplained) = fit.unexplained_motion {
-            rows.insert(
-                1,
-                vec!["motion the linear model leaves unexplained".into(), percent(unexplained)],
-            );
+            let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
+            let name = format!("motion the {model} leaves unexplained");
+            rows.insert(1, vec![name, percent(unexplained)]);
         }
         text_table(&rows)
     }
@@ -474,7 +496,13 @@ fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, AnalysisError> {
     Ok(rows)
 }
 
-fn covariance(estimate: &Estimate) -> ParameterCovariance {
+fn covariance(fitted: &Fitted) -> ParameterCovariance {
+    let estimate = &fitted.estimate;
+    if let Some(all) = &fitted.nonlinear {
+        let names = all.found.parameters().iter().map(|p| p.name.clone()).collect();
+        let freedom = estimate.degrees_of_freedom();
+        return ParameterCovariance::new(names, all.found.covariance(), freedom);
+    }
     let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
     ParameterCovariance::new(names, estimate.covariance(), estimate.degrees_of_freedom())
 }

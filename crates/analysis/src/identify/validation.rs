@@ -7,7 +7,7 @@ use mechid_model::{InitialState, SecondOrderSystem};
 use mechid_signal::Extent;
 use serde::{Deserialize, Serialize};
 
-use super::prediction::{Prediction, channels, failed};
+use super::prediction::{Model, Prediction, channels, failed};
 use crate::AnalysisError;
 use crate::measurement::{CHUNK_SAMPLES, Hold, Window, Windowed};
 use crate::text::{significant, text_table};
@@ -83,7 +83,7 @@ impl Validation {
     /// Compares the prediction with the record.
     pub(crate) fn of(
         recorded: &Windowed,
-        system: &SecondOrderSystem,
+        model: &Model,
         prediction: Prediction,
     ) -> Result<Self, AnalysisError> {
         let measured = &recorded.held;
@@ -94,13 +94,16 @@ impl Validation {
                 shares.push(Share { quantity, degree_of_freedom: at + 1, fit_percent });
             }
         };
-        match prediction {
-            Prediction::Sampled { discretisation, extent: Extent::Open } => {
+        match (prediction, model) {
+            (
+                Prediction::Sampled { discretisation, extent: Extent::Open },
+                Model::Linear(system),
+            ) => {
                 let found = in_stretches(recorded, system, discretisation)?;
                 found.into_iter().for_each(|(kind, fits)| add(kind, fits));
             }
             _ => {
-                for compared in prediction.predict(system, measured)? {
+                for compared in prediction.predict(model, measured)? {
                     add(compared.kind, fit_percent(&compared.measured, &compared.predicted)?);
                 }
             }
@@ -139,7 +142,8 @@ fn in_stretches(
     discretisation: Discretisation,
 ) -> Result<Vec<(ResponseQuantity, Vec<f64>)>, AnalysisError> {
     let held = &recorded.held;
-    let told = |reason| failed(reason, system, held);
+    let model = Model::Linear(system.clone());
+    let told = |reason| failed(reason, &model, held);
     let mut start = StartFit::new(system, discretisation)?;
     recorded.chunks(CHUNK_SAMPLES + 1, CHUNK_SAMPLES, &mut |chunk| {
         start.push(&chunk.force, &chunk.responses()).map_err(told)

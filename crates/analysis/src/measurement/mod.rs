@@ -386,6 +386,26 @@ impl Measurement {
         &self.source
     }
 
+    /// Reads the whole window, with whatever channels are named.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Window`], and if the file cannot be read again.
+    pub(crate) fn whole_block(&self) -> Result<Block, AnalysisError> {
+        let (start, len) = self.span()?;
+        let mut whole = None;
+        self.source.blocks(start..start + len, len, len, &mut |block| {
+            whole = Some(self.source.sorted(&block, start + 1)?);
+            Ok(())
+        })?;
+        let (first, last) = (start + 1, start + len);
+        let file = self.source.name.clone();
+        let mut whole =
+            whole.ok_or(AnalysisError::Window { file, first, last, len: self.sampling().len() })?;
+        whole.period = self.window.period.unwrap_or(len);
+        whole.periods = len / whole.period;
+        Ok(whole)
+    }
+
     /// Returns the first sample, counted from 0, and the number of samples of the window.
     pub(crate) fn span(&self) -> Result<(usize, usize), AnalysisError> {
         self.window.span(&self.source.name, self.source.sampling.len())

@@ -185,6 +185,7 @@ struct Task {
 
 impl Task {
     fn new(run: &Measurement, machine: &Machine, how: &Reconstruct) -> Result<Self, AnalysisError> {
+        machine.require_linear()?;
         let periodic = run.window_settings().period.is_some() || how.lines.is_some();
         let recorded = Recorded::new(run, machine.system().dof(), periodic)?;
         let request = Request::new(how, &recorded, machine.system().dof(), periodic)?;

@@ -65,7 +65,7 @@ impl<'a> Review<'a> {
             .map(|at| RecordReview::of(found, at, reconstruct_force))
             .collect::<Result<Vec<_>, _>>()?;
         let validation = match found.validated() {
-            Some(other) => found.prediction().predict(&found.system()?, other)?,
+            Some(other) => found.prediction().predict(&found.model()?, other)?,
             None => Vec::new(),
         };
         let receptance = Receptance::of(found, &records).map_err(|reason| reason.to_string());

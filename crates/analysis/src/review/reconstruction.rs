@@ -37,6 +37,7 @@ impl Reconstruction {
         period: &Block,
         lines: Option<Vec<usize>>,
     ) -> Result<Self, AnalysisError> {
+        found.machine()?.require_linear()?;
         let force = &period.force;
         let forced: Vec<usize> =
             (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();

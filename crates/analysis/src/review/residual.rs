@@ -39,10 +39,10 @@ impl Residual {
     /// # Errors
     /// If the machine has no such motion.
     pub fn of(found: &Identified, at: usize, mean: Option<&Block>) -> Result<Self, AnalysisError> {
-        let system = found.fitted().estimate.system()?;
+        let model = found.model()?;
         let prediction = found.fitted().prediction;
-        let compared = prediction.predict(&system, &found.records()[at].held)?;
-        let mean = mean.map(|mean| prediction.predict(&system, mean)).transpose()?;
+        let compared = prediction.predict(&model, &found.records()[at].held)?;
+        let mean = mean.map(|mean| prediction.predict(&model, mean)).transpose()?;
         let mean = mean.map(|mut motions| motions.swap_remove(0));
         let correlations = match found.fitted().residuals.get(at) {
             Some(left) => correlations(left)?,

@@ -2,6 +2,7 @@
 
 use clap::ValueEnum;
 use mechid::analysis::{Detrend, frf, identify, reconstruct, sweep};
+use mechid::estimate::nonlinear;
 use mechid::model::Discretisation;
 use mechid::signal::Extent;
 
@@ -43,6 +44,31 @@ choice! {
         /// biased, of least scatter
         MaximumLikelihood,
     }
+}
+
+choice! {
+    /// Weighting of the lines of a fit with nonlinear terms.
+    WeightingChoice => nonlinear::Weighting {
+        /// The one of the others that makes the residual likeliest
+        Automatic,
+        /// The equation error is equally large on all lines as a force
+        WhiteForce,
+        /// The equation error is equally large on all lines as a response
+        Response,
+        /// By the residual's own spectrum, averaged over neighbouring lines
+        SmoothSpectrum,
+    }
+}
+
+/// Constants to search for beside nonlinear terms.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SearchChoice {
+    /// Constants inside the laws, from the values given
+    Laws,
+    /// Delay of the force
+    Delay,
+    /// Phase that all channels have in common, as of equal filters
+    Phase,
 }
 
 /// Assumption on the force between samples.

@@ -5,15 +5,17 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use mechid::analysis::identify::{
-    Band, Derivatives, Fit, Identified, Identify, KnownMass, LineChoice, Method, Refinement,
-    ResponseFit, SampleFit, ValidationWindow,
+    Band, Derivatives, Fit, Identified, Identify, KnownMass, LineChoice, Method, Nonlinear,
+    Refinement, ResponseFit, SampleFit, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
+use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
 use mechid::io::LineSpec;
+use mechid::model::Terms;
 
 use super::choices::{
     BetweenSamplesChoice, EstimatorChoice, ExtentChoice, InterpolationChoice, MethodChoice,
-    WeightChoice,
+    SearchChoice, WeightChoice, WeightingChoice,
 };
 use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
@@ -52,6 +54,8 @@ pub struct FitArgs {
     )]
     mass: KnownMass,
     #[command(flatten)]
+    nonlinear: NonlinearArgs,
+    #[command(flatten)]
     time: TimeArgs,
     /// Fit frequency responses, averaged over segments, with their coherence as weights
     #[arg(long, value_name = "ESTIMATOR", value_enum, help_heading = "Frequency responses")]
@@ -84,6 +88,40 @@ pub struct LineArgs {
     /// Use the lines with force between two frequencies, in Hz
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
+}
+
+/// Nonlinear springs and dampers.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Nonlinear terms")]
+struct NonlinearArgs {
+    /// Springs and dampers to fit beside mass, damping and stiffness, each `name: law`: powers of x1
+    /// and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and (v1-v2), |v1| v1,
+    /// v1^3/(1 + (v1/b)^2) with a number for b, x1^0 for a constant force
+    #[arg(long, value_name = "TERMS")]
+    nonlinear: Option<Terms>,
+    /// Constants to search for besides: those inside the laws, the delay of the force, the phase that
+    /// all channels have in common
+    #[arg(long, value_name = "WHAT,…", value_enum, value_delimiter = ',', requires = "nonlinear")]
+    search: Vec<SearchChoice>,
+    /// Weighting of the lines [default: automatic]
+    #[arg(long, value_name = "WEIGHTING", value_enum, requires = "nonlinear")]
+    weighting: Option<WeightingChoice>,
+}
+
+impl NonlinearArgs {
+    /// Returns the settings of the terms, if there are any.
+    fn settings(&self) -> Option<Nonlinear> {
+        let searched = |what| self.search.contains(&what);
+        Some(Nonlinear {
+            terms: self.nonlinear.clone()?,
+            search: ShapeConstants {
+                laws: searched(SearchChoice::Laws),
+                delay: searched(SearchChoice::Delay),
+                phase: searched(SearchChoice::Phase),
+            },
+            weighting: self.weighting.map_or(Weighting::Automatic, Into::into),
+        })
+    }
 }
 
 /// Fits in the time domain.
@@ -252,7 +290,12 @@ impl FitArgs {
             }),
             (Domain::Frequency, None) => Fit::Spectra { method: method.unwrap_or_default() },
         };
-        Identify { fit, lines: self.lines.choice(), mass: self.mass.clone() }
+        Identify {
+            fit,
+            lines: self.lines.choice(),
+            mass: self.mass.clone(),
+            nonlinear: self.nonlinear.settings(),
+        }
     }
 
     /// Refuses options that the domain does not use.
@@ -262,6 +305,7 @@ impl FitArgs {
             self.lines.given(),
             self.method.map(|_| "--method"),
             self.from_frf.map(|_| "--from-frf"),
+            self.nonlinear.nonlinear.as_ref().map(|_| "--nonlinear"),
         ];
         let first = |options: &[Option<&'static str>]| options.iter().flatten().next().copied();
         let (misplaced, why) = match self.domain {

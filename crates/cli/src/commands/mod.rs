@@ -12,6 +12,7 @@ mod identify;
 mod info;
 mod modal;
 mod multisine;
+mod predict;
 mod report;
 mod simulate;
 mod stability;
@@ -51,6 +52,7 @@ pub enum Command {
     Info(info::InfoArgs),
     Modal(modal::ModalArgs),
     Multisine(multisine::MultisineArgs),
+    Predict(predict::PredictArgs),
     Report(report::PageArgs),
     Simulate(simulate::SimulateArgs),
     Stability(stability::StabilityArgs),
@@ -68,6 +70,7 @@ impl Command {
             Command::Info(args) => args.run(),
             Command::Modal(args) => args.run(),
             Command::Multisine(args) => args.run(),
+            Command::Predict(args) => args.run(),
             Command::Report(args) => args.run(),
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
@@ -85,6 +88,7 @@ impl Command {
             Command::Info(args) => args.files(),
             Command::Modal(args) => args.files(),
             Command::Multisine(args) => args.files(),
+            Command::Predict(args) => args.files(),
             Command::Report(args) => args.files(),
             Command::Simulate(args) => args.files(),
             Command::Stability(args) => args.files(),
@@ -114,6 +118,7 @@ impl Command {
             Command::Info(args) => &args.report,
             Command::Modal(args) => &args.report,
             Command::Multisine(args) => &args.report,
+            Command::Predict(args) => &args.report,
             Command::Report(args) => &args.report,
             Command::Simulate(args) => &args.report,
             Command::Stability(args) => &args.report,

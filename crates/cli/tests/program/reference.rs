@@ -63,9 +63,13 @@ fn every_field_of_every_report_is_in_the_reference() {
     let identify = "identify machine.csv --force force --displacement displacement";
     let found = mechid(folder.path(), &format!("{identify} --period 256 --json"));
     fs::write(folder.path().join("found.json"), found).unwrap();
+    let nonlinear = format!("{identify} --period 256 --nonlinear k3:x1^3 --search phase");
+    let found = mechid(folder.path(), &format!("{nonlinear} --json"));
+    fs::write(folder.path().join("nonlinear.json"), found).unwrap();
     let time = "--velocity velocity --acceleration acceleration --domain time";
     for arguments in [
         format!("{identify} --period 256"),
+        nonlinear,
         format!("{identify} {time} --mass 25"),
         format!("{} --period 256 --output report.html", identify.replace("identify", "report")),
         "force machine.csv --system found.json --displacement displacement --period 256".into(),
@@ -74,6 +78,11 @@ fn every_field_of_every_report_is_in_the_reference() {
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
         "modal found.json".into(),
+        "modal nonlinear.json".into(),
+        "predict found.json machine.csv --force force --displacement displacement --settle 64"
+            .into(),
+        "predict nonlinear.json machine.csv --force force --displacement displacement --period 256"
+            .into(),
         "modal machine.json".into(),
         "multisine --samples 64 --rate 64 --inputs 2 --output force.csv".into(),
         "simulate machine.json --output record.csv".into(),

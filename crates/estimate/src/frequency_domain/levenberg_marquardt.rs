@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::triangular::TriangularFactor;
 
 /// A sum of squares to be minimised over its parameters.
-pub(super) trait SumOfSquares {
+pub(crate) trait SumOfSquares {
     /// Number of residuals.
     fn residuals(&self) -> usize;
 
@@ -18,7 +18,7 @@ pub(super) trait SumOfSquares {
 
 /// Where a search ended.
 #[derive(Debug, Clone)]
-pub(super) struct Minimum {
+pub(crate) struct Minimum {
     pub theta: DVector<f64>,
     pub cost: f64,
     pub steps: usize,
@@ -42,7 +42,7 @@ const MAX_DAMPING: f64 = 1e12;
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; scaling after Moré (1978).
-pub(super) fn minimise(
+pub(crate) fn minimise(
     problem: &mut impl SumOfSquares,
     mut theta: DVector<f64>,
 ) -> Option<Minimum> {

@@ -44,7 +44,7 @@
 mod data;
 mod equation_error;
 mod instrumental;
-mod levenberg_marquardt;
+pub(crate) mod levenberg_marquardt;
 mod lines;
 mod misfit;
 mod output_error;

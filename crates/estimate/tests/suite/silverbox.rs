@@ -4,36 +4,15 @@
 //! system identification", ECC 2013. The data stand beside the project, not in it; without
 //! them this test says so and passes.
 
-use mechid_model::ResponseQuantity;
-use std::path::Path;
-
+use crate::common::silverbox::schroeder;
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
-use mechid_signal::{Record, Sampling};
-
-/// Force (first channel) and displacement (second) of the whole record, in volts.
-fn whole_record() -> Option<Record> {
-    let place = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/silverbox/Schroeder80mV.csv");
-    let text = std::fs::read_to_string(place).ok()?;
-    let mut channels = [Vec::new(), Vec::new()];
-    for row in text.lines().skip(1).filter(|row| !row.is_empty()) {
-        let fields: Vec<&str> = row.split(',').collect();
-        for (channel, field) in channels.iter_mut().zip(&fields[2..4]) {
-            channel.push(field.trim().parse().expect("a voltage"));
-        }
-    }
-    let sampling = Sampling::from_rate_hz(1e7 / 16384.0, channels[0].len()).unwrap();
-    Some(Record::from_channels(sampling, &channels).unwrap())
-}
+use mechid_model::ResponseQuantity;
+use mechid_signal::Record;
 
 #[test]
-#[allow(clippy::print_stderr, reason = "a skipped test says so")]
 fn the_measured_oscillator_has_its_known_frequency_and_damping() {
-    let Some(record) = whole_record() else {
-        eprintln!("skipped: the Silverbox record is not beside the project");
-        return;
-    };
+    let Some(record) = schroeder() else { return };
     // One period after a steady run-in; the sensors' offset is that of the whole record.
     let period = record.without_mean().window(10584, 1024).unwrap();
     let channel =

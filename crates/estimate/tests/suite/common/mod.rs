@@ -2,6 +2,8 @@
 
 pub mod documentation;
 pub mod monte_carlo;
+pub mod silverbox;
+pub mod stepped;
 
 use mechid_model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};

@@ -1,0 +1,246 @@
+//! Fits of whole periods with nonlinear terms beside M, C and K.
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::checks::before_spectral_fit;
+use mechid_estimate::frequency_domain::{FrequencyData, Lines};
+use mechid_estimate::nonlinear::{
+    ChannelPhase, Distortion, EquationErrorOptions, Level, NonlinearEstimate, ShapeConstants,
+    StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error,
+    output_error,
+};
+use mechid_model::Terms;
+use mechid_signal::{Extent, driven_lines, lines};
+use serde::{Deserialize, Serialize};
+
+use super::lines::{LineChoice, choose_lines};
+use super::options::Method;
+use super::prediction::{Model, Prediction};
+use super::spectra::{Fitted, one_motion_of, periods, steady_residuals};
+use super::summary::Uncertain;
+use crate::AnalysisError;
+use crate::measurement::{Block, Windowed};
+use crate::text::significant;
+
+/// Nonlinear springs and dampers to identify beside M, C and K.
+///
+/// ```
+/// use mechid_analysis::identify::Nonlinear;
+///
+/// let springs: Nonlinear = "k2: x1^2, k3: x1^3".parse()?;
+/// assert_eq!(springs.terms.len(), 2);
+/// # Ok::<(), mechid_analysis::AnalysisError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Nonlinear {
+    /// Terms as they are written, such as `k3: x1^3, c2: |v1| v1`.
+    pub terms: Terms,
+    /// Constants that do not enter linearly, to search for; none by default.
+    pub search: ShapeConstants,
+    /// Weighting of the lines.
+    pub weighting: Weighting,
+}
+
+impl std::str::FromStr for Nonlinear {
+    type Err = AnalysisError;
+
+    fn from_str(text: &str) -> Result<Self, AnalysisError> {
+        Ok(Self { terms: text.parse()?, ..Self::default() })
+    }
+}
+
+/// Result of a fit with nonlinear terms.
+#[derive(Debug)]
+pub struct WithTerms {
+    /// The estimate.
+    pub found: NonlinearEstimate,
+    /// Evidence against a linear system in the first record, before any model.
+    pub distortion: Distortion,
+}
+
+/// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) reads back.
+#[derive(Debug, Serialize)]
+pub struct NonlinearSummary {
+    /// Terms as they are written, with the constants found inside them.
+    pub terms: Terms,
+    /// Coefficients, one for each term, in its unit.
+    pub coefficients: Vec<f64>,
+    /// Delay and phase of the channels; zero unless they were searched for.
+    pub channels: ChannelPhase,
+    /// Parameters beside those of M, C and K, with their uncertainty.
+    pub parameters: Vec<TermRow>,
+    /// Weighting of the lines that was used.
+    pub weighting: Weighting,
+    /// Number of blocks of time whose scatter gives the standard errors; `None` if the residual was
+    /// taken as white.
+    pub blocks: Option<usize>,
+    /// Evidence against a linear system in the first record, before any model.
+    pub distortion: DistortionRow,
+}
+
+/// One parameter beside those of M, C and K.
+#[derive(Debug, Serialize)]
+pub struct TermRow {
+    /// Name of a term, `c3.b` for the constant b inside a term, `delay`, `p3` or `p5`.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Largest displacement (m) and velocity (m/s) of a term's coordinate in the data; `None` for
+    /// what is no coefficient of a term.
+    pub largest: Option<[f64; 2]>,
+    /// Estimate with its uncertainty.
+    #[serde(flatten)]
+    pub estimate: Uncertain,
+}
+
+/// Levels of distortion, and the kind of term that a linear model lacks most.
+#[derive(Debug, Serialize)]
+pub struct DistortionRow {
+    /// Level on even lines, where odd ones alone are driven.
+    pub even: Option<Level>,
+    /// Level on odd lines that are not driven.
+    pub odd: Option<Level>,
+    /// Part of the force that a linear model leaves on the lines (pure number).
+    pub linear_leaves: f64,
+    /// The finding, in a sentence.
+    pub text: String,
+}
+
+/// Fits whole periods of one or several records of the same period with nonlinear terms: by least
+/// squares on the equation of motion, or from there by output error.
+pub(super) fn fit(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    choice: &LineChoice,
+    method: Method,
+    how: &Nonlinear,
+) -> Result<Fitted, AnalysisError> {
+    let first = &records[0].held;
+    let (kind, dofs) = (first.response().1, first.force.channels());
+    let band =
+        Lines::new(first.force.sampling().with_len(first.period)?, all_lines(first, choice)?)?;
+    let mut data = SteadyExperiments::new(&band, dofs, kind);
+    for Windowed { held, .. } in records {
+        data.push(&held.force, held.response().0)?;
+    }
+    let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
+    let start = equation_error(&data, unknowns, &how.terms, &options)?;
+    let (estimator, found) = match method {
+        Method::LeastSquares => {
+            ("least squares on the equation of motion, in the frequency domain", start)
+        }
+        Method::MaximumLikelihood => {
+            let stepped: Vec<SteppedRecord> =
+                records.iter().map(|r| mean_period(&r.held)).collect::<Result<_, _>>()?;
+            let estimate = output_error(&stepped, kind, &start)?.estimate;
+            ("output error on the mean periods, started from least squares", estimate)
+        }
+        Method::Instrumental => {
+            let why = "instrumental variables take linear systems only: choose another `method`";
+            return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
+        }
+    };
+    let seen = distortion(&band, &first.force, first.response().0, kind, unknowns)?;
+    let model = Model::Nonlinear { system: found.system()?, channels: found.channels() };
+    let (mut before, mut spectra) = (Vec::new(), None::<FrequencyData>);
+    for recorded in records {
+        let held = &recorded.held;
+        let chosen = choose_lines(&held.force, held.period, &LineChoice::Driven)?;
+        let driven = Lines::new(band.sampling(), chosen)?;
+        before.push(before_spectral_fit(&driven, &held.force, held.response().0, kind, unknowns)?);
+        let own = periods(recorded, &driven)?.mean()?;
+        spectra = Some(match spectra {
+            None => own,
+            Some(all) => all.and(&own)?,
+        });
+    }
+    let mut remarks = one_motion_of(first);
+    if found.standard_errors() == StandardErrors::White {
+        remarks.push(
+            "the record is too short for standard errors from the scatter of blocks of time: they \
+             take the residual as white"
+                .into(),
+        );
+    }
+    Ok(Fitted {
+        domain: "frequency",
+        estimator,
+        least_squares: false,
+        equations: found.equations() / dofs,
+        frequency: spectra.map(|data| (band, data)),
+        before,
+        after: vec![Vec::new(); records.len()],
+        residuals: steady_residuals(records, &model)?,
+        prediction: Prediction::Steady,
+        misfit: None,
+        remarks,
+        estimate: found.linear().clone(),
+        nonlinear: Some(WithTerms { found, distortion: seen }),
+    })
+}
+
+/// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
+/// cancel.
+fn all_lines(held: &Block, choice: &LineChoice) -> Result<Vec<usize>, AnalysisError> {
+    let sampling = held.force.sampling().with_len(held.period)?;
+    let driven = choose_lines(&held.force, held.period, choice)?;
+    Ok(match choice {
+        LineChoice::Lines(_) => driven,
+        LineChoice::Band(band) => lines::band(sampling, band.low_hz, band.high_hz),
+        LineChoice::Driven => {
+            let last = driven_lines(&held.force, held.period)?.last().copied().unwrap_or(1);
+            (1..=last).collect()
+        }
+    })
+}
+
+fn mean_period(held: &Block) -> Result<SteppedRecord, AnalysisError> {
+    Ok(SteppedRecord {
+        force: held.force.period_mean(held.period)?,
+        response: held.response().0.period_mean(held.period)?,
+        extent: Extent::WholePeriod,
+    })
+}
+
+impl NonlinearSummary {
+    pub(super) fn of(fitted: &WithTerms) -> Result<Self, AnalysisError> {
+        let WithTerms { found, distortion } = fitted;
+        let linear = found.linear().parameters().len();
+        let ranges = found.ranges().iter().map(|range| Some(*range));
+        let rows = found.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
+        let row = |(parameter, largest): (&mechid_estimate::nonlinear::NamedParameter, _)| {
+            let estimate = Uncertain::of(&parameter.found)?;
+            let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
+            Ok(TermRow { name, unit, largest, estimate })
+        };
+        Ok(Self {
+            terms: found.terms().clone(),
+            coefficients: found.system()?.coefficients().to_vec(),
+            channels: found.channels(),
+            parameters: rows.map(row).collect::<Result<_, AnalysisError>>()?,
+            weighting: found.weighting(),
+            blocks: match found.standard_errors() {
+                StandardErrors::Blocks(count) => Some(count),
+                StandardErrors::White => None,
+            },
+            distortion: DistortionRow {
+                even: distortion.even,
+                odd: distortion.odd,
+                linear_leaves: distortion.linear_leaves,
+                text: distortion.to_string(),
+            },
+        })
+    }
+
+    /// Returns the findings before the fit and the amplitudes that hold the terms, a sentence each.
+    pub(super) fn text(&self) -> String {
+        let mut text = format!("before the fit: {}\n", self.distortion.text);
+        for row in &self.parameters {
+            if let Some([x, v]) = row.largest {
+                let (x, v) = (significant(x, 3), significant(v, 3));
+                text += &format!("{}: data up to {x} m, {v} m/s; beyond extrapolated\n", row.name);
+            }
+        }
+        text
+    }
+}

@@ -1,0 +1,293 @@
+//! Response of a known machine, linear or not, to a measured force.
+
+use std::fmt;
+
+use mechid_estimate::EstimateError;
+use mechid_estimate::nonlinear::{self, ChannelPhase};
+use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
+use mechid_signal::{Extent, Record, measures};
+use serde::{Deserialize, Serialize, Serializer};
+
+use crate::AnalysisError;
+use crate::identify::prediction::{channels, steady_state};
+use crate::machine::{Machine, NonlinearPart};
+use crate::measurement::channels::ABSENT;
+use crate::measurement::{Block, Measurement};
+use crate::text::{significant, text_table};
+
+/// Settings of a prediction.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Predict {
+    /// Number of first samples that the initial state is fitted to, and that do not count in the
+    /// errors; `None`: the machine is at rest before the first sample. For open records.
+    pub settle: Option<usize>,
+}
+
+/// A predicted response, and its error against what was measured.
+#[derive(Debug)]
+pub struct Predicted {
+    summary: PredictionSummary,
+    response: Response,
+}
+
+/// Numbers of a prediction.
+#[derive(Debug, Serialize)]
+pub struct PredictionSummary {
+    /// The record.
+    pub file: String,
+    /// The machine.
+    pub machine: String,
+    /// First sample predicted, counted from 1.
+    pub first_sample: usize,
+    /// Last sample predicted, counted from 1.
+    pub last_sample: usize,
+    /// First sample that counts in the errors, counted from 1.
+    pub first_judged: usize,
+    /// True for the steady state of whole periods.
+    pub steady: bool,
+    /// Errors of the channels measured.
+    pub channels: Vec<PredictionError>,
+    /// The settings, which repeat the analysis.
+    pub analysis: Predict,
+}
+
+/// Error of one predicted channel.
+#[derive(Debug, Serialize)]
+pub struct PredictionError {
+    /// Quantity that was measured.
+    #[serde(serialize_with = "as_text")]
+    pub quantity: ResponseQuantity,
+    /// Degree of freedom, counted from 1.
+    pub degree_of_freedom: usize,
+    /// SI unit.
+    pub unit: &'static str,
+    /// RMS of measured minus predicted, in this unit.
+    pub rmse: f64,
+    /// The same over the RMS of the measured response about its mean (pure number).
+    pub nrmse: f64,
+}
+
+/// Predicts the response of a machine to the force of a record.
+///
+/// With a period, the steady state under the mean period; otherwise the whole window from its first
+/// sample on. Between the samples the force is band-limited. Measured responses are compared, if there
+/// are any; a steady state without the means.
+///
+/// # Errors
+/// [`AnalysisError::NoForce`], [`AnalysisError::DegreesOfFreedom`], [`AnalysisError::Setting`] if
+/// `settle` cannot be used, and [`AnalysisError::Estimate`] if the response diverges or the record is
+/// too coarse for the machine.
+pub fn predict(
+    measured: &Measurement,
+    machine: &Machine,
+    how: &Predict,
+) -> Result<Predicted, AnalysisError> {
+    let (block, steady) = (measured.whole_block()?, measured.window_settings().period.is_some());
+    let (got, dofs) = (block.force.channels(), machine.system().dof());
+    if measured.channels().force.is_empty() {
+        return Err(AnalysisError::NoForce);
+    }
+    if got != dofs {
+        return Err(AnalysisError::DegreesOfFreedom { file: block.file, got, dofs });
+    }
+    let NonlinearPart { system, channels: phase } = machine.with_terms()?;
+    let settle = settle(how, measured, &block, steady)?;
+    let response = match steady {
+        true if block.responses().is_empty() => steady_from_rest(&system, phase, &block)?,
+        true => steady_state(&system, phase, &block)?,
+        false => open(&system, phase, &block, settle)?,
+    };
+    let mut errors = Vec::new();
+    for (kind, seen) in block.responses() {
+        let columns = measured.channels().response(kind);
+        for dof in (0..dofs).filter(|dof| columns.get(*dof).is_some_and(|c| c != ABSENT)) {
+            let (x, p) = (seen.channel(dof), channels(&response, kind).channel(dof));
+            errors.push(PredictionError::of(kind, dof, &x[settle..], &p[settle..], steady));
+        }
+    }
+    let summary = PredictionSummary {
+        file: block.file.clone(),
+        machine: machine.name.clone(),
+        first_sample: block.first_sample,
+        last_sample: block.last_sample(),
+        first_judged: block.first_sample + settle,
+        steady,
+        channels: errors,
+        analysis: how.clone(),
+    };
+    Ok(Predicted { summary, response })
+}
+
+/// Number of samples that the start is fitted to; 0 for a start at rest.
+fn settle(
+    how: &Predict,
+    measured: &Measurement,
+    block: &Block,
+    steady: bool,
+) -> Result<usize, AnalysisError> {
+    let wrong = |why: String| Err(AnalysisError::Setting { setting: "settle", why });
+    let Some(samples) = how.settle else { return Ok(0) };
+    if steady {
+        return wrong("whole periods are predicted as a steady state, which needs no start".into());
+    }
+    let measured_at_all = |kind: &ResponseQuantity| !measured.channels().response(*kind).is_empty();
+    let kinds: Vec<_> = ResponseQuantity::ALL.into_iter().filter(measured_at_all).collect();
+    let missing = |kind: &ResponseQuantity| {
+        let columns = measured.channels().response(*kind);
+        columns.iter().any(|column| column == ABSENT)
+    };
+    if kinds.is_empty() || kinds.iter().any(missing) {
+        return wrong("the start is fitted to the response of every degree of freedom".into());
+    }
+    let len = block.force.len();
+    match (2..len).contains(&samples) {
+        true => Ok(samples),
+        false => {
+            wrong(format!("a record of {len} samples settles within 2 to {} of them", len - 1))
+        }
+    }
+}
+
+/// Response of an open record from rest, or from the start that fits its first samples best.
+fn open(
+    system: &NonlinearSystem,
+    phase: ChannelPhase,
+    block: &Block,
+    settle: usize,
+) -> Result<Response, EstimateError> {
+    let (force, _) = phase.correct(&block.force, &block.force)?;
+    let start = match settle {
+        0 => InitialState::rest(system.dof()),
+        samples => {
+            let mut first = Vec::new();
+            for (kind, seen) in block.responses() {
+                first.push((kind, phase.correct(seen, seen)?.1.window(0, samples)?));
+            }
+            let first: Vec<_> = first.iter().map(|(kind, record)| (*kind, record)).collect();
+            nonlinear::fitted_start(system, &force.window(0, samples)?, &first)?
+        }
+    };
+    shown(&nonlinear::predict(system, &force, Extent::Open, &start)?, phase, 1)
+}
+
+/// Steady state of periods whose response was not measured.
+fn steady_from_rest(
+    system: &NonlinearSystem,
+    phase: ChannelPhase,
+    block: &Block,
+) -> Result<Response, EstimateError> {
+    let force = block.force.period_mean(block.period)?;
+    let (force, _) = phase.correct(&force, &force)?;
+    let rest = InitialState::rest(system.dof());
+    let found = nonlinear::predict(system, &force, Extent::WholePeriod, &rest)?;
+    shown(&found, phase, block.periods)
+}
+
+/// A response as the channels show it, over a number of periods.
+pub(crate) fn shown(
+    response: &Response,
+    phase: ChannelPhase,
+    periods: usize,
+) -> Result<Response, EstimateError> {
+    let one = |record: &Record| -> Result<Record, EstimateError> {
+        Ok(phase.as_measured(record)?.repeated(periods)?)
+    };
+    let [x, v, a] =
+        [response.displacement(), response.velocity(), response.acceleration()].map(one);
+    Ok(Response::new(x?, v?, a?)?)
+}
+
+impl PredictionError {
+    fn of(
+        quantity: ResponseQuantity,
+        dof: usize,
+        measured: &[f64],
+        predicted: &[f64],
+        without_mean: bool,
+    ) -> Self {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let about = mean(measured);
+        let apart = if without_mean { about - mean(predicted) } else { 0.0 };
+        let left: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p - apart).collect();
+        let size: Vec<f64> = measured.iter().map(|x| x - about).collect();
+        let (rmse, size) = (measures::rms(&left), measures::rms(&size));
+        let (degree_of_freedom, unit) = (dof + 1, quantity.unit());
+        Self { quantity, degree_of_freedom, unit, rmse, nrmse: rmse / size }
+    }
+}
+
+impl Predicted {
+    /// Returns the errors and how they came about.
+    pub fn summary(&self) -> &PredictionSummary {
+        &self.summary
+    }
+
+    /// Returns displacement, velocity and acceleration (samples × degrees of freedom, in m, m/s and
+    /// m/s²).
+    pub fn response(&self) -> &Response {
+        &self.response
+    }
+
+    /// Returns the columns of a record of the prediction, with their names: every kind of response
+    /// that was measured, or displacements, in m, m/s or m/s².
+    pub fn columns(&self) -> Vec<(String, &[f64])> {
+        let measured = |kind: &ResponseQuantity| {
+            self.summary.channels.iter().any(|channel| channel.quantity == *kind)
+        };
+        let mut kinds: Vec<_> = ResponseQuantity::ALL.into_iter().filter(measured).collect();
+        if kinds.is_empty() {
+            kinds.push(ResponseQuantity::Displacement);
+        }
+        let dofs = self.response.dof();
+        let name = |kind: ResponseQuantity, dof: usize| match dofs {
+            1 => kind.to_string(),
+            _ => format!("{kind} {}", dof + 1),
+        };
+        let of = |kind: ResponseQuantity| {
+            let record = channels(&self.response, kind);
+            (0..dofs).map(move |dof| (name(kind, dof), record.channel(dof)))
+        };
+        kinds.into_iter().flat_map(of).collect()
+    }
+}
+
+impl fmt::Display for Predicted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let PredictionSummary { file, machine, first_sample, last_sample, .. } = &self.summary;
+        let kind = if self.summary.steady { "steady state" } else { "response" };
+        writeln!(
+            f,
+            "{kind} of {machine} under the force of {file}, samples {first_sample} to {last_sample}"
+        )?;
+        if self.summary.channels.is_empty() {
+            return Ok(());
+        }
+        let from = self.summary.first_judged;
+        let header = [&format!("error from sample {from} on"), "RMSE", "unit", "NRMSE"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for channel in &self.summary.channels {
+            let number = match self.response.dof() {
+                1 => String::new(),
+                _ => format!(" {}", channel.degree_of_freedom),
+            };
+            rows.push(vec![
+                format!("{}{number}", channel.quantity),
+                significant(channel.rmse, 4),
+                channel.unit.into(),
+                format!("{} %", significant(100.0 * channel.nrmse, 3)),
+            ]);
+        }
+        write!(f, "\n{}", text_table(&rows))
+    }
+}
+
+impl Serialize for Predicted {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}
+
+fn as_text<S: Serializer>(value: &ResponseQuantity, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(value)
+}

@@ -1,0 +1,65 @@
+//! `mechid predict`: the response of a known machine to a measured force.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::Machine;
+use mechid::io::CsvFile;
+use mechid::{Predict, predict};
+
+use crate::args::{ChannelArgs, RecordArgs, ReportArgs, at_least_one};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Predict the response of an identified machine, linear or not, to a measured force
+///
+/// With --period the steady state under the mean of the periods, otherwise the whole window from its
+/// first sample on, at rest before it or from the state that --settle fits. Between the samples the
+/// force is band-limited. Response columns are compared with the prediction. The window is held in
+/// memory.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid identify rig.csv --force f --displacement x --period 1024 --nonlinear 'k3: x1^3' --json \\
+      > machine.json
+  mechid predict machine.json run.csv --force f --displacement x --settle 500 --output run-predicted.csv")]
+pub struct PredictArgs {
+    /// The machine: a report of `mechid identify --json`, or a description with a system
+    #[arg(value_name = "MODEL.json")]
+    model: PathBuf,
+    #[command(flatten)]
+    input: RecordArgs,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    /// Fit the initial state to this many first samples of the response, which then do not count in
+    /// the errors [default: at rest]
+    #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
+    settle: Option<usize>,
+    /// Where the predicted response goes: time in s, then every measured kind of response, or
+    /// displacements, in SI units
+    #[arg(long, short, value_name = "RESPONSE.csv", help_heading = "Output")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl PredictArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.model, &self.input.record]).writes(&self.output)
+    }
+
+    /// Reads, predicts, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let machine = Machine::read(&self.model)?;
+        let record = self.input.open(&self.channels.channels())?;
+        let found = predict(&record, &machine, &Predict { settle: self.settle })?;
+        let outcome = Outcome::new(found.to_string(), &found)?;
+        let Some(path) = &self.output else { return Ok(outcome) };
+        let columns = found.columns();
+        let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+        let values: Vec<&[f64]> = columns.iter().map(|(_, values)| *values).collect();
+        let mut rows = CsvFile::begin(path, found.response().sampling(), &names)?;
+        rows.append(&values)?;
+        Ok(outcome.with_begun(rows.finish()?))
+    }
+}

@@ -1,0 +1,133 @@
+//! Standard errors that hold for a residual of any colour, and for one that comes and goes with the
+//! response.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::grid::Grid;
+
+/// Blocks of one experiment, at most.
+const MOST: usize = 32;
+
+/// Blocks of all experiments from which their scatter is trusted.
+pub(super) const FEWEST: usize = 10;
+
+/// Time constants of the free response that a block is long, at least: scores of neighbouring blocks
+/// are then nearly independent.
+const TIME_CONSTANTS: f64 = 3.0;
+
+/// Blocks for an experiment of this duration (s), whose slowest free response decays at `rate` (1/s).
+pub(super) fn block_count(duration: f64, rate: f64) -> usize {
+    match duration * rate / TIME_CONSTANTS {
+        blocks if blocks.is_finite() => (blocks as usize).clamp(1, MOST),
+        _ => 1,
+    }
+}
+
+/// Scores (regressor times residual) and Gram matrices of the regressors, summed over blocks of time.
+///
+/// The white formula s²(AᵀA)⁻¹ takes the residual as independent of its neighbours and of the
+/// response. What a model of a nonlinear system leaves is neither. Leaving out one block after the
+/// other shows how much the estimate depends on each, whatever the reason.
+///
+/// # Source
+/// Künsch (1989), Annals of Statistics 17, 1217–1241 (the jackknife by blocks of a series); Bell &
+/// McCaffrey (2002), Survey Methodology 28, 169–181, for what it corrects of the plain sum of
+/// squares; Newey & West (1987), Econometrica 55, 703–708, for the problem.
+pub(super) struct BlockScores {
+    blocks: Vec<(DVector<f64>, DMatrix<f64>)>,
+    parameters: usize,
+}
+
+/// One equation or channel of one experiment, sample by sample.
+pub(super) struct InTime {
+    /// Places of parameters and their regressors.
+    pub(super) regressors: Vec<(usize, Vec<f64>)>,
+    pub(super) residual: Vec<f64>,
+}
+
+impl BlockScores {
+    pub(super) fn new(parameters: usize) -> Self {
+        Self { blocks: Vec::new(), parameters }
+    }
+
+    /// Adds one experiment.
+    pub(super) fn push(&mut self, blocks: usize, parts: &[InTime]) {
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        for block in 0..blocks {
+            let mut score = DVector::zeros(self.parameters);
+            let mut gram = DMatrix::zeros(self.parameters, self.parameters);
+            for InTime { regressors, residual } in parts {
+                let len = residual.len();
+                let range = block * len / blocks..(block + 1) * len / blocks;
+                for (row, left) in regressors {
+                    let left = &left[range.clone()];
+                    score[*row] += dot(left, &residual[range.clone()]);
+                    for (column, right) in regressors {
+                        if row <= column {
+                            gram[(*row, *column)] += dot(left, &right[range.clone()]);
+                        }
+                    }
+                }
+            }
+            gram.fill_lower_triangle_with_upper_triangle();
+            self.blocks.push((score, gram));
+        }
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// (B − 1)/B Σ d dᵀ over B blocks, d = (AᵀA − A_bᵀA_b)⁻¹ s_b being the change of the estimate
+    /// without block b, and `inverse` = (AᵀA)⁻¹; with the degrees of freedom of the parameter that has
+    /// least. `None` if a parameter rests on one block alone.
+    pub(super) fn covariance(&self, inverse: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
+        let blocks = self.blocks.len() as f64;
+        let mut sum = DMatrix::zeros(self.parameters, self.parameters);
+        for (score, gram) in &self.blocks {
+            // (G − G_b)⁻¹ = (I − G⁻¹G_b)⁻¹ G⁻¹.
+            let rest = DMatrix::identity(self.parameters, self.parameters) - inverse * gram;
+            let change = rest.lu().solve(&(inverse * score))?;
+            if change.iter().any(|d| !d.is_finite()) {
+                return None;
+            }
+            sum.ger(1.0, &change, &change, 1.0);
+        }
+        Some((sum * ((blocks - 1.0) / blocks), self.degrees_of_freedom(inverse)))
+    }
+
+    /// Satterthwaite's degrees of freedom of a variance to which the blocks contribute as unequally as
+    /// they carry information, (Σ w)²/Σ w² − 1 with w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk; of the
+    /// parameter k that has least.
+    fn degrees_of_freedom(&self, inverse: &DMatrix<f64>) -> usize {
+        let mut sums = DVector::<f64>::zeros(self.parameters);
+        let mut squares = DVector::<f64>::zeros(self.parameters);
+        for (_, gram) in &self.blocks {
+            let own = (inverse * gram * inverse).diagonal();
+            squares += own.component_mul(&own);
+            sums += own;
+        }
+        let of = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
+        let least = sums.iter().zip(squares.iter()).map(of).fold(f64::INFINITY, f64::min);
+        // Never more than blocks, never less than one.
+        (least as usize).clamp(1, self.blocks.len().max(2) - 1)
+    }
+}
+
+/// A weighted column of lines as a signal whose square sum is that of its real and imaginary parts.
+pub(super) fn in_time(
+    grid: &Grid,
+    lines: usize,
+    rows: &[usize],
+    values: &[Complex<f64>],
+) -> Vec<f64> {
+    let mut all = vec![Complex::ZERO; lines];
+    for (row, value) in rows.iter().zip(values) {
+        // The mean carries the factor √2 of its row.
+        all[*row] = if *row == 0 { value / std::f64::consts::SQRT_2 } else { *value };
+    }
+    let mut samples = grid.to_samples(all.into_iter());
+    let scale = (2.0 / samples.len() as f64).sqrt();
+    samples.iter_mut().for_each(|x| *x *= scale);
+    samples
+}

@@ -1,0 +1,66 @@
+//! Transforms between the lines of a period and a time grid, planned once.
+
+use std::sync::Arc;
+
+use nalgebra::Complex;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+/// A period on `samples` instants, of which the lines below `lines` are used; scaled as in
+/// [`mechid_signal::spectrum`].
+#[derive(Clone)]
+pub(super) struct Grid {
+    lines: usize,
+    samples: usize,
+    forward: Arc<dyn RealToComplex<f64>>,
+    inverse: Arc<dyn ComplexToReal<f64>>,
+}
+
+impl Grid {
+    /// For lines 0 to `lines` − 1, all of them below half of `samples`.
+    pub(super) fn new(lines: usize, samples: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        let (forward, inverse) =
+            (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        Self { lines, samples, forward, inverse }
+    }
+
+    /// Samples of the period whose lines are these, those beyond the last being zero.
+    pub(super) fn to_samples(&self, lines: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
+        let mut input = self.inverse.make_input_vec();
+        for (n, (slot, line)) in input.iter_mut().zip(lines).enumerate() {
+            *slot = if n == 0 { Complex::from(line.re) } else { line * 0.5 };
+        }
+        let mut output = vec![0.0; self.samples];
+        self.inverse.process(&mut input, &mut output).expect("DC is real, Nyquist is zero");
+        output
+    }
+
+    /// Lines 0 to `lines` − 1 of a period; the samples are used up.
+    pub(super) fn to_lines(&self, mut samples: Vec<f64>) -> Vec<Complex<f64>> {
+        let mut output = self.forward.make_output_vec();
+        self.forward.process(&mut samples, &mut output).expect("buffers come from the plan");
+        output.truncate(self.lines);
+        let scale = 1.0 / self.samples as f64;
+        for (n, line) in output.iter_mut().enumerate() {
+            *line *= if n == 0 { scale } else { 2.0 * scale };
+        }
+        output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cube_has_the_lines_of_the_addition_theorem() {
+        // x = 1 + cos: x³ = 5/2 + 15/4 cos + 3/2 cos 2 + 1/4 cos 3.
+        let grid = Grid::new(4, 32);
+        let one = Complex::from(1.0);
+        let x = grid.to_samples([one, one].into_iter());
+        let cube = grid.to_lines(x.iter().map(|x| x * x * x).collect());
+        for (line, expected) in cube.iter().zip([2.5, 3.75, 1.5, 0.25]) {
+            assert!((line - expected).norm() < 1e-14);
+        }
+    }
+}

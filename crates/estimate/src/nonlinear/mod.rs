@@ -1,0 +1,42 @@
+//! Systems with nonlinear springs and dampers, from steady periods or any record.
+//!
+//! Nonlinear terms ([`Terms`](mechid_model::Terms)) are more regressors of the same equation of
+//! motion:
+//!
+//! ```text
+//! M ẍ + C ẋ + K x + Σ θ f(q, q̇) = F
+//! ```
+//!
+//! | To | Use |
+//! |---|---|
+//! | see whether the system is linear, and what kind of term it needs | [`distortion()`] |
+//! | choose terms | [`select_terms`] |
+//! | fit steady periods, fast and without start values | [`equation_error`] on [`SteadyExperiments`] |
+//! | fit any record, without bias from noise on the response | [`output_error`], started from it |
+//! | predict a response | [`predict()`], from the [`fitted_start`] |
+
+mod channel_phase;
+mod covariance;
+mod distortion;
+mod equation_error;
+mod equations;
+mod estimate;
+mod experiments;
+mod grid;
+mod output_error;
+mod predict;
+mod selection;
+mod shape;
+mod simulate;
+mod weighting;
+
+pub use channel_phase::ChannelPhase;
+pub use distortion::{Distortion, Kind, Level, distortion};
+pub use equation_error::{EquationErrorOptions, equation_error};
+pub use estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
+pub use experiments::SteadyExperiments;
+pub use output_error::{NonlinearFit, SteppedRecord, output_error};
+pub use predict::{fitted_start, predict};
+pub use selection::{Criterion, Selection, SelectionStep, select_terms};
+pub use shape::ShapeConstants;
+pub use weighting::Weighting;

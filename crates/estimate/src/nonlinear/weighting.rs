@@ -1,0 +1,161 @@
+//! Weights of the rows of the equation error.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::equations::Equations;
+
+/// Assumed size of the equation error over the lines.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
+pub enum Weighting {
+    /// The one of the others that makes the residual likeliest.
+    #[default]
+    Automatic,
+    /// Equally large on all lines of an equation of motion: noise that is white as a force.
+    WhiteForce,
+    /// Equally large on all lines as a response of the linear part: what the model misses is where the
+    /// response is.
+    Response,
+    /// Smooth over the lines: the residual's own spectrum, averaged over neighbouring lines and all
+    /// experiments.
+    SmoothSpectrum,
+}
+
+/// Lines to either side that the spectrum of the residual is averaged over, at least.
+const HALF_WIDTH: usize = 10;
+
+/// Averages of independent lines that a smooth spectrum has, at most.
+const GROUPS: usize = 32;
+
+/// Part of the largest residual power of an equation below which none is taken to lie.
+const FLOOR: f64 = 1e-12;
+
+/// Weights of rows (lines × degrees of freedom) and what they rest on.
+pub(super) struct Weights {
+    pub(super) of_rows: DMatrix<f64>,
+    pub(super) kind: Weighting,
+}
+
+/// Lines to either side of a smooth spectrum over so many; `None` if they are too few for one.
+fn half_width(lines: usize) -> Option<usize> {
+    let half = HALF_WIDTH.max(lines / (2 * GROUPS));
+    (lines >= 2 * (2 * half + 1)).then_some(half)
+}
+
+impl Weights {
+    /// White noise, the same in all equations.
+    pub(super) fn equal(equations: &Equations<'_>) -> Self {
+        Self { of_rows: equations.unit.clone(), kind: Weighting::WhiteForce }
+    }
+
+    /// Weights from what a fit with these coefficients leaves (of each experiment rows × degrees of
+    /// freedom).
+    pub(super) fn from_residuals(
+        equations: &Equations<'_>,
+        residuals: &[DMatrix<Complex<f64>>],
+        coefficients: &[f64],
+        wanted: Weighting,
+    ) -> Self {
+        let (rows, n) = equations.unit.shape();
+        let power = DMatrix::from_fn(rows, n, |row, dof| {
+            let unit = equations.unit[(row, dof)];
+            let sum: f64 = residuals.iter().map(|e| (e[(row, dof)] * unit).norm_sqr()).sum();
+            sum / residuals.len() as f64
+        });
+        let first = usize::from(equations.rows.first() == Some(&0));
+        let lines = rows - first;
+        let flat = DMatrix::from_element(rows, n, 1.0);
+        let mut found = (levelled(&power, &flat, first), Weighting::WhiteForce);
+        let mut least = minus_log(&power, &found.0, first, residuals.len());
+        let half = half_width(lines);
+        for kind in [Weighting::Response, Weighting::SmoothSpectrum] {
+            if wanted != kind && wanted != Weighting::Automatic {
+                continue;
+            }
+            let (variance, extra) = match (kind, half) {
+                (Weighting::Response, _) => {
+                    let Some(variance) = as_response(equations, coefficients) else { continue };
+                    (levelled(&power, &variance, first), 0.0)
+                }
+                (_, Some(half)) => {
+                    let groups = lines as f64 / (2 * half + 1) as f64;
+                    (smooth(&power, first, half), n as f64 * (groups - 1.0))
+                }
+                _ => continue,
+            };
+            let score = minus_log(&power, &variance, first, residuals.len()) + extra;
+            if wanted == kind || score < least {
+                (found, least) = ((variance, kind), score);
+            }
+        }
+        let of_rows = equations.unit.zip_map(&found.0, |unit, v| unit / v.sqrt());
+        Self { of_rows, kind: found.1 }
+    }
+}
+
+/// Variances in proportion to given ones that have the mean power of each equation.
+fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMatrix<f64> {
+    let lines = power.nrows() - first;
+    let mut found = variance.clone();
+    for (mut column, power) in found.column_iter_mut().zip(power.column_iter()) {
+        let ratios = power.rows(first, lines).component_div(&column.rows(first, lines));
+        column *= ratios.mean().max(f64::MIN_POSITIVE);
+    }
+    found
+}
+
+/// Variance of a force in each equation whose response is equally large on all rows; `None` if the
+/// coefficients make no system with a response.
+fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
+    let [m, c, k] = equations.unknowns.assemble(&coefficients[..equations.free.len()]);
+    let system = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
+    let mut variance = DMatrix::zeros(equations.rows.len(), system.dof());
+    for row in 0..equations.rows.len() {
+        let receptance = system.receptance(equations.omega(row)).ok()?;
+        for dof in 0..system.dof() {
+            variance[(row, dof)] = receptance.column(dof).norm_squared().recip();
+        }
+    }
+    Some(variance)
+}
+
+/// Moving averages over the lines; the mean, where it counts, takes that of the first lines.
+fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
+    let rows = power.nrows();
+    let mut found = power.clone();
+    for (column, mut to) in power.column_iter().zip(found.column_iter_mut()) {
+        let mut sums = vec![0.0; rows + 1];
+        for row in first..rows {
+            sums[row + 1] = sums[row] + column[row];
+        }
+        let largest = column.rows(first, rows - first).max();
+        let floor = (FLOOR * largest).max(f64::MIN_POSITIVE);
+        for row in 0..rows {
+            let (low, high) =
+                (row.max(first).saturating_sub(half).max(first), (row + half + 1).min(rows));
+            to[row] = ((sums[high] - sums[low]) / (high - low) as f64).max(floor);
+        }
+    }
+    found
+}
+
+/// Minus the logarithm of the likelihood that the residuals of `experiments` have under these
+/// variances; each variance that is free counts as a parameter (Akaike's criterion, halved).
+///
+/// # Source
+/// Akaike (1974), IEEE Transactions on Automatic Control 19, 716–723, for circular Gaussian lines.
+fn minus_log(
+    power: &DMatrix<f64>,
+    variance: &DMatrix<f64>,
+    first: usize,
+    experiments: usize,
+) -> f64 {
+    let lines = power.nrows() - first;
+    let (power, variance) = (power.rows(first, lines), variance.rows(first, lines));
+    let pairs = power.iter().zip(variance.iter());
+    experiments as f64 * pairs.map(|(p, v)| v.ln() + p / v).sum::<f64>()
+}

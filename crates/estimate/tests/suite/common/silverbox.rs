@@ -1,0 +1,53 @@
+//! Records of the Silverbox, a public benchmark that stands beside the project, not in it.
+//!
+//! Wigren & Schoukens, "Three free data sets for development and benchmarking in nonlinear
+//! system identification", ECC 2013. An electronic circuit that obeys the equation of a mass on a
+//! spring that hardens; force and displacement in volts.
+
+use std::path::Path;
+
+use mechid_signal::{Record, Sampling};
+
+/// Force (first channel) and displacement (second) of a whole record, from two columns counted from
+/// 0; `None`, and a word on it, where the file is not.
+#[allow(clippy::print_stderr, reason = "a skipped test says so")]
+fn channels(file: &str, columns: [usize; 2]) -> Option<Record> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/silverbox");
+    let Ok(text) = std::fs::read_to_string(folder.join(file)) else {
+        eprintln!("skipped: {file} of the Silverbox is not beside the project");
+        return None;
+    };
+    let mut channels = [Vec::new(), Vec::new()];
+    for row in text.lines().skip(1).filter(|row| !row.is_empty()) {
+        let fields: Vec<&str> = row.split(',').collect();
+        for (channel, column) in channels.iter_mut().zip(columns) {
+            channel.push(fields[column].trim().parse().expect("a voltage"));
+        }
+    }
+    let sampling = Sampling::from_rate_hz(1e7 / 16384.0, channels[0].len()).unwrap();
+    Some(Record::from_channels(sampling, &channels).unwrap())
+}
+
+/// The Schroeder multisine of period 1024.
+pub fn schroeder() -> Option<Record> {
+    channels("Schroeder80mV.csv", [2, 3])
+}
+
+/// The estimation part of the benchmark: six realisations of a random odd multisine.
+pub fn realisations() -> Option<Record> {
+    channels("SNLS80mV_estimation.csv", [0, 1])
+}
+
+/// Samples of a realisation's steady period.
+pub const REALISATION: usize = 8192;
+
+/// First sample of the steady period of realisation 1 to 6, counted from 0.
+pub fn start_of(realisation: usize) -> usize {
+    8692 * realisation + 337
+}
+
+/// One channel of some samples.
+pub fn part(record: &Record, channel: usize, start: usize, len: usize) -> Record {
+    let window = record.window(start, len).unwrap();
+    Record::from_channel(window.sampling(), window.channel(channel).to_vec()).unwrap()
+}

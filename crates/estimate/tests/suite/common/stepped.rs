@@ -1,0 +1,97 @@
+//! Responses of nonlinear systems by extrapolation of very high order: the judge of nonlinear
+//! estimators, which share no line with it.
+
+use mechid_signal::{Record, Sampling};
+
+/// Amplitude and phase on a line: A cos(n ω₀ t + φ).
+pub type Cosine = (usize, f64, f64);
+
+/// Periods after which a system that decays within a tenth of one has forgotten how it started.
+const SETTLED: usize = 3;
+
+/// Numbers of substeps of the extrapolated midpoint rule: order 12.
+const SUBSTEPS: [usize; 6] = [2, 4, 6, 8, 10, 12];
+
+/// Force and displacement over a steady period of ẍ = acceleration(x, ẋ, F).
+///
+/// Gragg's midpoint rule, extrapolated in h² (Hairer, Nørsett & Wanner, *Solving Ordinary
+/// Differential Equations I*, section II.9), one step a sample, the force exact at every instant.
+pub fn steady<const N: usize>(
+    sampling: Sampling,
+    forces: &[Vec<Cosine>; N],
+    acceleration: impl Fn(&[f64; N], &[f64; N], &[f64; N]) -> [f64; N],
+) -> (Record, Record) {
+    let omega0 = sampling.omega0();
+    let force = |t: f64| {
+        let mut all = [0.0; N];
+        for (own, lines) in all.iter_mut().zip(forces) {
+            *own = lines.iter().map(|(n, a, p)| a * (*n as f64 * omega0 * t + p).cos()).sum();
+        }
+        all
+    };
+    // The instants of the substeps repeat from period to period.
+    let rate = |z: &[[f64; N]; 2], f: &[f64; N]| [z[1], acceleration(&z[0], &z[1], f)];
+    let (dt, len) = (sampling.dt(), sampling.len());
+    let at = |sample: usize| -> Vec<Vec<[f64; N]>> {
+        let instants = |count: &usize| {
+            (0..=*count).map(|k| force((sample as f64 + k as f64 / *count as f64) * dt)).collect()
+        };
+        SUBSTEPS.iter().map(instants).collect()
+    };
+    let table: Vec<_> = (0..len).map(at).collect();
+    let mut z = [[0.0; N]; 2];
+    let mut x = vec![vec![0.0; len]; N];
+    for period in 0..SETTLED {
+        for sample in 0..len {
+            if period + 1 == SETTLED {
+                x.iter_mut().zip(z[0]).for_each(|(channel, value)| channel[sample] = value);
+            }
+            z = step(&z, dt, &table[sample], &rate);
+        }
+    }
+    let data: Vec<Vec<f64>> =
+        (0..N).map(|dof| (0..len).map(|k| force(k as f64 * dt)[dof]).collect()).collect();
+    let record = |channels: &[Vec<f64>]| Record::from_channels(sampling, channels).unwrap();
+    (record(&data), record(&x))
+}
+
+fn step<const N: usize>(
+    z: &[[f64; N]; 2],
+    dt: f64,
+    forces: &[Vec<[f64; N]>],
+    rate: &impl Fn(&[[f64; N]; 2], &[f64; N]) -> [[f64; N]; 2],
+) -> [[f64; N]; 2] {
+    let plus = |a: &[[f64; N]; 2], h: f64, b: &[[f64; N]; 2]| {
+        let mut sum = *a;
+        for (sum, b) in sum.iter_mut().flatten().zip(b.iter().flatten()) {
+            *sum += h * b;
+        }
+        sum
+    };
+    let mut table: Vec<[[f64; N]; 2]> = Vec::new();
+    for (level, (count, forces)) in SUBSTEPS.iter().zip(forces).enumerate() {
+        let h = dt / *count as f64;
+        let (mut before, mut now) = (*z, plus(z, h, &rate(z, &forces[0])));
+        for force in &forces[1..*count] {
+            let next = plus(&before, 2.0 * h, &rate(&now, force));
+            (before, now) = (now, next);
+        }
+        // Aitken–Neville in h², from the newest value backwards.
+        let mut row = vec![now];
+        for column in 0..level {
+            let ratio = (*count as f64 / SUBSTEPS[level - 1 - column] as f64).powi(2) - 1.0;
+            let (fine, coarse) = (row[column], &table[column]);
+            let difference = plus(&fine, -1.0, coarse);
+            row.push(plus(&fine, 1.0 / ratio, &difference));
+        }
+        table = row;
+    }
+    table[SUBSTEPS.len() - 1]
+}
+
+/// Cosines of equal amplitude with random phases from a seed.
+pub fn random_phases(lines: impl Iterator<Item = usize>, amplitude: f64, seed: u64) -> Vec<Cosine> {
+    use rand::{RngExt, SeedableRng};
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
+    lines.map(|n| (n, amplitude, random.random_range(0.0..std::f64::consts::TAU))).collect()
+}

@@ -1,0 +1,225 @@
+//! Force laws: how a nonlinear force depends on one displacement and its velocity.
+
+use std::fmt;
+use std::sync::Arc;
+
+use crate::ModelError;
+use crate::error::require;
+
+/// Force per unit of its coefficient, as a function of a displacement q (m) and its velocity q̇ (m/s).
+///
+/// The coefficient of a law is a parameter of the system; constants inside the law, which the force
+/// does not depend on linearly, are [`Law::constants`].
+pub trait Law: fmt::Debug + Send + Sync {
+    /// f(q, q̇), in powers of m and m/s: see [`Law::dimension`].
+    fn value(&self, q: f64, v: f64) -> f64;
+
+    /// \[∂f/∂q, ∂f/∂q̇\], in the unit of f per m and per m/s.
+    fn slopes(&self, q: f64, v: f64) -> [f64; 2];
+
+    /// Powers of metre and second in the unit of f: \[1, −1\] for a velocity.
+    fn dimension(&self) -> [i32; 2];
+
+    /// The law as it is written and parsed, with these names for q and q̇.
+    fn expression(&self, q: &str, v: &str) -> String;
+
+    /// Constants inside the law, with name, unit and value; none for most laws.
+    fn constants(&self) -> Vec<Constant> {
+        Vec::new()
+    }
+
+    /// Returns the same law with other constants, one for each of [`Law::constants`] and in its unit; `None`
+    /// where they are out of range.
+    fn with_constants(&self, _values: &[f64]) -> Option<Arc<dyn Law>> {
+        None
+    }
+
+    /// Returns true if the force does not depend on the response at all.
+    fn is_constant(&self) -> bool {
+        false
+    }
+}
+
+/// A constant inside a force law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Constant {
+    /// Letter in the expression.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    /// The value, in this unit.
+    pub value: f64,
+}
+
+/// q^p q̇^r: springs (r = 0), dampers (p = 0), damping that depends on the displacement, and a
+/// constant force (p = r = 0).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Power {
+    displacement: u32,
+    velocity: u32,
+}
+
+/// Highest exponent of a [`Power`] law.
+const HIGHEST: u32 = 9;
+
+impl Power {
+    /// q^`displacement` · q̇^`velocity`.
+    ///
+    /// # Errors
+    /// [`ModelError::Parameter`] for an exponent above 9 or a linear law, which is an entry of K or C.
+    pub fn new(displacement: u32, velocity: u32) -> Result<Self, ModelError> {
+        for (name, exponent) in
+            [("exponent of the displacement", displacement), ("exponent of the velocity", velocity)]
+        {
+            require(name, f64::from(exponent), "at most 9", exponent <= HIGHEST)?;
+        }
+        let degree = displacement + velocity;
+        let requirement = "0 or at least 2 (a linear force is an entry of K or C)";
+        require("degree of a nonlinear term", f64::from(degree), requirement, degree != 1)?;
+        Ok(Self { displacement, velocity })
+    }
+}
+
+impl Law for Power {
+    fn value(&self, q: f64, v: f64) -> f64 {
+        q.powi(self.displacement as i32) * v.powi(self.velocity as i32)
+    }
+
+    fn slopes(&self, q: f64, v: f64) -> [f64; 2] {
+        let (p, r) = (self.displacement as i32, self.velocity as i32);
+        let derivative = |x: f64, n: i32| if n == 0 { 0.0 } else { f64::from(n) * x.powi(n - 1) };
+        [derivative(q, p) * v.powi(r), q.powi(p) * derivative(v, r)]
+    }
+
+    fn dimension(&self) -> [i32; 2] {
+        [(self.displacement + self.velocity) as i32, -(self.velocity as i32)]
+    }
+
+    fn expression(&self, q: &str, v: &str) -> String {
+        let power = |name: &str, exponent: u32| match exponent {
+            0 => None,
+            1 => Some(name.to_owned()),
+            _ => Some(format!("{name}^{exponent}")),
+        };
+        let factors = [power(q, self.displacement), power(v, self.velocity)];
+        match factors.into_iter().flatten().collect::<Vec<_>>().join(" ") {
+            none if none.is_empty() => format!("{q}^0"),
+            some => some,
+        }
+    }
+
+    fn is_constant(&self) -> bool {
+        self.displacement + self.velocity == 0
+    }
+}
+
+/// |q̇| q̇: turbulent drag, and the first guess for any damping that rises with the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QuadraticDamping;
+
+impl Law for QuadraticDamping {
+    fn value(&self, _: f64, v: f64) -> f64 {
+        v.abs() * v
+    }
+
+    fn slopes(&self, _: f64, v: f64) -> [f64; 2] {
+        [0.0, 2.0 * v.abs()]
+    }
+
+    fn dimension(&self) -> [i32; 2] {
+        [2, -2]
+    }
+
+    fn expression(&self, _: &str, v: &str) -> String {
+        format!("|{v}| {v}")
+    }
+}
+
+/// q̇³ / (1 + (q̇/b)²): cubic damping for small velocities that becomes linear above b, so that it
+/// does not run away beyond the amplitudes it was identified at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SaturatingDamping {
+    velocity: f64,
+}
+
+impl SaturatingDamping {
+    /// Saturating damper with the velocity b (m/s) at which it bends.
+    ///
+    /// # Errors
+    /// [`ModelError::Parameter`] unless b is positive and finite.
+    pub fn new(velocity: f64) -> Result<Self, ModelError> {
+        require("velocity of a saturating damper", velocity, "positive", velocity > 0.0)?;
+        Ok(Self { velocity })
+    }
+}
+
+impl Law for SaturatingDamping {
+    fn value(&self, _: f64, v: f64) -> f64 {
+        let ratio = v / self.velocity;
+        v * v * v / (1.0 + ratio * ratio)
+    }
+
+    fn slopes(&self, _: f64, v: f64) -> [f64; 2] {
+        let square = (v / self.velocity).powi(2);
+        [0.0, v * v * (3.0 + square) / (1.0 + square).powi(2)]
+    }
+
+    fn dimension(&self) -> [i32; 2] {
+        [3, -3]
+    }
+
+    fn expression(&self, _: &str, v: &str) -> String {
+        format!("{v}^3/(1 + ({v}/{})^2)", self.velocity)
+    }
+
+    fn constants(&self) -> Vec<Constant> {
+        vec![Constant { name: "b", unit: "m/s", value: self.velocity }]
+    }
+
+    fn with_constants(&self, values: &[f64]) -> Option<Arc<dyn Law>> {
+        let [velocity] = values else { return None };
+        Some(Arc::new(Self::new(*velocity).ok()?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_the_derivatives_of_the_values() {
+        let laws: [Box<dyn Law>; 6] = [
+            Box::new(Power::new(2, 0).unwrap()),
+            Box::new(Power::new(3, 1).unwrap()),
+            Box::new(Power::new(0, 3).unwrap()),
+            Box::new(Power::new(0, 0).unwrap()),
+            Box::new(QuadraticDamping),
+            Box::new(SaturatingDamping::new(0.7).unwrap()),
+        ];
+        for law in laws {
+            for (q, v) in [(0.3, -0.5), (-1.2, 0.8), (0.0, 0.0)] {
+                let h = 1e-6;
+                let central = [
+                    (law.value(q + h, v) - law.value(q - h, v)) / (2.0 * h),
+                    (law.value(q, v + h) - law.value(q, v - h)) / (2.0 * h),
+                ];
+                for (exact, difference) in law.slopes(q, v).into_iter().zip(central) {
+                    // Error of the difference: third derivatives times h², and rounding over h.
+                    assert!((exact - difference).abs() < 1e-5, "{law:?} at {q}, {v}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn linear_laws_and_impossible_constants_are_refused() {
+        assert!(Power::new(1, 0).unwrap_err().to_string().contains("an entry of K or C"));
+        assert!(Power::new(0, 1).is_err() && Power::new(10, 0).is_err());
+        for b in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(SaturatingDamping::new(b).is_err());
+        }
+        let law = SaturatingDamping::new(2.0).unwrap();
+        assert_eq!(law.with_constants(&[3.0]).unwrap().constants()[0].value, 3.0);
+        assert!(law.with_constants(&[-3.0]).is_none() && law.with_constants(&[]).is_none());
+    }
+}

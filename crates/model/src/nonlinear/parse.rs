@@ -1,0 +1,272 @@
+//! Terms from text.
+
+use std::str::FromStr;
+use std::sync::Arc;
+
+use super::{Coordinate, Law, Power, QuadraticDamping, SaturatingDamping, Term, Terms};
+use crate::ModelError;
+
+impl FromStr for Terms {
+    type Err = ModelError;
+
+    /// Terms such as `k2: x1^2, c2: |v1| v1`; none from an empty text.
+    ///
+    /// # Errors
+    /// [`ModelError::Term`] for what is no term, [`ModelError::RepeatedTerm`].
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        match text.trim() {
+            "" => Ok(Self::none()),
+            text => Self::new(text.split(',').map(str::parse).collect::<Result<_, _>>()?),
+        }
+    }
+}
+
+impl TryFrom<String> for Terms {
+    type Error = ModelError;
+
+    fn try_from(text: String) -> Result<Self, ModelError> {
+        text.parse()
+    }
+}
+
+impl FromStr for Term {
+    type Err = ModelError;
+
+    /// A term such as `k3: x1^3`.
+    ///
+    /// # Errors
+    /// [`ModelError::Term`].
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        let refused = |reason: String| ModelError::Term { text: text.trim().to_owned(), reason };
+        let (name, expression) = text.split_once(':').ok_or_else(|| {
+            refused("a term is written `name: expression`, such as `k3: x1^3`".to_owned())
+        })?;
+        let (coordinate, law) = Parser::new(expression).law().map_err(refused)?;
+        Self::of(name.trim().to_owned(), coordinate, law)
+    }
+}
+
+/// Displacement or velocity of a coordinate.
+type Variable = (char, Coordinate);
+
+/// Exponents found in a product, all of one coordinate.
+#[derive(Default)]
+struct Product {
+    coordinate: Option<Coordinate>,
+    displacement: u32,
+    velocity: u32,
+    /// Factors |q̇|.
+    absolute: u32,
+}
+
+struct Parser {
+    /// Without spaces.
+    text: Vec<char>,
+    at: usize,
+}
+
+impl Parser {
+    fn new(text: &str) -> Self {
+        Self { text: text.chars().filter(|c| !c.is_whitespace()).collect(), at: 0 }
+    }
+
+    fn law(mut self) -> Result<(Coordinate, Arc<dyn Law>), String> {
+        let mut product = Product::default();
+        while self.peek().is_some_and(|c| c != '/') {
+            self.factor(&mut product)?;
+        }
+        let coordinate = product.coordinate.ok_or("there is no expression after the name")?;
+        let bend = if self.take('/') { Some(self.saturation(coordinate)?) } else { None };
+        let named = |error: ModelError| error.to_string();
+        let law: Arc<dyn Law> =
+            match (product.displacement, product.velocity, product.absolute, bend) {
+                (0, 3, 0, Some(velocity)) => {
+                    Arc::new(SaturatingDamping::new(velocity).map_err(named)?)
+                }
+                (.., Some(_)) => return Err("only v^3 can be divided".to_owned()),
+                (p, r, 0, None) => Arc::new(Power::new(p, r).map_err(named)?),
+                (0, 1, 1, None) => Arc::new(QuadraticDamping),
+                _ => return Err("|v| stands in |v| v only".to_owned()),
+            };
+        Ok((coordinate, law))
+    }
+
+    /// `x1`, `v1^3`, `(x1-x2)^2`, `|v1|`, with a `*` before or after it.
+    fn factor(&mut self, product: &mut Product) -> Result<(), String> {
+        let absolute = self.take('|');
+        let (letter, coordinate) = self.variable()?;
+        if absolute {
+            self.expect('|')?;
+        }
+        let exponent = if self.take('^') { self.whole_number()? } else { 1 };
+        if product.coordinate.is_some_and(|other| other != coordinate) {
+            return Err("a term depends on one degree of freedom or one difference".to_owned());
+        }
+        product.coordinate = Some(coordinate);
+        let total = match (letter, absolute) {
+            ('x', false) => &mut product.displacement,
+            ('v', false) => &mut product.velocity,
+            (_, true) if letter == 'v' => &mut product.absolute,
+            _ => return Err("|x| is not among the laws".to_owned()),
+        };
+        *total = total.saturating_add(exponent);
+        self.take('*');
+        Ok(())
+    }
+
+    /// `x`, `v2` or `(x1-x2)`.
+    fn variable(&mut self) -> Result<Variable, String> {
+        if !self.take('(') {
+            let (letter, dof) = self.single()?;
+            return Ok((letter, Coordinate::Dof(dof)));
+        }
+        let (letter, first) = self.single()?;
+        self.expect('-')?;
+        let (other, second) = self.single()?;
+        self.expect(')')?;
+        match letter == other {
+            true => Ok((letter, Coordinate::Difference(first, second))),
+            false => Err("a difference is of two displacements or of two velocities".to_owned()),
+        }
+    }
+
+    fn single(&mut self) -> Result<(char, usize), String> {
+        let letter = match self.peek() {
+            Some(c @ ('x' | 'v')) => c,
+            found => return Err(format!("expected x or v, found {}", shown(found))),
+        };
+        self.at += 1;
+        if !self.peek().is_some_and(|c| c.is_ascii_digit()) {
+            return Ok((letter, 0));
+        }
+        match self.whole_number()? {
+            0 => Err("degrees of freedom are counted from 1".to_owned()),
+            number => Ok((letter, number as usize - 1)),
+        }
+    }
+
+    /// b of `(1+(v1/b)^2)`.
+    fn saturation(&mut self, coordinate: Coordinate) -> Result<f64, String> {
+        let form = || "after / stands (1 + (v/b)^2) with the v of v^3".to_owned();
+        for c in ['(', '1', '+', '('] {
+            self.expect(c).map_err(|_| form())?;
+        }
+        if self.variable()? != ('v', coordinate) || !self.take('/') {
+            return Err(form());
+        }
+        let start = self.at;
+        while self.peek().is_some_and(|c| c != ')') {
+            self.at += 1;
+        }
+        let number: String = self.text[start..self.at].iter().collect();
+        for c in [')', '^', '2', ')'] {
+            self.expect(c).map_err(|_| form())?;
+        }
+        if let Some(c) = self.peek() {
+            return Err(format!("unexpected {c} after the expression"));
+        }
+        number.parse().map_err(|_| format!("{number} is not a number"))
+    }
+
+    fn whole_number(&mut self) -> Result<u32, String> {
+        let start = self.at;
+        while self.peek().is_some_and(|c| c.is_ascii_digit()) {
+            self.at += 1;
+        }
+        let digits: String = self.text[start..self.at].iter().collect();
+        digits.parse().map_err(|_| format!("expected a whole number, found {}", shown(self.peek())))
+    }
+
+    fn peek(&self) -> Option<char> {
+        self.text.get(self.at).copied()
+    }
+
+    fn take(&mut self, expected: char) -> bool {
+        let found = self.peek() == Some(expected);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn expect(&mut self, expected: char) -> Result<(), String> {
+        let found = self.peek();
+        match self.take(expected) {
+            true => Ok(()),
+            false => Err(format!("expected {expected}, found {}", shown(found))),
+        }
+    }
+}
+
+fn shown(found: Option<char>) -> String {
+    found.map_or_else(|| "the end".to_owned(), String::from)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let text = "k2: x1^2, k3: x1^3, c2: |v1| v1, cx: x2^2 v2, f: x1^0, \
+                    k12: (x1-x2)^3, c12: |(v1-v3)| (v1-v3), s: v1^3/(1 + (v1/0.25)^2), \
+                    s2: (v2-v1)^3/(1 + ((v2-v1)/1e-3)^2)";
+        let terms: Terms = text.parse().unwrap();
+        assert_eq!(terms.len(), 9);
+        assert_eq!(terms.to_string().parse::<Terms>().unwrap(), terms);
+        let first = |text: &str| text.parse::<Term>().unwrap().to_string();
+        assert_eq!(first(" k3 : x * x*x"), "k3: x1^3");
+        assert_eq!(first("c: v1 x1^2"), "c: x1^2 v1");
+        assert_eq!("".parse::<Terms>().unwrap(), Terms::none());
+    }
+
+    #[test]
+    fn units_belong_to_the_laws() {
+        for (text, unit) in [
+            ("a: x^2", "N/m²"),
+            ("a: x^2 v", "N·s/m³"),
+            ("a: |v| v", "N·s²/m²"),
+            ("a: v^3/(1+(v/2)^2)", "N·s³/m³"),
+            ("a: x^0", "N"),
+            ("a: x^7", "N/m⁷"),
+        ] {
+            assert_eq!(text.parse::<Term>().unwrap().unit(), unit);
+        }
+    }
+
+    #[test]
+    fn what_is_no_term_is_refused_with_the_reason() {
+        for (text, reason) in [
+            ("x1^3", "written `name: expression`"),
+            ("k3:", "no expression"),
+            ("k3: y^3", "expected x or v, found y"),
+            ("k3: x1", "an entry of K or C"),
+            ("k3: x0^3", "counted from 1"),
+            ("k3: x1^2 x2", "one degree of freedom or one difference"),
+            ("k3: (x1-v2)^2", "two displacements or of two velocities"),
+            ("k3: (x1-x1)^2", "two different degrees of freedom"),
+            ("k3: x1^99", "at most 9"),
+            ("k3: x1^", "expected a whole number, found the end"),
+            ("c: |x| x", "|x| is not among the laws"),
+            ("c: |v|", "stands in |v| v only"),
+            ("c: v^2/(1+(v/2)^2)", "only v^3 can be divided"),
+            ("c: v^3/(1+(v/a)^2)", "a is not a number"),
+            ("c: v^3/(1+(v/-2)^2)", "must be positive"),
+            ("3k: x^3", "begins with a letter"),
+            ("c: v^3/(1+(v/2)^2) x", "unexpected x"),
+        ] {
+            let error = text.parse::<Term>().unwrap_err().to_string();
+            assert!(error.contains(reason), "{text}: {error}");
+        }
+        assert_eq!(
+            "a: x^2, a: x^3".parse::<Terms>(),
+            Err(ModelError::RepeatedTerm { name: "a".to_owned() })
+        );
+    }
+
+    #[test]
+    fn terms_fit_a_system_or_say_why_not() {
+        let fits = |text: &str, dof| text.parse::<Terms>().unwrap().check_dof(dof);
+        assert!(fits("k3: x1^3, k2: x1^2", 1).is_ok());
+        assert!(fits("a: x2^3", 1).unwrap_err().to_string().contains("1 degrees of freedom"));
+        assert!(fits("k12: (x1-x2)^3", 2).unwrap_err().to_string().contains("M, C or K"));
+    }
+}
