@@ -295,10 +295,17 @@ pub enum EstimateError {
         /// Frequency, in Hz.
         frequency_hz: f64,
     },
-    /// A search did not end at a minimum.
-    #[error("no convergence within {steps} steps: the model may not describe these data")]
+    /// No search for the maximum of the likelihood ended at one.
+    #[error(
+        "the search for the maximum of the likelihood failed: {} reached no minimum within {steps} \
+         steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
+         unknowns make the search easier",
+        if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
+    )]
     NotConverged {
-        /// Steps taken.
+        /// Number of searches, each from another start.
+        searches: usize,
+        /// Steps allowed for the first.
         steps: usize,
     },
     /// A coherence outside (0, 1].

@@ -18,6 +18,7 @@
 
 mod error;
 pub mod exact;
+pub mod machines;
 mod named;
 mod random;
 mod transition;

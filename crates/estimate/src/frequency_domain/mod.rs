@@ -41,14 +41,18 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
+mod cholesky;
 mod data;
 mod equation_error;
 mod instrumental;
-pub(crate) mod levenberg_marquardt;
 mod lines;
 mod misfit;
+mod multi_start;
+mod normal_equations;
 mod output_error;
 mod periods;
+mod search;
+mod starts;
 
 pub use data::FrequencyData;
 pub(crate) use equation_error::late_rows;
@@ -57,7 +61,7 @@ pub use instrumental::instrumental_variables;
 pub use lines::Lines;
 pub(crate) use lines::check_sampling;
 pub(crate) use output_error::in_units_of_noise;
-pub use output_error::{OutputErrorFit, output_error};
+pub use output_error::{OutputErrorFit, output_error, output_error_near};
 pub use periods::RepeatedPeriods;
 
 pub use crate::noise_spectrum::{NoiseSpectrum, Pooling};

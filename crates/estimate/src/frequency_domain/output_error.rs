@@ -1,14 +1,15 @@
 //! Maximum likelihood: modelled against measured displacement, weighted by the noise.
 
+use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::equation_error::weighted_equation_errors;
-use super::levenberg_marquardt::{Minimum, SumOfSquares, minimise};
-use super::misfit::{Misfit, Noise, output_weights};
+use super::misfit::Misfit;
+use super::multi_start::{Found, Plausible, search};
+use super::search::SumOfSquares;
+use super::starts::Starts;
 use super::{FrequencyData, NoiseSpectrum, equation_error};
 use crate::estimate::Findings;
-use crate::least_squares::solve_compressed;
-use crate::triangular::TriangularFactor;
+use crate::least_squares::size;
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// An [`Estimate`] by maximum likelihood, with what its search tells.
@@ -21,23 +22,31 @@ pub struct OutputErrorFit {
     /// what the model says (nonlinear, more degrees of freedom). 1 by construction where the
     /// noise is estimated from the residual.
     pub misfit_ratio: f64,
-    /// Gauss–Newton steps taken.
+    /// Gauss–Newton steps from the best start to the minimum.
     pub steps: usize,
+    /// Number of searches, each from another start.
+    pub searches: usize,
+    /// Number of searches that ended at this minimum; of two or more it is the global one as far as
+    /// searches can tell.
+    pub agreeing: usize,
 }
 
 /// Relative change of the noise levels below which another round of weighting is useless.
 const WEIGHT_TOLERANCE: f64 = 1e-3;
 /// A residual this small against the motion is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Standard deviations by which the misfit ratio of a right model may differ from 1.
+const PLAUSIBLE: f64 = 6.0;
 /// Rounds of weighting; the second is nearly always the last but one.
 const MAX_ROUNDS: usize = 10;
 
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
 ///
-/// Minimises the weighted distance between measured displacement and G(ω) F, by Gauss–Newton
-/// steps from the [`equation_error`] estimate, or from the same with its rows weighted by the noise
-/// stated where that is nearer. Unbiased and of least scatter to first order
-/// in the noise. The weights come from [`FrequencyData::noise`]:
+/// Minimises the weighted distance between measured displacement and G(ω) F by Gauss–Newton steps
+/// from several starts: [`equation_error`] with several weights, and total least squares weighted by
+/// the dynamic stiffness found before. Where they do not lead to one minimum, the search is repeated from
+/// the best ones after a few steps in resampled data; the best is kept. Unbiased and of least scatter to first order in the noise. The weights come from
+/// [`FrequencyData::noise`]:
 ///
 /// - noise on displacement alone (force exact): the output-error estimator;
 /// - noise on force too: errors in variables, the true force being eliminated row by row;
@@ -50,21 +59,40 @@ const MAX_ROUNDS: usize = 10;
 /// What [`equation_error`] refuses, [`EstimateError::Undetermined`] if the data leave a parameter
 /// open, [`EstimateError::SingularNoise`] if a stated noise covariance cannot be inverted,
 /// [`EstimateError::TooFewAverages`] if it comes from too few periods to weight with, and
-/// [`EstimateError::NotConverged`].
+/// [`EstimateError::NotConverged`] if no start leads to a minimum.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on
-/// maximum likelihood with known and with sampled noise covariances.
+/// maximum likelihood with known and with sampled noise covariances, and on starting values.
 pub fn output_error(
     data: &FrequencyData,
     unknowns: &Unknowns,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let start = equation_error(data, unknowns)?;
-    start.check_determined()?;
-    let theta = values(&start);
+    output_error_near(data, unknowns, None)
+}
+
+/// [`output_error`] that also starts its search from a machine that is expected to be near, such as a
+/// finite element model.
+///
+/// # Errors
+/// As [`output_error`], and [`EstimateError::Size`] if the machine has another number of degrees of
+/// freedom.
+///
+/// # Source
+/// That of [`output_error`].
+pub fn output_error_near(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    nominal: Option<&SecondOrderSystem>,
+) -> Result<OutputErrorFit, EstimateError> {
+    if let Some(system) = nominal {
+        size("degrees of freedom of the machine expected", unknowns.dof(), system.dof())?;
+    }
+    // Refuses what no estimator can determine.
+    equation_error(data, unknowns)?.check_determined()?;
     match data.noise() {
-        Some(noise) => with_known_noise(data, unknowns, noise, theta),
-        None => with_white_noise(data, unknowns, theta),
+        Some(noise) => with_known_noise(data, unknowns, noise, nominal),
+        None => with_white_noise(data, unknowns, nominal),
     }
 }
 
@@ -72,44 +100,44 @@ fn with_known_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
     noise: &NoiseSpectrum,
-    theta: DVector<f64>,
+    nominal: Option<&SecondOrderSystem>,
 ) -> Result<OutputErrorFit, EstimateError> {
     let inflation = sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?;
-    let weights =
-        if noise.has_force() { Noise::Both(noise) } else { Noise::Output(output_weights(noise)?) };
-    let mut misfit = Misfit::new(data, unknowns, weights);
-    let weighted = weighted_equation_errors(data, unknowns).map(|found| values(&found));
-    let theta = nearest(&mut misfit, theta, weighted);
-    let fit = search(&mut misfit, theta)?;
-    let spare = spare(data, &fit.theta);
+    let mut misfit = Misfit::new(data, unknowns, noise)?;
+    let starts = Starts::new(data, unknowns, noise).with_nominal(nominal);
+    let spare = spare(data, unknowns) as f64;
     // A sampled covariance makes the weights too large by ν/(ν − n) on average.
-    let expected = spare as f64 * noise.mean_inverse_ratio(data.dof());
-    finish(
-        data,
-        unknowns,
-        &misfit,
-        &fit,
-        Scale {
-            variance: inflation,
-            degrees_of_freedom: noise.total_degrees_of_freedom(),
-            misfit_ratio: fit.cost / expected,
-        },
-    )
+    let expected = spare * noise.mean_inverse_ratio(data.dof());
+    let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
+    let found = search(&mut misfit, &starts, plausible)?;
+    let scale = Scale {
+        variance: inflation,
+        degrees_of_freedom: noise.total_degrees_of_freedom(),
+        misfit_ratio: found.minimum.cost / expected,
+    };
+    finish(data, unknowns, &mut misfit, &found, scale)
 }
 
 /// White noise of unknown level per channel, found in turn with the parameters.
 fn with_white_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
-    mut theta: DVector<f64>,
+    nominal: Option<&SecondOrderSystem>,
 ) -> Result<OutputErrorFit, EstimateError> {
     let measured = measured_size(data, data.displacement());
     let mut levels = measured.clone();
-    let mut steps = 0;
+    let mut last: Option<Found> = None;
     for _ in 0..MAX_ROUNDS {
-        let mut misfit = Misfit::new(data, unknowns, Noise::Output(white_weights(data, &levels)));
-        let mut fit = search(&mut misfit, theta)?;
-        steps += fit.steps;
+        let noise = white_noise(data, &levels)?;
+        let mut misfit = Misfit::new(data, unknowns, &noise)?;
+        let fit = match last {
+            None => {
+                let starts = Starts::new(data, unknowns, &noise).with_nominal(nominal);
+                let spare = spare(data, unknowns) as f64;
+                search(&mut misfit, &starts, plausible(None, spare, spare))?
+            }
+            Some(before) => before.followed(&mut misfit)?,
+        };
         let found = measured_size(data, &misfit.errors());
         // Only the ratios between the channels weigh; the common level is the residual's.
         let common = found[0] / levels[0];
@@ -118,63 +146,27 @@ fn with_white_noise(
         // Rounding has no level that could settle.
         let exact = found.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
         if settled || exact || data.dof() == 1 {
-            fit.steps = steps;
-            let spare = spare(data, &fit.theta);
-            return finish(
-                data,
-                unknowns,
-                &misfit,
-                &fit,
-                Scale {
-                    variance: fit.cost / spare.max(1) as f64,
-                    degrees_of_freedom: spare,
-                    misfit_ratio: 1.0,
-                },
-            );
+            let spare = spare(data, unknowns);
+            let scale = Scale {
+                variance: fit.minimum.cost / spare.max(1) as f64,
+                degrees_of_freedom: spare,
+                misfit_ratio: 1.0,
+            };
+            return finish(data, unknowns, &mut misfit, &fit, scale);
         }
-        theta = fit.theta;
+        last = Some(fit);
         // A channel without any residual must not take all the weight.
         let least = found.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
         levels = found.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
     }
-    Err(EstimateError::NotConverged { steps })
+    let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
+    Err(EstimateError::NotConverged { searches, steps })
 }
 
-fn values(estimate: &Estimate) -> DVector<f64> {
-    let parameters = estimate.parameters();
-    DVector::from_iterator(parameters.len(), parameters.map(|p| p.value))
-}
-
-/// The start that misses the data least: far from the minimum a search may run off to a machine
-/// so heavy or stiff that it does not move.
-fn nearest(
-    misfit: &mut Misfit<'_>,
-    theta: DVector<f64>,
-    others: impl Iterator<Item = DVector<f64>>,
-) -> DVector<f64> {
-    let mut residual = DVector::zeros(misfit.residuals());
-    let mut cost = |theta: &DVector<f64>| match misfit.residual(theta, &mut residual) {
-        true => residual.norm_squared(),
-        false => f64::INFINITY,
-    };
-    let mut least = (cost(&theta), theta);
-    for other in others {
-        let own = cost(&other);
-        if own < least.0 {
-            least = (own, other);
-        }
-    }
-    least.1
-}
-
-/// The minimum, at which `misfit` is left evaluated.
-fn search(misfit: &mut Misfit<'_>, theta: DVector<f64>) -> Result<Minimum, EstimateError> {
-    let fit = minimise(misfit, theta).ok_or(EstimateError::NotConverged { steps: 0 })?;
-    if !fit.converged {
-        return Err(EstimateError::NotConverged { steps: fit.steps });
-    }
-    misfit.residual(&fit.theta, &mut DVector::zeros(misfit.residuals()));
-    Ok(fit)
+/// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
+fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
+    let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
+    Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
 }
 
 /// How the covariance follows from the Fisher information.
@@ -187,18 +179,12 @@ struct Scale {
 fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
-    misfit: &Misfit<'_>,
-    fit: &Minimum,
+    misfit: &mut Misfit<'_>,
+    found: &Found,
     scale: Scale,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let sensitivity = misfit.sensitivity();
-    let mut factor = TriangularFactor::new(sensitivity.ncols());
-    if !factor.push(&[sensitivity.as_view()]) {
-        crate::least_squares::finite("sensitivity of the motion", sensitivity.as_view())?;
-        return Err(EstimateError::Overflow);
-    }
-    let none = DMatrix::zeros(sensitivity.ncols(), 1);
-    let linear = solve_compressed(factor.r().as_view(), none.as_view(), factor.rows())?;
+    let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
+    let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
     let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors
@@ -208,19 +194,25 @@ fn finish(
         .collect();
     let estimate = Estimate::new(Findings {
         unknowns: unknowns.clone(),
-        values: fit.theta.iter().copied().collect(),
-        covariance: linear.unscaled_covariance * scale.variance,
+        values: found.minimum.theta.iter().copied().collect(),
+        covariance: covariance * scale.variance,
         degrees_of_freedom: scale.degrees_of_freedom,
         residual_nrmse,
-        condition: linear.condition,
+        condition,
         undetermined: Vec::new(),
     })?;
-    Ok(OutputErrorFit { estimate, misfit_ratio: scale.misfit_ratio, steps: fit.steps })
+    Ok(OutputErrorFit {
+        estimate,
+        misfit_ratio: scale.misfit_ratio,
+        steps: found.minimum.steps,
+        searches: found.searches,
+        agreeing: found.agreeing,
+    })
 }
 
 /// Real equations less unknowns.
-fn spare(data: &FrequencyData, theta: &DVector<f64>) -> usize {
-    (2 * data.dof() * data.len()).saturating_sub(theta.len())
+fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
+    (2 * data.dof() * data.len()).saturating_sub(unknowns.free().len())
 }
 
 /// Root mean square of displacement amplitudes, per channel, in the quantity measured.
@@ -236,15 +228,17 @@ fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Ve
     (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
 }
 
-fn white_weights(data: &FrequencyData, levels: &[f64]) -> Vec<DMatrix<Complex<f64>>> {
-    let levels = DVector::from_iterator(levels.len(), levels.iter().map(|l| Complex::new(*l, 0.0)));
-    data.omega()
-        .iter()
-        .map(|w| {
-            let scale = data.measured().per_displacement(*w).norm();
-            DMatrix::from_diagonal(&levels.unscale(scale))
+/// White noise of the given levels of the quantity measured, the force exact.
+fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, EstimateError> {
+    let n = data.dof();
+    let covariance = data.omega().iter().map(|w| {
+        let scale = data.measured().per_displacement(*w).norm();
+        DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+            let level = if i == j && i < n { levels[i] / scale } else { 0.0 };
+            Complex::from(level * level)
         })
-        .collect()
+    });
+    NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())
 }
 
 /// Covariance over the inverse of the Fisher information computed with sampled weights.
@@ -275,20 +269,9 @@ pub(crate) fn in_units_of_noise(
     data: &FrequencyData,
     estimate: &Estimate,
 ) -> Option<DMatrix<Complex<f64>>> {
-    let noise = data.noise()?;
-    let noise = if noise.has_force() {
-        Noise::Both(noise)
-    } else {
-        Noise::Output(output_weights(noise).ok()?)
-    };
-    let theta = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
-    let mut misfit = Misfit::new(data, estimate.unknowns(), noise);
-    let mut left = DVector::zeros(misfit.residuals());
-    if !misfit.residual(&theta, &mut left) {
-        return None;
-    }
-    let n = data.dof();
-    let part =
-        |row: usize, c: usize| Complex::new(left[2 * (n * row + c)], left[2 * (n * row + c) + 1]);
-    Some(DMatrix::from_fn(data.len(), n, |row, c| part(row, c) / std::f64::consts::SQRT_2))
+    let theta: DVector<f64> = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
+    let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;
+    misfit.try_at(&theta)?;
+    misfit.accept();
+    Some(misfit.white())
 }

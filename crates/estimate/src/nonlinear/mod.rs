@@ -23,6 +23,7 @@ mod equations;
 mod estimate;
 mod experiments;
 mod grid;
+mod levenberg_marquardt;
 mod output_error;
 mod predict;
 mod selection;

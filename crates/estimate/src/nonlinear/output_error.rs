@@ -11,7 +11,7 @@ use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::estimate::Findings;
-use crate::frequency_domain::levenberg_marquardt::{SumOfSquares, minimise};
+use super::levenberg_marquardt::{SumOfSquares, minimise};
 use crate::least_squares::size;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError, LeastSquares, Uncertain, Unknowns};
@@ -87,10 +87,10 @@ pub fn output_error(
     // The size of what is left of several channels is known after the first search.
     for round in 0..2 {
         let found = minimise(&mut problem, theta)
-            .ok_or(EstimateError::NotConverged { steps })
+            .ok_or(EstimateError::NotConverged { searches: 1, steps })
             .and_then(|found| match found.converged {
                 true => Ok(found),
-                false => Err(EstimateError::NotConverged { steps: found.steps }),
+                false => Err(EstimateError::NotConverged { searches: 1, steps: found.steps }),
             })?;
         steps += found.steps;
         theta = found.theta;
@@ -258,7 +258,7 @@ impl<'a> Problem<'a> {
         start: &NonlinearEstimate,
         steps: usize,
     ) -> Result<NonlinearFit, EstimateError> {
-        let wrong = EstimateError::NotConverged { steps };
+        let wrong = EstimateError::NotConverged { searches: 1, steps };
         let system = self.system(theta).ok_or(wrong.clone())?;
         let (n, shared, free) = (self.dof(), self.shared.len(), self.free.len());
         let inverse = self.inverse(theta.len())?;

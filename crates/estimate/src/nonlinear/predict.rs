@@ -5,7 +5,7 @@ use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::simulate::{Course, Direction, FineForce, Tangent};
-use crate::frequency_domain::levenberg_marquardt::{SumOfSquares, minimise};
+use super::levenberg_marquardt::{SumOfSquares, minimise};
 use crate::least_squares::size;
 use crate::{EstimateError, prediction};
 
@@ -119,7 +119,7 @@ pub fn fitted_start(
     let mut problem =
         Start { system, directions: &directions, fine: &fine, measured, course: None };
     let found = minimise(&mut problem, theta).filter(|found| found.converged);
-    initial(&found.ok_or(EstimateError::NotConverged { steps: 0 })?.theta)
+    initial(&found.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.theta)
 }
 
 /// Measured less predicted response as a function of the start.

@@ -4,10 +4,13 @@ mod row;
 #[cfg(test)]
 mod tests;
 
-use mechid_model::{Matrix, Parameter};
+use mechid_model::Matrix;
+use mechid_signal::{Sampling, noise};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::levenberg_marquardt::SumOfSquares;
+use super::cholesky::Cholesky;
+use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
+use super::search::SumOfSquares;
 use super::{FrequencyData, NoiseSpectrum};
 use crate::{EstimateError, Unknowns};
 use row::Row;
@@ -15,8 +18,8 @@ use row::Row;
 type ComplexMatrix = DMatrix<Complex<f64>>;
 type ComplexVector = DVector<Complex<f64>>;
 
-/// What is known of the noise of each row.
-pub(super) enum Noise<'a> {
+/// Covariance of the noise of each row.
+enum Noise<'a> {
     /// The force is exact; L of the displacement's covariance L Lᴴ.
     Output(Vec<ComplexMatrix>),
     /// Force and displacement are noisy.
@@ -31,35 +34,59 @@ pub(super) enum Noise<'a> {
 /// its sum of squares is what is left of the likelihood once the true force and
 /// displacement of each row have been eliminated.
 ///
+/// The Jacobian of row l is W_l E_ij X̂_l s^p with W = L⁻¹G, a Kronecker product. X̂ is the
+/// displacement under the most likely force F̂: because F̂ minimises, the gradient Jᵀr is that of the
+/// sum of squares, and JᵀJ is the Fisher information.
+///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the
 /// chapter on maximum likelihood in errors-in-variables.
 pub(super) struct Misfit<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
-    free: Vec<Parameter>,
+    layout: Layout,
     noise: Noise<'a>,
     /// n × rows, so that the forces of one row are contiguous.
     force: ComplexMatrix,
     displacement: ComplexMatrix,
-    /// All rows at the parameters of the last evaluation.
+    /// All rows at the parameters last accepted, and at those last tried.
     rows: Vec<Row>,
+    tried: Vec<Row>,
+    /// The regressors X̂ s^p at the parameters last accepted, orthonormal.
+    regressors: DMatrix<f64>,
+    /// How much each row counts; 1 but in a search's restarts.
+    shares: Vec<f64>,
 }
 
 impl<'a> Misfit<'a> {
-    pub(super) fn new(data: &'a FrequencyData, unknowns: &'a Unknowns, noise: Noise<'a>) -> Self {
-        Self {
+    /// # Errors
+    /// [`EstimateError::SingularNoise`] where the force is exact and a displacement has no noise at
+    /// all, or two of them the same.
+    pub(super) fn new(
+        data: &'a FrequencyData,
+        unknowns: &'a Unknowns,
+        noise: &'a NoiseSpectrum,
+    ) -> Result<Self, EstimateError> {
+        let noise = match noise.has_force() {
+            true => Noise::Both(noise),
+            false => Noise::Output(output_weights(noise)?),
+        };
+        let rows = vec![Row::new(data.dof()); data.len()];
+        Ok(Self {
             data,
             unknowns,
-            free: unknowns.free(),
+            layout: Layout::new(unknowns),
             noise,
             force: data.force().transpose(),
             displacement: data.displacement().transpose(),
-            rows: (0..data.len()).map(|_| Row::new(data.dof())).collect(),
-        }
+            tried: rows.clone(),
+            rows,
+            regressors: DMatrix::zeros(0, 0),
+            shares: vec![1.0; data.len()],
+        })
     }
 
-    /// X − G F, rows × n, at the parameters of the last evaluation.
+    /// X − G F, rows × n, at the parameters last accepted.
     pub(super) fn errors(&self) -> ComplexMatrix {
         let mut errors = self.displacement.clone();
         for (mut error, row) in errors.column_iter_mut().zip(&self.rows) {
@@ -68,74 +95,139 @@ impl<'a> Misfit<'a> {
         errors.transpose()
     }
 
-    /// Sensitivities of the whitened displacement at the most likely force: the Fisher
-    /// information is their Gram matrix. At the parameters of the last evaluation.
-    pub(super) fn sensitivity(&self) -> DMatrix<f64> {
-        let mut jacobian = DMatrix::zeros(self.residuals(), self.free.len());
-        let most_likely = |at: usize| self.rows[at].most_likely_displacement(self.force.column(at));
-        self.differentiate(&mut jacobian, most_likely, |_, _, _, _| {});
-        jacobian
+    /// L⁻¹(X − G F), rows × n, at the parameters last accepted.
+    pub(super) fn white(&self) -> ComplexMatrix {
+        let rows: Vec<_> = self.rows.iter().map(|row| row.white().transpose()).collect();
+        DMatrix::from_rows(&rows)
     }
 
-    /// Whitened G E_ij X s^p for every row and parameter, after `correct` has seen it.
-    fn differentiate(
-        &self,
-        jacobian: &mut DMatrix<f64>,
-        displacement: impl Fn(usize) -> ComplexVector,
-        correct: impl Fn(&Row, &Parameter, Complex<f64>, &mut ComplexVector),
-    ) {
-        let n = self.data.dof();
-        let mut white = DVector::zeros(n);
-        for (at, row) in self.rows.iter().enumerate() {
-            let s = Complex::new(0.0, self.data.omega()[at]);
-            let displacement = displacement(at);
-            for (parameter, mut column) in self.free.iter().zip(jacobian.column_iter_mut()) {
-                let power = match parameter.matrix() {
-                    Matrix::Mass => s * s,
-                    Matrix::Damping => s,
-                    Matrix::Stiffness => Complex::from(1.0),
+    fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
+        let matrices = self.unknowns.assemble(theta.as_slice());
+        let mut cost = 0.0;
+        for (at, row) in self.tried.iter_mut().enumerate() {
+            let (force, displacement) = (self.force.column(at), self.displacement.column(at));
+            let exists = row.model(&matrices, self.data.omega()[at], force)
+                && match &self.noise {
+                    Noise::Output(lower) => row.whiten(displacement, &lower[at]),
+                    Noise::Both(noise) => {
+                        row.whiten_both(displacement, force, noise.covariance(at))
+                    }
                 };
-                white.copy_from(&row.white_receptance().column(parameter.row()));
-                white *= power * displacement[parameter.column()];
-                correct(row, parameter, power, &mut white);
-                write_real(&white, &mut column.as_mut_slice()[2 * n * at..2 * n * (at + 1)]);
+            if !exists {
+                return None;
             }
+            row.scale(self.shares[at].sqrt());
+            cost += 2.0 * row.white().norm_squared();
+        }
+        cost.is_finite().then_some(cost)
+    }
+
+    /// The regressors φ of a displacement, given by row and channel, the weights WᴴW and the weighted
+    /// residuals Wᴴr.
+    fn factors(&self, displacement: impl Fn(usize, usize) -> Complex<f64>) -> Factors {
+        let (lines, n) = (self.rows.len(), self.data.dof());
+        let columns = self.layout.columns();
+        let mut regressors = DMatrix::zeros(columns.len(), 2 * lines);
+        let mut weights = DMatrix::zeros(2 * lines, n * n);
+        let mut residuals = DMatrix::zeros(2 * lines, n);
+        for (at, row) in self.rows.iter().enumerate() {
+            let powers = powers(self.data.omega()[at]);
+            for (to, (matrix, column)) in columns.iter().enumerate() {
+                let z = powers[*matrix as usize] * displacement(at, *column);
+                (regressors[(to, at)], regressors[(to, lines + at)]) = (z.re, z.im);
+            }
+            let white = row.white_receptance();
+            for j in 0..n {
+                for i in 0..=j {
+                    let z = white.column(i).dotc(&white.column(j));
+                    for (place, im) in [(i + n * j, z.im), (j + n * i, -z.im)] {
+                        (weights[(at, place)], weights[(lines + at, place)]) = (z.re, im);
+                    }
+                }
+            }
+            self.write_weighted(at, row.white(), &mut residuals);
+        }
+        Factors { regressors, weights, residuals }
+    }
+
+    /// Wᴴy of one row.
+    fn write_weighted(&self, at: usize, y: &ComplexVector, to: &mut DMatrix<f64>) {
+        let white = self.rows[at].white_receptance();
+        for (i, column) in white.column_iter().enumerate() {
+            let z = column.dotc(y);
+            (to[(at, i)], to[(self.rows.len() + at, i)]) = (z.re, z.im);
         }
     }
 }
 
 impl SumOfSquares for Misfit<'_> {
-    fn residuals(&self) -> usize {
-        2 * self.data.dof() * self.data.len()
+    fn try_at(&mut self, theta: &DVector<f64>) -> Option<f64> {
+        self.evaluate(theta)
     }
 
-    fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
-        let matrices = self.unknowns.assemble(theta.as_slice());
-        let n = self.data.dof();
-        let parts = residual.as_mut_slice().chunks_exact_mut(2 * n);
-        for (at, (row, part)) in self.rows.iter_mut().zip(parts).enumerate() {
-            let (force, displacement) = (self.force.column(at), self.displacement.column(at));
-            let exists = row.model(&matrices, self.data.omega()[at], force)
-                && match &self.noise {
-                    Noise::Output(lower) => row.whiten(displacement, &lower[at]),
-                    Noise::Both(noise) => row.whiten_both(displacement, noise.covariance(at)),
-                };
-            if !exists {
-                return false;
-            }
-            write_real(row.white(), part);
+    fn accept(&mut self) {
+        std::mem::swap(&mut self.rows, &mut self.tried);
+    }
+
+    /// With the measured displacement in place of X̂ the equations of a step lead to the least
+    /// |W (D X − F)|² for fixed W, which is linear in the parameters.
+    fn linear_step(&mut self) -> Option<DVector<f64>> {
+        let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
+        let NormalEquations { gram, gradient, coordinates } =
+            self.layout.normal_equations(&mut factors)?;
+        Some(coordinates.unknowns(&-Cholesky::new(&gram, 0.0)?.solve(&gradient)))
+    }
+
+    fn resample(&mut self, seed: Option<u64>) {
+        self.shares.fill(1.0);
+        let drawn = seed.and_then(|seed| {
+            let rows = Sampling::new(1.0, self.shares.len()).ok()?;
+            noise::white(rows, 2, 1.0, seed).ok()
+        });
+        // |z|²/2 of a complex normal number is exponential; half its square has the mean 1.
+        for (share, pair) in
+            self.shares.iter_mut().zip(drawn.iter().flat_map(|d| d.data().row_iter()))
+        {
+            *share = 0.125 * pair.norm_squared().powi(2);
         }
-        true
     }
 
-    fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
-        let modelled = |at: usize| self.rows[at].displacement().clone();
-        self.differentiate(jacobian, modelled, Row::subtract_change_of_spread);
+    fn normal_equations(&mut self) -> Option<NormalEquations> {
+        let mut factors = self.factors(|at, column| self.rows[at].likely_displacement()[column]);
+        let equations = self.layout.normal_equations(&mut factors);
+        self.regressors = factors.regressors;
+        equations
+    }
+
+    /// r″ = −2 W dD G dD X̂ along dD, the change of the dynamic stiffness; that of the spread, with
+    /// a noisy force, is left out.
+    fn curvature(&self, coordinates: &Coordinates, step: &DVector<f64>) -> DVector<f64> {
+        let zero = self.unknowns.assemble(&vec![0.0; step.len()]);
+        let ends = self.unknowns.assemble(step.as_slice());
+        let [m, c, k] = [0, 1, 2].map(|at| &ends[at] - &zero[at]);
+        let mut residuals = DMatrix::zeros(2 * self.rows.len(), self.data.dof());
+        for (at, row) in self.rows.iter().enumerate() {
+            let omega = self.data.omega()[at];
+            let change =
+                k.zip_zip_map(&c, &m, |k, c, m| Complex::new(k - omega * omega * m, omega * c));
+            let second = &change * (row.receptance() * (&change * row.likely_displacement()));
+            let white = row.white_receptance() * second * Complex::from(-2.0);
+            self.write_weighted(at, &white, &mut residuals);
+        }
+        coordinates.project(&self.regressors, &residuals)
     }
 }
 
+/// s², s and 1 with s = iω, in the order of the matrices.
+pub(super) fn powers(omega: f64) -> [Complex<f64>; 3] {
+    let mut powers = [Complex::from(1.0); 3];
+    powers[Matrix::Mass as usize] = Complex::from(-omega * omega);
+    powers[Matrix::Damping as usize] = Complex::new(0.0, omega);
+    powers
+}
+
 /// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
-pub(super) fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
+fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
     // nalgebra takes complex roots of negative pivots, so they have to be looked for.
     let lower = matrix.cholesky()?.unpack();
     let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
@@ -143,11 +235,7 @@ pub(super) fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
 }
 
 /// L of the displacement part of every covariance.
-///
-/// # Errors
-/// [`EstimateError::SingularNoise`] where a displacement has no noise at all, or two
-/// of them the same.
-pub(super) fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateError> {
+fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>, EstimateError> {
     let n = noise.dof();
     noise
         .omega()
@@ -159,11 +247,4 @@ pub(super) fn output_weights(noise: &NoiseSpectrum) -> Result<Vec<ComplexMatrix>
                 .ok_or(EstimateError::SingularNoise { frequency_hz: omega / std::f64::consts::TAU })
         })
         .collect()
-}
-
-fn write_real(white: &ComplexVector, part: &mut [f64]) {
-    for (z, pair) in white.iter().zip(part.chunks_exact_mut(2)) {
-        pair[0] = std::f64::consts::SQRT_2 * z.re;
-        pair[1] = std::f64::consts::SQRT_2 * z.im;
-    }
 }

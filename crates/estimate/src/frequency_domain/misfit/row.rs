@@ -1,11 +1,11 @@
 //! One spectral line at one set of parameters, in buffers that are reused.
 
-use mechid_model::Parameter;
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 
 use super::{ComplexMatrix, ComplexVector, cholesky};
 
 /// One row of the data at one set of parameters.
+#[derive(Clone)]
 pub(super) struct Row {
     /// K + iωC − ω²M, eliminated.
     dynamic: ComplexMatrix,
@@ -13,22 +13,12 @@ pub(super) struct Row {
     receptance: ComplexMatrix,
     /// G F.
     displacement: ComplexVector,
+    /// G F̂ with the most likely force F̂; of an exact force G F.
+    likely: ComplexVector,
     /// L⁻¹ G.
     white_receptance: ComplexMatrix,
     /// L⁻¹ e.
     white: ComplexVector,
-    /// With a noisy force: how the covariance depends on the parameters.
-    spread: Option<Spread>,
-}
-
-/// Parts of a covariance that depends on the parameters.
-struct Spread {
-    /// L.
-    lower: ComplexMatrix,
-    /// Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
-    cross: ComplexMatrix,
-    /// G Q L⁻ᴴ.
-    white_cross: ComplexMatrix,
 }
 
 impl Row {
@@ -38,9 +28,9 @@ impl Row {
             dynamic: square.clone(),
             receptance: square.clone(),
             displacement: vector.clone(),
+            likely: vector.clone(),
             white_receptance: square,
             white: vector,
-            spread: None,
         }
     }
 
@@ -48,8 +38,23 @@ impl Row {
         &self.displacement
     }
 
+    /// Displacement under the force that, within its noise, agrees best with what was measured.
+    pub(super) fn likely_displacement(&self) -> &ComplexVector {
+        &self.likely
+    }
+
+    pub(super) fn receptance(&self) -> &ComplexMatrix {
+        &self.receptance
+    }
+
     pub(super) fn white_receptance(&self) -> &ComplexMatrix {
         &self.white_receptance
+    }
+
+    /// Scales L⁻¹, as if the noise were smaller.
+    pub(super) fn scale(&mut self, by: f64) {
+        self.white.scale_mut(by);
+        self.white_receptance.scale_mut(by);
     }
 
     pub(super) fn white(&self) -> &ComplexVector {
@@ -72,6 +77,7 @@ impl Row {
         }
         let (one, zero) = (Complex::from(1.0), Complex::from(0.0));
         self.displacement.gemv(one, &self.receptance, &force, zero);
+        self.likely.copy_from(&self.displacement);
         self.displacement.iter().all(|z| z.is_finite())
     }
 
@@ -88,62 +94,27 @@ impl Row {
             && lower.solve_lower_triangular_mut(&mut self.white_receptance)
     }
 
-    /// As [`Row::whiten`], with L from the covariance of displacements and forces.
+    /// As [`Row::whiten`], with L from the covariance of displacements and forces, and the most
+    /// likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
     pub(super) fn whiten_both(
         &mut self,
         measured: DVectorView<'_, Complex<f64>>,
+        force: DVectorView<'_, Complex<f64>>,
         covariance: &ComplexMatrix,
     ) -> bool {
-        let Some(spread) = Spread::new(covariance, &self.receptance) else { return false };
-        let exists = self.whiten(measured, &spread.lower);
-        self.spread = Some(spread);
-        exists
-    }
-
-    /// G F̂ with the force F̂ = F − Q (L Lᴴ)⁻¹ e that, within its noise, agrees best with
-    /// the displacement.
-    pub(super) fn most_likely_displacement(
-        &self,
-        force: DVectorView<'_, Complex<f64>>,
-    ) -> ComplexVector {
-        let Some(spread) = &self.spread else { return self.displacement.clone() };
-        let mut whitened_twice = self.white.clone();
-        spread.lower.ad_solve_lower_triangular_mut(&mut whitened_twice);
-        &self.receptance * (force - &spread.cross * whitened_twice)
-    }
-
-    /// −Φ(S) L⁻¹e, with S = L⁻¹ dC L⁻ᴴ the relative change of the covariance and Φ its lower
-    /// triangle with half the diagonal: the derivative of L⁻¹ applied to e.
-    pub(super) fn subtract_change_of_spread(
-        &self,
-        parameter: &Parameter,
-        power: Complex<f64>,
-        white: &mut ComplexVector,
-    ) {
-        let Some(spread) = &self.spread else { return };
-        let u = self.white_receptance.column(parameter.row());
-        let v = spread.white_cross.row(parameter.column());
-        for i in 0..white.len() {
-            for j in 0..=i {
-                let change = power * u[i] * v[j] + (power * u[j] * v[i]).conj();
-                let share = if i == j { 0.5 } else { 1.0 };
-                white[i] -= change * share * self.white[j];
-            }
-        }
-    }
-}
-
-impl Spread {
-    fn new(covariance: &ComplexMatrix, receptance: &ComplexMatrix) -> Option<Self> {
-        let n = receptance.nrows();
+        let n = self.receptance.nrows();
         let block = |i: usize, j: usize| covariance.view((i * n, j * n), (n, n));
-        let cross = block(1, 0) - block(1, 1) * receptance.adjoint();
-        let passed = receptance * &cross;
-        let total = block(0, 0) - block(0, 1) * receptance.adjoint() - &passed;
-        let lower = cholesky(total)?;
-        let mut white = passed.adjoint();
-        lower.solve_lower_triangular_mut(&mut white).then_some(())?;
-        Some(Self { lower, cross, white_cross: white.adjoint() })
+        let adjoint = self.receptance.adjoint();
+        let cross = block(1, 0) - block(1, 1) * &adjoint;
+        let total = block(0, 0) - block(0, 1) * &adjoint - &self.receptance * &cross;
+        let Some(lower) = cholesky(total) else { return false };
+        if !self.whiten(measured, &lower) {
+            return false;
+        }
+        let mut whitened_twice = self.white.clone();
+        lower.ad_solve_lower_triangular_mut(&mut whitened_twice);
+        self.likely = &self.receptance * (force - cross * whitened_twice);
+        true
     }
 }
 
@@ -163,28 +134,30 @@ fn solve_in_place(a: &mut ComplexMatrix, b: &mut ComplexMatrix) -> bool {
         a.swap_rows(j, pivot);
         b.swap_rows(j, pivot);
         let inverse = a[(j, j)].inv();
-        for i in j + 1..n {
-            let factor = a[(i, j)] * inverse;
-            for k in j + 1..n {
-                let above = a[(j, k)];
-                a[(i, k)] -= factor * above;
-            }
-            for k in 0..n {
-                let above = b[(j, k)];
-                b[(i, k)] -= factor * above;
-            }
+        let (left, right) = a.as_mut_slice().split_at_mut((j + 1) * n);
+        let factors = &mut left[j * n + j + 1..];
+        factors.iter_mut().for_each(|f| *f *= inverse);
+        for column in right.chunks_exact_mut(n).chain(b.as_mut_slice().chunks_exact_mut(n)) {
+            let above = column[j];
+            subtract(&mut column[j + 1..], factors, above);
         }
     }
-    for k in 0..n {
-        for i in (0..n).rev() {
-            let mut sum = b[(i, k)];
-            for j in i + 1..n {
-                sum -= a[(i, j)] * b[(j, k)];
-            }
-            b[(i, k)] = sum / a[(i, i)];
+    for column in b.as_mut_slice().chunks_exact_mut(n) {
+        for j in (0..n).rev() {
+            let upper = &a.as_slice()[j * n..=j * n + j];
+            column[j] /= upper[j];
+            let found = column[j];
+            subtract(&mut column[..j], &upper[..j], found);
         }
     }
     true
+}
+
+/// y ← y − x·factor.
+fn subtract(y: &mut [Complex<f64>], x: &[Complex<f64>], factor: Complex<f64>) {
+    for (y, x) in y.iter_mut().zip(x) {
+        *y -= x * factor;
+    }
 }
 
 #[cfg(test)]

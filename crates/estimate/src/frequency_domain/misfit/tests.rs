@@ -1,25 +1,29 @@
 //! Derivatives against differences, and the likelihood against its definition.
 
 use mechid_model::ResponseQuantity;
+use mechid_model::linear_algebra::singular_values;
 use nalgebra::dmatrix;
 
 use super::*;
 
-/// Two degrees of freedom, nothing symmetric, at three frequencies, off the truth.
+/// Two degrees of freedom, nothing symmetric, at six frequencies, off the truth.
+const OMEGA: [f64; 6] = [1.0, 1.7, 2.5, 3.1, 4.0, 5.2];
+const RESIDUALS: usize = 4 * OMEGA.len();
+
 fn data() -> FrequencyData {
     let z = |seed: usize| {
         let turn = (seed * seed) as f64 * 0.7;
         Complex::from_polar(1.0 + 0.3 * (1.3 * seed as f64).sin(), turn)
     };
-    let force = DMatrix::from_fn(3, 2, |l, c| z(2 * l + c));
-    let motion = DMatrix::from_fn(3, 2, |l, c| z(11 + 2 * l + c) * 0.1);
-    let omega = vec![1.0, 2.5, 4.0];
-    FrequencyData::from_amplitudes(omega, force, motion, ResponseQuantity::Displacement).unwrap()
+    let force = DMatrix::from_fn(OMEGA.len(), 2, |l, c| z(2 * l + c));
+    let motion = DMatrix::from_fn(OMEGA.len(), 2, |l, c| z(31 + 2 * l + c) * 0.1);
+    FrequencyData::from_amplitudes(OMEGA.to_vec(), force, motion, ResponseQuantity::Displacement)
+        .unwrap()
 }
 
 /// Positive definite, every entry of it in use.
 fn noise() -> NoiseSpectrum {
-    let covariance = (0..3).map(|row| {
+    let covariance = (0..OMEGA.len()).map(|row| {
         let root = DMatrix::from_fn(4, 4, |i: usize, j: usize| {
             let size = if i < 2 { 0.01 } else { 0.05 };
             let other = Complex::new(0.3 * (i + 2 * j + row) as f64, 0.5 - 0.2 * i as f64);
@@ -27,83 +31,186 @@ fn noise() -> NoiseSpectrum {
         });
         &root * root.adjoint()
     });
-    NoiseSpectrum::new(vec![1.0, 2.5, 4.0], covariance.collect()).unwrap()
+    NoiseSpectrum::new(OMEGA.to_vec(), covariance.collect()).unwrap()
 }
 
-fn unknowns() -> Unknowns {
-    Unknowns::unknown_mass(2).unwrap().fix(Matrix::Mass, 0, 1, 0.1).unwrap()
+/// One equation with fewer unknowns than the other, and all unknown.
+fn unknowns() -> [(Unknowns, DVector<f64>); 2] {
+    let all = Unknowns::unknown_mass(2).unwrap();
+    let theta = vec![1.0, -0.2, 0.1, 1.5, 0.4, 0.1, -0.3, 0.6, 9.0, -3.0, -2.0, 7.0];
+    let mut fewer = theta.clone();
+    fewer.remove(1);
+    [(all.clone().fix(Matrix::Mass, 0, 1, 0.1).unwrap(), fewer.into()), (all, theta.into())]
 }
 
-fn theta() -> DVector<f64> {
-    DVector::from_vec(vec![1.0, -0.2, 1.5, 0.4, 0.1, -0.3, 0.6, 9.0, -3.0, -2.0, 7.0])
+fn cost(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> f64 {
+    let cost = misfit.try_at(theta).unwrap();
+    misfit.accept();
+    cost
+}
+
+/// √2·L⁻¹e as real numbers.
+fn residuals(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> DVector<f64> {
+    cost(misfit, theta);
+    let white = misfit.white();
+    let pairs = white.iter().flat_map(|z| [z.re, z.im]);
+    DVector::from_iterator(RESIDUALS, pairs.map(|part| std::f64::consts::SQRT_2 * part))
+}
+
+/// dv/dθ, a column for every unknown.
+fn transformation(coordinates: &Coordinates, unknowns: usize) -> DMatrix<f64> {
+    let unit = |at| DVector::from_fn(unknowns, |i, _| f64::from(u8::from(i == at)));
+    DMatrix::from_columns(&(0..unknowns).map(|at| coordinates.of(&unit(at))).collect::<Vec<_>>())
 }
 
 #[test]
-fn derivatives_agree_with_differences() {
-    let (data, unknowns, noise) = (data(), unknowns(), noise());
-    let output = Noise::Output(output_weights(&noise).unwrap());
-    for weights in [output, Noise::Both(&noise)] {
-        let mut misfit = Misfit::new(&data, &unknowns, weights);
-        let mut jacobian = DMatrix::zeros(12, 11);
-        assert!(misfit.residual(&theta(), &mut DVector::zeros(12)));
-        misfit.jacobian(&mut jacobian);
-        for parameter in 0..11 {
-            let mut at = |step: f64| {
-                let (mut theta, mut residual) = (theta(), DVector::zeros(12));
-                theta[parameter] += step;
-                assert!(misfit.residual(&theta, &mut residual));
-                residual
-            };
-            let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-            // Central differences: rounding 1e-16/1e-5 and curvature 1e-10, both relative.
-            let error = (jacobian.column(parameter) - difference).norm();
-            assert!(error < 1e-8 * jacobian.norm(), "{parameter}: {error:e}");
+fn the_gradient_is_that_of_the_sum_of_squares() {
+    for (unknowns, theta) in unknowns() {
+        for noise in [noise(), noise().with_exact_force()] {
+            let data = data();
+            let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
+            cost(&mut misfit, &theta);
+            let equations = misfit.normal_equations().unwrap();
+            let to = transformation(&equations.coordinates, theta.len());
+            let gradient = to.tr_mul(&equations.gradient) * 2.0;
+            for at in 0..theta.len() {
+                let mut near = |step: f64| {
+                    let mut theta = theta.clone();
+                    theta[at] += step;
+                    cost(&mut misfit, &theta)
+                };
+                let difference = (near(1e-5) - near(-1e-5)) / 2e-5;
+                // Central differences: rounding 1e-16/1e-5 and curvature 1e-10, both relative.
+                let error = (gradient[at] - difference).abs();
+                assert!(error < 1e-8 * gradient.norm(), "{at}: {error:e}");
+            }
         }
+    }
+}
+
+#[test]
+fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
+    let noise = noise().with_exact_force();
+    for (unknowns, theta) in unknowns() {
+        let data = data();
+        let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
+        let columns: Vec<_> = (0..theta.len())
+            .map(|at| {
+                let mut near = |step: f64| {
+                    let mut theta = theta.clone();
+                    theta[at] += step;
+                    residuals(&mut misfit, &theta)
+                };
+                (near(1e-5) - near(-1e-5)) / 2e-5
+            })
+            .collect();
+        let mut jacobian = DMatrix::from_columns(&columns);
+        cost(&mut misfit, &theta);
+        let equations = misfit.normal_equations().unwrap();
+        let to = transformation(&equations.coordinates, theta.len());
+        let gram = to.tr_mul(&(&equations.gram * &to));
+        let expected = jacobian.tr_mul(&jacobian);
+        assert!((&gram - &expected).norm() < 1e-8 * expected.norm());
+        assert!(equations.gram.diagonal().iter().all(|v| (v - 1.0).abs() < 1e-12));
+
+        let (covariance, condition) = equations.covariance().unwrap();
+        assert!((&covariance * &gram - DMatrix::identity(theta.len(), theta.len())).norm() < 1e-8);
+        jacobian.column_iter_mut().for_each(|mut column| column /= column.norm());
+        let singular = singular_values(jacobian).unwrap();
+        let expected = singular.max() / singular.min();
+        assert!((condition / expected - 1.0).abs() < 1e-6, "{condition} {expected}");
+
+        // There and back.
+        let back = equations.coordinates.unknowns(&equations.coordinates.of(&theta));
+        assert!((back - &theta).norm() < 1e-12 * theta.norm());
+    }
+}
+
+#[test]
+fn the_curvature_is_the_second_derivative_along_a_step() {
+    let noise = noise().with_exact_force();
+    for (unknowns, theta) in unknowns() {
+        let data = data();
+        let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
+        let step = DVector::from_fn(theta.len(), |at, _| (1.7 * at as f64).cos());
+        let mut near = |along: f64| residuals(&mut misfit, &(&theta + &step * along));
+        let second = (near(1e-4) + near(-1e-4) - near(0.0) * 2.0) / 1e-8;
+        let slope = |misfit: &mut Misfit<'_>, at: usize| {
+            let mut near = |along: f64| {
+                let mut theta = theta.clone();
+                theta[at] += along;
+                residuals(misfit, &theta)
+            };
+            ((near(1e-5) - near(-1e-5)) / 2e-5).dot(&second)
+        };
+        let expected = DVector::from_fn(theta.len(), |at, _| slope(&mut misfit, at));
+        cost(&mut misfit, &theta);
+        let equations = misfit.normal_equations().unwrap();
+        let curvature = misfit.curvature(&equations.coordinates, &step);
+        let to = transformation(&equations.coordinates, theta.len());
+        let error = (to.tr_mul(&curvature) - &expected).norm() / expected.norm();
+        // Second differences: rounding 1e-16/1e-8.
+        assert!(error < 1e-6, "{error:e}");
     }
 }
 
 /// Without noise on the force the two kinds of weighting are one.
 #[test]
 fn errors_in_variables_contain_output_error() {
-    let (data, unknowns) = (data(), unknowns());
-    let noise = noise().with_exact_force();
-    let mut output = Misfit::new(&data, &unknowns, Noise::Output(output_weights(&noise).unwrap()));
-    let mut both = Misfit::new(&data, &unknowns, Noise::Both(&noise));
-    assert!(!noise.has_force());
-    let (mut a, mut b) = (DVector::zeros(12), DVector::zeros(12));
-    assert!(output.residual(&theta(), &mut a) && both.residual(&theta(), &mut b));
-    assert!((&a - &b).norm() < 1e-12 * a.norm());
-    let difference = output.sensitivity() - both.sensitivity();
-    assert!(difference.norm() < 1e-12 * output.sensitivity().norm());
+    let exact = noise().with_exact_force();
+    // As good as none, but not none.
+    let next_to_none = NoiseSpectrum::new(
+        OMEGA.to_vec(),
+        (0..OMEGA.len())
+            .map(|row| {
+                let mut covariance = exact.covariance(row).clone();
+                covariance[(3, 3)] += Complex::from(1e-30);
+                covariance
+            })
+            .collect(),
+    );
+    let next_to_none = next_to_none.unwrap();
+    assert!(!exact.has_force() && next_to_none.has_force());
+    for (unknowns, theta) in unknowns() {
+        let data = data();
+        let mut output = Misfit::new(&data, &unknowns, &exact).unwrap();
+        let mut both = Misfit::new(&data, &unknowns, &next_to_none).unwrap();
+        let (left, right) = (cost(&mut output, &theta), cost(&mut both, &theta));
+        assert!((left / right - 1.0).abs() < 1e-12);
+        let [left, right] = [output, both].map(|mut m| m.normal_equations().unwrap());
+        assert!((&left.gram - right.gram).norm() < 1e-12 * left.gram.norm());
+        assert!((&left.gradient - right.gradient).norm() < 1e-12 * left.gradient.norm());
+    }
 }
 
 /// The sum of squares is the least distance, in the metric of the noise, between the
 /// measured forces and displacements and any that satisfy the equation of motion.
 #[test]
 fn the_true_force_is_eliminated() {
-    let (data, unknowns, noise) = (data(), unknowns(), noise());
-    let mut misfit = Misfit::new(&data, &unknowns, Noise::Both(&noise));
-    let mut residual = DVector::zeros(12);
-    assert!(misfit.residual(&theta(), &mut residual));
-    let [m, c, k] = unknowns.assemble(theta().as_slice());
-    let system = mechid_model::SecondOrderSystem::new(m, c, k).unwrap();
-    let mut distance = 0.0;
-    for row in 0..3 {
-        let receptance = system.receptance(data.omega()[row]).unwrap();
-        // z ≈ [G; I] F, whitened by the Cholesky factor of its whole covariance.
-        let mut tall = DMatrix::identity(4, 2);
-        tall.rows_mut(0, 2).copy_from(&receptance);
-        tall.rows_mut(2, 2).fill_with_identity();
-        let mut measured = DMatrix::zeros(4, 1);
-        measured.rows_mut(0, 2).tr_copy_from(&data.displacement().row(row));
-        measured.rows_mut(2, 2).tr_copy_from(&data.force().row(row));
-        let lower = cholesky(noise.covariance(row).clone()).unwrap();
-        lower.solve_lower_triangular_mut(&mut tall);
-        lower.solve_lower_triangular_mut(&mut measured);
-        let force = (tall.adjoint() * &tall).lu().solve(&(tall.adjoint() * &measured)).unwrap();
-        distance += 2.0 * (measured - tall * force).norm_squared();
+    let (data, noise) = (data(), noise());
+    for (unknowns, theta) in unknowns() {
+        let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
+        let sum = cost(&mut misfit, &theta);
+        let [m, c, k] = unknowns.assemble(theta.as_slice());
+        let system = mechid_model::SecondOrderSystem::new(m, c, k).unwrap();
+        let mut distance = 0.0;
+        for (row, omega) in OMEGA.into_iter().enumerate() {
+            let receptance = system.receptance(omega).unwrap();
+            // z ≈ [G; I] F, whitened by the Cholesky factor of its whole covariance.
+            let mut tall = DMatrix::identity(4, 2);
+            tall.rows_mut(0, 2).copy_from(&receptance);
+            tall.rows_mut(2, 2).fill_with_identity();
+            let mut measured = DMatrix::zeros(4, 1);
+            measured.rows_mut(0, 2).tr_copy_from(&data.displacement().row(row));
+            measured.rows_mut(2, 2).tr_copy_from(&data.force().row(row));
+            let lower = cholesky(noise.covariance(row).clone()).unwrap();
+            lower.solve_lower_triangular_mut(&mut tall);
+            lower.solve_lower_triangular_mut(&mut measured);
+            let force = (tall.adjoint() * &tall).lu().solve(&(tall.adjoint() * &measured)).unwrap();
+            distance += 2.0 * (measured - tall * force).norm_squared();
+        }
+        assert!((sum / distance - 1.0).abs() < 1e-10);
     }
-    assert!((residual.norm_squared() / distance - 1.0).abs() < 1e-10);
 }
 
 #[test]

@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::triangular::TriangularFactor;
 
 /// A sum of squares to be minimised over its parameters.
-pub(crate) trait SumOfSquares {
+pub(super) trait SumOfSquares {
     /// Number of residuals.
     fn residuals(&self) -> usize;
 
@@ -18,9 +18,8 @@ pub(crate) trait SumOfSquares {
 
 /// Where a search ended.
 #[derive(Debug, Clone)]
-pub(crate) struct Minimum {
+pub(super) struct Minimum {
     pub theta: DVector<f64>,
-    pub cost: f64,
     pub steps: usize,
     pub converged: bool,
 }
@@ -42,7 +41,7 @@ const MAX_DAMPING: f64 = 1e12;
 ///
 /// # Source
 /// Nocedal & Wright, *Numerical Optimization*, section 10.3; scaling after Moré (1978).
-pub(crate) fn minimise(
+pub(super) fn minimise(
     problem: &mut impl SumOfSquares,
     mut theta: DVector<f64>,
 ) -> Option<Minimum> {
@@ -63,7 +62,7 @@ pub(crate) fn minimise(
             let scaled_step = damped_step(&upper, columns, damping);
             let small = scaled_step.norm() <= STEP_TOLERANCE * scale.component_mul(&theta).norm();
             if small || reachable <= COST_TOLERANCE * cost {
-                return Some(Minimum { theta, cost, steps, converged: true });
+                return Some(Minimum { theta, steps, converged: true });
             }
             let trial = &theta - scaled_step.component_div(&scale);
             let exists = problem.residual(&trial, &mut trial_residual);
@@ -77,11 +76,11 @@ pub(crate) fn minimise(
             damping = f64::max(10.0 * damping, 1e-4);
             if damping > MAX_DAMPING {
                 // No descent in any direction: a minimum to within rounding.
-                return Some(Minimum { theta, cost, steps, converged: true });
+                return Some(Minimum { theta, steps, converged: true });
             }
         }
     }
-    Some(Minimum { theta, cost, steps: MAX_STEPS, converged: false })
+    Some(Minimum { theta, steps: MAX_STEPS, converged: false })
 }
 
 /// The triangle \[R q\] of \[J r\] with the columns of J scaled to unit length, and their lengths.

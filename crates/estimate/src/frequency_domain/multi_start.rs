@@ -1,0 +1,257 @@
+//! The least of the minima that searches from several starts lead to.
+
+use nalgebra::DVector;
+
+use super::search::{Minimum, SumOfSquares, minimise};
+use super::starts::Starts;
+use crate::EstimateError;
+
+/// Steps of the first search.
+const STEPS: usize = 200;
+/// Steps of the others, which are there to confirm it.
+const STEPS_MORE: usize = 60;
+/// Steps of a search in resampled data, which need not end at a minimum.
+const STEPS_RESAMPLED: usize = 15;
+/// Minima whose sums of squares differ by less than this share are one.
+const SAME: f64 = 1e-6;
+/// Sums of squares as small as this, in units of the noise or the response, are rounding.
+const EXACT: f64 = 1e-16;
+/// Starts whose sums of squares differ by less than this share are searched from last, for they
+/// would lead to the same minimum.
+const ALIKE: f64 = 0.01;
+/// Searches at least where the noise explains the best minimum.
+const CONFIRMED: usize = 2;
+/// Searches at least where it does not.
+const CONFIRMED_OTHERWISE: usize = 4;
+/// Rounds of linear least squares before a search.
+const LINEAR_ROUNDS: usize = 6;
+/// Restarts in a row that have to find nothing better where one minimum only has been seen.
+const RESTARTS: usize = 2;
+/// The same where there are several that the noise explains.
+const RESTARTS_AMONG_MANY: usize = 12;
+/// Restarts at most.
+const MAX_RESTARTS: u64 = 60;
+/// Ends of searches from which restarts are made, by turns.
+const RESTARTED: usize = 3;
+
+/// Sums of squares that noise explains.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Plausible {
+    /// That of a right model; `None` if the level of the noise is not known.
+    pub expected: Option<f64>,
+    /// How many times as large one may be by chance.
+    pub factor: f64,
+}
+
+/// The best minimum of several searches.
+#[derive(Debug, Clone)]
+pub(super) struct Found {
+    pub minimum: Minimum,
+    /// Number of searches.
+    pub searches: usize,
+    /// Number of searches that ended at this minimum.
+    pub agreeing: usize,
+}
+
+/// Searches from one start after the other; `problem` is left at the best minimum.
+///
+/// The search ends when all of the first few starts have led to one minimum. Otherwise it goes on from
+/// the best ends: a few steps in the data with every line weighted at random, then a search in the data
+/// themselves, until several restarts in a row have found nothing better. Minima due to the noise are
+/// others in resampled data; the global one is always near.
+///
+/// # Errors
+/// [`EstimateError::NotConverged`] if no search ends at a minimum.
+///
+/// # Source
+/// Wood (2001), Biometrics 57, 240–244 (bootstrap restarting); the weights, more unequal than those of a
+/// bootstrap, lead out of minima that it does not.
+pub(super) fn search(
+    problem: &mut impl SumOfSquares,
+    starts: &Starts<'_>,
+    plausible: Plausible,
+) -> Result<Found, EstimateError> {
+    let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };
+    for start in in_order(problem, starts.families()) {
+        let steps = if ends.searches == 0 { STEPS } else { STEPS_MORE };
+        let start = linear_rounds(problem, start, &plausible);
+        ends.push(start.and_then(|start| minimise(problem, start, steps)));
+        let needed = if ends.explained() { CONFIRMED } else { CONFIRMED_OTHERWISE };
+        if ends.searches >= needed && !ends.many() {
+            break;
+        }
+    }
+    if !ends.all_agree() {
+        restart(problem, &mut ends);
+    }
+    if let Some(open) = ends.open() {
+        ends.push(minimise(problem, open, STEPS));
+    }
+    let failed = EstimateError::NotConverged { searches: ends.searches, steps: STEPS };
+    let best = ends.distinct.into_iter().find(|end| end.minimum.converged).ok_or(failed)?;
+    problem.try_at(&best.minimum.theta);
+    problem.accept();
+    Ok(Found { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
+}
+
+/// Searches again from the best ends so far, moved by resampled data.
+fn restart(problem: &mut impl SumOfSquares, ends: &mut Ends) {
+    let mut without_gain = 0;
+    for seed in 0..MAX_RESTARTS {
+        let Some(from) = ends.turn(seed as usize) else { return };
+        problem.resample(Some(seed));
+        let moved = minimise(problem, from, STEPS_RESAMPLED);
+        problem.resample(None);
+        let gained = ends.push(moved.and_then(|m| minimise(problem, m.theta, STEPS_MORE)));
+        without_gain = if gained { 0 } else { without_gain + 1 };
+        let enough = if ends.many() { RESTARTS_AMONG_MANY } else { RESTARTS };
+        if without_gain >= enough {
+            return;
+        }
+    }
+}
+
+/// The best of some rounds of linear least squares, each with the weights of the one before: they cross
+/// wide regions in which a search would have to go in small steps. No rounds from where the noise
+/// explains the data already; `None` where the sum of squares does not exist.
+///
+/// # Source
+/// Sanathanan & Koerner (1963), IEEE Transactions on Automatic Control 8, 56–58.
+fn linear_rounds(
+    problem: &mut impl SumOfSquares,
+    start: DVector<f64>,
+    plausible: &Plausible,
+) -> Option<DVector<f64>> {
+    let mut cost = problem.try_at(&start)?;
+    let (mut best, mut theta) = (start.clone(), start);
+    for _ in 0..LINEAR_ROUNDS {
+        if plausible.explains(cost) {
+            break;
+        }
+        problem.accept();
+        let Some(step) = problem.linear_step() else { break };
+        theta += step;
+        let Some(now) = problem.try_at(&theta) else { break };
+        if now < cost {
+            (best, cost) = (theta.clone(), now);
+        }
+    }
+    Some(best)
+}
+
+impl Plausible {
+    fn explains(&self, cost: f64) -> bool {
+        self.expected.is_some_and(|expected| cost <= expected * self.factor)
+    }
+}
+
+/// Where searches have ended.
+struct Ends {
+    plausible: Plausible,
+    searches: usize,
+    /// Those of different sums of squares, the least first; converged or not.
+    distinct: Vec<End>,
+}
+
+/// One end of one or more searches.
+struct End {
+    minimum: Minimum,
+    count: usize,
+}
+
+impl Ends {
+    /// Counts a search and where it ended, if anywhere; whether that is better than any other.
+    fn push(&mut self, ended: Option<Minimum>) -> bool {
+        self.searches += 1;
+        let Some(minimum) = ended else { return false };
+        let same = |end: &&mut End| {
+            let (a, b) = (minimum.cost, end.minimum.cost);
+            (a - b).abs() <= SAME * a.max(b) + EXACT
+        };
+        if let Some(end) = self.distinct.iter_mut().find(same) {
+            end.count += 1;
+            if (minimum.converged, -minimum.cost) > (end.minimum.converged, -end.minimum.cost) {
+                end.minimum = minimum;
+            }
+            return false;
+        }
+        let place = self.distinct.partition_point(|end| end.minimum.cost < minimum.cost);
+        self.distinct.insert(place, End { minimum, count: 1 });
+        place == 0
+    }
+
+    /// Whether the noise explains the best end.
+    fn explained(&self) -> bool {
+        self.distinct.first().is_some_and(|end| self.plausible.explains(end.minimum.cost))
+    }
+
+    /// Whether every search has led to the same minimum.
+    fn all_agree(&self) -> bool {
+        matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
+    }
+
+    /// Whether noise may decide between several ends, or the best is no minimum.
+    fn many(&self) -> bool {
+        let Some(best) = self.distinct.first() else { return true };
+        let bound = best.minimum.cost * self.plausible.factor;
+        let close = self.distinct.get(1).is_some_and(|next| next.minimum.cost <= bound);
+        close || !best.minimum.converged
+    }
+
+    /// The best end where it is no minimum.
+    fn open(&self) -> Option<DVector<f64>> {
+        let best = &self.distinct.first()?.minimum;
+        (!best.converged).then(|| best.theta.clone())
+    }
+
+    /// One of the best ends.
+    fn turn(&self, at: usize) -> Option<DVector<f64>> {
+        let count = if self.many() { RESTARTED.min(self.distinct.len()) } else { 1 };
+        let end = self.distinct.get(at.checked_rem(count)?)?;
+        Some(end.minimum.theta.clone())
+    }
+}
+
+impl Found {
+    /// The minimum that this one has become for another weighting of the same residuals.
+    ///
+    /// # Errors
+    /// [`EstimateError::NotConverged`].
+    pub(super) fn followed(self, problem: &mut impl SumOfSquares) -> Result<Self, EstimateError> {
+        let Self { minimum: before, searches, agreeing } = self;
+        let minimum = minimise(problem, before.theta, STEPS).filter(|m| m.converged);
+        let mut minimum = minimum.ok_or(EstimateError::NotConverged { searches, steps: STEPS })?;
+        minimum.steps += before.steps;
+        Ok(Self { minimum, searches, agreeing })
+    }
+}
+
+/// The best of each family: first that of the first family, then the others in the order of their sums
+/// of squares, those like another one last.
+fn in_order(
+    problem: &mut impl SumOfSquares,
+    families: Vec<Vec<DVector<f64>>>,
+) -> Vec<DVector<f64>> {
+    let mut best: Vec<(usize, f64, DVector<f64>)> = Vec::new();
+    for (family, members) in families.into_iter().enumerate() {
+        let costs =
+            members.into_iter().filter_map(|start| Some((family, problem.try_at(&start)?, start)));
+        best.extend(costs.min_by(|a, b| a.1.total_cmp(&b.1)));
+    }
+    best.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (mut first, mut last): (Vec<_>, Vec<_>) = (Vec::new(), Vec::new());
+    let mut before = f64::NEG_INFINITY;
+    for (family, cost, start) in best {
+        if family == 0 {
+            first.insert(0, start);
+        } else if cost <= before * (1.0 + ALIKE) {
+            last.push(start);
+            continue;
+        } else {
+            first.push(start);
+        }
+        before = cost;
+    }
+    first.append(&mut last);
+    first
+}

@@ -1,0 +1,392 @@
+//! Normal equations of a Jacobian whose rows are Kronecker products, in coordinates that keep
+//! their condition number small.
+
+use std::rc::Rc;
+
+use mechid_model::Matrix;
+use mechid_model::linear_algebra::hermitian_eigen;
+use nalgebra::{DMatrix, DVector};
+
+use super::cholesky::Cholesky;
+use crate::Unknowns;
+use crate::triangular::TriangularFactor;
+
+/// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
+const DEPENDENT: f64 = 1e-14;
+/// Lines whose products are held at a time.
+const LINES: usize = 256;
+
+/// Which unknowns stand in which equation of motion.
+#[derive(Debug)]
+pub(super) struct Layout {
+    dof: usize,
+    unknowns: usize,
+    /// Columns of [M C K] that are unknown in at least one equation.
+    columns: Vec<(Matrix, usize)>,
+    equations: Vec<Equation>,
+}
+
+/// One equation of motion that has unknowns.
+#[derive(Debug)]
+struct Equation {
+    row: usize,
+    /// Places of its unknowns among all.
+    places: Vec<usize>,
+    /// Places of their columns in [`Layout::columns`].
+    columns: Vec<usize>,
+}
+
+/// Coordinates u = T θ, equation by equation, in which the regressors are orthonormal, scaled to a
+/// Gram matrix of unit diagonal.
+pub(super) struct Coordinates {
+    blocks: Vec<Block>,
+    scale: DVector<f64>,
+}
+
+struct Block {
+    row: usize,
+    places: Vec<usize>,
+    /// Of an equation with fewer unknown columns than there are: their span, orthonormal.
+    basis: Option<Rc<DMatrix<f64>>>,
+    /// T, upper triangular.
+    triangle: Rc<DMatrix<f64>>,
+}
+
+/// JᵀJ v = −Jᵀr for a step v.
+pub(super) struct NormalEquations {
+    /// JᵀJ, of unit diagonal.
+    pub gram: DMatrix<f64>,
+    /// Jᵀr.
+    pub gradient: DVector<f64>,
+    pub coordinates: Coordinates,
+}
+
+/// What a Jacobian √2 φ_l ⊗ W_l is made of, row block by row block.
+pub(super) struct Factors {
+    /// φ_l, columns of the layout × 2 lines, real parts first.
+    pub regressors: DMatrix<f64>,
+    /// W_lᴴW_l, 2 lines × dof², real parts first, columns in the order of a matrix.
+    pub weights: DMatrix<f64>,
+    /// W_lᴴr_l, 2 lines × dof, real parts first.
+    pub residuals: DMatrix<f64>,
+}
+
+impl Layout {
+    pub(super) fn new(unknowns: &Unknowns) -> Self {
+        let free = unknowns.free();
+        let mut columns: Vec<_> = free.iter().map(|p| (p.matrix(), p.column())).collect();
+        columns.sort_unstable_by_key(|(matrix, column)| (*matrix as usize, *column));
+        columns.dedup();
+        let equation = |row: usize| {
+            let own = free.iter().enumerate().filter(move |(_, p)| p.row() == row);
+            let place = |column: &(Matrix, usize)| {
+                columns.iter().position(|c| c == column).expect("a column of some equation")
+            };
+            let (places, columns) =
+                own.map(|(at, p)| (at, place(&(p.matrix(), p.column())))).unzip();
+            Equation { row, places, columns }
+        };
+        let equations: Vec<Equation> =
+            (0..unknowns.dof()).map(equation).filter(|e| !e.places.is_empty()).collect();
+        Self { dof: unknowns.dof(), unknowns: free.len(), columns, equations }
+    }
+
+    pub(super) fn columns(&self) -> &[(Matrix, usize)] {
+        &self.columns
+    }
+
+    /// The normal equations; turns the regressors into orthonormal ones. `None` if these are
+    /// dependent, or values overflow.
+    ///
+    /// With H = WᴴW the entry of unknowns (i, a) and (j, b) is 2 Re Σ φ̄_a φ_b H_ij: one product of a
+    /// matrix of pairs (a, b) and one of pairs (i, j), in a fraction 1/dof of the operations that
+    /// the rows of J take. The Gram matrix has the square of the condition number of J; with
+    /// regressors that are orthonormal over the lines weighted by ‖W_l‖ that is harmless, and a
+    /// rounded Gram matrix slows the search but does not move its end, where Jᵀr = 0.
+    ///
+    /// # Source
+    /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
+    /// Kronecker products).
+    pub(super) fn normal_equations(&self, factors: &mut Factors) -> Option<NormalEquations> {
+        let triangle = self.orthonormalise(factors)?;
+        let mut coordinates = Coordinates {
+            blocks: self.blocks(triangle),
+            scale: DVector::from_element(self.unknowns, 1.0),
+        };
+        let mut gram = self.gram(&self.products(factors), &coordinates);
+        for at in 0..self.unknowns {
+            let length = gram[(at, at)].sqrt();
+            coordinates.scale[at] = if length > 0.0 { length } else { 1.0 };
+        }
+        for (mut column, scale) in gram.column_iter_mut().zip(coordinates.scale.iter()) {
+            column.component_div_assign(&coordinates.scale);
+            column.unscale_mut(*scale);
+        }
+        let gradient = coordinates.project(&factors.regressors, &factors.residuals);
+        let finite = gram.iter().chain(gradient.iter()).all(|v| v.is_finite());
+        finite.then_some(NormalEquations { gram, gradient, coordinates })
+    }
+
+    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ.
+    fn orthonormalise(&self, factors: &mut Factors) -> Option<DMatrix<f64>> {
+        let lines = factors.weights.nrows() / 2;
+        let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
+        let power = diagonal.fold(DVector::zeros(2 * lines), |sum, own| sum + own);
+        let mut weighted = factors.regressors.transpose();
+        for mut column in weighted.column_iter_mut() {
+            for (at, value) in column.iter_mut().enumerate() {
+                *value *= power[at % lines].sqrt();
+            }
+        }
+        let mut factor = TriangularFactor::new(self.columns.len());
+        if !factor.push(&[weighted.as_view()]) {
+            return None;
+        }
+        let r = factor.r().clone();
+        let independent = |at: usize| r[(at, at)].abs() > DEPENDENT * r.column(at).norm();
+        let solved = (0..self.columns.len()).all(independent)
+            && r.tr_solve_upper_triangular_mut(&mut factors.regressors);
+        solved.then_some(r)
+    }
+
+    fn blocks(&self, triangle: DMatrix<f64>) -> Vec<Block> {
+        let whole = Rc::new(triangle);
+        let mut blocks: Vec<Block> = Vec::new();
+        for (at, equation) in self.equations.iter().enumerate() {
+            let same = self.equations[..at].iter().position(|e| e.columns == equation.columns);
+            let (basis, triangle) = match same {
+                Some(same) => (blocks[same].basis.clone(), blocks[same].triangle.clone()),
+                None if equation.columns.len() == self.columns.len() => (None, whole.clone()),
+                None => {
+                    let (q, r) = whole.select_columns(&equation.columns).qr().unpack();
+                    (Some(Rc::new(q)), Rc::new(r))
+                }
+            };
+            let (row, places) = (equation.row, equation.places.clone());
+            blocks.push(Block { row, places, basis, triangle });
+        }
+        blocks
+    }
+
+    /// 2 Re Σ φ̄_a φ_b H_ij: pairs a ≤ b × dof².
+    fn products(&self, factors: &Factors) -> DMatrix<f64> {
+        let (q, lines) = (self.columns.len(), factors.weights.nrows() / 2);
+        let mut sums = DMatrix::zeros(q * (q + 1) / 2, self.dof * self.dof);
+        let mut pairs = DMatrix::zeros(sums.nrows(), LINES.min(lines));
+        for start in (0..lines).step_by(LINES) {
+            let len = LINES.min(lines - start);
+            for imaginary in [false, true] {
+                for (at, mut column) in pairs.columns_mut(0, len).column_iter_mut().enumerate() {
+                    let re = factors.regressors.column(start + at);
+                    let im = factors.regressors.column(lines + start + at);
+                    let mut next = column.iter_mut();
+                    for b in 0..q {
+                        for (a, to) in (0..=b).zip(&mut next) {
+                            *to = match imaginary {
+                                false => 2.0 * (re[a] * re[b] + im[a] * im[b]),
+                                true => 2.0 * (im[a] * re[b] - re[a] * im[b]),
+                            };
+                        }
+                    }
+                }
+                let first = if imaginary { lines + start } else { start };
+                sums.gemm(1.0, &pairs.columns(0, len), &factors.weights.rows(first, len), 1.0);
+            }
+        }
+        sums
+    }
+
+    fn gram(&self, products: &DMatrix<f64>, coordinates: &Coordinates) -> DMatrix<f64> {
+        let q = self.columns.len();
+        let mut gram = DMatrix::zeros(self.unknowns, self.unknowns);
+        let mut part = DMatrix::zeros(q, q);
+        let mut column = 0;
+        for right in &coordinates.blocks {
+            let mut row = 0;
+            for left in &coordinates.blocks {
+                let upper = products.column(left.row + self.dof * right.row);
+                let lower = products.column(right.row + self.dof * left.row);
+                let mut pair = 0;
+                for b in 0..q {
+                    for a in 0..=b {
+                        part[(a, b)] = upper[pair];
+                        part[(b, a)] = lower[pair];
+                        pair += 1;
+                    }
+                }
+                let (rows, columns) = (left.places.len(), right.places.len());
+                let mut to = gram.view_mut((row, column), (rows, columns));
+                match (&left.basis, &right.basis) {
+                    (None, None) => to.copy_from(&part),
+                    (None, Some(right)) => to.copy_from(&(&part * &**right)),
+                    (Some(left), None) => to.copy_from(&left.tr_mul(&part)),
+                    (Some(left), Some(right)) => to.copy_from(&left.tr_mul(&(&part * &**right))),
+                }
+                row += rows;
+            }
+            column += right.places.len();
+        }
+        gram
+    }
+}
+
+impl NormalEquations {
+    /// (JᵀJ)⁻¹ of the unknowns, and the condition number of J with columns of unit length.
+    ///
+    /// `None` if JᵀJ is singular to rounding.
+    pub(super) fn covariance(&self) -> Option<(DMatrix<f64>, f64)> {
+        let inverse = Cholesky::new(&self.gram, 0.0)?.inverse_of_lower();
+        // Rows T⁻¹D⁻¹L⁻ᵀ of the unknowns, whose products are the covariances.
+        let roots = self.coordinates.unknowns_of_columns(&inverse.transpose());
+        let covariance = &roots * roots.transpose();
+        let lengths = self.coordinates.lengths(&self.gram);
+        let gram = |x: &DVector<f64>| {
+            let inner = &self.gram * self.coordinates.of(&x.component_div(&lengths));
+            self.coordinates.transposed(&inner).component_div(&lengths)
+        };
+        let inverse =
+            |x: &DVector<f64>| (&covariance * x.component_mul(&lengths)).component_mul(&lengths);
+        let largest = |of: &dyn Fn(&DVector<f64>) -> DVector<f64>| largest(lengths.len(), of);
+        let condition = (largest(&gram) * largest(&inverse)).sqrt();
+        covariance.iter().all(|v| v.is_finite()).then_some((covariance, condition.max(1.0)))
+    }
+}
+
+/// Steps of Lanczos, after which an extreme eigenvalue is known to many digits.
+const LANCZOS: usize = 80;
+
+/// The largest eigenvalue of a symmetric positive definite matrix, given by its products.
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 10.1 (Lanczos), with all vectors
+/// kept orthogonal.
+fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 {
+    let mut basis: Vec<DVector<f64>> = Vec::new();
+    let mut projected = DMatrix::zeros(LANCZOS.min(size), LANCZOS.min(size));
+    // Anything that is orthogonal to no eigenvector.
+    let mut next = DVector::from_fn(size, |at, _| 1.0 + (0.7 * (at * at) as f64).sin());
+    for at in 0..projected.nrows() {
+        let norm = next.norm();
+        if at > 0 {
+            if norm <= f64::EPSILON * projected[(at - 1, at - 1)] {
+                projected = projected.view((0, 0), (at, at)).into_owned();
+                break;
+            }
+            (projected[(at, at - 1)], projected[(at - 1, at)]) = (norm, norm);
+        }
+        next.unscale_mut(norm);
+        let own = next.clone();
+        next = product(&own);
+        projected[(at, at)] = own.dot(&next);
+        basis.push(own);
+        for _ in 0..2 {
+            for vector in &basis {
+                let along = vector.dot(&next);
+                next.axpy(-along, vector, 1.0);
+            }
+        }
+    }
+    hermitian_eigen(projected).map_or(f64::INFINITY, |found| found.eigenvalues.max())
+}
+
+impl Coordinates {
+    /// The unknowns themselves.
+    #[cfg(test)]
+    pub(super) fn plain(unknowns: usize) -> Self {
+        let triangle = Rc::new(DMatrix::identity(unknowns, unknowns));
+        let block = Block { row: 0, places: (0..unknowns).collect(), basis: None, triangle };
+        Self { blocks: vec![block], scale: DVector::from_element(unknowns, 1.0) }
+    }
+
+    /// 2 Re Σ φ̄ y for every unknown: Jᵀ of what W_lᴴ has made y of, 2 lines × dof.
+    pub(super) fn project(
+        &self,
+        regressors: &DMatrix<f64>,
+        weighted: &DMatrix<f64>,
+    ) -> DVector<f64> {
+        let all = (regressors * weighted) * 2.0;
+        let mut projected = DVector::zeros(self.scale.len());
+        for (block, start) in self.starts() {
+            let own = all.column(block.row);
+            let mut to = projected.rows_mut(start, block.places.len());
+            match &block.basis {
+                None => to.copy_from(&own),
+                Some(basis) => to.copy_from(&basis.tr_mul(&own)),
+            }
+        }
+        projected.component_div_assign(&self.scale);
+        projected
+    }
+
+    /// Unknowns θ at coordinates v.
+    pub(super) fn unknowns(&self, coordinates: &DVector<f64>) -> DVector<f64> {
+        let columns = DMatrix::from_column_slice(coordinates.len(), 1, coordinates.as_slice());
+        self.unknowns_of_columns(&columns).column(0).into_owned()
+    }
+
+    /// Unknowns θ at the coordinates v in each column.
+    fn unknowns_of_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut unknowns = coordinates.clone();
+        for (block, start) in self.starts() {
+            let len = block.places.len();
+            let mut own = coordinates.rows(start, len).into_owned();
+            for (mut row, scale) in own.row_iter_mut().zip(self.scale.rows(start, len).iter()) {
+                row.unscale_mut(*scale);
+            }
+            let solved = block.triangle.solve_upper_triangular_mut(&mut own);
+            debug_assert!(solved, "independent regressors");
+            for (at, row) in block.places.iter().zip(own.row_iter()) {
+                unknowns.row_mut(*at).copy_from(&row);
+            }
+        }
+        unknowns
+    }
+
+    /// Coordinates v of unknowns θ.
+    pub(super) fn of(&self, unknowns: &DVector<f64>) -> DVector<f64> {
+        let mut coordinates = DVector::zeros(self.scale.len());
+        for (block, start) in self.starts() {
+            let own = block.places.iter().map(|at| unknowns[*at]);
+            let own = DVector::from_iterator(block.places.len(), own);
+            coordinates.rows_mut(start, own.len()).copy_from(&(&*block.triangle * own));
+        }
+        coordinates.component_mul_assign(&self.scale);
+        coordinates
+    }
+
+    /// The transpose of what makes coordinates of unknowns.
+    fn transposed(&self, coordinates: &DVector<f64>) -> DVector<f64> {
+        let mut unknowns = DVector::zeros(self.scale.len());
+        let scaled = coordinates.component_mul(&self.scale);
+        for (block, start) in self.starts() {
+            let own = block.triangle.tr_mul(&scaled.rows(start, block.places.len()));
+            block.places.iter().zip(own.iter()).for_each(|(at, value)| unknowns[*at] = *value);
+        }
+        unknowns
+    }
+
+    /// Lengths of the columns of J, of the unknowns, from the Gram matrix of the coordinates.
+    fn lengths(&self, gram: &DMatrix<f64>) -> DVector<f64> {
+        let mut lengths = DVector::zeros(self.scale.len());
+        for (block, start) in self.starts() {
+            let len = block.places.len();
+            let mut root = (*block.triangle).clone();
+            for (mut row, scale) in root.row_iter_mut().zip(self.scale.rows(start, len).iter()) {
+                row.scale_mut(*scale);
+            }
+            let inner = gram.view((start, start), (len, len)) * &root;
+            for (at, place) in block.places.iter().enumerate() {
+                lengths[*place] = root.column(at).dot(&inner.column(at)).sqrt();
+            }
+        }
+        lengths
+    }
+
+    fn starts(&self) -> impl Iterator<Item = (&Block, usize)> {
+        self.blocks.iter().scan(0, |next, block| {
+            let start = *next;
+            *next += block.places.len();
+            Some((block, start))
+        })
+    }
+}

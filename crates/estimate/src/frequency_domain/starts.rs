@@ -1,0 +1,248 @@
+//! Starts of the search for the maximum of the likelihood: linear estimates of the equation of
+//! motion, with weights and corrections for noise.
+
+use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_model::{Matrix, Parameter, SecondOrderSystem};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::equation_error::weighted_equation_errors;
+use super::misfit::powers;
+use super::{FrequencyData, NoiseSpectrum};
+use crate::triangular::TriangularFactor;
+use crate::{Estimate, Unknowns};
+
+/// Exponents e of the weights ω^−e that stand in for a noise that is white in the displacement,
+/// whose part in the equation of motion grows with ω² where mass decides.
+const EXPONENTS: [i32; 3] = [0, -2, -3];
+/// Rounds of weighting by the dynamic stiffness found before.
+const ROUNDS: usize = 4;
+
+/// Linear estimates from spectra, each equation of motion by itself.
+pub(super) struct Starts<'a> {
+    data: &'a FrequencyData,
+    unknowns: &'a Unknowns,
+    noise: &'a NoiseSpectrum,
+    equations: Vec<Equation>,
+    nominal: Option<DVector<f64>>,
+}
+
+/// The unknowns of one equation of motion and their places among all.
+struct Equation {
+    row: usize,
+    own: Vec<(usize, Parameter)>,
+}
+
+/// How noise on the regressors is treated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Taken for none: ordinary least squares.
+    Ordinary,
+    /// Least squares in the metric of the noise of regressors and force: consistent.
+    Total,
+}
+
+/// Weights of the equations, rows × dof.
+type Weights = DMatrix<f64>;
+
+impl<'a> Starts<'a> {
+    pub(super) fn new(
+        data: &'a FrequencyData,
+        unknowns: &'a Unknowns,
+        noise: &'a NoiseSpectrum,
+    ) -> Self {
+        let free = unknowns.free();
+        let equation = |row| {
+            let own = free.iter().copied().enumerate().filter(|(_, p)| p.row() == row);
+            Equation { row, own: own.collect() }
+        };
+        let equations = (0..unknowns.dof()).map(equation).filter(|e| !e.own.is_empty()).collect();
+        Self { data, unknowns, noise, equations, nominal: None }
+    }
+
+    /// The same, with the entries of a machine expected to be near.
+    pub(super) fn with_nominal(mut self, nominal: Option<&SecondOrderSystem>) -> Self {
+        let entry = |system: &SecondOrderSystem, p: &Parameter| {
+            system.matrix(p.matrix())[(p.row(), p.column())]
+        };
+        let free = self.unknowns.free();
+        self.nominal = nominal.map(|system| {
+            DVector::from_iterator(free.len(), free.iter().map(|p| entry(system, p)))
+        });
+        self
+    }
+
+    /// Every start, those that are rounds of one iteration together, the most trusted first: total least
+    /// squares and ordinary ones weighted by the dynamic stiffness found before, then the machine
+    /// expected and ordinary least squares with weights ω^−e and with those of the noise.
+    pub(super) fn families(&self) -> Vec<Vec<DVector<f64>>> {
+        let powers =
+            EXPONENTS.map(|exponent| self.estimate(Kind::Ordinary, &self.powers(exponent)));
+        let reweighted = |kind| powers[..2].iter().flatten().map(move |s| self.reweighted(kind, s));
+        let total: Vec<_> = reweighted(Kind::Total).flatten().collect();
+        let ordinary = reweighted(Kind::Ordinary);
+        let weighted = weighted_equation_errors(self.data, self.unknowns);
+        let single = self.estimate(Kind::Total, &self.powers(0)).into_iter();
+        let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
+        let single = single.chain(weighted.map(|found| values(&found)));
+        std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start])).collect()
+    }
+
+    /// The estimates of every round of weighting, from `start` on.
+    fn reweighted(&self, kind: Kind, start: &DVector<f64>) -> Vec<DVector<f64>> {
+        let mut rounds: Vec<DVector<f64>> = Vec::new();
+        for _ in 0..ROUNDS {
+            let weights = self.weights(rounds.last().unwrap_or(start));
+            let Some(next) = weights.and_then(|w| self.estimate(kind, &w)) else { break };
+            rounds.push(next);
+        }
+        rounds
+    }
+
+    fn powers(&self, exponent: i32) -> Weights {
+        let omega = self.data.omega();
+        let middle = omega[omega.len() / 2];
+        DMatrix::from_fn(omega.len(), self.data.dof(), |row, _| {
+            (omega[row] / middle).powi(exponent)
+        })
+    }
+
+    /// One over the standard deviation of D ΔX − ΔF, by the dynamic stiffness D of `theta`.
+    fn weights(&self, theta: &DVector<f64>) -> Option<Weights> {
+        let matrices = self.unknowns.assemble(theta.as_slice());
+        let n = self.data.dof();
+        let mut weights = DMatrix::zeros(self.data.len(), n);
+        let mut z = DVector::zeros(2 * n);
+        for (line, &omega) in self.data.omega().iter().enumerate() {
+            let powers = powers(omega);
+            let covariance = self.noise.covariance(line);
+            for i in 0..n {
+                for j in 0..n {
+                    let stiffness =
+                        Matrix::ALL.map(|m| powers[m as usize] * matrices[m as usize][(i, j)]);
+                    z[j] = stiffness.iter().sum::<Complex<f64>>().conj();
+                    z[n + j] = Complex::from(if i == j { -1.0 } else { 0.0 });
+                }
+                let variance = z.dotc(&(covariance * &z)).re;
+                weights[(line, i)] = variance.sqrt().recip();
+            }
+        }
+        weights.iter().all(|w| w.is_finite()).then_some(weights)
+    }
+
+    fn estimate(&self, kind: Kind, weights: &Weights) -> Option<DVector<f64>> {
+        let mut theta = DVector::zeros(self.equations.iter().map(|e| e.own.len()).sum());
+        for equation in &self.equations {
+            let weights: Vec<f64> = weights.column(equation.row).iter().copied().collect();
+            let mut triangle = self.triangle(equation, &weights)?;
+            let scale = DVector::from_iterator(
+                triangle.ncols(),
+                triangle.column_iter().map(|c| c.norm()).map(|l| if l > 0.0 { l } else { 1.0 }),
+            );
+            triangle.column_iter_mut().zip(scale.iter()).for_each(|(mut c, s)| c.unscale_mut(*s));
+            let last = equation.own.len();
+            let values = match kind {
+                Kind::Ordinary => triangle
+                    .view((0, 0), (last, last))
+                    .solve_upper_triangular(&triangle.view((0, last), (last, 1)))?,
+                Kind::Total => {
+                    let mut noise = self.noise_gram(equation, &weights);
+                    for (at, value) in noise.iter_mut().enumerate() {
+                        *value /= scale[at % scale.len()] * scale[at / scale.len()];
+                    }
+                    total_least_squares(&triangle, &noise)?
+                }
+            };
+            for (at, (place, _)) in equation.own.iter().enumerate() {
+                theta[*place] = values[at] * (scale[last] / scale[at]);
+            }
+        }
+        theta.iter().all(|v| v.is_finite()).then_some(theta)
+    }
+
+    /// R of the weighted regressors and, last, the force less what known entries account for.
+    fn triangle(&self, equation: &Equation, weights: &[f64]) -> Option<DMatrix<f64>> {
+        let (lines, last) = (self.data.len(), equation.own.len());
+        let (x, force) = (self.data.displacement(), self.data.force());
+        let mut rows = DMatrix::zeros(2 * lines, last + 1);
+        for (line, &omega) in self.data.omega().iter().enumerate() {
+            let powers = powers(omega);
+            let mut put = |column: usize, z: Complex<f64>| {
+                let z = z * weights[line];
+                (rows[(line, column)], rows[(lines + line, column)]) = (z.re, z.im);
+            };
+            for (at, (_, p)) in equation.own.iter().enumerate() {
+                put(at, powers[p.matrix() as usize] * x[(line, p.column())]);
+            }
+            let mut target = force[(line, equation.row)];
+            for (matrix, column, value) in self.known(equation.row) {
+                target -= powers[matrix as usize] * x[(line, column)] * value;
+            }
+            put(last, target);
+        }
+        let mut factor = TriangularFactor::new(last + 1);
+        factor.push(&[rows.as_view()]).then(|| factor.r().clone())
+    }
+
+    /// E of the Gram matrix of the columns of [`Starts::triangle`] that noise alone would have.
+    fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
+        let (n, last) = (self.data.dof(), equation.own.len());
+        let mut gram = DMatrix::zeros(last + 1, last + 1);
+        // How the noise of displacements and forces enters each column.
+        let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); last + 1];
+        for (line, &omega) in self.data.omega().iter().enumerate() {
+            let powers = powers(omega).map(|power| power * weights[line]);
+            for (at, (_, p)) in equation.own.iter().enumerate() {
+                enters[at] = vec![(p.column(), powers[p.matrix() as usize])];
+            }
+            let known = self.known(equation.row).map(|(m, c, v)| (c, -powers[m as usize] * v));
+            enters[last] = known.collect();
+            enters[last].push((n + equation.row, Complex::from(weights[line])));
+            let covariance = self.noise.covariance(line);
+            for b in 0..=last {
+                for a in 0..=b {
+                    for (i, left) in &enters[a] {
+                        for (j, right) in &enters[b] {
+                            // E[Δz̄_i Δz_j] is the conjugate of what the covariance has.
+                            gram[(a, b)] += (left.conj() * right * covariance[(*j, *i)]).re;
+                        }
+                    }
+                }
+            }
+        }
+        gram.fill_lower_triangle_with_upper_triangle();
+        gram
+    }
+
+    /// The entries of an equation of motion that are known and not zero.
+    fn known(&self, row: usize) -> impl Iterator<Item = (Matrix, usize, f64)> + '_ {
+        let entries = Matrix::ALL
+            .into_iter()
+            .flat_map(|m| (0..self.data.dof()).map(move |column| (m, column)));
+        entries.filter_map(move |(matrix, column)| {
+            let value = self.unknowns.fixed(matrix, row, column).filter(|v| *v != 0.0)?;
+            Some((matrix, column, value))
+        })
+    }
+}
+
+fn values(estimate: &Estimate) -> DVector<f64> {
+    let parameters = estimate.parameters();
+    DVector::from_iterator(parameters.len(), parameters.map(|p| p.value))
+}
+
+/// θ for which |R [θ; −1]|² is least against [θ; −1]ᵀ N [θ; −1].
+///
+/// # Source
+/// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 6.3; Pintelon & Schoukens, *System
+/// Identification: A Frequency Domain Approach*, the chapter on estimation with known noise models
+/// (weighted generalized total least squares, bootstrapped).
+fn total_least_squares(triangle: &DMatrix<f64>, noise: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let lower = triangle.transpose();
+    let half = lower.solve_lower_triangular(noise)?;
+    let ratio = lower.solve_lower_triangular(&half.transpose())?;
+    let eigen = hermitian_eigen(ratio).ok()?;
+    let most = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    let solution = triangle.solve_upper_triangular(&most)?;
+    let last = triangle.ncols() - 1;
+    Some(DMatrix::from_fn(last, 1, |at, _| -solution[at] / solution[last]))
+}
