@@ -64,10 +64,7 @@ impl Machine {
     }
 
     /// Rate matrix A and input matrix B of z = [x; ẋ], ż = A z + B F.
-    fn state_matrices<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+    fn state_matrices<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 2]> {
         let system = self.0.system();
         let (rate, input) = py.detach(|| {
             let n = system.dof();
@@ -76,7 +73,7 @@ impl Machine {
             input.view_mut((n, 0), (n, n)).copy_from(&StateTransition::force_input(system, 1.0));
             (StateTransition::rate(system, 1.0), input)
         });
-        Ok((arrays::matrix(py, rate)?, arrays::matrix(py, input)?))
+        Ok([arrays::matrix(py, rate)?, arrays::matrix(py, input)?])
     }
 
     /// Modes as the program tells them: JSON and text.
