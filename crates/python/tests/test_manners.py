@@ -25,7 +25,7 @@ rng = np.random.default_rng(1)
 f, x, v = rng.standard_normal((3, 400_000))
 print("ready", flush=True)
 mechid.identify(f, x, velocity=v, fs=1000.0, domain="time", between_samples="euler",
-                refine=100, interpolation="spline")
+                refine=40, interpolation="spline")
 """
 
 
