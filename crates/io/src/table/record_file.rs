@@ -56,7 +56,7 @@ pub struct RecordFile {
 /// Result of one pass over some columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// Their time axis.
+    /// Time axis of the columns.
     pub sampling: Sampling,
     /// Mean of each, in its unit.
     pub means: Vec<f64>,
@@ -102,7 +102,7 @@ impl RecordFile {
         &self.head
     }
 
-    /// Whether [`RecordFile::head`] has all samples.
+    /// Returns whether [`RecordFile::head`] has all samples.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
