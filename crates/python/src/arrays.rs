@@ -3,7 +3,7 @@
 use mechid::model::ResponseQuantity;
 use mechid::signal::Record;
 use nalgebra::DMatrix;
-use numpy::{Element, IntoPyArray as _, PyArray2, PyArrayMethods as _};
+use numpy::{Element, IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};
 use pyo3::prelude::*;
 
 /// Returns an array of rows × columns of its own.
@@ -21,6 +21,11 @@ pub fn matrix<'py, T: Element + nalgebra::Scalar>(
 /// Returns an array of samples × channels of its own.
 pub fn record(py: Python<'_>, record: Record) -> PyResult<Bound<'_, PyArray2<f64>>> {
     matrix(py, record.into_data())
+}
+
+/// Returns a vector of its own.
+pub fn vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
+    values.into_pyarray(py)
 }
 
 /// Name of a kind of response, and its samples × degrees of freedom.

@@ -5,11 +5,14 @@ use std::sync::Arc;
 use mechid::Identify;
 use mechid::analysis::AnalysisError;
 use mechid::analysis::identify::ValidationWindow;
+use mechid::report::{PageSettings, page};
+use nalgebra::Complex;
+use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
 use crate::machine::Machine;
 use crate::measurement::Measurement;
-use crate::{failure, work};
+use crate::{answer, arrays, failure, work};
 
 /// An identified machine, and what it was identified from.
 #[pyclass(frozen, module = "mechid._mechid")]
@@ -45,6 +48,16 @@ pub fn identify(
     work::watched(py, threads, || Ok(()), find).map(|found| Identified(Arc::new(found)))
 }
 
+/// A kind of response, measured and predicted.
+type Compared<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// Frequencies, force and displacement.
+type Spectra<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<Complex<f64>>>,
+    Bound<'py, PyArray2<Complex<f64>>>,
+);
+
 /// Samples to predict.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,6 +82,43 @@ impl Identified {
     /// The result as a person reads it.
     fn text(&self) -> String {
         self.0.to_string()
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        answer::svg(py, Arc::clone(&self.0))
+    }
+
+    /// The page of the program's report, as HTML.
+    fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
+        let settings = PageSettings { title, reconstruct_force: force, command: None };
+        let found = Arc::clone(&self.0);
+        work::watched(py, None, || Ok(()), move || page(&found, &settings))
+    }
+
+    /// Measured and predicted response of the first record.
+    fn compared<'py>(&self, py: Python<'py>) -> PyResult<Vec<Compared<'py>>> {
+        let found = Arc::clone(&self.0);
+        let all = work::watched(py, None, || Ok(()), move || found.compared())?;
+        let all = all.into_iter().map(|one| {
+            let [measured, predicted] = [one.measured, one.predicted];
+            Ok((
+                one.kind.to_string(),
+                arrays::record(py, measured)?,
+                arrays::record(py, predicted)?,
+            ))
+        });
+        all.collect()
+    }
+
+    /// Frequencies in rad/s, and amplitudes of force and displacement on the lines fitted, in N and m.
+    fn spectra<'py>(&self, py: Python<'py>) -> PyResult<Option<Spectra<'py>>> {
+        let Some(data) = self.0.spectra() else { return Ok(None) };
+        Ok(Some((
+            arrays::vector(py, data.omega().to_vec()),
+            arrays::matrix(py, data.force().clone())?,
+            arrays::matrix(py, data.displacement().clone())?,
+        )))
     }
 
     /// Confidence interval of a parameter.

@@ -6,16 +6,22 @@
 //! a pool of threads of this process ([`work`]); failures and panics become `MechidError`
 //! ([`failure`]).
 
+mod answer;
 mod arrays;
 mod failure;
 mod identified;
 mod machine;
 mod measurement;
 mod program;
+mod questions;
+mod reconstructed;
+mod simulated;
 mod work;
 
 #[pyo3::pymodule(gil_used = false)]
 mod _mechid {
+    #[pymodule_export]
+    use super::answer::Answer;
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]
@@ -24,6 +30,12 @@ mod _mechid {
     use super::measurement::Measurement;
     #[pymodule_export]
     use super::program::program;
+    #[pymodule_export]
+    use super::questions::{frf, inspect, sweep};
+    #[pymodule_export]
+    use super::reconstructed::{Reconstructed, reconstruct};
+    #[pymodule_export]
+    use super::simulated::{integrate, multisine, predict, simulate};
 
     use pyo3::prelude::*;
 

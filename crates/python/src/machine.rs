@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use mechid::analysis::{AnalysisError, ModalSummary};
 use mechid::model::{SecondOrderSystem, StateTransition};
-use nalgebra::DMatrix;
+use mechid::report::{ReportError, ToFigure as _};
+use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -74,6 +75,26 @@ impl Machine {
             (StateTransition::rate(system, 1.0), input)
         });
         Ok([arrays::matrix(py, rate)?, arrays::matrix(py, input)?])
+    }
+
+    /// Receptances x_i / F_j at frequencies in rad/s, of frequencies × motions · forces.
+    fn receptances<'py>(
+        &self,
+        py: Python<'py>,
+        omega: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray2<Complex<f64>>>> {
+        let system = self.0.system();
+        let found = work::brief(py, || system.receptances(&omega))?;
+        let n = system.dof();
+        let flat = DMatrix::from_fn(found.len(), n * n, |row, at| found[row][(at / n, at % n)]);
+        arrays::matrix(py, flat)
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        let machine = self.0.clone();
+        let draw = move || -> Result<String, ReportError> { Ok(machine.figure()?.to_svg()?) };
+        work::watched(py, None, || Ok(()), draw)
     }
 
     /// Modes as the program tells them: JSON and text.

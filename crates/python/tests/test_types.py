@@ -8,6 +8,9 @@ import sys
 from .conftest import ROOT
 
 
+EXAMPLES = sorted(path.as_posix() for path in (ROOT / "crates/python/examples").glob("[0-9]*.py"))
+
+
 def told(*arguments: str) -> str:
     ended = subprocess.run(
         [sys.executable, "-m", *arguments], cwd=ROOT / "crates/python", capture_output=True, text=True
@@ -17,7 +20,7 @@ def told(*arguments: str) -> str:
 
 
 def test_the_package_is_typed_strictly() -> None:
-    assert "no issues found" in told("mypy", "--strict", "python/mechid")
+    assert "no issues found" in told("mypy", "--strict", "python/mechid", *EXAMPLES)
 
 
 def test_the_stub_is_the_compiled_module() -> None:

@@ -117,17 +117,8 @@ class Measurement:
             If the file cannot be read or has no such columns or samples.
         """
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
-        plan = {
-            "path": os.fspath(path),
-            "channels": {kind: _names(kind, given) for kind, given in columns.items()},
-            "reading": {
-                "skip_lines": skip_lines,
-                "time": time,
-                "sample_rate_hz": _rate(fs),
-                "detrend": detrend,
-            },
-            "window": _window(window),
-        }
+        channels = {kind: _names(kind, given) for kind, given in columns.items()}
+        plan = plan_of(path, channels, fs, time, skip_lines, detrend, window)
         return cls(_mechid.Measurement.open(json.dumps(plan)))
 
     @classmethod
@@ -365,6 +356,30 @@ def measurements(
         if name in arrays:
             raise TypeError(f"`{name}` belongs to files")
     return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
+
+
+def plan_of(
+    path: str | os.PathLike[str],
+    channels: Mapping[str, list[str]],
+    fs: float | None,
+    time: str | None,
+    skip_lines: int,
+    detrend: str,
+    window: Window,
+) -> dict[str, object]:
+    """Return what opens a file."""
+    reading = {"skip_lines": skip_lines, "time": time, "sample_rate_hz": _rate(fs), "detrend": detrend}
+    return {
+        "path": os.fspath(path),
+        "channels": dict(channels),
+        "reading": reading,
+        "window": _window(window),
+    }
+
+
+def matrix(name: str, values: object) -> NDArray[np.float64]:
+    """Return an array of samples × degrees of freedom of real numbers."""
+    return np.stack(_columns(name, values), axis=1)
 
 
 def _is_table(source: object) -> bool:

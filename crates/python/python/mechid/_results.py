@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NoReturn, Unpack, final
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, Protocol, Unpack, final
 
 import numpy as np
 
 from . import _mechid
-from ._records import Measurement, RecordOptions, measurements
+from ._errors import MechidError
+from ._records import Measurement, RecordOptions, Window, measurements
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -209,8 +211,49 @@ class Result:
         return settings
 
 
+class _Compiled(Protocol):
+    """What every compiled result can do."""
+
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+
+
+class Drawn(Result):
+    """A result that the program draws."""
+
+    @property
+    def _compiled(self) -> _Compiled:
+        inner: _Compiled = self.__dict__["_inner"]
+        return inner
+
+    def to_json(self) -> str:
+        """Return the result as the program prints it with ``--json``."""
+        return self._compiled.to_json()
+
+    def to_svg(self) -> str:
+        """Return the picture that the program draws with ``--plot``, as SVG.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return self._compiled.svg()
+
+    def _repr_html_(self) -> str:
+        text = f"<pre>{html.escape(str(self))}</pre>"
+        try:
+            return f"<div>{self.to_svg()}{text}</div>"
+        except MechidError:
+            return text
+
+    def __str__(self) -> str:
+        return self._compiled.text()
+
+
 @final
-class Identified(Result):
+class Identified(Drawn):
     """An identified machine, with what speaks for and against it.
 
     ``print`` shows it as the program does; `to_json` is the JSON of the program.
@@ -331,12 +374,50 @@ class Identified(Result):
         samples = json.dumps({"start": validate_start, "samples": validate_samples})
         return Validation._of(json.loads(self._inner.validate(other._inner, samples)))
 
-    def to_json(self) -> str:
-        """Return the result as the program prints it with ``--json``."""
-        return self._inner.to_json()
+    @property
+    def compared(self) -> Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Measured and predicted response of the first record by quantity, in SI units."""
+        return MappingProxyType({kind: (m, p) for kind, m, p in self._inner.compared()})
 
-    def __str__(self) -> str:
-        return self._inner.text()
+    @property
+    def spectra(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]] | None:
+        """Frequencies in Hz, force in N and displacement in m on the lines that were fitted.
+
+        Arrays of shape (lines, degrees of freedom); None for a fit in the time domain.
+        """
+        found = self._inner.spectra()
+        return None if found is None else (found[0] / (2 * np.pi), *found[1:])
+
+    def report(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        title: str | None = None,
+        reconstruct_force: bool = False,
+    ) -> str:
+        """Return one HTML page with everything the identification has to show, and write it.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the page goes, too.
+        title : str, optional
+            Heading; the name of the record, without.
+        reconstruct_force : bool
+            Whether to reconstruct the force with the identified machine and compare it.
+
+        Raises
+        ------
+        MechidError
+            If a record cannot be read again, or the force cannot be reconstructed.
+        """
+        page = self._inner.page(title, reconstruct_force)
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(page)
+        return page
 
     def __repr__(self) -> str:
         values = ", ".join(f"{p.name}={p.value:.6g} {p.unit}" for p in self.parameters.values())
@@ -344,7 +425,7 @@ class Identified(Result):
 
 
 @final
-class Machine(Result):
+class Machine(Drawn):
     """M, C and K, with the covariance of those of their entries that were identified.
 
     Parameters
@@ -408,6 +489,18 @@ class Machine(Result):
         """K, in N/m, likewise."""
         return self._inner.stiffness
 
+    def receptance(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        """Return the receptance in m/N, shape (frequencies, motions, forces).
+
+        Raises
+        ------
+        MechidError
+            If a frequency is not finite, or an undamped resonance.
+        """
+        n = len(self.mass)
+        omega = 2 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        return self._inner.receptances(omega.tolist()).reshape(-1, n, n)
+
     @cached_property
     def _modal(self) -> tuple[str, str]:
         return self._inner.modal()
@@ -457,6 +550,272 @@ class Machine(Result):
 
     def __repr__(self) -> str:
         return f"<Machine {self.name!r}, degrees of freedom: {len(self.mass)}>"
+
+
+@final
+class FrequencyResponses(Drawn):
+    """Frequency responses with coherence and standard errors."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]:
+        """Frequencies, in Hz."""
+        return np.array(self._told["frequency_hz"], dtype=np.float64)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the responses, such as ``"m/N"``."""
+        return str(self._told["unit"])
+
+    def response(self, motion: int = 1, force: int = 1) -> NDArray[np.complex128]:
+        """Return the complex response of a degree of freedom to the force on another, counted from 1.
+
+        Raises
+        ------
+        KeyError
+            If there is no such pair.
+        """
+        row = self._row(motion, force)
+        return np.array(row["real"]) + 1j * np.array(row["imaginary"])
+
+    def std_error(self, motion: int = 1, force: int = 1) -> NDArray[np.float64]:
+        """Return the standard error of real part, imaginary part and magnitude alike.
+
+        Raises
+        ------
+        KeyError
+            If there is no such pair.
+        """
+        values = self._row(motion, force)["standard_error"]
+        return np.array([_number(value) for value in values], dtype=np.float64)
+
+    def coherence(self, motion: int = 1) -> NDArray[np.float64]:
+        """Return the part of a motion's power that is linear in the forces.
+
+        Raises
+        ------
+        KeyError
+            If there is no such degree of freedom.
+        """
+        for row in self._told["coherence"]:
+            if row["motion"] == motion:
+                return np.array(row["values"], dtype=np.float64)
+        raise KeyError(motion)
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Motion and force of each response, counted from 1."""
+        return tuple((row["motion"], row["force"]) for row in self._told["responses"])
+
+    def _row(self, motion: int, force: int) -> dict[str, Any]:
+        for row in self._told["responses"]:
+            if (row["motion"], row["force"]) == (motion, force):
+                found: dict[str, Any] = row
+                return found
+        raise KeyError((motion, force))
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<FrequencyResponses {told['file']!r}: {len(told['frequency_hz'])} lines>"
+
+
+@final
+class Inspected(Drawn):
+    """What is in a record file."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def channels(self) -> tuple[Mapping[str, Any], ...]:
+        """Levels, strongest lines and period of each column."""
+        return tuple(MappingProxyType(row) for row in self._told["channels"])
+
+    @property
+    def fs(self) -> float | None:
+        """Sampling rate, in Hz; None without a time axis."""
+        sampling = self._told["sampling"]
+        return None if sampling is None else float(sampling["rate_hz"])
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<Inspected {told['file']!r}: {told['columns']} columns, {told['samples']} samples>"
+
+
+@final
+class Sweep(Drawn):
+    """Estimates and errors at many sampling steps."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Settings: NPI, rates in Hz, or decimations."""
+        return np.array([point["setting"] for point in self._told["points"]], dtype=np.float64)
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Error at each setting, relative; NaN where there is no estimate."""
+        errors = [point["error"] for point in self._told["points"]]
+        return np.array([np.nan if error is None else error for error in errors], dtype=np.float64)
+
+    @property
+    def best(self) -> float:
+        """Setting with the smallest error."""
+        return float(self._told["best_setting"])
+
+    @property
+    def points(self) -> tuple[Mapping[str, Any], ...]:
+        """Everything at each setting."""
+        return tuple(MappingProxyType(point) for point in self._told["points"])
+
+    def __repr__(self) -> str:
+        return f"<Sweep {self._told['file']!r}: best at {self.best:g} of {len(self.values)} settings>"
+
+
+@final
+class Reconstructed(Drawn):
+    """The force that drove a machine, and how it was found."""
+
+    _inner: _mechid.Reconstructed
+
+    def __init__(self, inner: _mechid.Reconstructed) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """The force, shape (samples, degrees of freedom), in N; of whole periods, one period."""
+        return self._inner.force
+
+    @property
+    def std_error(self) -> NDArray[np.float64] | None:
+        """Standard error of the force, likewise; None where it is not known."""
+        return self._inner.std_error
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Instants of the samples, in s."""
+        return np.arange(len(self.force)) / float(self._told["sample_rate_hz"])
+
+    @property
+    def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        """Frequencies in Hz, and complex amplitudes, shape (frequencies, degrees of freedom), in N."""
+        return self._inner.spectrum()
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<Reconstructed {told['file']!r}: {told['method']}, {told['samples']} samples>"
+
+
+@final
+class Simulation:
+    """The record that an experiment gives, and the truth behind it.
+
+    Attributes
+    ----------
+    scheme : str
+        How the response was computed.
+    fs : float
+        Sampling rate, in Hz.
+    machine : Machine
+        The machine.
+    force : array
+        The force as the sensors tell it, shape (samples, degrees of freedom), in N.
+    displacement, velocity, acceleration : array
+        The response as the sensors tell it, in m, m/s and m/s².
+    truth : mapping
+        The four without noise.
+    """
+
+    __slots__ = ("acceleration", "displacement", "force", "fs", "machine", "scheme", "truth", "velocity")
+
+    def __init__(self, found: _mechid._Simulated) -> None:
+        self.scheme, self.fs, machine, (force, measured), (true_force, truth) = found
+        self.machine = Machine._of(machine)
+        self.force = force
+        kinds = dict(measured)
+        self.displacement, self.velocity = kinds["displacement"], kinds["velocity"]
+        self.acceleration = kinds["acceleration"]
+        self.truth: Mapping[str, NDArray[np.float64]] = MappingProxyType(
+            {"force": true_force, **dict(truth)}
+        )
+
+    def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
+        """Return force and the responses named (the displacement, without) as a record."""
+        chosen: dict[str, Any] = {name: getattr(self, name) for name in quantities or ("displacement",)}
+        return Measurement.from_arrays(self.force, fs=self.fs, **chosen, **window)
+
+    def __repr__(self) -> str:
+        return f"<Simulation: {len(self.force)} samples at {self.fs:g} Hz, {self.scheme}>"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Multisine:
+    """One period of a multisine.
+
+    Attributes
+    ----------
+    fs : float
+        Sampling rate, in Hz.
+    force : array
+        The period, in N.
+    lines : tuple of int
+        Lines of the period with force.
+    amplitudes, phases : array
+        Of each line, in N and rad: the force is the sum of amplitude · cos(2π line t / period + phase).
+    rms, peak, crest_factor : float
+        RMS value and peak in N, between samples too, and their ratio.
+    """
+
+    fs: float
+    force: NDArray[np.float64]
+    lines: tuple[int, ...]
+    amplitudes: NDArray[np.float64]
+    phases: NDArray[np.float64]
+    rms: float
+    peak: float
+    crest_factor: float
+
+    @classmethod
+    def _of(cls, fs: float, found: _mechid._Sampled) -> Multisine:
+        force, lines, amplitudes, phases, measures = found
+        return cls(fs, force, tuple(lines), amplitudes, phases, *measures)
+
+
+def machine_of(given: Machine | Identified | str | os.PathLike[str]) -> Machine:
+    """Return the machine that is meant."""
+    if isinstance(given, Identified):
+        return given.machine()
+    if isinstance(given, Machine):
+        return given
+    return Machine.read(given)
+
+
+def description_of(given: object) -> tuple[str, str] | None:
+    """Return name and JSON of the experiment that is meant; None if it is something else."""
+    if isinstance(given, Mapping) and "system" in given:
+        return "the description", json.dumps(given)
+    if isinstance(given, (str, os.PathLike)) and os.fspath(given).lower().endswith(".json"):
+        path = os.fspath(given)
+        try:
+            with open(path, encoding="utf-8") as file:
+                return path, file.read()
+        except OSError as error:
+            quoted = json.dumps(path)
+            raise MechidError(
+                f"cannot read {path}: {error.strerror}", f"Io(Read {{ file: {quoted} }})"
+            ) from None
+    return None
 
 
 def one(sources: Sequence[object], door: str, record: RecordOptions) -> Measurement:
