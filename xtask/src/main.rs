@@ -24,7 +24,8 @@ enum Task {
         /// Only the table or figure of this number, for example 5.6.4 or figure-5.2.4.
         #[arg(long, value_name = "NUMBER")]
         only: Option<String>,
-        /// Compare with the golden files and write nothing; fails on any difference over 1e-9.
+        /// Compare with the golden files (to 1e-9), tables, figures and pages of the repository, and write
+        /// nothing; files that belong to none of them fail, too.
         #[arg(long, conflicts_with = "bless")]
         check: bool,
         /// Rewrite the golden files on purpose.
@@ -42,7 +43,7 @@ fn main() -> ExitCode {
     let out = out.unwrap_or_else(|| root.join("docs/thesis"));
     let outcome = computed(root, only.as_deref()).and_then(|reproduction| {
         if check {
-            return compared(root, &reproduction);
+            return compared(root, &reproduction, only.is_none());
         }
         let files = reproduction.write(&out)?;
         println!("{files} files written to {}", out.display());
@@ -74,14 +75,19 @@ fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {
     only.map_or(Ok(all.clone()), |number| all.only(number))
 }
 
-fn compared(root: &Path, reproduction: &Reproduction) -> Result<(), String> {
-    let differences = reproduction.differences(root);
+fn compared(root: &Path, reproduction: &Reproduction, whole: bool) -> Result<(), String> {
+    let differences = reproduction.differences(root, whole)?;
     if differences.is_empty() {
-        println!("{} golden files agree", reproduction.golden_files());
+        println!(
+            "{} golden files, {} tables and figures and {} pages agree",
+            reproduction.golden_files(),
+            reproduction.artefacts.len(),
+            reproduction.pages.len()
+        );
         return Ok(());
     }
     for difference in differences.iter().take(20) {
         eprintln!("{difference}");
     }
-    Err(format!("{} differences from the golden files", differences.len()))
+    Err(format!("{} differences from the files of the repository", differences.len()))
 }

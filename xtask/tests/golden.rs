@@ -9,7 +9,7 @@ use xtask::thesis::reproduce;
 fn tables_and_figures_agree_with_their_golden_files() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let reproduction = reproduce::all(root, || ()).unwrap();
-    let differences = reproduction.differences(root);
+    let differences = reproduction.differences(root, true).unwrap();
     assert!(differences.is_empty(), "{}", differences.join("\n"));
     let files = std::fs::read_dir(root.join("tests/golden")).unwrap().count();
     assert_eq!(files, reproduction.golden_files(), "a golden file without its table or figure");

@@ -4,8 +4,6 @@ use mechid::analysis::AnalysisError;
 use mechid::io::IoError;
 use mechid::signal::counted;
 
-use crate::options;
-
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -83,8 +81,8 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Returns the message, with the settings that the analysis names spelled as options.
-    pub fn message(&self) -> String {
+    /// Returns the message; `spelled` writes the settings that the analysis names as options.
+    pub fn message(&self, spelled: impl Fn(&str) -> String) -> String {
         match self {
             Self::Io(error @ IoError::TooLarge { .. })
             | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { .. })) => {
@@ -92,7 +90,7 @@ impl CliError {
             }
             // A file's own words stay as they are.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),
-            Self::Analysis(error) => options::spelled(&error.to_string()),
+            Self::Analysis(error) => spelled(&error.to_string()),
             other => other.to_string(),
         }
     }

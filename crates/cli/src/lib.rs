@@ -56,7 +56,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(error) => {
             // A message that cannot be told changes nothing: the exit code stays.
-            let _ = writeln!(stderr(), "error: {}", outcome::shown(&error.message()));
+            let _ =
+                writeln!(stderr(), "error: {}", outcome::shown(&error.message(options::spelled)));
             ExitCode::from(FAILURE)
         }
     }
@@ -68,5 +69,5 @@ fn outcome(cli: &Cli) -> Result<(), CliError> {
         Some(message) => progress::watched(message, || cli.command.run())?,
         None => cli.command.run()?,
     };
-    outcome.deliver(cli.command.report())
+    outcome.deliver(cli.command.report(), options::spelled)
 }

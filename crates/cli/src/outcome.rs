@@ -12,7 +12,6 @@ use serde::Serialize;
 
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
-use crate::options;
 
 /// Pixels of a PNG file for each px of the drawing.
 const PNG_SCALE: f64 = 2.0;
@@ -48,6 +47,8 @@ impl<'a> Files<'a> {
 pub struct Outcome {
     /// What a person reads.
     text: String,
+    /// `true` if settings in the text are named between backticks.
+    names_settings: bool,
     /// The same for programs.
     json: String,
     /// Files to write.
@@ -60,13 +61,18 @@ impl Outcome {
     /// An outcome told as `text` to a person and as the fields of `report` to a program.
     pub fn new(text: String, report: &impl Serialize) -> Result<Self, CliError> {
         let json = serde_json::to_string_pretty(report)? + "\n";
-        let text = options::spelled(&text);
-        Ok(Self { text, json, files: Vec::new(), begun: Vec::new() })
+        Ok(Self { text, names_settings: true, json, files: Vec::new(), begun: Vec::new() })
     }
 
     /// An outcome that is a text and nothing else.
     pub fn of_text(text: String) -> Self {
-        Self { text, json: String::new(), files: Vec::new(), begun: Vec::new() }
+        Self {
+            text,
+            names_settings: false,
+            json: String::new(),
+            files: Vec::new(),
+            begun: Vec::new(),
+        }
     }
 
     /// The same outcome with one more file to write.
@@ -97,7 +103,13 @@ impl Outcome {
 
     /// Writes the files, all or none, and prints the report: on the error stream where a file goes
     /// to standard output, for whoever reads on there expects the file and nothing else.
-    pub fn deliver(self, report: &ReportArgs) -> Result<(), CliError> {
+    ///
+    /// `spelled` writes the settings that the report names as options.
+    pub fn deliver(
+        self,
+        report: &ReportArgs,
+        spelled: impl Fn(&str) -> String,
+    ) -> Result<(), CliError> {
         let taken = self.begun.iter().filter(|file| file.is_for_standard_output()).count()
             + self.files.iter().filter(|file| is_standard_output(&file.path)).count();
         if taken + usize::from(report.json) > 1 && taken > 0 {
@@ -107,6 +119,7 @@ impl Outcome {
         let text = match report {
             ReportArgs { json: true, .. } => shown_json(&self.json),
             ReportArgs { quiet: true, .. } => return Ok(()),
+            _ if self.names_settings => shown(&spelled(&self.text)),
             _ => shown(&self.text),
         };
         match taken {

@@ -2,8 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use super::reproduce::Artefact;
-
 /// Relative difference from which two numbers count as different.
 const TOLERANCE: f64 = 1e-9;
 
@@ -13,34 +11,32 @@ const NOISE: f64 = 1e-12;
 /// The same for errors in per cent: a value that moved by 1e-9 of itself moves its error by this.
 const PERCENT_NOISE: f64 = 100.0 * TOLERANCE;
 
-/// Where the golden file of an artefact lies.
-pub fn path(root: &Path, artefact: &Artefact) -> PathBuf {
-    root.join("tests/golden").join(format!("{}.csv", artefact.name))
+/// Path of the golden file of a table or figure.
+pub fn path(root: &Path, name: &str) -> PathBuf {
+    root.join("tests/golden").join(format!("{name}.csv"))
 }
 
-/// Rewrites the golden file; a drawing has none.
+/// Rewrites a golden file.
 ///
 /// # Errors
 /// A sentence naming the file that cannot be written.
-pub fn bless(root: &Path, artefact: &Artefact) -> Result<(), String> {
-    let Some(csv) = &artefact.csv else { return Ok(()) };
-    let path = path(root, artefact);
+pub fn bless(root: &Path, name: &str, csv: &str) -> Result<(), String> {
+    let path = path(root, name);
     let words = |e: std::io::Error| format!("{}: {e}", path.display());
     std::fs::create_dir_all(root.join("tests/golden")).map_err(words)?;
     std::fs::write(&path, csv).map_err(words)
 }
 
-/// Every difference between an artefact and its golden file, one sentence each.
-pub fn differences(root: &Path, artefact: &Artefact) -> Vec<String> {
-    let Some(csv) = &artefact.csv else { return Vec::new() };
-    let path = path(root, artefact);
+/// Every difference between the data of a table or figure and its golden file, one sentence each.
+pub fn differences(root: &Path, name: &str, csv: &str) -> Vec<String> {
+    let path = path(root, name);
     let golden = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) => {
-            return vec![format!("{}: no golden file ({}: {e})", artefact.name, path.display())];
+            return vec![format!("{name}: no golden file ({}: {e})", path.display())];
         }
     };
-    compare(&artefact.name, &cells(&golden), &cells(csv))
+    compare(name, &cells(&golden), &cells(csv))
 }
 
 type Grid = Vec<Vec<String>>;

@@ -3,6 +3,7 @@
 pub mod audit;
 pub mod case;
 pub mod cells;
+pub mod committed;
 pub mod estimates;
 pub mod golden;
 pub mod interpolated;

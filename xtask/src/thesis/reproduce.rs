@@ -1,5 +1,6 @@
 //! Everything the reproduction makes, and where it goes.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -7,7 +8,7 @@ use rayon::prelude::*;
 
 use super::published::Published;
 use super::results::Results;
-use super::{audit, golden, tables};
+use super::{audit, committed, golden, tables};
 use crate::{drawing, figures};
 
 /// One table or figure: its data, and how a reader sees it.
@@ -30,6 +31,13 @@ pub enum View {
     Svg(String),
 }
 
+impl Artefact {
+    /// Name of the file that a reader looks at.
+    fn file(&self) -> String {
+        format!("{}.{}", self.name, self.view.ending())
+    }
+}
+
 impl View {
     fn ending(&self) -> &'static str {
         match self {
@@ -41,6 +49,23 @@ impl View {
     fn text(&self) -> &str {
         match self {
             View::Markdown(text) | View::Svg(text) => text,
+        }
+    }
+
+    /// What it shows: the first sentence below the heading of a table, the title of a figure without its
+    /// `number`.
+    fn caption(&self, number: &str) -> &str {
+        match self {
+            View::Markdown(text) => {
+                let paragraph = text.lines().skip(1).find(|line| !line.is_empty());
+                let sentence = paragraph.unwrap_or_default().split(". ").next().unwrap_or_default();
+                sentence.trim_end_matches('.')
+            }
+            View::Svg(text) => {
+                let title = text.split("<title>").nth(1).unwrap_or_default();
+                let title = title.split("</title>").next().unwrap_or_default();
+                title.strip_prefix(number).and_then(|rest| rest.strip_prefix(": ")).unwrap_or(title)
+            }
         }
     }
 }
@@ -111,16 +136,26 @@ fn index(artefacts: &[Artefact]) -> String {
          Made by `cargo xtask reproduce-thesis`; do not edit.\n\n\
          - **[What the audit found](audit.md)**\n",
     );
-    for artefact in artefacts {
+    let mut sorted: Vec<&Artefact> = artefacts.iter().collect();
+    sorted.sort_by_key(|artefact| natural(&artefact.name));
+    for artefact in sorted {
         let (kind, number) = artefact.name.split_once('-').unwrap_or(("", &artefact.name));
-        let ending = artefact.view.ending();
-        let _ = write!(text, "- [{kind} {number}]({}.{ending})", artefact.name);
+        let _ = write!(text, "- [{kind} {number}]({})", artefact.file());
         if artefact.csv.is_some() {
             let _ = write!(text, " ([data](../../tests/golden/{}.csv))", artefact.name);
         }
-        text.push('\n');
+        let _ = writeln!(text, ": {}", artefact.view.caption(number));
     }
     text
+}
+
+/// Key by which table 5.6.2 comes before table 5.6.10, and tables before figures.
+fn natural(name: &str) -> (bool, Vec<(usize, String)>) {
+    let pieces = name.split(['-', '.']).map(|piece| match piece.parse() {
+        Ok(number) => (number, String::new()),
+        Err(_) => (usize::MAX, piece.to_owned()),
+    });
+    (name.starts_with("figure"), pieces.collect())
 }
 
 impl Reproduction {
@@ -157,12 +192,40 @@ impl Reproduction {
 
     /// How many artefacts have a golden file.
     pub fn golden_files(&self) -> usize {
-        self.artefacts.iter().filter(|a| a.csv.is_some()).count()
+        self.golden().count()
     }
 
-    /// Every difference from the golden files, one sentence each.
-    pub fn differences(&self, root: &Path) -> Vec<String> {
-        self.artefacts.iter().flat_map(|a| golden::differences(root, a)).collect()
+    /// Names and data of what has a golden file; a drawing has none.
+    fn golden(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.artefacts.iter().filter_map(|a| Some((a.name.as_str(), a.csv.as_deref()?)))
+    }
+
+    /// Every difference from the golden files and from the tables, figures and pages in the repository,
+    /// one sentence each; of a complete reproduction (`whole`) files that it does not make, too.
+    ///
+    /// # Errors
+    /// A sentence naming the folder that cannot be read.
+    pub fn differences(&self, root: &Path, whole: bool) -> Result<Vec<String>, String> {
+        let of_golden = |(name, csv)| golden::differences(root, name, csv);
+        let mut found: Vec<String> = self.golden().flat_map(of_golden).collect();
+        let views = self.artefacts.iter().map(|a| (a.file(), a.view.text()));
+        let pages = self.pages.iter().map(|(name, text)| ((*name).to_owned(), text.as_str()));
+        let mut made = BTreeSet::new();
+        for (file, text) in views.chain(pages) {
+            let path = root.join("docs/thesis").join(&file);
+            match std::fs::read_to_string(&path) {
+                Ok(committed) if committed::alike(text, &committed) => {}
+                Ok(_) => found.push(format!("docs/thesis/{file} is not what is computed")),
+                Err(e) => found.push(format!("docs/thesis/{file}: {e}")),
+            }
+            made.insert(file);
+        }
+        if whole {
+            let golden = self.golden().map(|(name, _)| format!("{name}.csv")).collect();
+            found.extend(committed::strays(root, "tests/golden", &["csv"], &golden)?);
+            found.extend(committed::strays(root, "docs/thesis", &["md", "svg"], &made)?);
+        }
+        Ok(found)
     }
 
     /// Rewrites the golden files.
@@ -170,13 +233,13 @@ impl Reproduction {
     /// # Errors
     /// A sentence naming the file that cannot be written.
     pub fn bless(&self, root: &Path) -> Result<(), String> {
-        self.artefacts.iter().try_for_each(|a| golden::bless(root, a))
+        self.golden().try_for_each(|(name, csv)| golden::bless(root, name, csv))
     }
 }
 
 fn write_artefact(folder: &Path, artefact: &Artefact) -> Result<usize, String> {
     let file = |ending: &str| folder.join(format!("{}.{ending}", artefact.name));
-    write(&file(artefact.view.ending()), artefact.view.text())?;
+    write(&folder.join(artefact.file()), artefact.view.text())?;
     let mut files = 1;
     if let Some(csv) = &artefact.csv {
         write(&file("csv"), csv)?;
@@ -196,6 +259,27 @@ fn write(path: &Path, text: &str) -> Result<(), String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_are_sorted_as_they_are_read() {
+        let mut names =
+            ["figure-P1-4", "table-5.6.10", "figure-5.2.1", "table-5.6.2", "figure-A-damping"];
+        names.sort_by_key(|name| natural(name));
+        let sorted =
+            ["table-5.6.2", "table-5.6.10", "figure-5.2.1", "figure-A-damping", "figure-P1-4"];
+        assert_eq!(names, sorted);
+    }
+
+    #[test]
+    fn captions_are_first_sentences_and_titles() {
+        let table = View::Markdown("# Table 1\n\nKxx of it, Nt = 2. In N/m.\n\nMore.\n".into());
+        assert_eq!(table.caption("1"), "Kxx of it, Nt = 2");
+        let figure =
+            View::Svg("<svg><title>5.2.4: K over NPI</title><title>b</title></svg>".into());
+        assert_eq!(figure.caption("5.2.4"), "K over NPI");
+        let drawing = View::Svg("<svg><title>A force: found</title></svg>".into());
+        assert_eq!(drawing.caption("5.4.1"), "A force: found");
+    }
 
     #[test]
     fn a_number_or_a_part_selects() {

@@ -171,8 +171,12 @@ fn verdict(verdict: Verdict, reason: Option<&str>) -> String {
 fn heading(number: &str, rows: &[Row]) -> String {
     let mut text = format!("# Table {number}\n\n");
     let Some(cell) = rows.first().map(|r| &r.cell) else { return text };
-    let mut parameters: Vec<&str> = rows.iter().map(|r| r.cell.parameter.as_str()).collect();
-    parameters.dedup();
+    let mut parameters: Vec<&str> = Vec::new();
+    for row in rows {
+        if !parameters.contains(&row.cell.parameter.as_str()) {
+            parameters.push(&row.cell.parameter);
+        }
+    }
     let machine =
         if cell.parameter.len() == 3 { "journal bearing" } else { "single degree of freedom" };
     let nt = cell.nt.map_or_else(String::new, |n| format!(", Nt = {n}"));

@@ -17,6 +17,7 @@ mod motion;
 pub mod options;
 mod peak_line;
 mod periods;
+mod scatter;
 pub mod summary;
 mod tally;
 mod unexplained;

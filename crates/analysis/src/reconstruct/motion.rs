@@ -8,7 +8,7 @@ use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
-use super::periods::{Scatter, Sums};
+use super::scatter::{Scatter, Sums};
 use crate::AnalysisError;
 use crate::measurement::channels::ABSENT;
 use crate::measurement::{self, CHUNK_SAMPLES, Source};

@@ -5,51 +5,6 @@ use mechid_force::Unexplained;
 use super::motion::{Held, Recorded};
 use crate::text::significant;
 
-/// Scatter of the periods of a channel about their mean.
-#[derive(Debug, Clone, Copy)]
-pub struct Scatter {
-    /// Standard deviation, in the SI unit of the channel.
-    pub deviation: f64,
-    /// Correlation of the difference at a sample with that at the next: 0 of white noise.
-    pub correlation: f64,
-}
-
-/// Sums over a channel as its periods go by.
-#[derive(Debug, Clone, Default)]
-pub struct Sums {
-    squares: f64,
-    /// Sum of the products of each sample and the next of its period.
-    products: f64,
-    last: f64,
-}
-
-impl Sums {
-    /// Takes the samples that follow, all of one period.
-    pub fn push(&mut self, samples: impl Iterator<Item = f64>, begins_period: bool) {
-        if begins_period {
-            self.last = 0.0;
-        }
-        for value in samples {
-            self.squares += value * value;
-            self.products += self.last * value;
-            self.last = value;
-        }
-    }
-
-    /// Returns the scatter about the mean of `periods` periods.
-    pub fn about(&self, mean: &[f64], periods: usize) -> Scatter {
-        let all = periods as f64;
-        let in_mean: f64 = mean.iter().map(|m| m * m).sum();
-        let beside: f64 = mean.windows(2).map(|w| w[0] * w[1]).sum();
-        let squares = (self.squares - all * in_mean).max(0.0);
-        let left = ((periods - 1) * mean.len()) as f64;
-        Scatter {
-            deviation: (squares / left).sqrt(),
-            correlation: (self.products - all * beside) / squares,
-        }
-    }
-}
-
 /// Periods that differ less than this share of their mean count as alike.
 const ALIKE: f64 = 0.1;
 

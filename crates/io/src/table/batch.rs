@@ -3,8 +3,9 @@
 use memchr::{memchr, memchr_iter};
 
 use super::blocks::Block;
-use super::dialect::{Delimiter, Number, number};
-use super::fields::{Fields, Layout, Row, RowIter, words};
+use super::delimiter::{Delimiter, words};
+use super::dialect::{Number, number};
+use super::fields::{Fields, Layout, Row, RowIter};
 use crate::contents::{DecimalSign, Lines, Place, Unusable};
 
 /// Largest number of characters of a field that a message repeats.

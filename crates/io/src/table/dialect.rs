@@ -1,38 +1,10 @@
-//! Delimiters, comments and decimal signs of a text.
+//! Dialect of a text: its delimiter and decimal sign, found from its first lines.
 
 use memchr::memchr_iter;
 
-use super::fields::{Fields, words};
+use super::delimiter::{COMMENT, Delimiter};
+use super::fields::Fields;
 use crate::contents::DecimalSign;
-
-/// Separator of two fields.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Delimiter {
-    /// One byte: comma, semicolon or tab.
-    Byte(u8),
-    /// Any run of blanks.
-    Blanks,
-}
-
-impl Delimiter {
-    /// Name of the format of such a text, for people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Delimiter::Byte(b';') => "text, fields between semicolons",
-            Delimiter::Byte(b'\t') => "text, fields between tabs",
-            Delimiter::Byte(_) => "text, fields between commas",
-            Delimiter::Blanks => "text, fields between blanks",
-        }
-    }
-
-    /// Whether numbers may have a decimal comma.
-    pub fn allows_decimal_comma(self) -> bool {
-        self != Delimiter::Byte(b',')
-    }
-}
-
-/// First byte of a comment line.
-pub(crate) const COMMENT: u8 = b'#';
 
 /// Number of lines from which the delimiter and the decimal sign are found.
 const SAMPLE_LINES: usize = 8;
@@ -135,13 +107,4 @@ pub(crate) fn number(
 /// Whether a field is a number.
 pub(crate) fn is_number(field: &[u8], delimiter: Delimiter) -> bool {
     number(field, delimiter, &mut String::new()).is_some()
-}
-
-/// Whether a line is a comment.
-pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
-    let first = match delimiter {
-        Delimiter::Byte(_) => line.first(),
-        Delimiter::Blanks => words(line).next().and_then(<[u8]>::first),
-    };
-    first == Some(&COMMENT)
 }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use memchr::{memchr, memchr_iter};
 
-use super::dialect::{Delimiter, is_comment};
+use super::delimiter::{Delimiter, is_comment, words};
 
 /// The quote around fields that hold delimiters or line breaks.
 const QUOTE: u8 = b'"';
@@ -216,9 +216,4 @@ impl Fields {
     pub fn iter(&self) -> impl Iterator<Item = &[u8]> {
         self.ranges.iter().map(|range| &self.text[range.clone()])
     }
-}
-
-/// The fields of a line that stand between blanks.
-pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
-    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }

@@ -1,6 +1,7 @@
 //! The line on which a table begins below other text.
 
-use super::dialect::{detect, is_comment, is_number};
+use super::delimiter::is_comment;
+use super::dialect::{detect, is_number};
 use super::fields::{Fields, Layout, Row, RowIter};
 
 /// Number of rows looked at: a header, units, and numbers.

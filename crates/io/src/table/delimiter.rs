@@ -1,0 +1,44 @@
+//! Delimiters and comments of a text.
+
+/// Separator of two fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Delimiter {
+    /// One byte: comma, semicolon or tab.
+    Byte(u8),
+    /// Any run of blanks.
+    Blanks,
+}
+
+impl Delimiter {
+    /// Name of the format of such a text, for people.
+    pub fn name(self) -> &'static str {
+        match self {
+            Delimiter::Byte(b';') => "text, fields between semicolons",
+            Delimiter::Byte(b'\t') => "text, fields between tabs",
+            Delimiter::Byte(_) => "text, fields between commas",
+            Delimiter::Blanks => "text, fields between blanks",
+        }
+    }
+
+    /// Whether numbers may have a decimal comma.
+    pub fn allows_decimal_comma(self) -> bool {
+        self != Delimiter::Byte(b',')
+    }
+}
+
+/// First byte of a comment line.
+pub(crate) const COMMENT: u8 = b'#';
+
+/// Whether a line is a comment.
+pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
+    let first = match delimiter {
+        Delimiter::Byte(_) => line.first(),
+        Delimiter::Blanks => words(line).next().and_then(<[u8]>::first),
+    };
+    first == Some(&COMMENT)
+}
+
+/// The fields of a line that stand between blanks.
+pub(crate) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
