@@ -1,4 +1,4 @@
-"""Speed and accuracy beside SciPy, in one run: prints the table of the book's page on Python.
+"""Speed and accuracy beside SciPy, in one run: prints a table.
 
 SciPy does what it does best in each row; both answers are held against the same truth, and the least
 time of several repeats counts.
