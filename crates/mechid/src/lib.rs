@@ -75,4 +75,4 @@ pub use mechid_plot as plot;
 #[cfg(feature = "report")]
 pub use mechid_report as report;
 pub use mechid_signal as signal;
-pub use simulation::{SimulateError, Simulation, exact_periodic, simulate, sweep};
+pub use simulation::{SimulateError, Simulation, exact_periodic, respond, simulate, sweep};

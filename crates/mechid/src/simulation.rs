@@ -64,21 +64,15 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         }
         None => exact_periodic(&system, &period)?,
         Some(scheme) => {
-            let unguarded = AllowUnstable(&**scheme);
-            let scheme = if experiment.allow_unstable { &unguarded } else { &**scheme };
             let within = scheme.inner_instant();
             let middle = within.map(|part| experiment.force_within_steps(part)).transpose()?;
             match experiment.response {
-                ResponseKind::Periodic if has_given_start(experiment) => {
-                    return Err(SimulateError::GivenStartPeriodic);
-                }
                 ResponseKind::Periodic => {
-                    integrate_periodic(scheme, &system, with_middle(&period, middle.as_ref()))?
+                    stepped(experiment, &**scheme, &system, &period, middle.as_ref())?
                 }
                 ResponseKind::FromRest | ResponseKind::From(_) => {
-                    let start = experiment.initial_state()?;
                     let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
-                    integrate(scheme, &system, with_middle(&force, middle.as_ref()), &start)?
+                    stepped(experiment, &**scheme, &system, &force, middle.as_ref())?
                 }
             }
         }
@@ -109,6 +103,45 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         measured_force,
         measured_response,
     })
+}
+
+/// Computes the response of a described machine to `force` (samples × degrees of freedom, in N) in the
+/// place of its excitation, by its scheme and from its start; noise and number of periods do not count.
+///
+/// # Errors
+/// As [`simulate`]; [`IntegrateError::MidStepMissing`] if the scheme asks for the exact force between
+/// the samples.
+pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
+    let system = experiment.system()?;
+    let Some(scheme) = scheme(experiment)? else {
+        return match experiment.response {
+            ResponseKind::Periodic => Ok(exact_periodic(&system, force)?),
+            ResponseKind::FromRest | ResponseKind::From(_) => Err(SimulateError::ExactFromRest),
+        };
+    };
+    stepped(experiment, &*scheme, &system, force, None)
+}
+
+/// Steps through one force record, or through the period that repeats.
+fn stepped(
+    experiment: &Experiment,
+    scheme: &dyn Scheme,
+    system: &SecondOrderSystem,
+    force: &Record,
+    middle: Option<&Record>,
+) -> Result<Response, SimulateError> {
+    let unguarded = AllowUnstable(scheme);
+    let scheme = if experiment.allow_unstable { &unguarded } else { scheme };
+    let force = with_middle(force, middle);
+    match experiment.response {
+        ResponseKind::Periodic if has_given_start(experiment) => {
+            Err(SimulateError::GivenStartPeriodic)
+        }
+        ResponseKind::Periodic => Ok(integrate_periodic(scheme, system, force)?),
+        ResponseKind::FromRest | ResponseKind::From(_) => {
+            Ok(integrate(scheme, system, force, &experiment.initial_state()?)?)
+        }
+    }
 }
 
 /// A simulation that cannot be run.

@@ -10,7 +10,8 @@ use serde_json::Value;
 use super::runs::Run;
 
 /// Words with which a command in running text begins.
-pub const BEGINNINGS: [&str; 5] = ["cargo ", "git ", "mdbook ", "rustup ", "MECHID_"];
+pub const BEGINNINGS: [&str; 8] =
+    ["cargo ", "git ", "mdbook ", "rustup ", "pip ", "python ", ".ci/", "MECHID_"];
 
 /// What holds the lines: the workspace as cargo sees it.
 pub struct Workspace {
@@ -43,6 +44,9 @@ impl Workspace {
                 Ok(Run::Book(folder.into()))
             }
             ["mdbook", "build", folder] => Err(format!("no book.toml in {folder}")),
+            // The check of every change has Python and what the line installs in a clean environment.
+            ["pip" | "python", ..] => has_line(&self.root, ".ci/python", typed),
+            [check] if check.starts_with(".ci/") => has_line(&self.root, ".ci/run", check),
             _ => Err("nothing runs this command".into()),
         }
     }
@@ -105,15 +109,17 @@ impl Workspace {
     }
 
     fn is_run_always(&self, line: &str) -> Result<Run, String> {
-        let checks = std::fs::read_to_string(self.root.join(".ci/run")).unwrap();
-        let line = line.trim_end_matches(" --open");
-        match checks
-            .lines()
-            .any(|check| check.trim_end_matches(" --locked") == line.trim_end_matches(" --locked"))
-        {
-            true => Ok(Run::Always),
-            false => Err(format!("`.ci/run` has no such line: {line}")),
-        }
+        has_line(&self.root, ".ci/run", line.trim_end_matches(" --open"))
+    }
+}
+
+/// The script of a check has this line, `--locked` or not.
+fn has_line(root: &Path, script: &str, line: &str) -> Result<Run, String> {
+    let checks = std::fs::read_to_string(root.join(script)).unwrap();
+    let unlocked = |line: &str| line.trim_end_matches(" --locked").to_owned();
+    match checks.lines().any(|check| unlocked(check) == unlocked(line)) {
+        true => Ok(Run::Always),
+        false => Err(format!("`{script}` has no such line: {line}")),
     }
 }
 
@@ -216,6 +222,8 @@ fn lines_are_known_by_what_they_run() {
         ("cargo xtask reproduce-thesis", program("bin", "xtask", &["reproduce-thesis"])),
         ("mdbook build docs/book", Run::Book("docs/book".into())),
         ("cargo doc --workspace --no-deps --open", Run::Always),
+        ("pip install \"./crates/python[test]\" && python -m pytest crates/python", Run::Always),
+        (".ci/python", Run::Always),
     ] {
         assert_eq!(workspace.meaning(line), Ok(run), "{line}");
     }
@@ -237,6 +245,8 @@ fn what_is_not_there_is_found() {
         ("cargo bench -p mechid-cli", "nothing runs"),
         ("cargo install --path crates/mechid", "no program mechid"),
         ("cargo test --workspace --no-run", "no such line"),
+        ("pip install mechid-of-another", "`.ci/python` has no such line"),
+        (".ci/parrot", "`.ci/run` has no such line"),
         ("cargo frobnicate", "no command frobnicate"),
         ("mdbook build docs", "no book.toml"),
         ("echo 'open", "no shell"),

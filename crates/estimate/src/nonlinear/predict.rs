@@ -4,8 +4,8 @@ use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
-use super::simulate::{Course, Direction, FineForce, Tangent};
 use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::least_squares::size;
 use crate::{EstimateError, prediction};
 

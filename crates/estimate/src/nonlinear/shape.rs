@@ -6,8 +6,8 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::ChannelPhase;
 use super::equations::Equations;
 use super::experiments::Columns;
-use crate::EstimateError;
 use super::levenberg_marquardt::{SumOfSquares, minimise};
+use crate::EstimateError;
 
 /// Constants to search for, besides the parameters that enter linearly.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -133,7 +133,8 @@ impl Shape {
         for (at, step) in self.steps(equations.data.period().dt()).into_iter().enumerate() {
             let mut moved = values.clone();
             moved[at] += step;
-            let shape = self.with(&moved).ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
+            let shape =
+                self.with(&moved).ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
             let columns = equations.columns(&shape.terms, &shape.channels);
             let changed = equations.residuals(&columns, coefficients);
             for ((slopes, before), after) in slopes.iter_mut().zip(residuals).zip(&changed) {
@@ -155,7 +156,8 @@ pub(super) fn fit_shape(
 ) -> Result<Shape, EstimateError> {
     let start = DVector::from_iterator(shape.count(), shape.values());
     let mut projected = Projected { equations, shape: &shape, weights, at: None };
-    let found = minimise(&mut projected, start).ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
+    let found = minimise(&mut projected, start)
+        .ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
     let steps = found.steps;
     let found = shape.with(found.theta.as_slice()).filter(|_| found.converged);
     found.ok_or(EstimateError::NotConverged { searches: 1, steps })

@@ -1,0 +1,39 @@
+"""Are the standard errors honest? Repeat an experiment with fresh noise, side by side in threads."""
+
+# %% One period of a multisine on a known machine; the response is exact.
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+
+import mechid
+
+FS, PERIOD, PERIODS, RUNS = 128.0, 256, 8, 400
+TRUTH = {"m": 25.0, "c": 188.5, "k": 142_122.0}
+machine = mechid.Machine(TRUTH["m"], TRUTH["c"], TRUTH["k"])
+drive = mechid.multisine(PERIOD, FS, lines="4:60", amplitude=2.0)
+response = mechid.integrate(machine, drive.force, FS, scheme="exact", response="periodic")
+force, motion = np.tile(drive.force, PERIODS), np.tile(response["displacement"][:, 0], PERIODS)
+
+
+# %% Each run has a stream of noise of its own; threads share the work, for the lock is released.
+def run(seed: int) -> tuple[list[float], list[float]]:
+    noise = np.random.default_rng([1998, seed]).normal(0.0, 0.02 * motion.std(), len(motion))
+    found = mechid.identify(
+        force, motion + noise, fs=FS, period=PERIOD, method="maximum-likelihood", threads=1
+    )
+    rows = [found.parameters[name] for name in TRUTH]
+    return [row.value for row in rows], [row.std_error or 0.0 for row in rows]
+
+
+with ThreadPoolExecutor() as pool:
+    runs = list(pool.map(run, range(RUNS)))
+values, errors = (np.array(part) for part in zip(*runs, strict=True))
+
+# %% The scatter of the estimates against the standard errors that each of them stated.
+for column, (name, truth) in enumerate(TRUTH.items()):
+    scatter, stated = values[:, column].std(), np.sqrt((errors[:, column] ** 2).mean())
+    bias = (values[:, column].mean() - truth) / (scatter / np.sqrt(RUNS))
+    inside = (np.abs(values[:, column] - truth) < 1.96 * errors[:, column]).mean()
+    print(f"{name}: scatter {scatter:.4g}, stated {stated:.4g}, {100 * inside:.1f} % within 1.96 of them")
+    assert abs(scatter / stated - 1) < 0.15 and abs(bias) < 4
+    assert 0.90 < inside < 0.99

@@ -1,0 +1,112 @@
+"""Measure a force and a response, get the machine.
+
+>>> import mechid
+>>> found = mechid.identify("examples/machine.csv", force="force",
+...                         displacement="displacement", period=256)
+>>> mass = found.parameters["m"].value  # kg
+
+Everything is in SI units, and in Hz where a name ends in ``_hz``. A record is a file, or arrays of
+shape ``(samples,)`` or ``(samples, degrees of freedom)``. Failures are `MechidError`, a
+`ValueError` whose message says what would have been right.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._doors import frf as frf
+    from ._doors import identify as identify
+    from ._doors import inspect as inspect
+    from ._doors import integrate as integrate
+    from ._doors import multisine as multisine
+    from ._doors import predict as predict
+    from ._doors import reconstruct as reconstruct
+    from ._doors import simulate as simulate
+    from ._doors import sweep as sweep
+    from ._errors import MechidError as MechidError
+    from ._mechid import __version__ as __version__
+    from ._records import Measurement as Measurement
+    from ._results import Finding as Finding
+    from ._results import FrequencyResponses as FrequencyResponses
+    from ._results import Identified as Identified
+    from ._results import Inspected as Inspected
+    from ._results import Machine as Machine
+    from ._results import Mode as Mode
+    from ._results import Multisine as Multisine
+    from ._results import Parameter as Parameter
+    from ._results import Reconstructed as Reconstructed
+    from ._results import Simulation as Simulation
+    from ._results import Sweep as Sweep
+    from ._results import Uncertain as Uncertain
+    from ._results import Validation as Validation
+
+# Where each name is: imported when it is used, so that the program starts without NumPy.
+_HOMES = {
+    "frf": "_doors",
+    "identify": "_doors",
+    "inspect": "_doors",
+    "integrate": "_doors",
+    "multisine": "_doors",
+    "predict": "_doors",
+    "reconstruct": "_doors",
+    "simulate": "_doors",
+    "sweep": "_doors",
+    "MechidError": "_errors",
+    "__version__": "_mechid",
+    "Measurement": "_records",
+    "Finding": "_results",
+    "FrequencyResponses": "_results",
+    "Identified": "_results",
+    "Inspected": "_results",
+    "Machine": "_results",
+    "Mode": "_results",
+    "Multisine": "_results",
+    "Parameter": "_results",
+    "Reconstructed": "_results",
+    "Simulation": "_results",
+    "Sweep": "_results",
+    "Uncertain": "_results",
+    "Validation": "_results",
+}
+
+__all__ = [
+    "Finding",
+    "FrequencyResponses",
+    "Identified",
+    "Inspected",
+    "Machine",
+    "Measurement",
+    "MechidError",
+    "Mode",
+    "Multisine",
+    "Parameter",
+    "Reconstructed",
+    "Simulation",
+    "Sweep",
+    "Uncertain",
+    "Validation",
+    "__version__",
+    "frf",
+    "identify",
+    "inspect",
+    "integrate",
+    "multisine",
+    "predict",
+    "reconstruct",
+    "simulate",
+    "sweep",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOMES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOMES})

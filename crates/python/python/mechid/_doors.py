@@ -1,0 +1,698 @@
+"""The questions one asks of a record; each is a function."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
+
+import numpy as np
+
+from . import _mechid
+from ._records import (
+    Measurement,
+    RecordOptions,
+    Window,
+    _index,
+    matrix,
+    measurements,
+    plan_of,
+)
+from ._results import (
+    FrequencyResponses,
+    Identified,
+    Inspected,
+    Machine,
+    Multisine,
+    Reconstructed,
+    Simulation,
+    Sweep,
+    description_of,
+    machine_of,
+    one,
+)
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+Method: TypeAlias = Literal["least-squares", "instrumental", "maximum-likelihood"]
+Estimator: TypeAlias = Literal["h1", "h2", "hv"]
+ForceMethod: TypeAlias = Literal[
+    "auto",
+    "continuous",
+    "discretised",
+    "frequency-domain",
+    "shrinkage",
+    "tikhonov",
+    "truncated-svd",
+    "kalman",
+]
+Scheme: TypeAlias = Literal[
+    "exact", "newmark", "central-difference", "houbolt", "wilson-theta", "runge-kutta-4"
+]
+SweepEstimator: TypeAlias = Literal[
+    "euler", "held", "linear", "equation-of-motion", "least-squares", "maximum-likelihood"
+]
+Weight: TypeAlias = Literal["hann", "hamming", "blackman", "rectangular"]
+
+
+def identify(
+    *sources: object,
+    method: Method | None = None,
+    lines: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+    mass: float | Sequence[float | None] | None = None,
+    domain: Literal["frequency", "time"] = "frequency",
+    from_frf: Estimator | None = None,
+    segment: int | None = None,
+    segment_window: Weight | None = None,
+    segment_overlap: float | None = None,
+    between_samples: Literal["euler", "held", "linear"] | None = None,
+    extent: Literal["open", "period"] | None = None,
+    derivatives: str | None = None,
+    refine: int | None = None,
+    interpolation: Literal["linear", "spline", "band-limited"] | None = None,
+    validate: Measurement | None = None,
+    validate_start: int | None = None,
+    validate_samples: int | None = None,
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> Identified:
+    """Identify mass, damping and stiffness from measured forces and responses.
+
+    Every option of the program's ``mechid identify`` is a keyword of the same name.
+
+    Parameters
+    ----------
+    *sources
+        One or several records, fitted together: files by path, tables (data frames, xarray datasets,
+        mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
+        arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
+    method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
+        Estimator of the parameters from spectra; least squares unless `from_frf` is given, then
+        maximum likelihood.
+    lines : str, optional
+        Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
+        ``"1:2:335"``; every line at which the force exceeds its noise, without.
+    band_hz : (float, float), optional
+        Use the lines with force between two frequencies, in Hz.
+    mass : float or sequence of float or None, optional
+        Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
+        one.
+    domain : {"frequency", "time"}
+        Domain of the fit.
+    from_frf : {"h1", "h2", "hv"}, optional
+        Fit frequency responses, averaged over segments.
+    segment, segment_window, segment_overlap : optional
+        Samples of a segment, its weights, and the part that the next one repeats, in per cent.
+    between_samples : {"euler", "held", "linear"}, optional
+        Assumption on the force between samples, in the time domain.
+    extent : {"open", "period"}, optional
+        Extent of the window, in the time domain.
+    derivatives : str, optional
+        How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
+    refine, interpolation : optional
+        Steps in every sampling interval, and the interpolation between the samples.
+    validate, validate_start, validate_samples : optional
+        Record to predict that is not fitted, its first sample counted from 1 and their number.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads; as many as there are processors, without.
+    **record
+        What is in the records, as `RecordOptions`: ``force``, ``displacement``, ``velocity``,
+        ``acceleration``, ``fs``, ``start``, ``period``, ``periods``, ``time``, ``skip_lines``,
+        ``detrend``.
+
+    Returns
+    -------
+    Identified
+
+    Raises
+    ------
+    MechidError
+        If a record cannot be read, or the fit fails; the message says why.
+    TypeError
+        If an array holds other than real numbers, or options do not go together.
+
+    Examples
+    --------
+    >>> import mechid
+    >>> found = mechid.identify("examples/machine.csv", force="force",
+    ...                         displacement="displacement", period=256)
+    >>> sorted(found.parameters)
+    ['c', 'k', 'm']
+    """
+    records = measurements(sources, "identify", record)
+    if settings is None:
+        fit = _fit(
+            method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
+            between_samples, extent, derivatives, refine, interpolation,
+        )
+        if domain == "time" and (lines is not None or band_hz is not None):
+            raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
+        settings = {"fit": fit, "lines": _lines(lines, band_hz), "mass": _mass(mass)}
+    predicted = None
+    if validate is not None or validate_start is not None or validate_samples is not None:
+        if validate is None and validate_start is None:
+            raise TypeError("`validate_samples` of which record? Give `validate`, or `validate_start`")
+        other = records[0] if validate is None else validate
+        window = {"start": validate_start, "samples": validate_samples}
+        predicted = (other._inner, json.dumps(window))
+    inner = _mechid.identify(
+        [record._inner for record in records], json.dumps(settings), predicted, threads
+    )
+    return Identified(inner)
+
+
+def frf(
+    *sources: object,
+    estimator: Estimator = "h1",
+    lines: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+    segment: int | None = None,
+    segment_window: Weight | None = None,
+    segment_overlap: float | None = None,
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> FrequencyResponses:
+    """Estimate frequency responses and coherence from measured forces and responses.
+
+    With a periodic excitation (`period`) the periods are the segments that are averaged; with a random
+    excitation say `segment`.
+
+    Parameters
+    ----------
+    *sources, **record
+        The record, as in `identify`.
+    estimator : {"h1", "h2", "hv"}
+        Where the noise is: on the response, on the force, or on both.
+    lines, band_hz : optional
+        Spectral lines of a segment, as in `identify`.
+    segment, segment_window, segment_overlap : optional
+        Samples of a segment, its weights, and the part that the next one repeats, in per cent.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads.
+
+    Returns
+    -------
+    FrequencyResponses
+
+    Raises
+    ------
+    MechidError
+        If the record cannot be read, no chosen line carries force, or segments are too few.
+    """
+    found = one(sources, "frf", record)
+    if settings is None:
+        settings = {
+            "estimator": estimator,
+            "lines": _lines(lines, band_hz),
+            "segments": _segments(True, segment, segment_window, segment_overlap),
+        }
+    return FrequencyResponses(_mechid.frf(found._inner, json.dumps(settings), threads))
+
+
+def reconstruct(
+    machine: Machine | Identified | str | os.PathLike[str],
+    *sources: object,
+    method: ForceMethod = "auto",
+    forced: Sequence[int] = (),
+    lines: str | None = None,
+    at_rest: bool = False,
+    noise: Sequence[float] = (),
+    rule: Literal["likelihood", "gcv", "l-curve"] = "likelihood",
+    parameter: float | None = None,
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> Reconstructed:
+    """Reconstruct the force that drove a known machine, from its measured responses.
+
+    Parameters
+    ----------
+    machine : Machine, Identified, or path
+        The machine; the uncertainty of an identified one counts in the standard error of the force. A
+        path is that of the program's JSON.
+    *sources, **record
+        The record: a file, table or `Measurement` with response columns and no force. Arrays are given
+        by keyword: ``displacement=x, fs=…``.
+    method : str
+        Method, as ``mechid force --method`` has them.
+    forced : sequence of int
+        Degrees of freedom on which a force acts, counted from 1; all, without.
+    lines : str, optional
+        Spectral lines with force.
+    at_rest : bool
+        Whether an open record begins at rest.
+    noise : sequence of float
+        Standard deviation of the noise in each measured column, in its unit; estimated, without.
+    rule, parameter : optional
+        How to choose the regularisation parameter, or the parameter itself.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads.
+
+    Returns
+    -------
+    Reconstructed
+
+    Raises
+    ------
+    MechidError
+        If the responses do not fit the machine or the method, or the method fails.
+    """
+    found = one(sources, "reconstruct", record)
+    if settings is None:
+        settings = {
+            "method": method,
+            "forced": [_index("forced", dof) for dof in forced],
+            "lines": lines,
+            "at_rest": at_rest,
+            "noise": [float(level) for level in noise],
+            "rule": rule if parameter is None else {"given": float(parameter)},
+        }
+    known = machine_of(machine)
+    inner = _mechid.reconstruct(found._inner, known._inner, json.dumps(settings), threads)
+    return Reconstructed(inner)
+
+
+def inspect(
+    path: str | os.PathLike[str],
+    *,
+    columns: Sequence[str] = (),
+    curves: bool = False,
+    fs: float | None = None,
+    time: str | None = None,
+    skip_lines: int = 0,
+    detrend: Literal["none", "mean"] = "none",
+    **window: Unpack[Window],
+) -> Inspected:
+    """Tell what is in a record file: format, columns, sampling, levels, strongest lines, period.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    columns : sequence of str
+        Columns to show, by name or number; every column that holds numbers only, without.
+    curves : bool
+        Whether to gather the curves that `Inspected.to_svg` draws.
+    fs, time, skip_lines, detrend, **window
+        As in `Measurement.open`.
+
+    Returns
+    -------
+    Inspected
+
+    Raises
+    ------
+    MechidError
+        If the file cannot be read or has no such columns or samples.
+    """
+    plan = json.dumps(plan_of(path, {}, fs, time, skip_lines, detrend, window))
+    settings = json.dumps({"columns": list(columns), "curves": curves})
+    return Inspected(_mechid.inspect(plan, settings))
+
+
+def sweep(
+    *sources: object,
+    npi: Sequence[float] | None = None,
+    rate_hz: Sequence[float] | None = None,
+    decimate: Sequence[float] | None = None,
+    estimator: SweepEstimator = "linear",
+    unknown_mass: bool = False,
+    mass: float | Sequence[float | None] | None = None,
+    natural_frequency_hz: float | None = None,
+    reference: Machine | Identified | str | os.PathLike[str] | None = None,
+    settings: dict[str, Any] | None = None,
+    progress: Callable[[int], object] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> Sweep:
+    """Identify a machine at many sampling steps, and find the step that suits the estimator best.
+
+    Parameters
+    ----------
+    *sources, **record
+        A record, as in `identify`, or the description of an experiment: a mapping as `simulate` takes
+        it, or the path of a JSON file, which is simulated at each setting.
+    npi, rate_hz, decimate : sequence of float
+        The settings, of one of these kinds: cycles of the natural frequency in a period, sampling
+        rates in Hz, or every n-th sample.
+    estimator : str
+        Estimator, as ``mechid sweep --estimator`` has them.
+    unknown_mass, mass : optional
+        Whether the mass of a described machine is to be found, too; known masses, as in `identify`.
+    natural_frequency_hz : float, optional
+        Natural frequency that `npi` counts; the lowest of the machine, without.
+    reference : Machine, Identified or path, optional
+        The machine that errors of a record's estimates are measured against.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    progress : callable, optional
+        Called with the number of settings done, now and then.
+    threads : int, optional
+        Number of threads.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    MechidError
+        If no setting gives an estimate, or the record or description cannot be read.
+    """
+    if settings is None:
+        given = {"npi": npi, "rate_hz": rate_hz, "decimation": decimate}
+        kinds = {kind: values for kind, values in given.items() if values is not None}
+        if len(kinds) != 1:
+            raise TypeError("one of `npi`, `rate_hz` and `decimate` is needed")
+        ((kind, values),) = kinds.items()
+        if unknown_mass and mass is not None:
+            raise TypeError("either `unknown_mass` or `mass`")
+        settings = {
+            "kind": kind,
+            "settings": [float(value) for value in values],
+            "estimator": estimator,
+            "mass": None if mass is None and not unknown_mass else _mass(mass),
+            "natural_frequency_hz": natural_frequency_hz,
+        }
+    described = description_of(sources[0]) if len(sources) == 1 else None
+    if described is None:
+        inner = one(sources, "sweep", record)._inner
+        compared = None if reference is None else machine_of(reference)._inner
+    else:
+        for name in (*record, *(["reference"] if reference is not None else [])):
+            raise TypeError(f"`{name}` belongs to a record; the experiment described has its own")
+        inner, compared = None, None
+    found = _mechid.sweep(
+        inner, described or ("", ""), json.dumps(settings), compared, progress, threads
+    )
+    return Sweep(found)
+
+
+def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulation:
+    """Simulate a described experiment: the record that it would give.
+
+    Parameters
+    ----------
+    experiment : mapping or path
+        ``system``, ``sampling``, ``excitation``, ``scheme``, ``response``, ``periods`` and ``noise``,
+        as in the JSON that ``mechid simulate`` takes, or the path of such a file.
+
+    Returns
+    -------
+    Simulation
+
+    Raises
+    ------
+    MechidError
+        If the description is wrong, or the response does not exist.
+    """
+    described = description_of(experiment)
+    if described is None:
+        raise TypeError("an experiment is a mapping, or the path of a .json file")
+    return Simulation(_mechid.simulate(*described))
+
+
+def integrate(
+    machine: Machine | Identified,
+    force: ArrayLike,
+    fs: float,
+    *,
+    scheme: Scheme | Mapping[str, Any] = "newmark",
+    response: Literal["from-rest", "periodic"] = "from-rest",
+    displacement: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+    allow_unstable: bool = False,
+) -> Mapping[str, NDArray[np.float64]]:
+    """Integrate the equation of motion under a sampled force, by a time-stepping scheme.
+
+    Parameters
+    ----------
+    machine : Machine or Identified
+        M, C and K.
+    force : array_like
+        Shape (samples,) or (samples, degrees of freedom), in N.
+    fs : float
+        Sampling rate, in Hz.
+    scheme : str or mapping
+        ``"newmark"``, ``"central-difference"``, ``"houbolt"``, ``"wilson-theta"``,
+        ``"runge-kutta-4"`` (the force linear between samples), ``"exact"`` (periodic responses), or a
+        mapping of its ``name`` and parameters, as in the JSON of an experiment.
+    response : {"from-rest", "periodic"}
+        Whether the motion begins at the first sample, or repeats with the force.
+    displacement, velocity : array_like, optional
+        Motion at the first sample, in m and m/s; zero, without.
+    allow_unstable : bool
+        Whether steps are allowed at which the motion grows by itself.
+
+    Returns
+    -------
+    mapping
+        ``"displacement"``, ``"velocity"``, ``"acceleration"``, each (samples, degrees of freedom), in
+        m, m/s and m/s².
+
+    Raises
+    ------
+    MechidError
+        If the scheme refuses, or the force does not fit the machine.
+    """
+    start = {"displacement": displacement, "velocity": velocity}
+    given = {name: _vector(name, values) for name, values in start.items() if values is not None}
+    if given and response == "periodic":
+        raise TypeError("a periodic response has no start: leave `displacement` and `velocity` out")
+    known = machine_of(machine)
+    forces = matrix("force", force)
+    named: dict[str, Any] = {"name": scheme} if isinstance(scheme, str) else dict(scheme)
+    if named.get("name") == "runge-kutta-4":
+        named.setdefault("load", "linear")
+    rows = {
+        name: getattr(known, name).tolist() for name in ("mass", "damping", "stiffness")
+    }
+    described = {
+        "system": rows,
+        "sampling": {"samples": len(forces), "rate_hz": float(fs)},
+        "excitation": [],
+        "scheme": named,
+        "response": {"from": given} if given else response,
+        "allow_unstable": allow_unstable,
+    }
+    return MappingProxyType(dict(_mechid.integrate(json.dumps(described), forces, float(fs))))
+
+
+def predict(
+    machine: Machine | Identified,
+    force: ArrayLike,
+    fs: float,
+    *,
+    between_samples: Literal["held", "linear", "euler"] = "linear",
+    extent: Literal["open", "period"] = "open",
+    displacement: ArrayLike | None = None,
+    velocity: ArrayLike | None = None,
+) -> Mapping[str, NDArray[np.float64]]:
+    """Compute the exact response to a force that is held or linear between its samples.
+
+    Parameters
+    ----------
+    machine : Machine or Identified
+        M, C and K.
+    force : array_like
+        Shape (samples,) or (samples, degrees of freedom), in N.
+    fs : float
+        Sampling rate, in Hz.
+    between_samples : {"held", "linear", "euler"}
+        Assumption on the force between samples.
+    extent : {"open", "period"}
+        Whether the motion begins at the first sample, or repeats with the force.
+    displacement, velocity : array_like, optional
+        Motion at the first sample, in m and m/s; zero, without.
+
+    Returns
+    -------
+    mapping
+        ``"displacement"``, ``"velocity"``, ``"acceleration"``, each (samples, degrees of freedom), in
+        m, m/s and m/s².
+
+    Raises
+    ------
+    MechidError
+        If the force does not fit the machine, or the response overflows.
+    """
+    known = machine_of(machine)
+    start = None
+    if displacement is not None or velocity is not None:
+        zero = [0.0] * len(known.mass)
+        start = tuple(
+            np.array(_vector(name, zero if values is None else values), dtype=np.float64)
+            for name, values in (("displacement", displacement), ("velocity", velocity))
+        )
+    found = _mechid.predict(
+        known._inner,
+        matrix("force", force),
+        float(fs),
+        json.dumps(between_samples),
+        json.dumps({"period": "whole_period"}.get(extent, extent)),
+        start,  # type: ignore[arg-type]
+    )
+    return MappingProxyType(dict(found))
+
+
+def multisine(
+    samples: int,
+    fs: float,
+    *,
+    lines: str = "all",
+    phases: Literal["schroeder", "schroeder-binary", "random", "zero", "low-crest"] = "schroeder",
+    amplitude: float | None = None,
+    rms: float | None = None,
+    peak: float | None = None,
+    seed: int = 0,
+    starts: int = 16,
+) -> Multisine:
+    """Make one period of a multisine, a sum of cosines on chosen lines of the period.
+
+    Parameters
+    ----------
+    samples : int
+        Number of samples in the period.
+    fs : float
+        Sampling rate, in Hz.
+    lines : str
+        ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as ``"1:2:801"``.
+    phases : str
+        How the phases are chosen, as ``mechid multisine --phases`` has it.
+    amplitude, rms, peak : float, optional
+        Level, one of them: amplitude of every line (1 without), RMS value, or peak between samples
+        too, in N.
+    seed, starts : int
+        Seed of random phases, and number of starting points of the search for a low crest factor.
+
+    Returns
+    -------
+    Multisine
+
+    Raises
+    ------
+    MechidError
+        If a line is outside of the period, or a level is not positive.
+    """
+    levels = {"amplitude": amplitude, "rms": rms, "peak": peak}
+    given = [(name, float(level)) for name, level in levels.items() if level is not None]
+    if len(given) > 1:
+        raise TypeError(f"either `{given[0][0]}` or `{given[1][0]}`")
+    laws = ("schroeder", "schroeder-binary", "random", "zero", "low-crest")
+    if phases not in laws:
+        raise ValueError(f"`phases` is one of {', '.join(laws)}, got {phases!r}")
+    search = starts if phases == "low-crest" else 0
+    law = "schroeder" if phases == "low-crest" else phases
+    found = _mechid.multisine(
+        _index("samples", samples), float(fs), lines, law, (search, seed),
+        given[0] if given else ("amplitude", 1.0),
+    )
+    return Multisine._of(float(fs), found)
+
+
+def _fit(
+    method: str | None,
+    domain: str,
+    from_frf: str | None,
+    segments: dict[str, Any],
+    between_samples: str | None,
+    extent: str | None,
+    derivatives: str | None,
+    refine: int | None,
+    interpolation: str | None,
+) -> dict[str, Any]:
+    of_time = {
+        "between_samples": between_samples,
+        "extent": extent,
+        "derivatives": derivatives,
+        "refine": refine,
+        "interpolation": interpolation,
+    }
+    if domain == "time":
+        _refuse({"method": method, "from_frf": from_frf}, "belongs to domain='frequency'")
+        if (refine is None) != (interpolation is None):
+            raise TypeError("`refine` and `interpolation` go together")
+        return {
+            "domain": "samples",
+            "between_samples": between_samples,
+            "extent": {"period": "whole_period"}.get(extent or "", extent),
+            "derivatives": _derivatives(derivatives),
+            "refine": None
+            if refine is None
+            else {"factor": refine, "interpolation": interpolation},
+        }
+    if domain != "frequency":
+        raise ValueError(f"`domain` is frequency or time, got {domain!r}")
+    _refuse(of_time, "belongs to domain='time'")
+    if from_frf is not None:
+        return {
+            "domain": "responses",
+            "estimator": from_frf,
+            "segments": segments,
+            "method": method,
+        }
+    return {"domain": "spectra", "method": method or "least-squares"}
+
+
+def _refuse(options: dict[str, Any], why: str) -> None:
+    for name, value in options.items():
+        if value is not None:
+            raise TypeError(f"`{name}` {why}")
+
+
+def _segments(
+    belongs: object, segment: int | None, window: str | None, overlap: float | None
+) -> dict[str, Any]:
+    if belongs is None:
+        _refuse({"segment": segment}, "belongs to `from_frf`")
+    if segment is None:
+        _refuse({"segment_window": window, "segment_overlap": overlap}, "needs `segment`")
+    kept = {"segment": segment, "window": window, "overlap_percent": overlap}
+    return {name: value for name, value in kept.items() if value is not None}
+
+
+def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
+    if lines is not None and band_hz is not None:
+        raise TypeError("either `lines` or `band_hz`")
+    if lines is not None:
+        return {"lines": lines}
+    if band_hz is not None:
+        low, high = band_hz
+        return {"band": {"low_hz": float(low), "high_hz": float(high)}}
+    return "driven"
+
+
+def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:
+    if mass is None:
+        return []
+    if isinstance(mass, Sequence):
+        return [None if value is None else float(value) for value in mass]
+    return [float(mass)]
+
+
+def _derivatives(text: str | None) -> Any:
+    if text is None or not text.startswith("savitzky-golay:"):
+        return text
+    _, window, order = (text + "::").split(":")[:3]
+    if not (window.isdecimal() and order.isdecimal()):
+        raise ValueError(f"`derivatives` is spectral or savitzky-golay:WINDOW:ORDER, got {text!r}")
+    return {"savitzky-golay": {"window": int(window), "order": int(order)}}
+
+
+def _vector(name: str, values: ArrayLike) -> list[float]:
+    given = np.atleast_1d(np.asarray(values))
+    if given.ndim != 1 or given.dtype.kind not in "fiu":
+        raise TypeError(f"`{name}` is a number, or one for each degree of freedom")
+    return [float(value) for value in given]

@@ -1,0 +1,166 @@
+"""The compiled half of the package: the library and the program `mechid`, settings and results as JSON."""
+
+from collections.abc import Callable, Sequence
+from os import PathLike
+from typing import TypeAlias, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "Answer",
+    "Identified",
+    "Machine",
+    "Measurement",
+    "Reconstructed",
+    "__version__",
+    "frf",
+    "identify",
+    "inspect",
+    "integrate",
+    "multisine",
+    "predict",
+    "program",
+    "reconstruct",
+    "simulate",
+    "sweep",
+]
+
+__version__: str
+
+@final
+class Measurement:
+    @staticmethod
+    def open(plan: str) -> Measurement: ...
+    @staticmethod
+    def from_columns(
+        name: str,
+        rate_hz: float,
+        columns: Sequence[tuple[str, NDArray[np.float64]]],
+        channels: str,
+        window: str,
+    ) -> Measurement: ...
+    def window(self, window: str) -> Measurement: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def samples(self) -> int: ...
+    @property
+    def fs(self) -> float: ...
+    @property
+    def window_settings(self) -> str: ...
+    @property
+    def channels(self) -> str: ...
+    @property
+    def plan(self) -> str | None: ...
+    def force(self) -> NDArray[np.float64]: ...
+    def responses(self) -> list[tuple[str, NDArray[np.float64]]]: ...
+
+@final
+class Machine:
+    @staticmethod
+    def known(
+        mass: NDArray[np.float64], damping: NDArray[np.float64], stiffness: NDArray[np.float64]
+    ) -> Machine: ...
+    @staticmethod
+    def read(path: str | PathLike[str]) -> Machine: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def is_exact(self) -> bool: ...
+    @property
+    def mass(self) -> NDArray[np.float64]: ...
+    @property
+    def damping(self) -> NDArray[np.float64]: ...
+    @property
+    def stiffness(self) -> NDArray[np.float64]: ...
+    def state_matrices(self) -> list[NDArray[np.float64]]: ...
+    def receptances(self, omega: Sequence[float]) -> NDArray[np.complex128]: ...
+    def svg(self) -> str: ...
+    def modal(self) -> tuple[str, str]: ...
+
+@final
+class Identified:
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+    def page(self, title: str | None, force: bool) -> str: ...
+    def compared(self) -> list[tuple[str, NDArray[np.float64], NDArray[np.float64]]]: ...
+    def spectra(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]] | None: ...
+    def interval(self, name: str, level: float) -> list[float]: ...
+    def machine(self) -> Machine: ...
+    def validate(self, other: Measurement, samples: str) -> str: ...
+
+def identify(
+    records: Sequence[Measurement],
+    settings: str,
+    validate: tuple[Measurement, str] | None,
+    threads: int | None,
+) -> Identified: ...
+@final
+class Answer:
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+
+@final
+class Reconstructed:
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+    @property
+    def force(self) -> NDArray[np.float64]: ...
+    @property
+    def std_error(self) -> NDArray[np.float64] | None: ...
+    def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]: ...
+
+_Named: TypeAlias = tuple[str, NDArray[np.float64]]
+_Simulated: TypeAlias = tuple[
+    str,
+    float,
+    Machine,
+    tuple[NDArray[np.float64], list[_Named]],
+    tuple[NDArray[np.float64], list[_Named]],
+]
+_Sampled: TypeAlias = tuple[
+    NDArray[np.float64],
+    list[int],
+    NDArray[np.float64],
+    NDArray[np.float64],
+    tuple[float, float, float],
+]
+
+def frf(record: Measurement, settings: str, threads: int | None) -> Answer: ...
+def inspect(plan: str, settings: str) -> Answer: ...
+def sweep(
+    record: Measurement | None,
+    experiment: tuple[str, str],
+    settings: str,
+    reference: Machine | None,
+    progress: Callable[[int], object] | None,
+    threads: int | None,
+) -> Answer: ...
+def reconstruct(
+    record: Measurement, machine: Machine, settings: str, threads: int | None
+) -> Reconstructed: ...
+def simulate(name: str, description: str) -> _Simulated: ...
+def integrate(description: str, force: NDArray[np.float64], fs: float) -> list[_Named]: ...
+def predict(
+    machine: Machine,
+    force: NDArray[np.float64],
+    fs: float,
+    between_samples: str,
+    extent: str,
+    start: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+) -> list[_Named]: ...
+def multisine(
+    samples: int,
+    fs: float,
+    lines: str,
+    phases: str,
+    search: tuple[int, int],
+    level: tuple[str, float],
+) -> _Sampled: ...
+def program(arguments: Sequence[str]) -> int: ...

@@ -1,0 +1,15 @@
+"""The program ``mechid``."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from ._mechid import program
+
+
+def main() -> int:
+    """Run the program with the arguments of this process and return its exit code."""
+    # Ctrl-C ends the program as it ends any other: nobody looks at Python's flag meanwhile.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return program(["mechid", *sys.argv[1:]])

@@ -1,0 +1,473 @@
+"""Records: files, arrays and tables as measurements."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypedDict, Unpack, final, runtime_checkable
+
+import numpy as np
+
+from . import _mechid
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@runtime_checkable
+class Table(Protocol):
+    """Columns by name: a data frame, an xarray dataset, a mapping of arrays."""
+
+    def __getitem__(self, name: str, /) -> ArrayLike: ...
+    def keys(self) -> object: ...
+
+
+Names: TypeAlias = str | Sequence[str]
+"""Columns, one per degree of freedom: names separated by commas, or a sequence of names."""
+
+_KINDS = ("force", "displacement", "velocity", "acceleration")
+
+
+class Window(TypedDict, total=False):
+    """Samples of a record to use.
+
+    ``start`` is the first sample, counted from 1; ``period`` the number of samples in one period
+    (without it, all samples from ``start`` on are one window); ``periods`` the number of whole
+    periods (without it, as many as there are).
+    """
+
+    start: int
+    period: int | None
+    periods: int | None
+
+
+class RecordOptions(Window, total=False):
+    """What is in a record, and which samples of it to use.
+
+    ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table, or
+    arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is the
+    sampling rate in Hz, which arrays and tables need. Of files: ``time`` names the time column,
+    ``skip_lines`` counts header lines to skip, and ``detrend="mean"`` subtracts the mean of every
+    channel.
+    """
+
+    force: Names | ArrayLike
+    displacement: Names | ArrayLike
+    velocity: Names | ArrayLike
+    acceleration: Names | ArrayLike
+    fs: float | None
+    time: str | None
+    skip_lines: int
+    detrend: Literal["none", "mean"]
+
+
+@final
+class Measurement:
+    """Forces and responses of a machine, and the window of them to use.
+
+    Make one with `open`, `from_arrays` or `from_table`. It never changes, and a long text file is
+    not held in memory.
+    """
+
+    __slots__ = ("_inner",)
+
+    def __init__(self, inner: _mechid.Measurement) -> None:
+        self._inner = inner
+
+    @classmethod
+    def open(
+        cls,
+        path: str | os.PathLike[str],
+        *,
+        force: Names = (),
+        displacement: Names = (),
+        velocity: Names = (),
+        acceleration: Names = (),
+        fs: float | None = None,
+        time: str | None = None,
+        skip_lines: int = 0,
+        detrend: Literal["none", "mean"] = "none",
+        **window: Unpack[Window],
+    ) -> Measurement:
+        """Open a record file: text, MATLAB or universal file, packed with gzip or not.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+        force, displacement, velocity, acceleration : str or sequence of str
+            Columns, by name or number counted from 1, one per degree of freedom; ``"0"`` where no
+            force acts. Columns in other units are converted where their name says so.
+        fs : float, optional
+            Sampling rate in Hz, where there is no time column.
+        time : str, optional
+            The time column.
+        skip_lines : int
+            Number of header lines to skip above the table.
+        detrend : {"none", "mean"}
+            Constant to subtract from every channel.
+        **window
+            ``start``, ``period`` and ``periods``, as in `window`.
+
+        Raises
+        ------
+        MechidError
+            If the file cannot be read or has no such columns or samples.
+        """
+        columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
+        channels = {kind: _names(kind, given) for kind, given in columns.items()}
+        plan = plan_of(path, channels, fs, time, skip_lines, detrend, window)
+        return cls(_mechid.Measurement.open(json.dumps(plan)))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        force: ArrayLike | None = None,
+        displacement: ArrayLike | None = None,
+        *,
+        velocity: ArrayLike | None = None,
+        acceleration: ArrayLike | None = None,
+        fs: float,
+        name: str = "the record",
+        **window: Unpack[Window],
+    ) -> Measurement:
+        """Copy arrays.
+
+        Parameters
+        ----------
+        force, displacement, velocity, acceleration : array_like of real numbers
+            Shape (samples,) or (samples, degrees of freedom), in N, m, m/s and m/s².
+        fs : float
+            Sampling rate, in Hz.
+        name : str
+            Name of the record in messages and results.
+        **window
+            ``start``, ``period`` and ``periods``, as in `window`.
+
+        Raises
+        ------
+        TypeError
+            If an array holds other than real numbers.
+        MechidError
+            If arrays differ in length, hold NaN or infinity, or have not the samples of the window.
+        """
+        channels: dict[str, list[str]] = {}
+        columns: list[tuple[str, NDArray[np.float64]]] = []
+        arrays = (force, displacement, velocity, acceleration)
+        for kind, given in zip(_KINDS, arrays, strict=True):
+            if given is None:
+                continue
+            found = _columns(kind, given)
+            channels[kind] = [f"{kind} {dof}" for dof in range(1, len(found) + 1)]
+            columns.extend(zip(channels[kind], found, strict=True))
+        return cls._of(name, fs, columns, channels, window)
+
+    @classmethod
+    def from_table(
+        cls,
+        table: Table | Sequence[Mapping[str, object]],
+        *,
+        force: Names = (),
+        displacement: Names = (),
+        velocity: Names = (),
+        acceleration: Names = (),
+        fs: float | None = None,
+        name: str = "the record",
+        **window: Unpack[Window],
+    ) -> Measurement:
+        """Copy columns of a data frame, an xarray dataset, a mapping, or channels in SEP 5 form.
+
+        Parameters
+        ----------
+        table : mapping of names to columns, or sequence of SEP 5 dictionaries
+            Columns in other units than N, m, m/s and m/s² are converted where the name says so, such
+            as ``"x [um]"``, or the ``unit_str`` of a SEP 5 channel.
+        force, displacement, velocity, acceleration : str or sequence of str
+            Names of columns, one per degree of freedom; ``"0"`` where no force acts.
+        fs : float, optional
+            Sampling rate, in Hz; SEP 5 channels have their own.
+        name : str
+            Name of the record in messages and results.
+        **window
+            ``start``, ``period`` and ``periods``, as in `window`.
+
+        Raises
+        ------
+        MechidError
+            If there is no such column, or as `from_arrays`.
+        """
+        channels: dict[str, list[str]] = {}
+        columns: list[tuple[str, NDArray[np.float64]]] = []
+        given = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
+        source = _Sep5(table) if isinstance(table, Sequence) else None
+        for kind, names in given.items():
+            channels[kind] = []
+            for column in _names(kind, names):
+                label = column
+                if column != "0":
+                    label = source.label(column) if source else column
+                    values = source[column] if source else _column(table, column)
+                    found = _columns(column, values)
+                    if len(found) != 1:
+                        raise ValueError(f"column {column!r} has {len(found)} columns of its own")
+                    columns.append((label, found[0]))
+                channels[kind].append(label)
+        rate = source.fs(given) if source and fs is None else fs
+        if rate is None:
+            raise TypeError("a table needs its sampling rate: give `fs`, in Hz")
+        return cls._of(name, rate, columns, channels, window)
+
+    @classmethod
+    def _of(
+        cls,
+        name: str,
+        fs: float,
+        columns: list[tuple[str, NDArray[np.float64]]],
+        channels: dict[str, list[str]],
+        window: Window,
+    ) -> Measurement:
+        rate = _rate(fs)
+        if rate is None:
+            raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
+        inner = _mechid.Measurement.from_columns(
+            name, rate, columns, json.dumps(channels), json.dumps(_window(window))
+        )
+        return cls(inner)
+
+    def window(self, **window: Unpack[Window]) -> Measurement:
+        """Return another window of the same record.
+
+        Parameters
+        ----------
+        start : int
+            First sample, counted from 1.
+        period : int, optional
+            Number of samples in one period; without it, all samples from ``start`` on.
+        periods : int, optional
+            Number of whole periods; without it, as many as there are.
+
+        Raises
+        ------
+        MechidError
+            If the record has not all of these samples.
+        """
+        return Measurement(self._inner.window(json.dumps(_window(window))))
+
+    @property
+    def name(self) -> str:
+        """Name in messages: the file, as it was written."""
+        return self._inner.name
+
+    @property
+    def fs(self) -> float:
+        """Sampling rate, in Hz."""
+        return self._inner.fs
+
+    @property
+    def samples(self) -> int:
+        """Number of samples of the whole record."""
+        return self._inner.samples
+
+    @property
+    def channels(self) -> Mapping[str, Sequence[str]]:
+        """Columns of each quantity."""
+        return MappingProxyType(json.loads(self._inner.channels))
+
+    @property
+    def plan(self) -> dict[str, object] | None:
+        """What opens the same record again; None for arrays."""
+        plan = self._inner.plan
+        return None if plan is None else json.loads(plan)
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force of the window, shape (samples, degrees of freedom), in N."""
+        return self._inner.force()
+
+    @property
+    def responses(self) -> Mapping[str, NDArray[np.float64]]:
+        """Responses of the window by quantity, each (samples, degrees of freedom), in SI units."""
+        return MappingProxyType(dict(self._inner.responses()))
+
+    def __len__(self) -> int:
+        return self.samples
+
+    def __repr__(self) -> str:
+        return f"<Measurement {self.name!r}: {self.samples} samples at {self.fs:g} Hz>"
+
+
+class _Sep5:
+    """Channels in the form of the SDyPy enhancement proposal 5."""
+
+    def __init__(self, channels: Sequence[Mapping[str, object]]) -> None:
+        self._channels = {str(channel["name"]): channel for channel in channels}
+
+    def __getitem__(self, name: str) -> ArrayLike:
+        channel = self._channels.get(name)
+        if channel is None:
+            raise _no_column(name, self._channels)
+        values: ArrayLike = channel["data"]  # type: ignore[assignment]
+        return values
+
+    def label(self, name: str) -> str:
+        unit = self._channels.get(name, {}).get("unit_str")
+        return f"{name} [{unit}]" if unit else name
+
+    def fs(self, given: Mapping[str, Names]) -> float:
+        names = [name for kind, names in given.items() for name in _names(kind, names)]
+        used = (self._channels[name] for name in names if name in self._channels)
+        rates = {float(channel["fs"]) for channel in used}  # type: ignore[arg-type]
+        if len(rates) != 1:
+            raise ValueError(f"the channels have several sampling rates: {sorted(rates)} Hz")
+        return rates.pop()
+
+
+def measurements(
+    sources: Sequence[object], threads_of: str, options: RecordOptions
+) -> list[Measurement]:
+    """Return the records that a call names, by whatever way it does.
+
+    Either the sources are records (measurements, or files or tables with columns), or they are the
+    force and the displacement as arrays.
+    """
+    if sources and all(isinstance(source, Measurement) for source in sources):
+        known = [source for source in sources if isinstance(source, Measurement)]
+        given = [name for name in ("fs", "time", "skip_lines", "detrend", *_KINDS) if name in options]
+        if given:
+            raise TypeError(f"a Measurement knows its `{given[0]}`: leave it out")
+        window = _window_of(options)
+        return [record.window(**window) for record in known] if window else known
+    if sources and all(isinstance(source, (str, os.PathLike)) for source in sources):
+        return [Measurement.open(source, **options) for source in sources]  # type: ignore[arg-type]
+    if sources and all(_is_table(source) for source in sources):
+        return [Measurement.from_table(source, **options) for source in sources]  # type: ignore[arg-type, misc]
+    if len(sources) > 2:
+        raise TypeError(f"{threads_of} takes a force and a displacement as arrays, got {len(sources)}")
+    arrays = dict(options)
+    for kind, values in zip(_KINDS, sources, strict=False):
+        if kind in arrays:
+            raise TypeError(f"`{kind}` is given twice")
+        arrays[kind] = values
+    if arrays.get("fs") is None:
+        raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
+    for name in ("time", "skip_lines", "detrend"):
+        if name in arrays:
+            raise TypeError(f"`{name}` belongs to files")
+    return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
+
+
+def plan_of(
+    path: str | os.PathLike[str],
+    channels: Mapping[str, list[str]],
+    fs: float | None,
+    time: str | None,
+    skip_lines: int,
+    detrend: str,
+    window: Window,
+) -> dict[str, object]:
+    """Return what opens a file."""
+    reading = {"skip_lines": skip_lines, "time": time, "sample_rate_hz": _rate(fs), "detrend": detrend}
+    return {
+        "path": os.fspath(path),
+        "channels": dict(channels),
+        "reading": reading,
+        "window": _window(window),
+    }
+
+
+def matrix(name: str, values: object) -> NDArray[np.float64]:
+    """Return an array of samples × degrees of freedom of real numbers."""
+    return np.stack(_columns(name, values), axis=1)
+
+
+def _is_table(source: object) -> bool:
+    if isinstance(source, Sequence) and not isinstance(source, str):
+        return bool(source) and all(isinstance(channel, Mapping) for channel in source)
+    return isinstance(source, Mapping) or (
+        hasattr(source, "keys") and (hasattr(source, "columns") or hasattr(source, "data_vars"))
+    )
+
+
+def _window_of(options: RecordOptions) -> Window:
+    window: Window = {}
+    if "start" in options:
+        window["start"] = options["start"]
+    if "period" in options:
+        window["period"] = options["period"]
+    if "periods" in options:
+        window["periods"] = options["periods"]
+    return window
+
+
+def _window(window: Window) -> dict[str, int | None]:
+    kept: dict[str, int | None] = {"start": 1}
+    for name, value in window.items():
+        if name not in Window.__annotations__:
+            raise TypeError(f"there is no setting `{name}` of a window")
+        kept[name] = _count(name, value)
+    return kept
+
+
+def _count(name: str, value: object) -> int | None:
+    if value is None:
+        return None
+    count = _index(name, value)
+    if count < 1:
+        raise ValueError(f"`{name}` is counted from 1, got {count}")
+    return count
+
+
+def _index(name: str, value: object) -> int:
+    try:
+        return value.__index__()  # type: ignore[attr-defined, no-any-return]
+    except AttributeError:
+        raise TypeError(f"`{name}` is a whole number, got {value!r}") from None
+
+
+def _rate(fs: float | None) -> float | None:
+    return None if fs is None else float(fs)
+
+
+def _names(kind: str, given: object) -> list[str]:
+    if isinstance(given, str):
+        return [name.strip() for name in given.split(",")]
+    if isinstance(given, Sequence) and all(isinstance(name, str) for name in given):
+        return list(given)
+    raise TypeError(f"`{kind}` of a file or table is a name of a column, or several, got {given!r}")
+
+
+def _column(table: Table | Sequence[Mapping[str, object]], name: str) -> ArrayLike:
+    try:
+        return table[name]  # type: ignore[call-overload]
+    except KeyError:
+        raise _no_column(name, table.keys()) from None  # type: ignore[union-attr]
+
+
+def _no_column(name: str, known: object) -> Exception:
+    from ._errors import MechidError
+
+    available = ", ".join(str(column) for column in known)  # type: ignore[attr-defined]
+    quoted = json.dumps(name), json.dumps(available)
+    return MechidError(
+        f'there is no column "{name}"; the columns are {available}',
+        f"NoColumn {{ column: {quoted[0]}, available: {quoted[1]} }}",
+    )
+
+
+def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
+    """Return the columns of an array of real numbers, each contiguous."""
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise ValueError(f"`{name}` has masked values: fill or leave them out")
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"`{name}` holds {array.dtype}, not real numbers")
+    if array.ndim == 1:
+        array = array[:, np.newaxis]
+    if array.ndim != 2:
+        shape = "×".join(str(size) for size in array.shape) or "no dimension"
+        raise ValueError(
+            f"`{name}` has the shape (samples,) or (samples, degrees of freedom), got {shape}"
+        )
+    return [np.ascontiguousarray(column, dtype=np.float64) for column in array.T]

@@ -1,0 +1,867 @@
+"""Results, which never change."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, NoReturn, Protocol, Unpack, final
+
+import numpy as np
+
+from . import _mechid
+from ._errors import MechidError
+from ._records import Measurement, RecordOptions, Window, measurements
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Uncertain:
+    """A number with its standard error and 95 % confidence interval, in its unit.
+
+    Both are None for a number that is known.
+    """
+
+    value: float
+    std_error: float | None
+    interval: tuple[float, float] | None
+
+    def __float__(self) -> float:
+        return self.value
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """An entry of M, C or K with its uncertainty.
+
+    Attributes
+    ----------
+    name : str
+        ``"m"``, ``"c"``, ``"k"``, or ``"m11"``, ``"c12"`` … with several degrees of freedom.
+    value : float
+        The estimate, in ``unit``.
+    std_error : float or None
+        Its standard error; None for a value that was given.
+    unit : str
+        SI unit.
+    matrix : str
+        ``"mass"``, ``"damping"`` or ``"stiffness"``.
+    row, column : int
+        Place in the matrix, counted from 1.
+    known : bool
+        Whether the value was given, not estimated.
+    """
+
+    name: str
+    value: float
+    std_error: float | None
+    unit: str
+    matrix: str
+    row: int
+    column: int
+    known: bool
+    _found: _mechid.Identified
+
+    def __float__(self) -> float:
+        return self.value
+
+    def interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Return the confidence interval at a level between 0 and 1, by Student's t.
+
+        Raises
+        ------
+        MechidError
+            If the level is not between 0 and 1, or the value is known.
+        """
+        low, high = self._found.interval(self.name, level)
+        return low, high
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Mode:
+    """A mode of a machine.
+
+    Attributes
+    ----------
+    oscillates : bool
+        Whether it is underdamped.
+    natural_frequency_hz, damped_frequency_hz : Uncertain
+        In Hz.
+    damping_ratio : Uncertain
+        Dimensionless.
+    eigenvalue : complex
+        In rad/s.
+    shape : array of complex
+        One entry per degree of freedom, the largest is 1.
+    shape_std_error : array of complex, or None
+        Standard errors of the real and imaginary parts of ``shape``.
+    """
+
+    oscillates: bool
+    natural_frequency_hz: Uncertain
+    damped_frequency_hz: Uncertain
+    damping_ratio: Uncertain
+    eigenvalue: complex
+    shape: NDArray[np.complex128]
+    shape_std_error: NDArray[np.complex128] | None
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One finding of the checks before and after a fit.
+
+    Attributes
+    ----------
+    when : {"before", "after"}
+        Whether it looks at the data or at what the fit leaves.
+    record : str or None
+        The record, where there are several.
+    subject : str
+        What was looked at.
+    verdict : {"good", "doubtful", "bad"}
+        What came of it.
+    value : float or None
+        The number that decides; None where it is infinite.
+    text : str
+        The finding, in a sentence.
+    numbers : mapping
+        All numbers of the finding, by name.
+    """
+
+    when: Literal["before", "after"]
+    record: str | None
+    subject: str
+    verdict: str
+    value: float | None
+    text: str
+    numbers: Mapping[str, Any]
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """How well an identified machine predicts a record that was not fitted.
+
+    Attributes
+    ----------
+    fit_percent : mapping of str to float
+        Predicted part of each channel, in per cent; 100 is perfect.
+    values : mapping
+        Everything, as in the JSON of the program.
+    """
+
+    fit_percent: Mapping[str, float]
+    values: Mapping[str, Any]
+
+    @classmethod
+    def _of(cls, told: dict[str, Any]) -> Validation:
+        channels = told["channels"]
+        several = any(channel["degree_of_freedom"] > 1 for channel in channels)
+        fit = {
+            f"{channel['quantity']} {channel['degree_of_freedom']}" if several else channel["quantity"]: float(
+                channel["fit_percent"]
+            )
+            for channel in channels
+        }
+        return cls(MappingProxyType(fit), MappingProxyType(told))
+
+
+class Result:
+    """What results have in common; they never change."""
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        raise AttributeError(f"a result never changes: `{name}` cannot be set")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        raise AttributeError(f"a result never changes: `{name}` cannot be deleted")
+
+    @cached_property
+    def _told(self) -> dict[str, Any]:
+        told: dict[str, Any] = json.loads(self.to_json())
+        return told
+
+    def to_json(self) -> str:
+        """Return the result as the program prints it with ``--json``."""
+        raise NotImplementedError
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the result as dictionaries, lists and numbers, as `to_json` has them."""
+        told: dict[str, Any] = json.loads(self.to_json())
+        return told
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks to read before using the numbers."""
+        return tuple(self._told["remarks"])
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings that repeat the analysis."""
+        settings: dict[str, Any] = self.to_dict()["analysis"]
+        return settings
+
+
+class _Compiled(Protocol):
+    """What every compiled result can do."""
+
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+
+
+class Drawn(Result):
+    """A result that the program draws."""
+
+    @property
+    def _compiled(self) -> _Compiled:
+        inner: _Compiled = self.__dict__["_inner"]
+        return inner
+
+    def to_json(self) -> str:
+        """Return the result as the program prints it with ``--json``."""
+        return self._compiled.to_json()
+
+    def to_svg(self) -> str:
+        """Return the picture that the program draws with ``--plot``, as SVG.
+
+        Raises
+        ------
+        MechidError
+            If there is nothing to draw.
+        """
+        return self._compiled.svg()
+
+    def _repr_html_(self) -> str:
+        text = f"<pre>{html.escape(str(self))}</pre>"
+        try:
+            return f"<div>{self.to_svg()}{text}</div>"
+        except MechidError:
+            return text
+
+    def __str__(self) -> str:
+        return self._compiled.text()
+
+
+@final
+class Identified(Drawn):
+    """An identified machine, with what speaks for and against it.
+
+    ``print`` shows it as the program does; `to_json` is the JSON of the program.
+    """
+
+    def __init__(self, inner: _mechid.Identified) -> None:
+        self.__dict__["_inner"] = inner
+
+    _inner: _mechid.Identified
+
+    @cached_property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """Entries of M, C and K by name, with standard errors."""
+        rows = self._told["parameters"]
+        return MappingProxyType({row["name"]: self._parameter(row) for row in rows})
+
+    def _parameter(self, row: dict[str, Any]) -> Parameter:
+        return Parameter(
+            name=row["name"],
+            value=_number(row["value"]),
+            std_error=row["standard_error"],
+            unit=row["unit"],
+            matrix=row["matrix"],
+            row=row["row"],
+            column=row["column"],
+            known=row["known"],
+            _found=self._inner,
+        )
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """M, in kg, shape (degrees of freedom, degrees of freedom)."""
+        return _array(self._told["system"]["mass"])
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """C, in N·s/m, likewise."""
+        return _array(self._told["system"]["damping"])
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """K, in N/m, likewise."""
+        return _array(self._told["system"]["stiffness"])
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the estimated parameters, in the order of `estimated`."""
+        return _array(self._told["covariance"]["matrix"])
+
+    @property
+    def estimated(self) -> tuple[str, ...]:
+        """Names of the parameters that were not given, in the order of `covariance`."""
+        return tuple(self._told["covariance"]["parameters"])
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes by rising frequency, with standard errors."""
+        return self.machine().modes
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """Every check of the data and of the fit, in the order in which they were made."""
+        return tuple(
+            Finding(
+                when=row["when"],
+                record=row["record"],
+                subject=row["subject"],
+                verdict=row["verdict"],
+                value=row["value"],
+                text=row["text"],
+                numbers=MappingProxyType(row["finding"]),
+            )
+            for row in self._told["checks"]
+        )
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Findings that are not good."""
+        return tuple(check for check in self.findings if check.verdict != "good")
+
+    @property
+    def fit(self) -> Mapping[str, Any]:
+        """Quality of the fit: ``nrmse``, ``unexplained_motion``, ``condition_number`` …"""
+        return MappingProxyType(self._told["fit"])
+
+    @property
+    def validation(self) -> Validation | None:
+        """Prediction of the record given as ``validate``."""
+        told = self.to_dict()["validation"]
+        return None if told is None else Validation._of(told)
+
+    def machine(self) -> Machine:
+        """Return M, C and K with the covariance of their entries."""
+        return Machine._of(self._inner.machine())
+
+    def validate(
+        self,
+        *sources: object,
+        validate_start: int | None = None,
+        validate_samples: int | None = None,
+        **record: Unpack[RecordOptions],
+    ) -> Validation:
+        """Predict a record that was not fitted.
+
+        Parameters
+        ----------
+        *sources, **record
+            The record, as in `identify`.
+        validate_start, validate_samples : int, optional
+            First sample to predict, counted from 1, and their number.
+
+        Raises
+        ------
+        MechidError
+            If the record does not fit the machine, or the machine is unstable.
+        """
+        other = one(sources, "validate", record)
+        samples = json.dumps({"start": validate_start, "samples": validate_samples})
+        return Validation._of(json.loads(self._inner.validate(other._inner, samples)))
+
+    @property
+    def compared(self) -> Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Measured and predicted response of the first record by quantity, in SI units."""
+        return MappingProxyType({kind: (m, p) for kind, m, p in self._inner.compared()})
+
+    @property
+    def spectra(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]] | None:
+        """Frequencies in Hz, force in N and displacement in m on the lines that were fitted.
+
+        Arrays of shape (lines, degrees of freedom); None for a fit in the time domain.
+        """
+        found = self._inner.spectra()
+        return None if found is None else (found[0] / (2 * np.pi), *found[1:])
+
+    def report(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        *,
+        title: str | None = None,
+        reconstruct_force: bool = False,
+    ) -> str:
+        """Return one HTML page with everything the identification has to show, and write it.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the page goes, too.
+        title : str, optional
+            Heading; the name of the record, without.
+        reconstruct_force : bool
+            Whether to reconstruct the force with the identified machine and compare it.
+
+        Raises
+        ------
+        MechidError
+            If a record cannot be read again, or the force cannot be reconstructed.
+        """
+        page = self._inner.page(title, reconstruct_force)
+        if path is not None:
+            with open(path, "w", encoding="utf-8") as file:
+                file.write(page)
+        return page
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{p.name}={p.value:.6g} {p.unit}" for p in self.parameters.values())
+        return f"<Identified {self._told['file']!r}: {values}>"
+
+
+@final
+class Machine(Drawn):
+    """M, C and K, with the covariance of those of their entries that were identified.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : array_like
+        Numbers, or matrices of shape (degrees of freedom, degrees of freedom), in kg, N·s/m and N/m,
+        taken as exactly known. They need not be symmetric.
+
+    Raises
+    ------
+    MechidError
+        If the matrices are not square, of one size and finite, or M is singular.
+    """
+
+    _inner: _mechid.Machine
+
+    def __init__(self, mass: ArrayLike, damping: ArrayLike, stiffness: ArrayLike) -> None:
+        given = {"mass": mass, "damping": damping, "stiffness": stiffness}
+        inner = _mechid.Machine.known(*(_square(name, values) for name, values in given.items()))
+        self.__dict__["_inner"] = inner
+
+    @classmethod
+    def _of(cls, inner: _mechid.Machine) -> Machine:
+        machine = cls.__new__(cls)
+        machine.__dict__["_inner"] = inner
+        return machine
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> Machine:
+        """Read a machine from the JSON of an identification, or from a description.
+
+        Raises
+        ------
+        MechidError
+            If the file cannot be read or describes no machine.
+        """
+        return cls._of(_mechid.Machine.read(os.fspath(path)))
+
+    @property
+    def name(self) -> str:
+        """Where the machine comes from."""
+        return self._inner.name
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether the machine is taken as exactly known."""
+        return self._inner.is_exact
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """M, in kg, shape (degrees of freedom, degrees of freedom)."""
+        return self._inner.mass
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """C, in N·s/m, likewise."""
+        return self._inner.damping
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """K, in N/m, likewise."""
+        return self._inner.stiffness
+
+    def receptance(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        """Return the receptance in m/N, shape (frequencies, motions, forces).
+
+        Raises
+        ------
+        MechidError
+            If a frequency is not finite, or an undamped resonance.
+        """
+        n = len(self.mass)
+        omega = 2 * np.pi * np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+        return self._inner.receptances(omega.tolist()).reshape(-1, n, n)
+
+    @cached_property
+    def _modal(self) -> tuple[str, str]:
+        return self._inner.modal()
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes by rising frequency, with standard errors where the machine was identified.
+
+        Raises
+        ------
+        MechidError
+            If the machine has no modes.
+        """
+        return tuple(_mode(row) for row in self._told["modes"])
+
+    def state_space(
+        self, output: Literal["displacement", "velocity", "acceleration"] = "displacement"
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return A, B, C and D for the state [x, ẋ], the input F and the output chosen.
+
+        ``scipy.signal.StateSpace(*machine.state_space())`` takes them.
+        """
+        a, b = self._inner.state_matrices()
+        n = b.shape[1]
+        rows = {"displacement": np.eye(2 * n)[:n], "velocity": a[:n], "acceleration": a[n:]}
+        if output not in rows:
+            raise ValueError(f"`output` is one of {', '.join(rows)}, got {output!r}")
+        d = b[n:] if output == "acceleration" else np.zeros((n, n))
+        return a, b, rows[output], d
+
+    def to_json(self) -> str:
+        """Return the modes and the system as ``mechid modal --json`` prints them."""
+        return self._modal[0]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing: a machine has no remarks."""
+        return ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Nothing: a machine has no settings."""
+        return {}
+
+    def __str__(self) -> str:
+        return self._modal[1]
+
+    def __repr__(self) -> str:
+        return f"<Machine {self.name!r}, degrees of freedom: {len(self.mass)}>"
+
+
+@final
+class FrequencyResponses(Drawn):
+    """Frequency responses with coherence and standard errors."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def frequency_hz(self) -> NDArray[np.float64]:
+        """Frequencies, in Hz."""
+        return np.array(self._told["frequency_hz"], dtype=np.float64)
+
+    @property
+    def unit(self) -> str:
+        """Unit of the responses, such as ``"m/N"``."""
+        return str(self._told["unit"])
+
+    def response(self, motion: int = 1, force: int = 1) -> NDArray[np.complex128]:
+        """Return the complex response of a degree of freedom to the force on another, counted from 1.
+
+        Raises
+        ------
+        KeyError
+            If there is no such pair.
+        """
+        row = self._row(motion, force)
+        return np.array(row["real"]) + 1j * np.array(row["imaginary"])
+
+    def std_error(self, motion: int = 1, force: int = 1) -> NDArray[np.float64]:
+        """Return the standard error of real part, imaginary part and magnitude alike.
+
+        Raises
+        ------
+        KeyError
+            If there is no such pair.
+        """
+        values = self._row(motion, force)["standard_error"]
+        return np.array([_number(value) for value in values], dtype=np.float64)
+
+    def coherence(self, motion: int = 1) -> NDArray[np.float64]:
+        """Return the part of a motion's power that is linear in the forces.
+
+        Raises
+        ------
+        KeyError
+            If there is no such degree of freedom.
+        """
+        for row in self._told["coherence"]:
+            if row["motion"] == motion:
+                return np.array(row["values"], dtype=np.float64)
+        raise KeyError(motion)
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Motion and force of each response, counted from 1."""
+        return tuple((row["motion"], row["force"]) for row in self._told["responses"])
+
+    def _row(self, motion: int, force: int) -> dict[str, Any]:
+        for row in self._told["responses"]:
+            if (row["motion"], row["force"]) == (motion, force):
+                found: dict[str, Any] = row
+                return found
+        raise KeyError((motion, force))
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<FrequencyResponses {told['file']!r}: {len(told['frequency_hz'])} lines>"
+
+
+@final
+class Inspected(Drawn):
+    """What is in a record file."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def channels(self) -> tuple[Mapping[str, Any], ...]:
+        """Levels, strongest lines and period of each column."""
+        return tuple(MappingProxyType(row) for row in self._told["channels"])
+
+    @property
+    def fs(self) -> float | None:
+        """Sampling rate, in Hz; None without a time axis."""
+        sampling = self._told["sampling"]
+        return None if sampling is None else float(sampling["rate_hz"])
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<Inspected {told['file']!r}: {told['columns']} columns, {told['samples']} samples>"
+
+
+@final
+class Sweep(Drawn):
+    """Estimates and errors at many sampling steps."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def values(self) -> NDArray[np.float64]:
+        """Settings: NPI, rates in Hz, or decimations."""
+        return np.array([point["setting"] for point in self._told["points"]], dtype=np.float64)
+
+    @property
+    def error(self) -> NDArray[np.float64]:
+        """Error at each setting, relative; NaN where there is no estimate."""
+        errors = [point["error"] for point in self._told["points"]]
+        return np.array([np.nan if error is None else error for error in errors], dtype=np.float64)
+
+    @property
+    def best(self) -> float:
+        """Setting with the smallest error."""
+        return float(self._told["best_setting"])
+
+    @property
+    def points(self) -> tuple[Mapping[str, Any], ...]:
+        """Everything at each setting."""
+        return tuple(MappingProxyType(point) for point in self._told["points"])
+
+    def __repr__(self) -> str:
+        return f"<Sweep {self._told['file']!r}: best at {self.best:g} of {len(self.values)} settings>"
+
+
+@final
+class Reconstructed(Drawn):
+    """The force that drove a machine, and how it was found."""
+
+    _inner: _mechid.Reconstructed
+
+    def __init__(self, inner: _mechid.Reconstructed) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """The force, shape (samples, degrees of freedom), in N; of whole periods, one period."""
+        return self._inner.force
+
+    @property
+    def std_error(self) -> NDArray[np.float64] | None:
+        """Standard error of the force, likewise; None where it is not known."""
+        return self._inner.std_error
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Instants of the samples, in s."""
+        return np.arange(len(self.force)) / float(self._told["sample_rate_hz"])
+
+    @property
+    def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        """Frequencies in Hz, and complex amplitudes, shape (frequencies, degrees of freedom), in N."""
+        return self._inner.spectrum()
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<Reconstructed {told['file']!r}: {told['method']}, {told['samples']} samples>"
+
+
+@final
+class Simulation:
+    """The record that an experiment gives, and the truth behind it.
+
+    Attributes
+    ----------
+    scheme : str
+        How the response was computed.
+    fs : float
+        Sampling rate, in Hz.
+    machine : Machine
+        The machine.
+    force : array
+        The force as the sensors tell it, shape (samples, degrees of freedom), in N.
+    displacement, velocity, acceleration : array
+        The response as the sensors tell it, in m, m/s and m/s².
+    truth : mapping
+        The four without noise.
+    """
+
+    __slots__ = ("acceleration", "displacement", "force", "fs", "machine", "scheme", "truth", "velocity")
+
+    def __init__(self, found: _mechid._Simulated) -> None:
+        self.scheme, self.fs, machine, (force, measured), (true_force, truth) = found
+        self.machine = Machine._of(machine)
+        self.force = force
+        kinds = dict(measured)
+        self.displacement, self.velocity = kinds["displacement"], kinds["velocity"]
+        self.acceleration = kinds["acceleration"]
+        self.truth: Mapping[str, NDArray[np.float64]] = MappingProxyType(
+            {"force": true_force, **dict(truth)}
+        )
+
+    def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
+        """Return force and the responses named (the displacement, without) as a record."""
+        chosen: dict[str, Any] = {name: getattr(self, name) for name in quantities or ("displacement",)}
+        return Measurement.from_arrays(self.force, fs=self.fs, **chosen, **window)
+
+    def __repr__(self) -> str:
+        return f"<Simulation: {len(self.force)} samples at {self.fs:g} Hz, {self.scheme}>"
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class Multisine:
+    """One period of a multisine.
+
+    Attributes
+    ----------
+    fs : float
+        Sampling rate, in Hz.
+    force : array
+        The period, in N.
+    lines : tuple of int
+        Lines of the period with force.
+    amplitudes, phases : array
+        Of each line, in N and rad: the force is the sum of amplitude · cos(2π line t / period + phase).
+    rms, peak, crest_factor : float
+        RMS value and peak in N, between samples too, and their ratio.
+    """
+
+    fs: float
+    force: NDArray[np.float64]
+    lines: tuple[int, ...]
+    amplitudes: NDArray[np.float64]
+    phases: NDArray[np.float64]
+    rms: float
+    peak: float
+    crest_factor: float
+
+    @classmethod
+    def _of(cls, fs: float, found: _mechid._Sampled) -> Multisine:
+        force, lines, amplitudes, phases, measures = found
+        return cls(fs, force, tuple(lines), amplitudes, phases, *measures)
+
+
+def machine_of(given: Machine | Identified | str | os.PathLike[str]) -> Machine:
+    """Return the machine that is meant."""
+    if isinstance(given, Identified):
+        return given.machine()
+    if isinstance(given, Machine):
+        return given
+    return Machine.read(given)
+
+
+def description_of(given: object) -> tuple[str, str] | None:
+    """Return name and JSON of the experiment that is meant; None if it is something else."""
+    if isinstance(given, Mapping) and "system" in given:
+        return "the description", json.dumps(given)
+    if isinstance(given, (str, os.PathLike)) and os.fspath(given).lower().endswith(".json"):
+        path = os.fspath(given)
+        try:
+            with open(path, encoding="utf-8") as file:
+                return path, file.read()
+        except OSError as error:
+            quoted = json.dumps(path)
+            raise MechidError(
+                f"cannot read {path}: {error.strerror}", f"Io(Read {{ file: {quoted} }})"
+            ) from None
+    return None
+
+
+def one(sources: Sequence[object], door: str, record: RecordOptions) -> Measurement:
+    """Return the only record that a call names."""
+    found = measurements(sources, door, record)
+    if len(found) != 1:
+        raise TypeError(f"{door} takes one record, got {len(found)}")
+    return found[0]
+
+
+def _mode(row: dict[str, Any]) -> Mode:
+    shape = row["shape"]
+    errors = [entry["standard_error"] for entry in shape]
+    return Mode(
+        oscillates=row["oscillates"],
+        natural_frequency_hz=_uncertain(row["natural_frequency_hz"]),
+        damped_frequency_hz=_uncertain(row["damped_frequency_hz"]),
+        damping_ratio=_uncertain(row["damping_ratio"]),
+        eigenvalue=complex(*row["eigenvalue"]),
+        shape=np.array([complex(*entry["value"]) for entry in shape]),
+        shape_std_error=None if None in errors else np.array([complex(*e) for e in errors]),
+    )
+
+
+def _uncertain(row: dict[str, Any]) -> Uncertain:
+    interval = row["interval"]
+    return Uncertain(
+        value=_number(row["value"]),
+        std_error=row["standard_error"],
+        interval=None if interval is None else (interval[0], interval[1]),
+    )
+
+
+def _number(value: float | None) -> float:
+    # JSON has no infinity.
+    return float("inf") if value is None else value
+
+
+def _array(rows: list[list[float | None]]) -> NDArray[np.float64]:
+    return np.array([[_number(value) for value in row] for row in rows], dtype=np.float64)
+
+
+def _square(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    array = np.asarray(values)
+    if array.dtype.kind not in "fiu":
+        raise TypeError(f"`{name}` holds {array.dtype}, not real numbers")
+    if array.ndim not in (0, 2):
+        raise ValueError(f"`{name}` is a number or a matrix, got {array.ndim} dimensions")
+    return np.array(array.reshape(array.shape or (1, 1)), dtype=np.float64)

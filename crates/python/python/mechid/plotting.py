@@ -1,0 +1,203 @@
+"""Plots of results with Matplotlib, each into the axes given or into new ones.
+
+Matplotlib is imported when a function is called: ``pip install "mechid[plot]"`` brings it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._results import FrequencyResponses, Identified, Machine, Reconstructed, Sweep
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def receptance(
+    found: Identified, motion: int = 1, force: int = 1, *, phase: bool = False, ax: Axes | None = None
+) -> Axes:
+    """Plot measured and identified receptance of a pair of degrees of freedom, counted from 1.
+
+    Parameters
+    ----------
+    found : Identified
+        A fit in the frequency domain.
+    motion, force : int
+        Degree of freedom that moves and the one that is driven. Measured points are shown on lines
+        where no other force acts.
+    phase : bool
+        Whether to plot the phase in degrees instead of the magnitude in m/N.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ValueError
+        If the fit is one in the time domain.
+    """
+    spectra = found.spectra
+    if spectra is None:
+        raise ValueError("a fit in the time domain has no lines: plot `response` instead")
+    frequency, forces, motions = spectra
+    others = np.delete(np.abs(forces), force - 1, axis=1).sum(axis=1)
+    alone = others <= 1e-3 * np.abs(forces[:, force - 1])
+    fine = np.linspace(frequency.min(), frequency.max(), 801)
+    model = found.machine().receptance(fine)[:, motion - 1, force - 1]
+    measured = motions[alone, motion - 1] / forces[alone, force - 1]
+    shown = _degrees if phase else np.abs
+    axes = _axes(ax)
+    axes.plot(fine, shown(model), label="identified")
+    axes.plot(frequency[alone], shown(measured), ".", label="measured")
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Phase (°)" if phase else "Receptance (m/N)")
+    if not phase:
+        axes.set_yscale("log")
+    axes.legend()
+    return axes
+
+
+def response(found: Identified, dof: int = 1, *, ax: Axes | None = None) -> Axes:
+    """Plot the first measured response and the one that the identified machine predicts.
+
+    Parameters
+    ----------
+    found : Identified
+        An identification.
+    dof : int
+        Degree of freedom, counted from 1.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    MechidError
+        If the identified system is unstable.
+    """
+    (kind, (measured, predicted)) = next(iter(found.compared.items()))
+    axes = _axes(ax)
+    time = np.arange(len(measured)) / found.to_dict()["window"]["sample_rate_hz"]
+    axes.plot(time, measured[:, dof - 1], label="measured")
+    axes.plot(time, predicted[:, dof - 1], "--", label="predicted")
+    units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s²"}
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel(f"{kind.capitalize()} ({units[kind]})")
+    axes.legend()
+    return axes
+
+
+def frf(
+    found: FrequencyResponses, motion: int = 1, force: int = 1, *, ax: Axes | None = None
+) -> Axes:
+    """Plot the magnitude of a frequency response.
+
+    Parameters
+    ----------
+    found : FrequencyResponses
+        Frequency responses.
+    motion, force : int
+        Degree of freedom that moves and the one that is driven, counted from 1.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    KeyError
+        If there is no such pair.
+    """
+    axes = _axes(ax)
+    axes.plot(found.frequency_hz, np.abs(found.response(motion, force)))
+    axes.set_yscale("log")
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel(f"Magnitude ({found.unit})")
+    return axes
+
+
+def coherence(found: FrequencyResponses, motion: int = 1, *, ax: Axes | None = None) -> Axes:
+    """Plot the coherence of a degree of freedom, counted from 1.
+
+    Raises
+    ------
+    KeyError
+        If there is no such degree of freedom.
+    """
+    axes = _axes(ax)
+    axes.plot(found.frequency_hz, found.coherence(motion))
+    axes.set_xlabel("Frequency (Hz)")
+    axes.set_ylabel("Coherence")
+    axes.set_ylim(0, 1.05)
+    return axes
+
+
+def force(found: Reconstructed, dof: int = 1, *, ax: Axes | None = None) -> Axes:
+    """Plot a reconstructed force over time, with twice its standard error where that is known.
+
+    Parameters
+    ----------
+    found : Reconstructed
+        A reconstruction.
+    dof : int
+        Degree of freedom, counted from 1.
+    ax : matplotlib.axes.Axes, optional
+        Axes to plot into.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+    """
+    axes = _axes(ax)
+    values, error = found.force[:, dof - 1], found.std_error
+    axes.plot(found.time, values)
+    if error is not None:
+        width = 2 * error[:, dof - 1]
+        axes.fill_between(found.time, values - width, values + width, alpha=0.3)
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel("Force (N)")
+    return axes
+
+
+def sweep(found: Sweep, *, ax: Axes | None = None) -> Axes:
+    """Plot the error over the settings of a sweep, both logarithmic."""
+    axes = _axes(ax)
+    axes.loglog(found.values, found.error)
+    axes.set_xlabel({"npi": "NPI", "rate_hz": "Rate (Hz)"}.get(found.settings["kind"], "Decimation"))
+    axes.set_ylabel("Relative error")
+    return axes
+
+
+def modes(machine: Machine | Identified, *, ax: Axes | None = None) -> Axes:
+    """Plot the eigenvalues of a machine in the complex plane, in rad/s."""
+    axes = _axes(ax)
+    values = np.array([mode.eigenvalue for mode in machine.modes])
+    axes.plot(values.real, values.imag, "x")
+    axes.axvline(0.0, color="0.7", linewidth=0.8)
+    axes.set_xlabel("Real part (rad/s)")
+    axes.set_ylabel("Imaginary part (rad/s)")
+    return axes
+
+
+def _degrees(values: np.ndarray[tuple[int], np.dtype[np.complex128]]) -> np.ndarray[
+    tuple[int], np.dtype[np.float64]
+]:
+    return np.angle(values, deg=True)
+
+
+def _axes(ax: Axes | None) -> Axes:
+    if ax is not None:
+        return ax
+    from matplotlib import pyplot
+
+    return pyplot.subplots()[1]

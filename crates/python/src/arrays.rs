@@ -1,0 +1,41 @@
+//! Arrays in and out: copied in, owned arrays handed out.
+
+use mechid::model::ResponseQuantity;
+use mechid::signal::Record;
+use nalgebra::DMatrix;
+use numpy::{Element, IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};
+use pyo3::prelude::*;
+
+/// Returns an array of rows × columns of its own.
+pub fn matrix<'py, T: Element + nalgebra::Scalar>(
+    py: Python<'py>,
+    matrix: DMatrix<T>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    let (rows, columns) = matrix.shape();
+    let values: Vec<T> = matrix.data.into();
+    // nalgebra stores column by column.
+    let transposed = values.into_pyarray(py).reshape([columns, rows])?;
+    transposed.transpose()
+}
+
+/// Returns an array of samples × channels of its own.
+pub fn record(py: Python<'_>, record: Record) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    matrix(py, record.into_data())
+}
+
+/// Returns a vector of its own.
+pub fn vector<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
+    values.into_pyarray(py)
+}
+
+/// Name of a kind of response, and its samples × degrees of freedom.
+pub type Named<'py> = (String, Bound<'py, PyArray2<f64>>);
+
+/// Returns records with their names.
+pub fn responses(
+    py: Python<'_>,
+    records: Vec<(ResponseQuantity, Record)>,
+) -> PyResult<Vec<Named<'_>>> {
+    let named = records.into_iter();
+    named.map(|(kind, values)| Ok((kind.to_string(), record(py, values)?))).collect()
+}

@@ -1,0 +1,149 @@
+//! Identification of a machine.
+
+use std::sync::Arc;
+
+use mechid::Identify;
+use mechid::analysis::AnalysisError;
+use mechid::analysis::identify::ValidationWindow;
+use mechid::report::{PageSettings, page};
+use nalgebra::Complex;
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::machine::Machine;
+use crate::measurement::Measurement;
+use crate::{answer, arrays, failure, work};
+
+/// An identified machine, and what it was identified from.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct Identified(pub Arc<mechid::Identified>);
+
+/// Identifies the machine behind the records; settings and the window to validate with are JSON.
+#[pyfunction]
+#[pyo3(signature = (records, settings, validate, threads))]
+pub fn identify(
+    py: Python<'_>,
+    records: Vec<PyRef<'_, Measurement>>,
+    settings: &str,
+    validate: Option<(PyRef<'_, Measurement>, &str)>,
+    threads: Option<usize>,
+) -> PyResult<Identified> {
+    let how: Identify = failure::settings(py, settings)?;
+    let records: Vec<mechid::Measurement> = records.iter().map(|record| record.0.clone()).collect();
+    let validate = match validate {
+        Some((other, samples)) => {
+            let samples: Samples = failure::settings(py, samples)?;
+            Some((other.0.clone(), samples.into()))
+        }
+        None => None,
+    };
+    let find = move || -> Result<mechid::Identified, AnalysisError> {
+        let mut found = mechid::identify(&records, &how)?;
+        if let Some((other, samples)) = validate {
+            let other = found.validation_window(other, &samples)?;
+            found.add_validation(&other)?;
+        }
+        Ok(found)
+    };
+    work::watched(py, threads, || Ok(()), find).map(|found| Identified(Arc::new(found)))
+}
+
+/// A kind of response, measured and predicted.
+type Compared<'py> = (String, Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// Frequencies, force and displacement.
+type Spectra<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray2<Complex<f64>>>,
+    Bound<'py, PyArray2<Complex<f64>>>,
+);
+
+/// Samples to predict.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Samples {
+    start: Option<usize>,
+    samples: Option<usize>,
+}
+
+impl From<Samples> for ValidationWindow {
+    fn from(Samples { start, samples }: Samples) -> Self {
+        Self { start, samples }
+    }
+}
+
+#[pymethods]
+impl Identified {
+    /// The result as the program prints it with `--json`.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        failure::json(py, &*self.0)
+    }
+
+    /// The result as a person reads it.
+    fn text(&self) -> String {
+        self.0.to_string()
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        answer::svg(py, Arc::clone(&self.0))
+    }
+
+    /// The page of the program's report, as HTML.
+    fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
+        let settings = PageSettings { title, reconstruct_force: force, command: None };
+        let found = Arc::clone(&self.0);
+        work::watched(py, None, || Ok(()), move || page(&found, &settings))
+    }
+
+    /// Measured and predicted response of the first record.
+    fn compared<'py>(&self, py: Python<'py>) -> PyResult<Vec<Compared<'py>>> {
+        let found = Arc::clone(&self.0);
+        let all = work::watched(py, None, || Ok(()), move || found.compared())?;
+        let all = all.into_iter().map(|one| {
+            let [measured, predicted] = [one.measured, one.predicted];
+            Ok((
+                one.kind.to_string(),
+                arrays::record(py, measured)?,
+                arrays::record(py, predicted)?,
+            ))
+        });
+        all.collect()
+    }
+
+    /// Frequencies in rad/s, and amplitudes of force and displacement on the lines fitted, in N and m.
+    fn spectra<'py>(&self, py: Python<'py>) -> PyResult<Option<Spectra<'py>>> {
+        let Some(data) = self.0.spectra() else { return Ok(None) };
+        Ok(Some((
+            arrays::vector(py, data.omega().to_vec()),
+            arrays::matrix(py, data.force().clone())?,
+            arrays::matrix(py, data.displacement().clone())?,
+        )))
+    }
+
+    /// Confidence interval of a parameter.
+    fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
+        work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
+    }
+
+    /// The identified system with the covariance of its parameters.
+    fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
+        work::brief(py, || self.0.machine()).map(Machine)
+    }
+
+    /// Prediction of a record that was not fitted, as JSON.
+    fn validate(
+        &self,
+        py: Python<'_>,
+        other: PyRef<'_, Measurement>,
+        samples: &str,
+    ) -> PyResult<String> {
+        let samples: Samples = failure::settings(py, samples)?;
+        let (found, other) = (Arc::clone(&self.0), other.0.clone());
+        let predict = move || {
+            let other = found.validation_window(other, &samples.into())?;
+            found.validate(&other)
+        };
+        failure::json(py, &work::watched(py, None, || Ok(()), predict)?)
+    }
+}

@@ -1,0 +1,46 @@
+//! The compiled half of the Python package `mechid`: the facade and the program, for `python/mechid`,
+//! which gives them the shape that users of NumPy expect.
+//!
+//! Settings come and results go as the JSON that the program reads and prints; arrays are copied in
+//! and owned arrays handed out. Nothing is computed here. Work runs without the interpreter's lock, in
+//! a pool of threads of this process ([`work`]); failures and panics become `MechidError`
+//! ([`failure`]).
+
+mod answer;
+mod arrays;
+mod failure;
+mod identified;
+mod machine;
+mod measurement;
+mod program;
+mod questions;
+mod reconstructed;
+mod simulated;
+mod work;
+
+#[pyo3::pymodule(gil_used = false)]
+mod _mechid {
+    #[pymodule_export]
+    use super::answer::Answer;
+    #[pymodule_export]
+    use super::identified::{Identified, identify};
+    #[pymodule_export]
+    use super::machine::Machine;
+    #[pymodule_export]
+    use super::measurement::Measurement;
+    #[pymodule_export]
+    use super::program::program;
+    #[pymodule_export]
+    use super::questions::{frf, inspect, sweep};
+    #[pymodule_export]
+    use super::reconstructed::{Reconstructed, reconstruct};
+    #[pymodule_export]
+    use super::simulated::{integrate, multisine, predict, simulate};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn version(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

@@ -1,0 +1,107 @@
+//! M, C and K, and how well they are known.
+
+use std::path::PathBuf;
+
+use mechid::analysis::{AnalysisError, ModalSummary};
+use mechid::model::{SecondOrderSystem, StateTransition};
+use mechid::report::{ReportError, ToFigure as _};
+use nalgebra::{Complex, DMatrix};
+use numpy::{PyArray2, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::{arrays, failure, work};
+
+/// A system with the covariance of its parameters, where it was identified.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct Machine(pub mechid::Machine);
+
+#[pymethods]
+impl Machine {
+    /// Takes M, C and K as exactly known.
+    #[staticmethod]
+    fn known(
+        py: Python<'_>,
+        mass: PyReadonlyArray2<'_, f64>,
+        damping: PyReadonlyArray2<'_, f64>,
+        stiffness: PyReadonlyArray2<'_, f64>,
+    ) -> PyResult<Self> {
+        let [mass, damping, stiffness] = [mass, damping, stiffness].map(|given| {
+            let given = given.as_array();
+            DMatrix::from_fn(given.nrows(), given.ncols(), |row, column| given[[row, column]])
+        });
+        let system = work::brief(py, || SecondOrderSystem::new(mass, damping, stiffness))?;
+        Ok(Self(mechid::Machine::known(system)))
+    }
+
+    /// Reads the system and its covariance from JSON.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        work::brief(py, || mechid::Machine::read(path)).map(Self)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.name
+    }
+
+    #[getter]
+    fn is_exact(&self) -> bool {
+        self.0.is_exact()
+    }
+
+    #[getter]
+    fn mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::matrix(py, self.0.system().mass().clone())
+    }
+
+    #[getter]
+    fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::matrix(py, self.0.system().damping().clone())
+    }
+
+    #[getter]
+    fn stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::matrix(py, self.0.system().stiffness().clone())
+    }
+
+    /// Rate matrix A and input matrix B of z = [x; ẋ], ż = A z + B F.
+    fn state_matrices<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyArray2<f64>>; 2]> {
+        let system = self.0.system();
+        let (rate, input) = py.detach(|| {
+            let n = system.dof();
+            let mut input = DMatrix::zeros(2 * n, n);
+            // In step units of one second.
+            input.view_mut((n, 0), (n, n)).copy_from(&StateTransition::force_input(system, 1.0));
+            (StateTransition::rate(system, 1.0), input)
+        });
+        Ok([arrays::matrix(py, rate)?, arrays::matrix(py, input)?])
+    }
+
+    /// Receptances x_i / F_j at frequencies in rad/s, of frequencies × motions · forces.
+    fn receptances<'py>(
+        &self,
+        py: Python<'py>,
+        omega: Vec<f64>,
+    ) -> PyResult<Bound<'py, PyArray2<Complex<f64>>>> {
+        let system = self.0.system();
+        let found = work::brief(py, || system.receptances(&omega))?;
+        let n = system.dof();
+        let flat = DMatrix::from_fn(found.len(), n * n, |row, at| found[row][(at / n, at % n)]);
+        arrays::matrix(py, flat)
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        let machine = self.0.clone();
+        let draw = move || -> Result<String, ReportError> { Ok(machine.figure()?.to_svg()?) };
+        work::watched(py, None, || Ok(()), draw)
+    }
+
+    /// Modes as the program tells them: JSON and text.
+    fn modal(&self, py: Python<'_>) -> PyResult<(String, String)> {
+        let machine = self.0.clone();
+        let find = move || -> Result<_, AnalysisError> { ModalSummary::of(&machine) };
+        let found = work::watched(py, None, || Ok(()), find)?;
+        Ok((failure::json(py, &found)?, found.to_string()))
+    }
+}

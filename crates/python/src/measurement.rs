@@ -1,0 +1,103 @@
+//! Measured forces and responses.
+
+use mechid::analysis::{RecordPlan, Window};
+use mechid::signal::Sampling;
+use mechid::{Channels, analysis::AnalysisError};
+use numpy::{PyArray2, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Named};
+use crate::{failure, work};
+
+/// Forces and responses of a machine, from a file or from arrays, and the window of them to use.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct Measurement(pub mechid::Measurement);
+
+#[pymethods]
+impl Measurement {
+    /// Opens the file of a saved plan (JSON).
+    #[staticmethod]
+    fn open(py: Python<'_>, plan: &str) -> PyResult<Self> {
+        let plan: RecordPlan = failure::settings(py, plan)?;
+        work::watched(py, None, || Ok(()), move || plan.open()).map(Self)
+    }
+
+    /// Copies named columns; channels and window are JSON.
+    #[staticmethod]
+    fn from_columns(
+        py: Python<'_>,
+        name: &str,
+        rate_hz: f64,
+        columns: Vec<(String, PyReadonlyArray1<'_, f64>)>,
+        channels: &str,
+        window: &str,
+    ) -> PyResult<Self> {
+        let channels: Channels = failure::settings(py, channels)?;
+        let window: Window = failure::settings(py, window)?;
+        let copied = columns.into_iter().map(|(name, values)| (name, values.as_array().to_vec()));
+        let columns: Vec<(String, Vec<f64>)> = copied.collect();
+        work::brief(py, || {
+            let len = columns.first().map_or(0, |(_, values)| values.len());
+            let sampling = Sampling::from_rate_hz(rate_hz, len)?;
+            let named: Vec<(&str, &[f64])> =
+                columns.iter().map(|(name, values)| (name.as_str(), values.as_slice())).collect();
+            let whole = mechid::Measurement::from_columns(sampling, &named, &channels)?;
+            whole.named(name).window(window)
+        })
+        .map(Self)
+    }
+
+    /// Takes another window (JSON) of the same record.
+    fn window(&self, py: Python<'_>, window: &str) -> PyResult<Self> {
+        let window: Window = failure::settings(py, window)?;
+        let whole = self.0.clone();
+        work::brief(py, || whole.window(window)).map(Self)
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        self.0.name()
+    }
+
+    #[getter]
+    fn samples(&self) -> usize {
+        self.0.sampling().len()
+    }
+
+    #[getter]
+    fn fs(&self) -> f64 {
+        self.0.sampling().rate_hz()
+    }
+
+    /// Window as JSON.
+    #[getter]
+    fn window_settings(&self, py: Python<'_>) -> PyResult<String> {
+        failure::json(py, self.0.window_settings())
+    }
+
+    /// Columns as JSON.
+    #[getter]
+    fn channels(&self, py: Python<'_>) -> PyResult<String> {
+        failure::json(py, self.0.channels())
+    }
+
+    /// Saved plan as JSON; `None` for arrays.
+    #[getter]
+    fn plan(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.0.plan().map(|plan| failure::json(py, &plan)).transpose()
+    }
+
+    /// Reads the forces of the window.
+    fn force<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let record = self.0.clone();
+        let force = work::watched(py, None, || Ok(()), move || record.force())?;
+        arrays::record(py, force)
+    }
+
+    /// Reads every kind of response of the window.
+    fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
+        let record = self.0.clone();
+        let read = move || -> Result<_, AnalysisError> { record.responses() };
+        arrays::responses(py, work::watched(py, None, || Ok(()), read)?)
+    }
+}

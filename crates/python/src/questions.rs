@@ -1,0 +1,84 @@
+//! The questions whose answers are told and drawn: frequency responses, sweeps, inspection.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use mechid::FrfSettings;
+use mechid::analysis::sweep::{SweepSettings, sweep_record};
+use mechid::analysis::{InspectSettings, RecordPlan};
+use mechid::io::Experiment;
+use pyo3::prelude::*;
+
+use crate::answer::Answer;
+use crate::machine::Machine;
+use crate::measurement::Measurement;
+use crate::{failure, work};
+
+/// Estimates frequency responses; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (record, settings, threads))]
+pub fn frf(
+    py: Python<'_>,
+    record: PyRef<'_, Measurement>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: FrfSettings = failure::settings(py, settings)?;
+    let record = record.0.clone();
+    work::watched(py, threads, || Ok(()), move || mechid::frf(&record, &how)).map(Answer::of)
+}
+
+/// Inspects the file of a saved plan; plan and settings are JSON.
+#[pyfunction]
+pub fn inspect(py: Python<'_>, plan: &str, settings: &str) -> PyResult<Answer> {
+    let plan: RecordPlan = failure::settings(py, plan)?;
+    let how: InspectSettings = failure::settings(py, settings)?;
+    let look = move || mechid::inspect(&plan.path, &plan.reading, &plan.window, &how);
+    work::watched(py, None, || Ok(()), look).map(Answer::of)
+}
+
+/// Identifies a record, or a described experiment (its name and JSON), at many sampling steps, and
+/// calls `progress` with the number of steps done.
+#[pyfunction]
+#[pyo3(signature = (record, experiment, settings, reference, progress, threads))]
+pub fn sweep(
+    py: Python<'_>,
+    record: Option<PyRef<'_, Measurement>>,
+    experiment: (&str, &str),
+    settings: &str,
+    reference: Option<PyRef<'_, Machine>>,
+    progress: Option<Py<PyAny>>,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: SweepSettings = failure::settings(py, settings)?;
+    let done = Arc::new(AtomicUsize::new(0));
+    let count = Arc::clone(&done);
+    let step = move || {
+        count.fetch_add(1, Ordering::Relaxed);
+    };
+    let mut told = 0;
+    let tell = || -> PyResult<()> {
+        let steps = done.load(Ordering::Relaxed);
+        match &progress {
+            Some(progress) if steps > told => {
+                told = steps;
+                progress.call1(py, (steps,)).map(drop)
+            }
+            _ => Ok(()),
+        }
+    };
+    let found = match record {
+        Some(record) => {
+            let record = record.0.clone();
+            let reference = reference.map(|machine| machine.0.system().clone());
+            let find = move || sweep_record(&record, &how, reference.as_ref(), &step);
+            work::watched(py, threads, tell, find)?
+        }
+        None => {
+            let (name, text) = experiment;
+            let experiment = work::brief(py, || Experiment::parse(name, text))?;
+            work::watched(py, threads, tell, move || mechid::sweep(&experiment, &how, &step))?
+        }
+    };
+    Ok(Answer::of(found))
+}

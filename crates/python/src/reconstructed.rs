@@ -1,0 +1,80 @@
+//! Reconstruction of an unknown force.
+
+use std::sync::Arc;
+
+use mechid::Reconstruct;
+use mechid::signal::Record;
+use nalgebra::{Complex, DMatrix};
+use numpy::{PyArray1, PyArray2};
+use pyo3::prelude::*;
+
+use crate::answer::{self, Told as _};
+use crate::machine::Machine;
+use crate::measurement::Measurement;
+use crate::{arrays, failure, work};
+
+/// The force that drove a machine, and how it was found.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct Reconstructed(Arc<mechid::Reconstructed>);
+
+/// Reconstructs the force that drove a machine; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (record, machine, settings, threads))]
+pub fn reconstruct(
+    py: Python<'_>,
+    record: PyRef<'_, Measurement>,
+    machine: PyRef<'_, Machine>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Reconstructed> {
+    let how: Reconstruct = failure::settings(py, settings)?;
+    let (record, machine) = (record.0.clone(), machine.0.clone());
+    let find = move || mechid::reconstruct(&record, &machine, &how);
+    work::watched(py, threads, || Ok(()), find).map(|found| Reconstructed(Arc::new(found)))
+}
+
+/// Frequencies, and amplitudes of frequencies × degrees of freedom.
+type Lines<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<Complex<f64>>>);
+
+#[pymethods]
+impl Reconstructed {
+    /// The result as the program prints it with `--json`.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.json(py)
+    }
+
+    /// The result as a person reads it.
+    fn text(&self) -> String {
+        self.0.text()
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        answer::svg(py, Arc::clone(&self.0))
+    }
+
+    #[getter]
+    fn force<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        arrays::record(py, self.0.force().record().clone())
+    }
+
+    #[getter]
+    fn std_error<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
+        let error: Option<&Record> = self.0.force().standard_error();
+        error.map(|error| arrays::record(py, error.clone())).transpose()
+    }
+
+    /// Frequencies in Hz, and complex amplitudes of the force.
+    fn spectrum<'py>(&self, py: Python<'py>) -> PyResult<Lines<'py>> {
+        let spectrum = self.0.force().spectrum();
+        let lines: Vec<usize> = match self.0.lines() {
+            Some(lines) => lines.to_vec(),
+            None => (0..spectrum.len()).collect(),
+        };
+        let frequencies = lines.iter().map(|n| spectrum.frequency_hz(*n)).collect();
+        let amplitudes = DMatrix::from_fn(lines.len(), spectrum.channels(), |row, dof| {
+            spectrum.line(lines[row], dof)
+        });
+        Ok((arrays::vector(py, frequencies), arrays::matrix(py, amplitudes)?))
+    }
+}

@@ -1,0 +1,144 @@
+//! Responses: of a described experiment, of a machine to a force by a scheme, and exactly between
+//! samples; and excitations.
+
+use mechid::SimulateError;
+use mechid::estimate::EstimateError;
+use mechid::io::{Experiment, LineSpec};
+use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity};
+use mechid::signal::{CrestSearch, Extent, Multisine, Phases, Record, Sampling, SignalError};
+use nalgebra::{DMatrix, DVector};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Named};
+use crate::machine::Machine;
+use crate::{failure, work};
+
+/// What a simulated experiment records: scheme, sampling rate, machine, then force and responses as the
+/// sensors tell them, then without their noise.
+type Simulated<'py> = (String, f64, Machine, Channels<'py>, Channels<'py>);
+
+/// The force, and each kind of response.
+type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
+
+/// Simulates a described experiment: its name in messages, and its JSON.
+#[pyfunction]
+pub fn simulate<'py>(py: Python<'py>, name: &str, description: &str) -> PyResult<Simulated<'py>> {
+    let experiment = work::brief(py, || Experiment::parse(name, description))?;
+    let run = work::watched(py, None, || Ok(()), move || mechid::simulate(&experiment))?;
+    let fs = run.force.sampling().rate_hz();
+    let machine = Machine(mechid::Machine::known(run.system));
+    let measured = (arrays::record(py, run.measured_force)?, responses(py, run.measured_response)?);
+    let truth = (arrays::record(py, run.force)?, responses(py, run.response)?);
+    Ok((run.scheme, fs, machine, measured, truth))
+}
+
+/// Computes the response of a described machine, by its scheme, to a force of samples × degrees of
+/// freedom.
+#[pyfunction]
+pub fn integrate<'py>(
+    py: Python<'py>,
+    description: &str,
+    force: PyReadonlyArray2<'_, f64>,
+    fs: f64,
+) -> PyResult<Vec<Named<'py>>> {
+    let experiment = work::brief(py, || Experiment::parse("the description", description))?;
+    let force = copied(&force);
+    let step = move || -> Result<Response, SimulateError> {
+        let sampling = Sampling::from_rate_hz(fs, force.nrows())?;
+        mechid::respond(&experiment, &Record::new(sampling, force)?)
+    };
+    responses(py, work::watched(py, None, || Ok(()), step)?)
+}
+
+/// Computes the exact response of a machine to a force that is held or linear between its samples;
+/// assumption and extent are JSON.
+#[pyfunction]
+#[pyo3(signature = (machine, force, fs, between_samples, extent, start))]
+pub fn predict<'py>(
+    py: Python<'py>,
+    machine: PyRef<'_, Machine>,
+    force: PyReadonlyArray2<'_, f64>,
+    fs: f64,
+    between_samples: &str,
+    extent: &str,
+    start: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>)>,
+) -> PyResult<Vec<Named<'py>>> {
+    let between: Discretisation = failure::settings(py, between_samples)?;
+    let extent: Extent = failure::settings(py, extent)?;
+    let (system, force) = (machine.0.system().clone(), copied(&force));
+    let vector = |given: PyReadonlyArray1<'_, f64>| DVector::from_vec(given.as_array().to_vec());
+    let start = start.map(|(x, v)| (vector(x), vector(v)));
+    let step = move || -> Result<Response, EstimateError> {
+        let sampling = Sampling::from_rate_hz(fs, force.nrows())?;
+        let start = match start {
+            Some((x, v)) => InitialState::new(x, v)?,
+            None => InitialState::rest(system.dof()),
+        };
+        mechid::estimate::predict(&system, &Record::new(sampling, force)?, between, extent, &start)
+    };
+    responses(py, work::watched(py, None, || Ok(()), step)?)
+}
+
+/// One period, its lines, amplitudes and phases, RMS value, peak between samples too, crest factor.
+type Sampled<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    Vec<usize>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    (f64, f64, f64),
+);
+
+/// Makes a multisine: phases by a law, searched for a low crest factor from so many starts; its level
+/// is a quantity (`amplitude`, `rms` or `peak`) and its value.
+#[pyfunction]
+pub fn multisine<'py>(
+    py: Python<'py>,
+    samples: usize,
+    fs: f64,
+    lines: &str,
+    phases: &str,
+    search: (usize, u64),
+    level: (&str, f64),
+) -> PyResult<Sampled<'py>> {
+    let ((starts, seed), (quantity, level)) = (search, level);
+    let lines: LineSpec = work::brief(py, || lines.parse())?;
+    let law = match phases {
+        "schroeder" => Phases::Schroeder,
+        "schroeder-binary" => Phases::SchroederBinary,
+        "random" => Phases::Random { seed },
+        _ => Phases::Zero,
+    };
+    let (rms, peak) = (quantity == "rms", quantity == "peak");
+    let sampling = work::brief(py, || Sampling::from_rate_hz(fs, samples))?;
+    let chosen = work::brief(py, || lines.lines(sampling))?;
+    let make = move || -> Result<_, SignalError> {
+        let amplitude = if rms || peak { 1.0 } else { level };
+        let mut made = Multisine::flat(chosen, amplitude, law)?;
+        if starts > 0 {
+            made = CrestSearch { starts, seed }.minimise(&made)?;
+        }
+        if rms {
+            made = made.with_rms(level)?;
+        } else if peak {
+            made = made.with_peak(level)?;
+        }
+        let period = made.sample(sampling)?.channel(0).to_vec();
+        let measures = (made.rms(), made.peak(), made.crest_factor()?);
+        Ok((made, period, measures))
+    };
+    let (made, period, measures) = work::watched(py, None, || Ok(()), make)?;
+    let vector = |values: &[f64]| arrays::vector(py, values.to_vec());
+    let (amplitudes, phases) = (vector(made.amplitudes()), vector(made.phases()));
+    Ok((vector(&period), made.lines().to_vec(), amplitudes, phases, measures))
+}
+
+fn copied(given: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
+    let given = given.as_array();
+    DMatrix::from_fn(given.nrows(), given.ncols(), |row, column| given[[row, column]])
+}
+
+fn responses(py: Python<'_>, response: Response) -> PyResult<Vec<Named<'_>>> {
+    let kinds = ResponseQuantity::ALL.into_iter();
+    arrays::responses(py, kinds.map(|kind| (kind, response.quantity(kind).clone())).collect())
+}

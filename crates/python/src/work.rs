@@ -1,0 +1,122 @@
+//! Work without the interpreter's lock, in threads of this process, that Ctrl-C ends.
+
+use std::any::Any;
+use std::error::Error;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process;
+use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::failure;
+
+/// Time between two looks at the signals that the interpreter has received.
+const POLL: Duration = Duration::from_millis(50);
+
+/// The pool of the process of this number. A forked child inherits the record of a pool whose threads
+/// it does not have, and makes its own.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+/// Does short work on the calling thread, without the interpreter's lock.
+///
+/// # Errors
+/// `MechidError` for a failure or a panic of `work`.
+pub fn brief<T: Send, E: Error + Send>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, E> + Send,
+) -> PyResult<T> {
+    outcome(py, py.detach(|| catch_unwind(AssertUnwindSafe(work))))
+}
+
+/// Does work in the pool of this process, or in one of `threads` threads of its own, and calls `poll`
+/// with the lock now and then.
+///
+/// Where `poll` fails or Ctrl-C is pressed, the call returns at once; what it has begun runs to its end
+/// in the background, and the result is dropped.
+///
+/// # Errors
+/// `MechidError` for a failure or a panic of `work`, `KeyboardInterrupt`, and what `poll` gives.
+pub fn watched<T: Send + 'static, E: Error + Send + 'static>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    mut poll: impl FnMut() -> PyResult<()>,
+    work: impl FnOnce() -> Result<T, E> + Send + 'static,
+) -> PyResult<T> {
+    let pool = match threads {
+        Some(threads) => made(py, threads)?,
+        None => shared(py)?,
+    };
+    let (done, mut end) = sync_channel(1);
+    pool.spawn(move || {
+        // Nobody waits any more after Ctrl-C.
+        let _ = done.send(catch_unwind(AssertUnwindSafe(work)));
+    });
+    loop {
+        let (received, back) = py.detach(move || (end.recv_timeout(POLL), end));
+        end = back;
+        match received {
+            Ok(result) => {
+                poll()?;
+                return outcome(py, result);
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                return Err(failure::panicked(py, "a thread has ended without a result"));
+            }
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(interrupt) = py.check_signals().and_then(|()| poll()) {
+                    abandon(&pool);
+                    return Err(interrupt);
+                }
+            }
+        }
+    }
+}
+
+fn outcome<T, E: Error>(
+    py: Python<'_>,
+    result: Result<Result<T, E>, Box<dyn Any + Send>>,
+) -> PyResult<T> {
+    match result {
+        Ok(result) => result.map_err(|error| failure::exception(py, &error)),
+        Err(panic) => {
+            let text = panic.downcast_ref::<String>().map(String::as_str);
+            let text = text.or(panic.downcast_ref::<&str>().copied());
+            Err(failure::panicked(py, text.unwrap_or("no reason is known")))
+        }
+    }
+}
+
+fn made(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map(Arc::new).map_err(|error| failure::exception(py, &error))
+}
+
+fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {
+    // The lock is held as long as a pool takes to make, without calling Python.
+    let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = process::id();
+    match known.take() {
+        Some((owner, pool)) if owner == process => {
+            *known = Some((process, Arc::clone(&pool)));
+            Ok(pool)
+        }
+        stale => {
+            // Its threads are not in this process: there is nothing to end.
+            std::mem::forget(stale);
+            let pool = made(py, 0)?;
+            *known = Some((process, Arc::clone(&pool)));
+            Ok(pool)
+        }
+    }
+}
+
+/// Leaves a pool whose threads are busy to itself: the next call makes another one.
+fn abandon(pool: &Arc<ThreadPool>) {
+    let mut known = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    if known.as_ref().is_some_and(|(_, shared)| Arc::ptr_eq(shared, pool)) {
+        *known = None;
+    }
+}

@@ -1,0 +1,285 @@
+"""The other questions: what the program says to the last bit, and what closed forms say."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mechid
+
+FILE, EXPERIMENT = "examples/machine.csv", "examples/machine.json"
+COLUMNS = {"force": "force", "displacement": "displacement"}
+ONE = mechid.Machine(25.0, 188.5, 142_122.0)
+TWO = mechid.Machine(np.diag([2.0, 3.0]), [[4.0, 1.0], [-2.0, 5.0]], [[900.0, -200.0], [300.0, 700.0]])
+
+
+def words(options: dict[str, Any]) -> list[str]:
+    told = []
+    for name, value in options.items():
+        if value is True:
+            told.append(f"--{name.replace('_', '-')}")
+            continue
+        if isinstance(value, tuple):
+            value = ":".join(str(part) for part in value)
+        if isinstance(value, list):
+            value = ",".join(str(part) for part in value)
+        told += [f"--{name.replace('_', '-')}", str(value)]
+    return told
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"period": 256},
+        {"period": 256, "estimator": "hv", "band_hz": (5, 20)},
+        {"segment": 128, "segment_window": "blackman", "segment_overlap": 66.0, "estimator": "h2"},
+        {"period": 128, "lines": "odd"},
+    ],
+)
+def test_frequency_responses_are_those_of_the_program(
+    program: Callable[..., str], options: dict[str, Any]
+) -> None:
+    told = program("frf", FILE, *words({**COLUMNS, **options}), "--json")
+    found = mechid.frf(FILE, **COLUMNS, **options)
+    assert found.to_json() + "\n" == told
+    assert found.response().dtype == complex and found.coherence().shape == found.frequency_hz.shape
+    assert found.pairs == ((1, 1),) and (found.std_error() >= 0).all()
+    with pytest.raises(KeyError):
+        found.response(2, 1)
+
+
+def test_a_frequency_response_is_the_ratio_of_spectra(columns: dict[str, np.ndarray]) -> None:
+    found = mechid.frf(columns["force"], columns["displacement"], fs=128, period=256, lines="4:60")
+    force, x = (
+        np.fft.rfft(columns[name].reshape(2, 256), axis=1)[:, 4:61] for name in ("force", "displacement")
+    )
+    h1 = (x * force.conj()).sum(axis=0) / (np.abs(force) ** 2).sum(axis=0)
+    np.testing.assert_allclose(found.response(), h1, rtol=1e-9)
+    np.testing.assert_allclose(found.frequency_hz, np.arange(4, 61) / 2, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"displacement": "displacement", "period": 256},
+        {"displacement": "displacement", "period": 256, "method": "tikhonov", "rule": "gcv"},
+        {"displacement": "displacement", "period": 256, "lines": "4:60", "noise": [2e-6]},
+        {"displacement": "displacement", "velocity": "velocity", "method": "discretised"},
+        {"displacement": "displacement", "velocity": "velocity", "acceleration": "acceleration",
+         "method": "continuous", "forced": [1]},
+        {"displacement": "displacement", "method": "kalman", "at_rest": True},
+    ],
+)
+def test_forces_are_those_of_the_program(
+    program: Callable[..., str], tmp_path: Path, options: dict[str, Any]
+) -> None:
+    machine = tmp_path / "found.json"
+    identified = mechid.identify(FILE, **COLUMNS, period=256, method="maximum-likelihood")
+    machine.write_text(identified.to_json(), encoding="utf-8")
+    table = tmp_path / "force.csv"
+    told = program("force", FILE, "--system", machine, *words(options), "--json", "--output", table)
+    found = mechid.reconstruct(machine, FILE, **options)
+    assert found.to_dict() == json.loads(told)
+    written = np.loadtxt(table, delimiter=",", skiprows=1, ndmin=2)
+    np.testing.assert_array_equal(found.force[:, 0], written[:, 1])
+    np.testing.assert_array_equal(found.time, written[:, 0])
+    if found.std_error is not None:
+        np.testing.assert_array_equal(found.std_error[:, 0], written[:, 2])
+    frequency, amplitudes = found.spectrum
+    assert len(frequency) == len(amplitudes)
+    # The identification itself will do as the machine.
+    again = mechid.reconstruct(identified, FILE, **options)
+    np.testing.assert_array_equal(again.force, found.force)
+
+
+@pytest.mark.parametrize("options", [{"npi": [2, 4, 8]}, {"rate_hz": [64, 128], "estimator": "held"}])
+def test_sweeps_are_those_of_the_program(program: Callable[..., str], options: dict[str, Any]) -> None:
+    told = program("sweep", EXPERIMENT, *words(options), "--json")
+    steps: list[int] = []
+    found = mechid.sweep(EXPERIMENT, **options, progress=steps.append)
+    assert found.to_json() + "\n" == told
+    values = next(iter(options.values())) if "npi" in options else options["rate_hz"]
+    np.testing.assert_array_equal(found.values, values)
+    assert steps[-1] == len(values) and found.best in values and found.error.shape == found.values.shape
+    described = json.loads(Path(EXPERIMENT).read_text(encoding="utf-8"))
+    again = mechid.sweep(described, settings=found.settings)
+    assert [p["error"] for p in again.points] == [p["error"] for p in found.points]
+
+
+def test_a_record_is_swept_as_the_program_does(program: Callable[..., str]) -> None:
+    options: dict[str, Any] = {**COLUMNS, "velocity": "velocity", "decimate": [1, 2, 4]}
+    told = program("sweep", FILE, *words(options), "--reference", EXPERIMENT, "--json")
+    assert mechid.sweep(FILE, **options, reference=EXPERIMENT).to_json() + "\n" == told
+
+
+def test_failing_progress_ends_a_sweep() -> None:
+    def fail(_: int) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        mechid.sweep(EXPERIMENT, npi=[2, 4], progress=fail)
+
+
+def test_an_inventory_is_that_of_the_program(program: Callable[..., str]) -> None:
+    assert mechid.inspect(FILE).to_json() + "\n" == program("info", FILE, "--json")
+    found = mechid.inspect(FILE, columns=["force"], period=256, curves=True)
+    assert found.fs == 128.0 and found.channels[0]["period"]["samples"] == 256
+    assert found.to_svg().startswith("<svg")
+
+
+def test_modes_are_those_of_the_program(program: Callable[..., str]) -> None:
+    machine = mechid.Machine.read(EXPERIMENT)
+    assert machine.to_json() + "\n" == program("modal", EXPERIMENT, "--json")
+    assert str(machine) == program("modal", EXPERIMENT)
+
+
+def test_modes_of_a_machine_that_is_not_symmetric_are_those_of_numpy() -> None:
+    a, _, _, _ = TWO.state_space()
+    judge = np.linalg.eigvals(a)
+    judge = np.sort_complex(judge[judge.imag > 0])
+    found = np.sort_complex(np.array([mode.eigenvalue for mode in TWO.modes]))
+    np.testing.assert_allclose(found, judge, rtol=1e-10)
+    omega = 17.0
+    dynamic = TWO.stiffness - omega**2 * TWO.mass + 1j * omega * TWO.damping
+    receptance = TWO.receptance(omega / (2 * np.pi))
+    np.testing.assert_allclose(receptance, [np.linalg.inv(dynamic)], rtol=1e-12)
+    assert TWO.receptance([1.0, 2.0, 3.0]).shape == (3, 2, 2)
+
+
+def test_simulations_are_those_of_the_program(program: Callable[..., str], tmp_path: Path) -> None:
+    table = tmp_path / "record.csv"
+    program("simulate", EXPERIMENT, "--output", table)
+    written = np.loadtxt(table, delimiter=",", skiprows=1)
+    found = mechid.simulate(EXPERIMENT)
+    for column, name in enumerate(("force", "displacement", "velocity", "acceleration"), 1):
+        np.testing.assert_array_equal(getattr(found, name)[:, 0], written[:, column])
+    assert not np.array_equal(found.truth["displacement"], found.displacement)
+    record = found.measurement("displacement", "velocity", period=256)
+    identified = mechid.identify(record, method="maximum-likelihood")
+    assert abs(identified.parameters["m"].value / 25 - 1) < 0.01
+
+
+SCHEMES = ["newmark", "central-difference", "houbolt", "wilson-theta", "runge-kutta-4"]
+
+
+@pytest.mark.parametrize("scheme", [*SCHEMES, {"name": "newmark", "beta": 0.3, "gamma": 0.6}])
+@pytest.mark.parametrize("response", ["from-rest", "periodic"])
+def test_integration_is_that_of_a_simulation(scheme: Any, response: str) -> None:
+    named = {"name": scheme} if isinstance(scheme, str) else scheme
+    if scheme == "runge-kutta-4":
+        named = {"name": scheme, "load": "linear"}
+    described = {
+        "system": {"mass": 25.0, "damping": 188.5, "stiffness": 142122.0},
+        "sampling": {"samples": 512, "rate_hz": 400.0},
+        "excitation": [{"lines": "1:20", "amplitude": 2.0}],
+        "scheme": named,
+        "response": response,
+    }
+    run = mechid.simulate(described)
+    found = mechid.integrate(ONE, run.force, run.fs, scheme=scheme, response=response)  # type: ignore[arg-type]
+    for name in ("displacement", "velocity", "acceleration"):
+        np.testing.assert_array_equal(found[name], run.truth[name])
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_free_motion_is_the_closed_form(scheme: Any) -> None:
+    fs, n, x0, v0 = 4000.0, 2000, 1e-3, 0.02
+    found = mechid.integrate(ONE, np.zeros(n), fs, scheme=scheme, displacement=x0, velocity=v0)
+    t = np.arange(n) / fs
+    sigma, omega_n = 188.5 / 50.0, np.sqrt(142_122.0 / 25.0)
+    omega_d = np.sqrt(omega_n**2 - sigma**2)
+    sine = (v0 + sigma * x0) / omega_d
+    truth = np.exp(-sigma * t) * (x0 * np.cos(omega_d * t) + sine * np.sin(omega_d * t))
+    assert np.abs(found["displacement"][:, 0] - truth).max() < 2e-3 * x0
+
+
+def test_predictions_are_exact_between_samples() -> None:
+    linalg = pytest.importorskip("scipy.linalg")
+    rng = np.random.default_rng(3)
+    force, fs = rng.standard_normal((300, 2)), 50.0
+    a, b, c, _ = TWO.state_space()
+    # Judge: the matrix exponential of the state with the force and its slope.
+    n, m = b.shape
+    augmented = np.zeros((n + 2 * m, n + 2 * m))
+    augmented[:n, :n], augmented[:n, n : n + m] = a, b
+    augmented[n : n + m, n + m :] = np.eye(m)
+    step = linalg.expm(augmented / fs)
+    state, rows = np.zeros(n), []
+    for k, now in enumerate(force):
+        rows.append(c @ state)
+        slope = (force[k + 1] - now) * fs if k + 1 < len(force) else np.zeros(m)
+        state = (step @ np.concatenate([state, now, slope]))[:n]
+    found = mechid.predict(TWO, force, fs)["displacement"]
+    np.testing.assert_allclose(found, rows, atol=1e-12 * np.abs(rows).max(), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"lines": "1:2:63"},
+        {"lines": "2:40", "phases": "schroeder-binary", "amplitude": 3.0},
+        {"lines": "2:40", "phases": "random", "rms": 10.0, "seed": 5},
+        {"lines": "1:12", "phases": "low-crest", "peak": 20.0, "starts": 2},
+    ],
+)
+def test_multisines_are_those_of_the_program(
+    program: Callable[..., str], tmp_path: Path, options: dict[str, Any]
+) -> None:
+    table = tmp_path / "force.csv"
+    told = json.loads(
+        program("multisine", "--samples", 256, "--rate", 100, *words(options), "--output", table, "--json")
+    )["channels"][0]
+    found = mechid.multisine(256, 100.0, **options)
+    np.testing.assert_array_equal(found.force, np.loadtxt(table, delimiter=",", skiprows=1)[:, 1])
+    assert list(found.lines) == told["lines"] and found.crest_factor == told["crest_factor"]
+    t = np.arange(256) / 256
+    cosines = np.cos(2 * np.pi * np.outer(t, found.lines) + found.phases)
+    np.testing.assert_allclose(found.force, cosines @ found.amplitudes, atol=1e-9 * found.peak)
+
+
+def test_results_are_drawn_and_reported(tmp_path: Path) -> None:
+    found = mechid.identify(FILE, **COLUMNS, period=256, method="maximum-likelihood")
+    page = found.report(tmp_path / "report.html", title="<rig>", reconstruct_force=True)
+    assert (tmp_path / "report.html").read_text(encoding="utf-8") == page
+    assert page.startswith("<!DOCTYPE html>") and "&lt;rig&gt;" in page
+    results = [
+        found, found.machine(), mechid.frf(FILE, **COLUMNS, period=256),
+        mechid.reconstruct(found, FILE, displacement="displacement", period=256),
+        mechid.sweep(EXPERIMENT, npi=[2, 4]),
+    ]
+    for result in results:
+        html = result._repr_html_()
+        assert "<svg" in html and "<pre>" in html and repr(result).startswith("<")
+    measured, predicted = found.compared["displacement"]
+    assert np.linalg.norm(measured - predicted) < 0.02 * np.linalg.norm(measured)
+
+
+def test_plots_go_into_the_axes_given() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("svg")
+    from matplotlib import pyplot
+
+    from mechid import plotting
+
+    found = mechid.identify(FILE, **COLUMNS, period=256)
+    table = mechid.frf(FILE, **COLUMNS, period=256)
+    force = mechid.reconstruct(found, FILE, displacement="displacement", period=256)
+    for plot, result in [
+        (plotting.receptance, found), (plotting.response, found), (plotting.frf, table),
+        (plotting.coherence, table), (plotting.force, force), (plotting.modes, found),
+        (plotting.sweep, mechid.sweep(EXPERIMENT, npi=[2, 4])),
+    ]:
+        figure, ax = pyplot.subplots()
+        assert plot(result, ax=ax) is ax and ax.lines and ax.get_xlabel()
+        pyplot.close(figure)
+    ax = plotting.receptance(found, phase=True)
+    assert "°" in ax.get_ylabel()
+    pyplot.close("all")
+    in_time = mechid.identify(FILE, **COLUMNS, velocity="velocity", domain="time")
+    with pytest.raises(ValueError, match="time domain"):
+        plotting.receptance(in_time)

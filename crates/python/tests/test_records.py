@@ -1,0 +1,75 @@
+"""Records of every source."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mechid
+
+FILE = "examples/machine.csv"
+
+
+def values(found: mechid.Identified) -> dict[str, float]:
+    return {name: parameter.value for name, parameter in found.parameters.items()}
+
+
+def test_mappings_and_sep_5_channels_are_records(columns: dict[str, np.ndarray]) -> None:
+    named = mechid.identify(FILE, force="force", displacement="displacement", period=256)
+    found = mechid.identify(columns, force="force", displacement="displacement", fs=128, period=256)
+    assert values(found) == values(named)
+    channels = [
+        {"data": columns[name], "name": name, "unit_str": unit, "fs": 128.0, "type": "td"}
+        for name, unit in (("force", "N"), ("displacement", "m"))
+    ]
+    found = mechid.identify(channels, force="force", displacement="displacement", period=256)
+    assert values(found) == values(named)
+    channels[1] |= {"data": columns["displacement"] * 1e6, "unit_str": "um"}
+    found = mechid.identify(channels, force="force", displacement="displacement", period=256)
+    for name, value in values(found).items():
+        assert abs(value / values(named)[name] - 1) < 1e-9
+    channels[1]["fs"] = 64.0
+    with pytest.raises(ValueError, match="several sampling rates"):
+        mechid.identify(channels, force="force", displacement="displacement", period=256)
+
+
+def test_data_frames_are_records(columns: dict[str, np.ndarray]) -> None:
+    pandas = pytest.importorskip("pandas")
+    frame = pandas.DataFrame(columns)
+    named = mechid.identify(FILE, force="force", displacement="displacement", period=256)
+    found = mechid.identify(frame, force="force", displacement="displacement", fs=128, period=256)
+    assert values(found) == values(named)
+    series = mechid.identify(frame["force"], frame["displacement"], fs=128, period=256)
+    assert values(series) == values(named)
+
+
+def test_xarray_datasets_are_records(columns: dict[str, np.ndarray]) -> None:
+    xarray = pytest.importorskip("xarray")
+    dataset = xarray.Dataset({name: ("time", data) for name, data in columns.items() if name != "time"})
+    named = mechid.identify(FILE, force="force", displacement="displacement", period=256)
+    found = mechid.identify(dataset, force="force", displacement="displacement", fs=128, period=256)
+    assert values(found) == values(named)
+    arrays = mechid.identify(dataset.force, dataset.displacement, fs=128, period=256)
+    assert values(arrays) == values(named)
+
+
+def test_a_measurement_tells_what_it_holds(columns: dict[str, np.ndarray]) -> None:
+    record = mechid.Measurement.open(FILE, force="force", displacement="displacement", velocity="velocity")
+    assert (record.name, record.fs, record.samples, len(record)) == (FILE, 128.0, 512, 512)
+    assert record.channels["force"] == ["force"]
+    np.testing.assert_array_equal(record.force[:, 0], columns["force"])
+    assert set(record.responses) == {"displacement", "velocity"}
+    window = record.window(start=11, period=100, periods=2)
+    np.testing.assert_array_equal(window.responses["velocity"][:, 0], columns["velocity"][10:210])
+    assert window.plan is not None and window.plan["window"] == {"start": 11, "period": 100, "periods": 2}
+    assert mechid.Measurement.from_arrays(columns["force"], fs=1.0).plan is None
+
+
+def test_what_comes_in_is_copied(columns: dict[str, np.ndarray]) -> None:
+    force, x = columns["force"].copy(), columns["displacement"].copy()
+    record = mechid.Measurement.from_arrays(force, x, fs=128, period=256)
+    force[:], x[:] = 0.0, np.nan
+    assert 24 < mechid.identify(record).parameters["m"].value < 26
+    out = record.force
+    out[:] = 0.0
+    np.testing.assert_array_equal(record.force[:, 0], columns["force"])
