@@ -295,9 +295,9 @@ pub enum EstimateError {
         /// Frequency, in Hz.
         frequency_hz: f64,
     },
-    /// No search for the maximum of the likelihood ended at one.
+    /// No search for the best fit (maximum likelihood, output error or a constant) ended at one.
     #[error(
-        "the search for the maximum of the likelihood failed: {} reached no minimum within {steps} \
+        "the search for the best fit failed: {} reached no minimum within {steps} \
          steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
          unknowns make the search easier",
         if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }

@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
-use mechid::analysis::text::{compact, significant, text_table};
+use mechid::analysis::text::{compact, paged_table, significant};
 
 /// Show stability and accuracy of the time-stepping schemes
 ///
@@ -279,7 +279,7 @@ impl Report {
             }
             rows.push(row);
         }
-        text + &text_table(&rows)
+        text + &paged_table(&rows, 1)
     }
 
     /// One row per step, one column per scheme.
@@ -293,7 +293,7 @@ impl Report {
             row.extend(self.schemes.iter().map(|s| value(&s.chart[k]).map_or("–".into(), rounded)));
             rows.push(row);
         }
-        text_table(&rows)
+        paged_table(&rows, 1)
     }
 }
 

@@ -10,8 +10,8 @@ use super::Cli;
 const UNITS: [(&str, &str); 3] = [("HZ", "Hz"), ("N", "N"), ("DB", "dB")];
 
 /// Values that are numbers without a unit.
-const PURE: [&str; 8] =
-    ["PERCENT", "STEPS", "RATIO", "LAMBDA", "BETA", "GAMMA", "THETA", "FRACTION,…"];
+const PURE: [&str; 9] =
+    ["PERCENT", "STEPS", "RATIO", "LAMBDA", "BETA", "GAMMA", "THETA", "RADIUS", "FRACTION,…"];
 
 fn subcommands() -> Vec<clap::Command> {
     let mut program = Cli::command();

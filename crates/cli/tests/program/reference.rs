@@ -63,7 +63,7 @@ fn every_field_of_every_report_is_in_the_reference() {
     let identify = "identify machine.csv --force force --displacement displacement";
     let found = mechid(folder.path(), &format!("{identify} --period 256 --json"));
     fs::write(folder.path().join("found.json"), found).unwrap();
-    let nonlinear = format!("{identify} --period 256 --nonlinear k3:x1^3 --search phase");
+    let nonlinear = format!("{identify} --period 256 --nonlinear k3:x1^3 --search delay");
     let found = mechid(folder.path(), &format!("{nonlinear} --json"));
     fs::write(folder.path().join("nonlinear.json"), found).unwrap();
     let time = "--velocity velocity --acceleration acceleration --domain time";
