@@ -3,8 +3,8 @@
 //!
 //! Settings come and results go as the JSON that the program reads and prints; arrays are copied in
 //! and owned arrays handed out. Nothing is computed here. Work runs without the interpreter's lock, in
-//! a pool of threads of this process ([`work`]); failures and panics become `MechidError`
-//! ([`failure`]).
+//! a pool of threads of this process (`work`); failures and panics become `MechidError`
+//! (`failure`).
 
 mod answer;
 mod arrays;
