@@ -92,9 +92,11 @@ def test_forces_are_those_of_the_program(
         np.testing.assert_array_equal(found.std_error[:, 0], written[:, 2])
     frequency, amplitudes = found.spectrum
     assert len(frequency) == len(amplitudes)
-    # The identification itself will do as the machine.
+    # The identification itself will do as the machine; numbers in a file are read to the last bit but
+    # one, and the inverse problem enlarges that bit; the minimum that cross-validation seeks is flat.
     again = mechid.reconstruct(identified, FILE, **options)
-    np.testing.assert_array_equal(again.force, found.force)
+    largest, tolerance = np.abs(found.force).max(), 1e-4 if "rule" in options else 1e-8
+    np.testing.assert_allclose(again.force, found.force, rtol=0, atol=tolerance * largest)
 
 
 @pytest.mark.parametrize("options", [{"npi": [2, 4, 8]}, {"rate_hz": [64, 128], "estimator": "held"}])
