@@ -11,7 +11,7 @@ use mechid_signal::Extent;
 use super::lines::LineChoice;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
-use super::spectra::{Fitted, Misfit, one_motion_of, steady_residuals};
+use super::spectra::{Fitted, Misfit, one_motion_of};
 use super::summary::LinesUsed;
 use crate::AnalysisError;
 use crate::frf::Responses;
@@ -54,7 +54,8 @@ pub fn fit(
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,
-        residuals: if periodic { steady_residuals(records, &found)? } else { Vec::new() },
+        after_all: Vec::new(),
+        residuals: Vec::new(),
         prediction: match periodic {
             true => Prediction::Steady,
             false => Prediction::Sampled {

@@ -49,6 +49,7 @@ mod lines;
 mod misfit;
 mod output_error;
 mod periods;
+mod whitened;
 
 pub use data::FrequencyData;
 pub(crate) use equation_error::late_rows;
@@ -59,5 +60,6 @@ pub(crate) use lines::check_sampling;
 pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{OutputErrorFit, output_error};
 pub use periods::RepeatedPeriods;
+pub(crate) use whitened::Whitened;
 
 pub use crate::noise_spectrum::{NoiseSpectrum, Pooling};
