@@ -1,4 +1,4 @@
-//! What can go wrong between a record and the result.
+//! Errors between a record and the result.
 
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
@@ -31,7 +31,7 @@ pub enum AnalysisError {
         /// Number of samples in the record.
         len: usize,
     },
-    /// Neither a time column nor a sampling rate is known.
+    /// The record has no time column, and no sampling rate is given.
     #[error(
         "{file} has no column called time, time_s or t: name the time column with `time`, or give \
          `sample_rate` in Hz; its columns are {available}"
@@ -58,7 +58,7 @@ pub enum AnalysisError {
     ArrayShape {
         /// Name of the array.
         name: String,
-        /// Its samples and columns.
+        /// Samples and columns of the array.
         got: [usize; 2],
         /// Samples and columns of the others.
         expected: [usize; 2],
@@ -118,7 +118,7 @@ pub enum AnalysisError {
         /// Quantity that it must hold.
         wanted: mechid_io::Quantity,
     },
-    /// Not one response column per degree of freedom of the system.
+    /// The number of response columns is not that of the degrees of freedom of the system.
     #[error(
         "`{response}` names {}, the system has {}: name one for each, 0 where it was not measured",
         counted(*got, "column"), counted(*dofs, "degree of freedom")
@@ -142,7 +142,7 @@ pub enum AnalysisError {
         /// Degrees of freedom of the system.
         dofs: usize,
     },
-    /// Not one noise level per measured column.
+    /// The number of noise levels is not that of the measured columns.
     #[error(
         "`noise` gives {}, the response has {}: give one for each",
         counted(*levels, "level"), counted(*columns, "column")
@@ -160,7 +160,7 @@ pub enum AnalysisError {
         if *with_acceleration { " and acceleration" } else { "" }
     )]
     ForceMotions {
-        /// Whether accelerations are needed, too.
+        /// `true` if accelerations are needed, too.
         with_acceleration: bool,
     },
     /// Spectral lines belong to whole periods.
@@ -196,7 +196,7 @@ pub enum AnalysisError {
         /// The value given, in kg.
         value: f64,
     },
-    /// Not one mass per degree of freedom.
+    /// The number of masses fits neither the degrees of freedom nor the entries of their matrix.
     #[error(
         "`mass` gives {}, the record has {}: give one mass for each, or all entries of the \
          {dof}×{dof} matrix row by row", counted(*got, "value"), counted(*dof, "degree of freedom")
@@ -278,9 +278,9 @@ pub enum AnalysisError {
     DegreesOfFreedom {
         /// The record, or the file of the system.
         file: String,
-        /// Its degrees of freedom.
+        /// Degrees of freedom of the system.
         got: usize,
-        /// Those of the system it is compared with.
+        /// Degrees of freedom of the system it is compared with.
         dofs: usize,
     },
     /// A covariance names a parameter that the system does not have.
@@ -313,7 +313,7 @@ pub enum AnalysisError {
     /// A decimation is a whole number.
     #[error("every n-th sample of a record: n is a whole number, got {value}")]
     Decimation {
-        /// The number asked for.
+        /// Number of samples asked for, a pure number.
         value: f64,
     },
     /// A period is no whole number of the samples taken.
@@ -339,7 +339,7 @@ pub enum AnalysisError {
         setting = told(*setting)
     )]
     EmptySweep {
-        /// The first setting.
+        /// First setting, in the unit of its kind.
         setting: f64,
         /// The failure there.
         reason: String,

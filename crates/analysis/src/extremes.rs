@@ -1,4 +1,4 @@
-//! What a picture shows of a long window: no more than it has pixels for.
+//! Minima and maxima of stretches of a long window: as many as a picture has pixels for.
 
 /// Stretches of a long window of which a picture shows the extremes: several for each column of its
 /// pixels.

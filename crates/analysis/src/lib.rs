@@ -1,4 +1,5 @@
-//! From a measured record to the machine behind it, or to the force that drove it.
+//! Identification of a machine from its measured records, and reconstruction of the force that drove
+//! it.
 //!
 //! The numerical crates fit arrays; this one answers the questions that a test engineer asks of a
 //! record. It opens files of any format and length (or takes arrays), converts units, cuts windows,

@@ -61,7 +61,7 @@ impl Machine {
         self.uncertain.system()
     }
 
-    /// Whether the system is taken as exactly known.
+    /// Returns whether the system is taken as exactly known.
     pub fn is_exact(&self) -> bool {
         self.uncertain.parameters().is_empty()
     }

@@ -16,11 +16,11 @@ use crate::text::{compact, significant, text_table};
 pub struct ModalSummary {
     /// The machine.
     pub file: String,
-    /// Its degrees of freedom.
+    /// Degrees of freedom of the system.
     pub degrees_of_freedom: usize,
-    /// Level of the intervals.
+    /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Its modes, by rising frequency.
+    /// Modes of the system, by rising frequency.
     pub modes: Vec<ModeRow>,
     /// M, C and K.
     pub system: SystemMatrices,
@@ -29,7 +29,7 @@ pub struct ModalSummary {
 /// One mode.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModeRow {
-    /// Whether it is underdamped.
+    /// `true` if it is underdamped.
     pub oscillates: bool,
     /// Real and imaginary part, in rad/s.
     pub eigenvalue: [f64; 2],
@@ -48,7 +48,7 @@ pub struct ModeRow {
 pub struct ShapeEntry {
     /// Real and imaginary part.
     pub value: [f64; 2],
-    /// `None` for a machine that is exactly known.
+    /// Standard errors of real and imaginary part, in the same unit; `None` for a machine that is exactly known.
     pub standard_error: Option<[f64; 2]>,
 }
 

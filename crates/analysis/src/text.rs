@@ -23,7 +23,8 @@ pub fn text_table(rows: &[Vec<String>]) -> String {
 /// Columns that fit beside one another on a page.
 const PAGE: usize = 100;
 
-/// As [`text_table`], in several tables one below the other where one would be too wide; each begins
+/// Formats a table as [`text_table`] does, in several tables one below the other where one would be too
+/// wide; each begins
 /// with the first column, and has no rows that say nothing more. The first table has the first
 /// columns, as many as stay `together`.
 pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
@@ -52,7 +53,8 @@ pub fn paged_table(rows: &[Vec<String>], together: usize) -> String {
     pages.iter().map(|page| part(page)).collect::<Vec<_>>().join("\n")
 }
 
-/// `value` with so many significant digits; scientific where plain notation would be long.
+/// Formats a number, in any unit, with so many significant digits; scientific where plain notation would be
+/// long.
 pub fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".into();
@@ -70,7 +72,8 @@ pub fn significant(value: f64, digits: usize) -> String {
     format!("{value:.decimals$}")
 }
 
-/// As [`significant`], without zeros at the end: for numbers that were chosen, not measured.
+/// Formats a number as [`significant`] does, without zeros at the end: for numbers that were chosen,
+/// not measured, in any unit.
 pub fn compact(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     if text.contains('.') && !text.contains('e') {

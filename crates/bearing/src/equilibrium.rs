@@ -1,4 +1,4 @@
-//! What a bearing does under a static load.
+//! Static equilibrium of a bearing under its load.
 
 /// The place of the journal under a static load, and the coefficients of the film there.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -69,9 +69,9 @@ pub enum BearingError {
     /// The covariance of the coefficients is not 8 × 8.
     #[error("the covariance of eight coefficients is {rows}×{columns}, expected 8×8")]
     CovarianceShape {
-        /// Its rows.
+        /// Rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Columns of the matrix.
         columns: usize,
     },
     /// The covariance of the coefficients has an entry that is not finite or a negative variance.

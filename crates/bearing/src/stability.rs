@@ -1,4 +1,4 @@
-//! When a rigid rotor on a film becomes unstable.
+//! Threshold of instability of a rigid rotor on a film.
 
 use mechid_model::OilFilm;
 use nalgebra::{DMatrix, SVector};
@@ -50,11 +50,11 @@ struct Gradient {
 /// Standard errors of what a [`Threshold`] tells, to first order in those of the coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ThresholdErrors {
-    /// Of the equivalent stiffness, in N/m.
+    /// Standard error of the equivalent stiffness, in N/m.
     pub equivalent_stiffness: f64,
-    /// Of the whirl frequency ratio, a ratio; `None` if there is no whirl.
+    /// Standard error of the whirl frequency ratio, a ratio; `None` if there is no whirl.
     pub whirl_frequency_ratio: Option<f64>,
-    /// Of the critical mass, in kg; `None` if there is none.
+    /// Standard error of the critical mass, in kg; `None` if there is none.
     pub critical_mass: Option<f64>,
 }
 

@@ -1,6 +1,7 @@
 //! What can go wrong between the command line and the result.
 
 use mechid::analysis::AnalysisError;
+use mechid::io::IoError;
 use mechid::signal::counted;
 
 use crate::options;
@@ -20,7 +21,7 @@ pub enum CliError {
     Plot(#[from] mechid::plot::PlotError),
     /// A file cannot be read, understood or written.
     #[error(transparent)]
-    Io(#[from] mechid::io::IoError),
+    Io(#[from] IoError),
     /// An option without its object.
     #[error("{option} {why}")]
     MisplacedOption {
@@ -85,6 +86,10 @@ impl CliError {
     /// Returns the message, with the settings that the analysis names spelled as options.
     pub fn message(&self) -> String {
         match self {
+            Self::Io(error @ IoError::TooLarge { .. })
+            | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { .. })) => {
+                format!("{error}; if the record is really so large, use --raise-limits")
+            }
             // A file's own words stay as they are.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),
             Self::Analysis(error) => options::spelled(&error.to_string()),

@@ -1,5 +1,26 @@
 //! The `mechid` program.
 
 fn main() -> std::process::ExitCode {
+    #[cfg(unix)]
+    signals::watch();
     mechid_cli::run(std::env::args_os())
+}
+
+#[cfg(unix)]
+mod signals {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    use signal_hook::iterator::Signals;
+    use signal_hook::low_level::emulate_default_handler;
+
+    /// Removes unfinished outputs when a signal ends the program.
+    pub fn watch() {
+        // Without it such a file stays until the same output is written again.
+        let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) else { return };
+        std::thread::spawn(move || {
+            for signal in signals.forever() {
+                mechid::io::remove_unfinished_files();
+                let _ = emulate_default_handler(signal);
+            }
+        });
+    }
 }

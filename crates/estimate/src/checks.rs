@@ -44,11 +44,11 @@ pub use spectral_residual::{AfterSpectralFit, SpectralResidual, after_spectral_f
 /// Maximum number of samples used by a check that takes much time or memory per sample.
 const MAX_SAMPLES: usize = 1 << 15;
 
-/// How far a finding speaks against the data or the fit.
+/// Degree to which a finding speaks against the data or the fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Verdict {
-    /// Nothing speaks against them.
+    /// The finding does not speak against them.
     Good,
     /// The fit can be done; the numbers tell how far to trust it.
     Doubtful,

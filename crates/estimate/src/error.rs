@@ -1,4 +1,4 @@
-//! What can go wrong in an identification.
+//! Errors of an identification.
 
 use mechid_model::Matrix;
 use mechid_signal::counted;
@@ -10,11 +10,11 @@ pub enum EstimateError {
     /// A known matrix is not of the size of the problem.
     #[error("the known {matrix} matrix is {rows}×{columns}, expected {dof}×{dof}")]
     Shape {
-        /// Which matrix.
+        /// Name of the matrix.
         matrix: Matrix,
-        /// Its rows.
+        /// Rows of the matrix.
         rows: usize,
-        /// Its columns.
+        /// Columns of the matrix.
         columns: usize,
         /// Degrees of freedom expected.
         dof: usize,
@@ -57,7 +57,7 @@ pub enum EstimateError {
     /// A block of data has the wrong number of channels, lines or samples.
     #[error("{what}: expected {expected}, got {got}")]
     Size {
-        /// What was counted, such as `"channels of the force"`.
+        /// Name of the items counted, such as `"channels of the force"`.
         what: &'static str,
         /// Number expected.
         expected: usize,
@@ -67,7 +67,7 @@ pub enum EstimateError {
     /// A value among the data is NaN or infinite.
     #[error("row {row}, column {column} of the {what} is {value}, not a finite number")]
     NotFinite {
-        /// Which data.
+        /// Name of the data.
         what: &'static str,
         /// Row, counted from 0.
         row: usize,
@@ -86,7 +86,7 @@ pub enum EstimateError {
         column + 1
     )]
     Underflow {
-        /// Which data.
+        /// Name of the data.
         what: &'static str,
         /// Column, counted from 0.
         column: usize,
@@ -250,7 +250,7 @@ pub enum EstimateError {
          leave the line out, or make experiments with different forces"
     )]
     DependentForces {
-        /// Where, in Hz.
+        /// Frequency, in Hz.
         frequency_hz: f64,
         /// Smallest over largest eigenvalue of the scaled force cross-spectrum.
         reciprocal_condition: f64,
@@ -271,7 +271,7 @@ pub enum EstimateError {
          periods than degrees of freedom; pool it over more lines"
     )]
     SingularNoise {
-        /// Where, in Hz.
+        /// Frequency, in Hz.
         frequency_hz: f64,
     },
     /// A search did not end at a minimum.
@@ -291,7 +291,7 @@ pub enum EstimateError {
         "the motion at {frequency_hz} Hz has nothing in common with the force: H2 does not exist there"
     )]
     IncoherentMotion {
-        /// Where, in Hz.
+        /// Frequency, in Hz.
         frequency_hz: f64,
     },
     /// The identified matrices do not make a system.

@@ -1,4 +1,4 @@
-//! What an identification found, and how well.
+//! Result of an identification: parameters with their covariance.
 
 use std::fmt;
 
@@ -38,11 +38,11 @@ pub(crate) struct Findings {
 /// One estimated entry of M, C or K.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimated {
-    /// Which entry.
+    /// Entry of M, C or K.
     pub parameter: Parameter,
-    /// Its value in kg, N·s/m or N/m; NaN if the data do not determine it.
+    /// Value in kg, N·s/m or N/m; NaN if the data do not determine it.
     pub value: f64,
-    /// Its standard error, in the same unit; infinite if the data do not determine it.
+    /// Standard error, in the same unit; infinite if the data do not determine it.
     pub standard_error: f64,
     /// Degrees of freedom of the residual variance behind the standard error.
     pub degrees_of_freedom: usize,
@@ -51,7 +51,7 @@ pub struct Estimated {
 /// A combination of parameters on which the data say nothing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Undetermined {
-    /// How strongly the data excite it, as a ratio to the best determined combination.
+    /// Strength with which the data excite it, as a ratio to the best determined combination.
     pub relative_singular_value: f64,
     /// The parameters and how much of each, in its unit (any multiple of all of them may be added).
     pub terms: Vec<(Parameter, f64)>,
@@ -94,7 +94,7 @@ impl Estimate {
         })
     }
 
-    /// What was free and what was known.
+    /// Free and known entries.
     pub fn unknowns(&self) -> &Unknowns {
         &self.unknowns
     }

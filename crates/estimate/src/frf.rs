@@ -16,7 +16,7 @@ use crate::frequency_domain::{FrequencyData, Lines, NoiseSpectrum};
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
-/// Which signal is believed where force and motion disagree.
+/// Estimator of a frequency response, by the signal that is taken as free of noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -179,7 +179,7 @@ impl Frf {
         Ok(())
     }
 
-    /// As data for the estimators: every force channel in turn is an experiment with unit
+    /// Returns data for the estimators: every force channel in turn is an experiment with unit
     /// force at its degree of freedom (`force_dof`, one per channel, counted from 0), and
     /// the coherence gives the noise of the motion.
     ///
@@ -281,7 +281,7 @@ impl Frf {
         &self.variance[at]
     }
 
-    /// How many independent segments the averages are worth.
+    /// Equivalent number of independent segments.
     pub fn averages(&self) -> f64 {
         self.averages
     }

@@ -72,7 +72,7 @@ pub struct Direction {
     pub relative_singular_value: f64,
     /// One entry per unknown, in its unit, the one that counts most (in scaled columns) being 1.
     pub combination: DVector<f64>,
-    /// Which of the unknowns take part.
+    /// `true` for each unknown that takes part.
     pub involved: Vec<bool>,
 }
 

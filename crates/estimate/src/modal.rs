@@ -12,7 +12,7 @@ use crate::{Estimate, EstimateError};
 pub struct Uncertain {
     /// The value, in the unit its owner gives.
     pub value: f64,
-    /// Its standard error, in the same unit; infinite where it has no derivative with
+    /// Standard error, in the same unit; infinite where it has no derivative with
     /// respect to the matrices (repeated eigenvalues).
     pub standard_error: f64,
     /// Degrees of freedom of the variance behind the standard error.

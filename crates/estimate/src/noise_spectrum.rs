@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
 
-/// Over which lines a noise covariance is averaged.
+/// Lines over which a noise covariance is averaged.
 ///
 /// A covariance of few periods is itself uncertain, and an estimator weighted with it
 /// loses by that. Noise spectra are smooth, so neighbouring lines may share theirs.
@@ -155,7 +155,7 @@ impl NoiseSpectrum {
         &self.covariance[row]
     }
 
-    /// How many independent complex deviations each covariance was averaged from;
+    /// Number of independent complex deviations that each covariance was averaged from;
     /// infinite for known noise.
     pub fn degrees_of_freedom(&self) -> f64 {
         self.degrees_of_freedom
@@ -167,7 +167,7 @@ impl NoiseSpectrum {
         self.total_degrees_of_freedom / self.degrees_of_freedom
     }
 
-    /// Whether any force is noisy.
+    /// Returns whether any force is noisy.
     pub fn has_force(&self) -> bool {
         let n = self.dof();
         self.covariance.iter().any(|c| (n..2 * n).any(|i| c[(i, i)].re > 0.0))

@@ -1,4 +1,4 @@
-//! What an identified machine would do: for validation on a record that was not fitted.
+//! Predicted response of an identified machine, for validation on a record that was not fitted.
 
 mod ahead;
 mod periodic;
@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::EstimateError;
 use crate::least_squares::size;
 
-/// How much of the variation of each channel a prediction explains, in per cent:
+/// Returns the part of the variation of each channel that a prediction explains, in per cent:
 /// 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100 is perfect, 0 no better than the mean, negative worse.
 ///
 /// # Errors

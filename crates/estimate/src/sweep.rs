@@ -5,14 +5,14 @@ use rayon::prelude::*;
 
 use crate::Estimate;
 
-/// What came out at one setting.
+/// Outcome at one setting.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPoint<S, E> {
     /// The setting, such as an NPI.
     pub setting: S,
     /// The estimate with its intervals, or why there is none.
     pub outcome: Result<Estimate, E>,
-    /// How good it is, a pure number, the smaller the better; `None` if there is no complete
+    /// Merit of the outcome, a pure number, the smaller the better; `None` if there is no complete
     /// estimate.
     ///
     /// With a reference: the largest error of an entry of M, C or K relative to the largest entry

@@ -110,12 +110,13 @@ impl TriangularFactor {
         finite
     }
 
-    /// The first column whose squares are too small to be told from 0, and its norm.
+    /// The first column whose squares are too small to be told from 0, and its largest entry in R.
     pub(crate) fn too_small(&self) -> Option<(usize, f64)> {
-        let norms = self.r.column_iter().map(|column| column.norm()).enumerate();
-        norms.into_iter().find(
-            |(at, norm)| {
-                if *norm == 0.0 { self.vanished[*at] } else { *norm < LEAST_NORM }
+        // The largest entry: the squares of what is too small vanish.
+        let sizes = self.r.column_iter().map(|column| column.amax()).enumerate();
+        sizes.into_iter().find(
+            |(at, size)| {
+                if *size == 0.0 { self.vanished[*at] } else { *size < LEAST_NORM }
             },
         )
     }

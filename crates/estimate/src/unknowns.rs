@@ -1,11 +1,11 @@
-//! Which entries of M, C and K are to be found, and which are known.
+//! Free and known entries of M, C and K.
 
 use mechid_model::{Matrix, Parameter};
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
 
-/// Which entries of M, C and K are free, and the values of those that are not.
+/// Free entries of M, C and K, and the values of the others.
 ///
 /// ```
 /// use mechid_estimate::Unknowns;

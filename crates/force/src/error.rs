@@ -1,4 +1,4 @@
-//! What can keep a force from being reconstructed.
+//! Errors of the reconstruction of a force.
 
 use mechid_model::ModelError;
 use mechid_signal::{SignalError, counted, told_to};
@@ -39,13 +39,13 @@ pub enum ForceError {
     NoSuchDof {
         /// The one asked for, counted from 0.
         dof: usize,
-        /// How many there are.
+        /// Number of those there are.
         dofs: usize,
     },
     /// The same spectral line was named twice.
     #[error("line {line} is named twice")]
     RepeatedLine {
-        /// Its number, 0 for the mean.
+        /// Number of the line, 0 for the mean.
         line: usize,
     },
     /// The same degree of freedom was named twice.
@@ -54,7 +54,7 @@ pub enum ForceError {
         /// Counted from 0.
         dof: usize,
     },
-    /// Nothing is forced, so nothing is to be found.
+    /// No degree of freedom is forced, so there is no unknown.
     #[error("no forced degree of freedom was named")]
     NoForcedDof,
     /// More unknown forces than measured channels.
@@ -74,7 +74,7 @@ pub enum ForceError {
         /// The order asked for.
         order: usize,
     },
-    /// At this step the end of a step does not tell the force during it.
+    /// The time step is so long that the end of a step does not depend on the force during it.
     #[error(
         "the time step {dt} s is too long for the machine: the force during a step leaves no \
          trace at its end (reciprocal condition {reciprocal_condition:.1e}); sample faster"
@@ -123,7 +123,7 @@ pub enum ForceError {
     NotTransmitted {
         /// The line.
         line: usize,
-        /// Its angular frequency, in rad/s.
+        /// Angular frequency, in rad/s.
         omega: f64,
         /// The forced degree of freedom most affected, counted from 0.
         dof: usize,
@@ -139,7 +139,7 @@ pub enum ForceError {
     Resonance {
         /// The line.
         line: usize,
-        /// Its angular frequency, in rad/s.
+        /// Angular frequency, in rad/s.
         omega: f64,
     },
     /// Too few lines are left to measure the noise on.
@@ -165,7 +165,7 @@ pub enum ForceError {
     /// A number that must be positive and finite is not.
     #[error("{what} must be positive and finite, got {value}")]
     NotPositive {
-        /// What the number is.
+        /// Name of the number.
         what: &'static str,
         /// The value found, in the unit of that number.
         value: f64,
@@ -191,7 +191,7 @@ pub enum ForceError {
         /// The forced degree of freedom, counted from 0.
         dof: usize,
     },
-    /// Not one random walk per force.
+    /// The number of random walks is not that of the forces.
     #[error("as many random-walk intensities as forces are needed: {forces}, got {walks}")]
     WalkCount {
         /// Intensities given.
@@ -206,7 +206,7 @@ pub enum ForceError {
          or take the initial state as unknown"
     )]
     NoLikelihood,
-    /// Nothing to reconstruct from.
+    /// The measurement has no channel.
     #[error("no force reaches the measured channels, or all of them are zero: measure elsewhere")]
     Silent,
     /// Two force records have different numbers of channels.

@@ -1,4 +1,4 @@
-//! What the measurement says about force and noise before any parameter is chosen.
+//! Marginal likelihood of force and noise, before any parameter is chosen.
 //!
 //! Each component is y_i = s_i f_i + e_i with e of variance σ². Of the `reach` strongest
 //! components a share π carries a force of variance τ², the others and all weaker ones carry none:

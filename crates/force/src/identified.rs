@@ -63,7 +63,7 @@ impl IdentifiedForce {
         self.standard_error.as_ref()
     }
 
-    /// What the force leaves unexplained of each measured channel.
+    /// Part of each measured channel that the force leaves unexplained.
     ///
     /// `None` where every channel is needed for a force of its own, and by
     /// [`continuous`](crate::continuous()) and [`discretised`](crate::discretised()), which compare

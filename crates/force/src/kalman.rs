@@ -12,13 +12,13 @@ use crate::transfer::Transfer;
 use crate::unexplained::Rest;
 use crate::{ForceError, IdentifiedForce, Measurement, Noise, Start};
 
-/// How strong noise and force are taken to be.
+/// Choice of the levels of noise and force.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 #[non_exhaustive]
 pub enum Tuning {
-    /// As strong as makes the measurement most likely (innovations form of the likelihood).
+    /// Levels of maximum likelihood (innovations form of the likelihood).
     ///
     /// The noise of the channels is in proportion to their size; each force has a walk of its own.
     Likelihood,
@@ -28,7 +28,7 @@ pub enum Tuning {
     /// Better than [`Tuning::Likelihood`] for a force that is no random walk: there noise is the
     /// only other explanation the likelihood has for what the walk does not fit.
     NoiseKnown(Vec<f64>),
-    /// These.
+    /// Levels given.
     Given {
         /// Standard deviation of the noise, one per channel, in the channel's unit.
         noise_std: Vec<f64>,

@@ -1,4 +1,4 @@
-//! What was measured, and where.
+//! Measured responses and their degrees of freedom.
 
 use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Sampling};
@@ -13,7 +13,7 @@ use crate::ForceError;
 pub struct Channel {
     /// Degree of freedom, counted from 0.
     pub dof: usize,
-    /// What was measured there.
+    /// Response quantity measured there.
     pub quantity: ResponseQuantity,
 }
 
@@ -22,7 +22,7 @@ pub struct Channel {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Start {
-    /// At rest: neither displaced nor moving.
+    /// Start at rest: neither displaced nor moving.
     FromRest,
     /// Unknown: displacement and velocity are estimated with the force.
     InMotion,
@@ -77,7 +77,7 @@ impl Measurement {
         &self.record
     }
 
-    /// What each channel is.
+    /// Degree of freedom and response quantity of each channel.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }

@@ -1,4 +1,4 @@
-//! How far a reconstructed force is from the one it is compared with.
+//! Errors of a reconstructed force relative to the one it is compared with.
 
 use mechid_signal::{Record, Spectrum};
 

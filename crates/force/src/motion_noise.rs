@@ -1,4 +1,4 @@
-//! What noise in a complete motion means for the force of the equation of motion.
+//! Propagation of noise in a complete response to the force of the equation of motion.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,8 @@ pub struct MotionNoise {
 }
 
 impl MotionNoise {
-    /// Of the displacement (m), velocity (m/s) and acceleration (m/s²) of every degree of freedom;
+    /// Standard deviations of the displacement (m), velocity (m/s) and acceleration (m/s²) of every
+    /// degree of freedom;
     /// no acceleration where none was measured.
     ///
     /// # Errors

@@ -5,12 +5,12 @@ use mechid_signal::{Record, Spectrum};
 use crate::lines::inner_lines;
 use crate::{ForceError, Measurement};
 
-/// What is known of the noise in the measured channels, taken as white.
+/// Knowledge of the noise in the measured channels, taken as white.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
 pub enum Noise {
-    /// Nothing: no standard error, and channels count by their size.
+    /// Unknown noise: no standard error, and channels count by their size.
     Unknown,
     /// One standard deviation per channel, in the channel's unit.
     PerChannel(Vec<f64>),

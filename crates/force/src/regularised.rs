@@ -21,7 +21,7 @@ use crate::{Filter, ForceError, IdentifiedForce, Measurement, Noise, Start};
 pub enum ForceUnknowns {
     /// Every spectral line below Nyquist; the record is one whole period in steady state.
     EveryLine,
-    /// These spectral lines only; the record is one whole period in steady state.
+    /// Spectral lines of the force only; the record is one whole period in steady state.
     Lines(Vec<usize>),
     /// Every sample, the force linear between them; the record is open.
     Samples(Start),
@@ -34,7 +34,7 @@ pub struct RegularisedForce {
     pub force: IdentifiedForce,
     /// λ, in the unit of a scaled channel per N; `None` for [`Filter::Shrinkage`], which has none.
     pub parameter: Option<f64>,
-    /// How many real unknowns the filter lets through, a pure number and rarely a whole one.
+    /// Effective number of real unknowns that pass the filter, a pure number and rarely a whole one.
     pub unknowns: f64,
     /// Standard deviation of the noise in each channel, as the residual has it, in the channel's unit.
     pub noise_std: Vec<f64>,

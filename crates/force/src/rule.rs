@@ -4,7 +4,7 @@ use crate::ForceError;
 use crate::components::{Components, Fit};
 use crate::evidence::Evidence;
 
-/// How the regularisation parameter λ is chosen.
+/// Rule for the regularisation parameter λ.
 ///
 /// λ is in the unit of a singular value: scaled channel per newton. Tikhonov damps the components
 /// of the force that the machine transmits more weakly than λ, truncation drops them.
@@ -37,11 +37,11 @@ pub enum Rule {
     /// # Source
     /// Hansen & O'Leary (1993) for the curve and its curvature; both changes are ours.
     LCurve,
-    /// This λ, in the unit of a scaled channel per N.
+    /// Given λ, in the unit of a scaled channel per N.
     Given(f64),
 }
 
-/// How the components are damped.
+/// Filter factors of the components.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]

@@ -1,4 +1,4 @@
-//! From unknown forces to measured channels, and back, at one angular frequency.
+//! Receptance from unknown forces to measured channels, and its inverse, at one angular frequency.
 
 use mechid_model::SecondOrderSystem;
 use mechid_model::linear_algebra::svd;

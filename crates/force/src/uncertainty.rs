@@ -1,4 +1,4 @@
-//! What an identified machine, not exactly known, means for the force.
+//! Propagation of the uncertainty of an identified machine to the force.
 
 use mechid_model::{Matrix, Parameter, SecondOrderSystem, UncertainSystem};
 use mechid_signal::Record;

@@ -1,4 +1,4 @@
-//! What a force leaves of the measured motion.
+//! Part of the measured response that a force does not explain.
 //!
 //! Where fewer forces are sought than channels were measured, the channels contradict one another
 //! if another force acts, if a sensor is dead or two are exchanged, or if the machine is another.
@@ -12,7 +12,7 @@ use crate::state_space::Machine;
 use crate::transfer::Transfer;
 use crate::{ForceError, Measurement, Start};
 
-/// What the force found leaves unexplained of one measured channel.
+/// Part of one measured channel that the reconstructed force leaves unexplained.
 ///
 /// All are root mean squares over the record; where it is a period, of the lines used.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,10 +22,10 @@ pub struct Unexplained {
     /// Measured motion, or that which the force found makes, whichever is larger, in the unit of
     /// the channel.
     pub motion: f64,
-    /// What noise alone may leave, its level on the lines used, in the unit of the channel. `None`
+    /// Part that noise alone may leave, its level on the lines used, in the unit of the channel. `None`
     /// where the level was neither stated nor measured apart from the fit.
     pub noise: Option<f64>,
-    /// What the uncertainty of the machine leaves, in the unit of the channel, as
+    /// Part that the uncertainty of the machine leaves, in the unit of the channel, as
     /// [`with_uncertain_system`](crate::with_uncertain_system) counts it; `None` without that.
     pub machine: Option<f64>,
 }

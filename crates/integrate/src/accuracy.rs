@@ -1,4 +1,4 @@
-//! What a step does to a free oscillation: the charts of period elongation and amplitude decay.
+//! Effect of a step on a free oscillation: period elongation and amplitude decay.
 
 use std::f64::consts::TAU;
 

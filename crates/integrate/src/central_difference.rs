@@ -7,7 +7,7 @@ use crate::newmark::{Newmark, NewmarkStepper, motion_mut};
 use crate::scheme::check_step;
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// How central difference gets the displacement before t = 0.
+/// Displacement before t = 0 of central difference.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum CentralDifferenceStart {
     /// x(−Δt) = x(0) − Δt ẋ(0) + ½Δt² ẍ(0), with the consistent acceleration: second order.

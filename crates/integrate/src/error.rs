@@ -1,4 +1,4 @@
-//! What can be wrong with an integration.
+//! Errors of an integration.
 
 use mechid_signal::{counted, told, told_to};
 
@@ -18,9 +18,9 @@ pub enum IntegrateError {
         least = told(*least), most = told(*most), value = told(*value)
     )]
     Parameter {
-        /// Which scheme.
+        /// Name of the scheme.
         scheme: &'static str,
-        /// Which parameter.
+        /// Name of the parameter.
         parameter: &'static str,
         /// Smallest value allowed; parameters of schemes are pure numbers.
         least: f64,
@@ -32,7 +32,7 @@ pub enum IntegrateError {
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
     #[error("{what} has {}, the system has {}", counted(*got, "component"), counted(*dof, "degree of freedom"))]
     Components {
-        /// What was given.
+        /// Name of the input.
         what: &'static str,
         /// Components found.
         got: usize,
@@ -64,11 +64,11 @@ pub enum IntegrateError {
     MidStepSampling {
         /// Samples of the mid-step forces.
         got: usize,
-        /// Their step, in seconds.
+        /// Step of the mid-step forces, in seconds.
         got_dt: f64,
         /// Samples of the force.
         expected: usize,
-        /// Its step, in seconds.
+        /// Step of the force, in seconds.
         dt: f64,
     },
     /// The scheme needs the force in the middle of the steps and was given samples alone.
@@ -85,7 +85,7 @@ pub enum IntegrateError {
         time = told(*time), value = told(*value)
     )]
     NotFinite {
-        /// What was given.
+        /// Name of the input.
         what: &'static str,
         /// Component, counted from 1.
         component: usize,
@@ -100,7 +100,7 @@ pub enum IntegrateError {
         dt = told(*dt)
     )]
     SingularEffectiveMass {
-        /// Which scheme.
+        /// Name of the scheme.
         scheme: &'static str,
         /// Time step, in seconds.
         dt: f64,
@@ -131,7 +131,7 @@ pub enum IntegrateError {
     NotAtRest {
         /// Component, counted from 1.
         component: usize,
-        /// Its velocity, in m/s.
+        /// Velocity, in m/s.
         velocity: f64,
     },
     /// No response repeats with the period of the force, or none that can be told from rounding.
@@ -145,7 +145,7 @@ pub enum IntegrateError {
         period: f64,
         /// Reciprocal condition of I − Φ, Φ being the free motion over one period.
         reciprocal_condition: f64,
-        /// What rounding alone can make of it.
+        /// Change that rounding alone can make.
         rounding: f64,
     },
     /// The response grew beyond what a number can hold.

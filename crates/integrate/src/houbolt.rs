@@ -7,7 +7,7 @@ use crate::newmark::{Newmark, NewmarkStepper, motion, motion_mut};
 use crate::scheme::{check_finite, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// Where Houbolt's scheme gets the motion at Δt and 2Δt from.
+/// Source of the motion at Δt and 2Δt for Houbolt's scheme.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum HouboltStart {
     /// Two steps of Newmark's average acceleration.

@@ -62,7 +62,7 @@ pub fn integrate_periodic<'a>(
     motion.into_response(&table)
 }
 
-/// As [`integrate_periodic`] for a force given as a function of time with the period of
+/// Integrates as [`integrate_periodic`] does, for a force given as a function of time with the period of
 /// `sampling`; `force(t, f)` writes the n components at t (s) into `f` (N).
 ///
 /// # Errors

@@ -7,7 +7,7 @@ use crate::newmark::{motion, motion_mut, start_consistently};
 use crate::scheme::check_step;
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// What the two middle stages take for the force at t + Δt/2.
+/// Force at t + Δt/2 for the two middle stages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MidStepForce {
     /// F(t): first order where the force changes.

@@ -1,4 +1,4 @@
-//! What a scheme is: parameters a user chooses, and the work prepared once from them.
+//! Schemes: parameters that a user chooses, and the work prepared once from them.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::{IntegrateError, System, stability};
 /// A choice on which programs that share a formula still differ; printed with every result.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Convention {
-    /// What is chosen.
+    /// Name of the choice.
     pub what: &'static str,
     /// The choice in force.
     pub choice: &'static str,
@@ -25,7 +25,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// The conventions in force.
     fn conventions(&self) -> Vec<Convention>;
 
-    /// Whether the force in the middle of each step must be supplied.
+    /// Returns whether the force in the middle of each step must be supplied.
     fn needs_mid_step_force(&self) -> bool {
         false
     }
@@ -48,7 +48,7 @@ pub trait Scheme: fmt::Debug + Send + Sync {
         dt: f64,
     ) -> Result<Box<dyn Stepper>, IntegrateError>;
 
-    /// As [`prepare_unchecked`](Self::prepare_unchecked), but refuses a step `dt` (s) that makes
+    /// Prepares as [`prepare_unchecked`](Self::prepare_unchecked) does, but refuses a step `dt` (s) that makes
     /// the motion of the system grow. Wrap the scheme in [`AllowUnstable`] to go on all the same.
     ///
     /// # Errors
@@ -84,7 +84,7 @@ pub enum StableSteps {
     Frequencies(f64),
     /// Steps with |λ|Δt ≤ this pure number for every eigenvalue λ.
     Eigenvalues(f64),
-    /// Not known in closed form.
+    /// Limit that is not known in closed form.
     Unknown,
 }
 
@@ -133,7 +133,7 @@ impl Scheme for AllowUnstable<'_> {
     }
 }
 
-/// Where in a step from t to t + Δt a scheme looks at the force.
+/// Instant within a step from t to t + Δt at which a scheme reads the force.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Instant {
     /// t
@@ -173,7 +173,7 @@ pub trait Stepper: Send {
     /// Length of the state, at least 3·n.
     fn state_len(&self) -> usize;
 
-    /// At which instants of a step the force is read.
+    /// Returns the instants of a step at which the force is read.
     fn instants(&self) -> &'static [Instant];
 
     /// Writes what the step adds to `state` into `change`: z(t + Δt) − z(t).

@@ -7,7 +7,7 @@ use crate::newmark::{motion, motion_mut, start_consistently};
 use crate::scheme::check_step;
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
-/// What Wilson's scheme takes for the force at t + θΔt.
+/// Force at t + θΔt for Wilson's scheme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum WilsonLoad {
     /// F(t) + θ [F(t+Δt) − F(t)]: the line through the two ends of the step, carried on.

@@ -213,7 +213,7 @@ pub enum IoError {
         file: String,
         /// Number and name of the column.
         column: String,
-        /// Its unit.
+        /// Unit of the column.
         unit: &'static str,
         /// Quantity of the unit.
         quantity: Quantity,
@@ -282,15 +282,15 @@ pub enum IoError {
         file: String,
         /// Number and name of one column.
         first: String,
-        /// Its first instant, in seconds.
+        /// First instant of the first column, in seconds.
         first_start: f64,
-        /// Its step, in seconds.
+        /// Step of the first column, in seconds.
         first_step: f64,
         /// Number and name of the other column.
         second: String,
-        /// Its first instant, in seconds.
+        /// First instant of the second column, in seconds.
         second_start: f64,
-        /// Its step, in seconds.
+        /// Step of the second column, in seconds.
         second_step: f64,
     },
     /// The rate given is not that of the file.

@@ -43,7 +43,9 @@ pub use experiment::{
 };
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
-pub use output::{BegunFile, OutputFile, refuse_replaced_inputs, write_all};
+pub use output::{
+    BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
+};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{SystemMatrices, read_system};
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -45,6 +45,17 @@ impl Limits {
     /// The default limits.
     pub const DEFAULT: Self =
         Self { row_bytes: 4 << 20, columns: 1 << 16, unpacked_bytes: 1 << 30, numbers: 1 << 28 };
+
+    /// Returns these limits, each `factor` times as large.
+    #[must_use]
+    pub fn times(self, factor: usize) -> Self {
+        Self {
+            row_bytes: self.row_bytes.saturating_mul(factor),
+            columns: self.columns.saturating_mul(factor),
+            unpacked_bytes: self.unpacked_bytes.saturating_mul(factor),
+            numbers: self.numbers.saturating_mul(factor),
+        }
+    }
 }
 
 impl Default for Limits {

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::IoError;
 use crate::standard::{input_name, is_input, is_standard_output, output_name};
@@ -22,8 +23,8 @@ pub struct OutputFile {
 ///
 /// On Linux the file has no name until then, so that nothing is left of it however the program
 /// ends. Elsewhere, and on file systems without such files, it has a hidden name beside the
-/// destination; what a killed program leaves of it is removed when the same destination is next
-/// written to.
+/// destination; [`remove_unfinished_files`] removes it when a signal ends the program, and what a killed
+/// program leaves of it is removed when the same destination is next written to.
 ///
 /// A file that is replaced keeps its permissions; one without permission to write is not replaced.
 ///
@@ -65,6 +66,9 @@ enum Stage {
 /// A file that is removed when it is no longer used, unless it was renamed.
 #[derive(Debug)]
 struct Temporary(PathBuf);
+
+/// Paths of all [`Temporary`] files of this process.
+static TEMPORARIES: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Writes all files, or none: each is written beside its destination first, and they take their
 /// names only once all are complete, those that were begun before first.
@@ -144,7 +148,7 @@ impl BegunFile {
         }
     }
 
-    /// Whether it goes to standard output.
+    /// Returns whether it goes to standard output.
     pub fn is_for_standard_output(&self) -> bool {
         matches!(self.stage, Stage::StandardOutput)
     }
@@ -302,7 +306,7 @@ mod beside {
         let (file, path) = named(destination, open)?;
         // Where files cannot be locked, abandoned ones stay.
         let _ = file.try_lock();
-        Ok((file, Temporary(path)))
+        Ok((file, Temporary::new(path)))
     }
 
     /// Removes temporary files of a destination that no running program has locked.
@@ -381,8 +385,50 @@ fn failed(path: &Path, source: io::Error) -> IoError {
     IoError::Write { file: output_name(path), source }
 }
 
+impl Temporary {
+    fn new(path: PathBuf) -> Self {
+        temporaries().insert(path.clone());
+        Self(path)
+    }
+}
+
 impl Drop for Temporary {
     fn drop(&mut self) {
         let _ = fs::remove_file(&self.0);
+        temporaries().remove(&self.0);
+    }
+}
+
+fn temporaries() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    // A set of paths is whole whenever a thread panics.
+    TEMPORARIES.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the temporary files of every [`BegunFile`] of this process that is not complete.
+///
+/// A program calls it when a signal ends it: then nothing is dropped. The files cannot be completed
+/// afterwards.
+pub fn remove_unfinished_files() {
+    for path in &*temporaries() {
+        let _ = fs::remove_file(path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_named_file_that_is_not_complete_can_be_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let destination = folder.path().join("a.csv");
+        let (_file, temporary) = beside::create(&destination).unwrap();
+        assert!(temporary.0.exists());
+        remove_unfinished_files();
+        assert!(!temporary.0.exists());
+        let path = temporary.0.clone();
+        assert!(temporaries().contains(&path));
+        drop(temporary);
+        assert!(!temporaries().contains(&path));
     }
 }

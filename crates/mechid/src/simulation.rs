@@ -15,12 +15,12 @@ use mechid_model::{ModelError, Response, SecondOrderSystem};
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
-/// What [`simulate`] makes: the truth, and what the sensors say.
+/// Result of [`simulate`]: the true response and the measured record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// The machine.
     pub system: SecondOrderSystem,
-    /// How the response was computed, with the scheme's parameters.
+    /// Scheme that computed the response, with its parameters.
     pub scheme: String,
     /// The scheme's conventions in force.
     pub conventions: Vec<Convention>,
@@ -128,13 +128,13 @@ pub enum SimulateError {
     /// A record cannot be made.
     #[error(transparent)]
     Signal(#[from] SignalError),
-    /// Without time steps there is no start.
+    /// The exact scheme has no time steps, and so no start.
     #[error(
         "the scheme \"exact\" gives the periodic response only: choose another one for a response that \
          starts from rest or from a given motion"
     )]
     ExactFromRest,
-    /// What repeats has no start.
+    /// A periodic response has no start.
     #[error(
         "a periodic response has no start: give displacements for Houbolt's first steps only with a \
          response from rest or from a given motion"

@@ -1,4 +1,4 @@
-//! What can go wrong between a result and its figure or page.
+//! Errors between a result and its figure or page.
 
 /// A failure to draw or to describe a result.
 #[derive(Debug, thiserror::Error)]
@@ -21,7 +21,7 @@ pub enum ReportError {
         /// The machine.
         file: String,
     },
-    /// Something cannot be computed.
+    /// The analysis cannot compute what is shown.
     #[error(transparent)]
     Analysis(#[from] mechid_analysis::AnalysisError),
     /// A figure cannot be drawn.

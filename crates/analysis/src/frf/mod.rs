@@ -12,7 +12,7 @@ use crate::AnalysisError;
 use crate::identify::lines::{LineChoice, choose_lines};
 use crate::measurement::{CHUNK_SAMPLES, Hold, Measurement, Windowed};
 
-/// How to estimate frequency responses.
+/// Settings of an estimate of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrfSettings {
@@ -120,7 +120,7 @@ impl Segmentation {
         Self { segment: Some(samples), ..Self::default() }
     }
 
-    /// Whether the segments are whole periods.
+    /// `true` if the segments are whole periods.
     pub fn are_periods(&self) -> bool {
         self.segment.is_none()
     }

@@ -31,7 +31,7 @@ pub struct FrfTable {
     pub quantity: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Frequencies, in Hz.
+    /// Frequencies, in Hz, one per value of a response.
     pub frequency_hz: Vec<f64>,
     /// Frequency responses, one per pair of response and force.
     pub responses: Vec<Response>,
@@ -52,7 +52,7 @@ pub struct SegmentRow {
     pub hop: usize,
     /// `None` for whole periods.
     pub window: Option<&'static str>,
-    /// Equivalent number of independent averages.
+    /// Equivalent number of independent averages, a pure number.
     pub averages: f64,
 }
 
@@ -65,22 +65,23 @@ pub struct Response {
     pub force: usize,
     /// Real part, one value per frequency, in the unit of the table.
     pub real: Vec<f64>,
-    /// Imaginary part, likewise.
+    /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
-    /// Magnitude, likewise.
+    /// Magnitude, one value per frequency, in the unit of the table.
     pub magnitude: Vec<f64>,
-    /// Phase, in degrees.
+    /// Phase, one value per frequency, in degrees.
     pub phase_deg: Vec<f64>,
-    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2).
+    /// Standard error of the magnitude, and of real and imaginary part alike: √(E|ΔH|²/2), one value per
+    /// frequency, in the unit of the table.
     pub standard_error: Vec<f64>,
 }
 
-/// Share of a motion's power that is linear in the forces.
+/// Fraction of the power of a response that is linear in the forces.
 #[derive(Debug, Serialize)]
 pub struct Coherence {
     /// Degree of freedom, counted from 1.
     pub motion: usize,
-    /// Values, one per frequency.
+    /// Values, one per frequency, pure numbers from 0 to 1.
     pub values: Vec<f64>,
 }
 

@@ -24,7 +24,7 @@ pub struct CheckRow {
     pub subject: Subject,
     /// Good, doubtful or bad.
     pub verdict: Verdict,
-    /// The number that decides the verdict; `None` where it is infinite.
+    /// Number that decides the verdict, a ratio or a probability; `None` where it is infinite.
     pub value: Option<f64>,
     /// The finding, in a sentence.
     pub text: String,
@@ -36,9 +36,9 @@ pub struct CheckRow {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum When {
-    /// Before the fit.
+    /// Check of the data, before the fit.
     Before,
-    /// After the fit.
+    /// Check of the residual, after the fit.
     After,
 }
 
@@ -119,12 +119,12 @@ impl CheckRow {
         }
     }
 
-    /// Whether the user must be warned.
+    /// Returns whether the user must be warned.
     pub fn is_conspicuous(&self) -> bool {
         self.verdict > Verdict::Good
     }
 
-    /// Whether the finding names a fault.
+    /// Returns whether the finding names a fault.
     pub fn is_bad(&self) -> bool {
         self.verdict == Verdict::Bad
     }

@@ -15,7 +15,7 @@ pub enum LineChoice {
     /// Every line at which the force exceeds its noise.
     #[default]
     Driven,
-    /// Such lines within a frequency band.
+    /// Driven lines within a frequency band.
     Band(Band),
     /// Given lines, whatever the force.
     Lines(LineSpec),

@@ -19,7 +19,7 @@ pub mod options;
 pub mod prediction;
 mod responses;
 mod samples;
-pub mod spectra;
+pub(crate) mod spectra;
 pub mod summary;
 pub mod validation;
 

@@ -13,7 +13,7 @@ use super::mass::KnownMass;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
 
-/// How to identify a machine from its records.
+/// Settings of an identification.
 ///
 /// ```
 /// use mechid_analysis::{Identify, identify::Method};
@@ -90,7 +90,7 @@ pub struct SampleFit {
     pub between_samples: Option<Discretisation>,
     /// Extent of the window; `None`: open, or whole periods with spectral derivatives.
     pub extent: Option<Extent>,
-    /// How to find the velocity and acceleration that were not measured.
+    /// Derivation of the velocity and acceleration that were not measured.
     pub derivatives: Option<Derivatives>,
     /// Steps between the samples.
     pub refine: Option<Refinement>,
@@ -128,7 +128,7 @@ impl Between {
     }
 }
 
-/// How to find the kinds of response that were not measured.
+/// Derivation of the kinds of response that were not measured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Derivatives {

@@ -38,7 +38,7 @@ pub struct Compared {
 impl Prediction {
     /// Returns every response measured, as far as it is held, beside the one predicted. An open record
     /// starts from the state that fits it best.
-    pub fn predict(
+    pub(crate) fn predict(
         self,
         system: &SecondOrderSystem,
         measured: &Block,

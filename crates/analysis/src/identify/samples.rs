@@ -29,7 +29,11 @@ impl SampleFit {
 
     /// Fits the samples of one or several windows: the equation of motion itself where there is an
     /// acceleration and nothing else is asked for, otherwise what leads from one sample to the next.
-    pub fn fit(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+    pub(crate) fn fit(
+        &self,
+        records: &[Windowed],
+        unknowns: &Unknowns,
+    ) -> Result<Fitted, AnalysisError> {
         let between = self.between_samples;
         let prepare = |r: &Windowed| Prepared::of(&r.held, self.derivatives);
         let prepared: Vec<Prepared> = records.iter().map(prepare).collect::<Result<_, _>>()?;

@@ -263,7 +263,7 @@ impl Fitted {
         (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
     }
 
-    /// Whether frequency responses were fitted, weighted by their noise.
+    /// Returns whether frequency responses were fitted, weighted by their noise.
     pub fn is_weighted(&self) -> bool {
         let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
         noise_stated && !self.least_squares

@@ -20,7 +20,7 @@ use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::{compact, paragraph, significant, text_table};
 
-/// Level of the confidence intervals.
+/// Level of the confidence intervals, a pure number such as 0.95.
 pub const CONFIDENCE: f64 = 0.95;
 
 /// Result of an identification: numbers, checks and remarks.
@@ -34,12 +34,12 @@ pub struct IdentificationSummary {
     pub estimator: &'static str,
     /// Samples used.
     pub window: WindowRow,
-    /// Whether the windows are whole periods.
+    /// `true` if the windows are whole periods.
     #[serde(skip)]
     pub repeats: bool,
     /// Lines used; none in the time domain.
     pub lines: Option<LinesUsed>,
-    /// Level of the confidence intervals.
+    /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
     /// Parameters, one each.
     pub parameters: Vec<ParameterRow>,
@@ -108,9 +108,9 @@ pub struct LinesUsed {
 pub struct Uncertain {
     /// Value, in its unit.
     pub value: f64,
-    /// `None` for a value that is known.
+    /// Standard error, in the same unit; `None` for a value that is known.
     pub standard_error: Option<f64>,
-    /// Confidence interval; `None` for a value that is known.
+    /// Confidence interval, in the same unit; `None` for a value that is known.
     pub interval: Option<[f64; 2]>,
 }
 
@@ -127,7 +127,7 @@ pub struct ParameterRow {
     pub column: usize,
     /// SI unit.
     pub unit: &'static str,
-    /// Whether it was given, not estimated.
+    /// `true` if it was given, not estimated.
     pub known: bool,
     #[serde(flatten)]
     /// Estimate with its uncertainty.
@@ -137,7 +137,7 @@ pub struct ParameterRow {
 /// One mode of the identified system.
 #[derive(Debug, Serialize)]
 pub struct ModeRow {
-    /// Whether the mode is underdamped.
+    /// `true` if the mode is underdamped.
     pub oscillates: bool,
     /// Natural frequency, in Hz.
     pub natural_frequency_hz: Uncertain,
@@ -150,15 +150,16 @@ pub struct ModeRow {
 /// Quality of a fit.
 #[derive(Debug, Serialize)]
 pub struct FitRow {
-    /// RMS of the residual over RMS of what was fitted: the force, or with maximum likelihood the
-    /// motion.
+    /// RMS of the residual over the RMS of the quantity fitted, a ratio: the force, or with maximum likelihood
+    /// the response.
     pub nrmse: f64,
-    /// RMS of measured minus modelled motion over RMS of the measured motion: what the linear model
-    /// leaves unexplained. Nothing where it was not computed.
+    /// RMS of measured minus modelled response over the RMS of the measured response, a ratio: the part that the
+    /// linear model leaves unexplained. `None` where it was not computed.
     pub unexplained_motion: Option<f64>,
-    /// Power of the residual over what the noise explains; nothing where the noise is not known.
+    /// Power of the residual over the power that the noise explains, a ratio; `None` where the noise is not
+    /// known.
     pub misfit_ratio: Option<f64>,
-    /// Condition number of the column-scaled regressor.
+    /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of real equations per degree of freedom.
     pub equations: usize,
@@ -386,8 +387,8 @@ impl WindowRow {
 }
 
 impl ModeRow {
-    /// Frequencies and damping of an identified mode.
-    pub fn of(found: &IdentifiedMode) -> Result<Self, AnalysisError> {
+    /// Returns frequencies and damping of an identified mode.
+    pub(crate) fn of(found: &IdentifiedMode) -> Result<Self, AnalysisError> {
         Ok(Self {
             oscillates: found.mode.oscillates(),
             natural_frequency_hz: Uncertain::of(&found.natural_frequency_hz)?,
@@ -399,7 +400,7 @@ impl ModeRow {
 
 impl LinesUsed {
     /// The first, the last and the number of the lines used.
-    pub fn of(used: &frequency_domain::Lines) -> Self {
+    pub(crate) fn of(used: &frequency_domain::Lines) -> Self {
         let (lines, spacing_hz) = (used.as_slice(), used.sampling().line_spacing_hz());
         let first = lines.iter().copied().min().unwrap_or(0);
         let last = lines.iter().copied().max().unwrap_or(0);
@@ -409,18 +410,18 @@ impl LinesUsed {
 }
 
 impl Uncertain {
-    /// A value that was estimated.
-    pub fn new(value: f64, standard_error: f64, interval: [f64; 2]) -> Self {
+    /// Returns a value that was estimated.
+    pub(crate) fn new(value: f64, standard_error: f64, interval: [f64; 2]) -> Self {
         Self { value, standard_error: Some(standard_error), interval: Some(interval) }
     }
 
-    /// A value derived from what was estimated.
-    pub fn of(found: &estimate::Uncertain) -> Result<Self, AnalysisError> {
+    /// Returns a value derived from the estimate.
+    pub(crate) fn of(found: &estimate::Uncertain) -> Result<Self, AnalysisError> {
         Ok(Self::new(found.value, found.standard_error, found.interval(CONFIDENCE)?))
     }
 
-    /// A value that was given.
-    pub fn known(value: f64) -> Self {
+    /// Returns a value that was given.
+    pub(crate) fn known(value: f64) -> Self {
         Self { value, standard_error: None, interval: None }
     }
 

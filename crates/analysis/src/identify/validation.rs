@@ -33,7 +33,7 @@ pub struct Share {
     /// Degree of freedom, counted from 1.
     pub degree_of_freedom: usize,
     /// 100 (1 − ‖measured − predicted‖ / ‖measured − mean‖): 100 is perfect, 0 no better than the
-    /// mean, negative worse.
+    /// mean, negative worse; in per cent.
     pub fit_percent: f64,
 }
 
@@ -80,8 +80,8 @@ pub(super) fn hold(fitted: Hold, prediction: Prediction) -> Hold {
 }
 
 impl Validation {
-    /// Holds the prediction against the record.
-    pub fn of(
+    /// Compares the prediction with the record.
+    pub(crate) fn of(
         recorded: &Windowed,
         system: &SecondOrderSystem,
         prediction: Prediction,

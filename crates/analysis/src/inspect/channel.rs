@@ -29,19 +29,19 @@ pub struct Channel {
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// Peak over RMS; 1.41 for a sine. Nothing for a channel of zeros.
+    /// Peak over RMS, a ratio; 1.41 for a sine. `None` for a channel of zeros.
     pub crest_factor: Option<f64>,
     /// Smallest sample, in the unit of the channel.
     pub minimum: f64,
     /// Largest sample, in the unit of the channel.
     pub maximum: f64,
-    /// `None` if it was not clipped.
+    /// Clipping of the channel; `None` if it was not clipped.
     pub clipping: Option<Cut>,
     /// The strongest lines of the spectrum, the strongest first.
     pub spectrum_peaks: Vec<SpectrumPeak>,
-    /// `None` if it does not repeat.
+    /// Period of the channel; `None` if it does not repeat.
     pub period: Option<Period>,
-    /// Whether lines and period were looked for.
+    /// `true` if lines and period were looked for.
     #[serde(skip)]
     pub spectral: bool,
 }
@@ -49,9 +49,9 @@ pub struct Channel {
 /// A line of a spectrum that is higher than its neighbours.
 #[derive(Debug, Serialize)]
 pub struct SpectrumPeak {
-    /// Frequency, in cycles per sample.
+    /// Frequency in cycles per sample, a pure number.
     pub cycles_per_sample: f64,
-    /// `None` without a time axis.
+    /// Frequency, in Hz; `None` without a time axis.
     pub frequency_hz: Option<f64>,
     /// Amplitude of the sine, in the unit of the channel.
     pub amplitude: f64,
@@ -60,7 +60,7 @@ pub struct SpectrumPeak {
 /// Clipping of a channel by an amplifier or a converter.
 #[derive(Debug, Serialize)]
 pub struct Cut {
-    /// In the unit of the channel.
+    /// Amplitude, in the unit of the channel.
     pub level: f64,
     /// Samples there, in rows of three or more.
     pub samples: usize,
@@ -71,9 +71,9 @@ pub struct Cut {
 pub struct Period {
     /// Number of samples.
     pub samples: usize,
-    /// `None` without a time axis.
+    /// Length, in s; `None` without a time axis.
     pub seconds: Option<f64>,
-    /// RMS difference from one period to the next, over √2 times the RMS about the mean.
+    /// RMS difference from one period to the next, over √2 times the RMS about the mean; a ratio.
     pub mismatch: f64,
 }
 
@@ -95,18 +95,18 @@ pub struct Measured {
     pub channel: Channel,
     /// Amplitude spectrum.
     pub lines: AmplitudeSpectrum,
-    /// `None` if it is not drawn.
+    /// Extreme values over time; `None` if it is not drawn.
     pub extremes: Option<Extremes>,
 }
 
 impl Gathered {
-    /// Starts with no sample of a channel that may be drawn, over a window of `window` samples.
-    pub fn of(window: usize, drawn: bool) -> Self {
+    /// Creates statistics without a sample of a channel that may be drawn, over a window of `window` samples.
+    pub(crate) fn of(window: usize, drawn: bool) -> Self {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }
 
-    /// The next samples; whole blocks are held until there are `hold` of them.
-    pub fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
+    /// Takes the next samples; whole blocks are held until there are `hold` of them.
+    pub(crate) fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
         if let Some(extremes) = &mut self.extremes {
             extremes.push(values);
@@ -121,7 +121,7 @@ impl Gathered {
 
 impl Measured {
     /// Measures a channel whose step, in s, may be unknown, and of which a period may be `given`.
-    pub fn of(
+    pub(crate) fn of(
         column: usize,
         name: String,
         about: String,

@@ -21,17 +21,17 @@ use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
 /// Number of columns drawn at most.
 pub const DRAWN_COLUMNS: usize = 8;
 
-/// How to inspect a record.
+/// Settings of an inspection.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct InspectSettings {
     /// Columns to show, by name or number; empty: every column that holds numbers only.
     pub columns: Vec<String>,
-    /// Whether to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
+    /// `true` to gather the curves of a picture, of the first [`DRAWN_COLUMNS`] columns.
     pub curves: bool,
 }
 
-/// What is in a record.
+/// Result of an inspection: columns, time axis and contents of a record.
 ///
 /// [`Display`](fmt::Display) gives it as a person reads it, `serde` the same for programs.
 #[derive(Debug)]
@@ -116,6 +116,7 @@ impl Inspection<'_> {
         let mut inventory = file.inventory(&asked, instants)?;
         let (samples, open_line) = (inventory.samples, inventory.open_line);
         let sampling = inventory.sampling.take();
+        let of_file = std::mem::take(&mut inventory.remarks);
         let (mut shown, len, mut left_out) = self.shown(table, &asked, instants, inventory)?;
         let dt = self.step(&file, time, sampling, &mut left_out)?;
         let window = match len {
@@ -123,6 +124,7 @@ impl Inspection<'_> {
             len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
         };
         let mut summary = RecordSummary::begin(table, samples, window, dt, left_out, self.how);
+        summary.remarks.extend(of_file);
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
             doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
         }));

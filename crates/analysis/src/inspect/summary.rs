@@ -50,11 +50,11 @@ pub struct WindowRow {
 /// Time axis of the samples shown.
 #[derive(Debug, Serialize)]
 pub struct SamplingRow {
-    /// In Hz.
+    /// Sampling rate, in Hz.
     pub rate_hz: f64,
-    /// In s.
+    /// Sampling interval, in s.
     pub step_s: f64,
-    /// In s.
+    /// Length, in s.
     pub duration_s: f64,
 }
 
@@ -80,8 +80,8 @@ impl SamplingRow {
 }
 
 impl RecordSummary {
-    /// All but the channels.
-    pub fn begin(
+    /// Creates a summary without channels.
+    pub(crate) fn begin(
         table: &Table,
         samples: usize,
         window: Option<Span>,

@@ -1,4 +1,4 @@
-//! Which columns of a record hold the forces and responses of a machine.
+//! Columns of a record that hold the forces and responses of a machine.
 
 use mechid_io::Quantity;
 use mechid_model::ResponseQuantity;

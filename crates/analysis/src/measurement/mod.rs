@@ -7,7 +7,7 @@ mod window;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use mechid_io::{ReadOptions, RecordFile, Table, TimeAxis, Unit};
+use mechid_io::{Limits, ReadOptions, RecordFile, Table, TimeAxis, Unit};
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
@@ -26,7 +26,7 @@ pub const IN_MEMORY_SAMPLES: usize = 1 << 18;
 /// Number of samples read at a time from a window that is not held in memory.
 pub const CHUNK_SAMPLES: usize = 1 << 16;
 
-/// How to read a record file.
+/// Settings for reading a record file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Reading {
@@ -39,6 +39,9 @@ pub struct Reading {
     pub sample_rate_hz: Option<f64>,
     /// Constant to subtract from every channel.
     pub detrend: Detrend,
+    /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
+    /// `None`: 1.
+    pub limits_factor: Option<usize>,
 }
 
 /// Constant to subtract from a channel.
@@ -58,7 +61,8 @@ impl Reading {
     /// # Errors
     /// As [`RecordFile::open`].
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
-        let options = ReadOptions { skip_lines: self.skip_lines, ..ReadOptions::default() };
+        let limits = Limits::DEFAULT.times(self.limits_factor.unwrap_or(1));
+        let options = ReadOptions { skip_lines: self.skip_lines, limits };
         Ok(RecordFile::open(path, &options, rows)?)
     }
 
@@ -81,7 +85,7 @@ pub struct RecordPlan {
     pub path: PathBuf,
     /// Columns of force and response.
     pub channels: Channels,
-    /// How to read the file.
+    /// Settings for reading the file.
     pub reading: Reading,
     /// Samples to use.
     pub window: Window,
@@ -111,7 +115,7 @@ impl RecordPlan {
 /// let columns = [("force", force.as_slice()), ("x [um]", x.as_slice())];
 /// let channels = Channels::new("force", ResponseQuantity::Displacement, "x [um]");
 /// let test = Measurement::from_columns(Sampling::new(0.01, 4)?, &columns, &channels)?.period(2)?;
-/// assert_eq!(test.responses()?[0].1.channel(0)[1], 20e-6);
+/// assert!((test.responses()?[0].1.channel(0)[1] / 20e-6 - 1.0).abs() < 1e-15);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
@@ -183,7 +187,8 @@ impl Measurement {
         Self::open_with(path, channels, &Reading::default())
     }
 
-    /// As [`Measurement::open`], with a time axis, lines to skip or a mean to subtract.
+    /// Opens a record file as [`Measurement::open`] does, with a time axis, lines to skip or a mean to
+    /// subtract.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read or has no such columns,
@@ -204,7 +209,7 @@ impl Measurement {
         let survey = file.survey(&time, &channels.used())?;
         let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
         let mut units = units;
-        units.remarks.extend(doubt);
+        units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let source = Source {
             name: file.head().file().to_owned(),
             path: Some(path.to_owned()),

@@ -20,7 +20,7 @@ pub struct Role<'a> {
 /// Factors that convert columns to SI units.
 #[derive(Debug, Clone, Default)]
 pub struct ToSi {
-    /// One per column.
+    /// Factor of each column, in SI units per unit of the column.
     pub factors: Vec<f64>,
     /// Columns in other units, and a time axis that may be.
     pub remarks: Vec<String>,

@@ -114,10 +114,10 @@ impl Windowed {
         self.held
     }
 
-    /// Goes through the window in chunks of `samples` samples, each beginning `advance` samples after
+    /// Passes the window to `take` in chunks of `samples` samples, each beginning `advance` samples after
     /// the one before; the last may be shorter. A window that is held and fits into one chunk is not
     /// read again.
-    pub fn chunks(
+    pub(crate) fn chunks(
         &self,
         samples: usize,
         advance: usize,

@@ -1,4 +1,4 @@
-//! Whether a velocity is the rate of its displacement, and an acceleration that of its velocity.
+//! Consistency of velocity with the rate of displacement, and of acceleration with that of velocity.
 
 use mechid_force::{Channel, Measurement};
 use mechid_model::ResponseQuantity;

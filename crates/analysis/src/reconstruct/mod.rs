@@ -60,7 +60,7 @@ pub struct ForceChunk<'a> {
     pub force: &'a IdentifiedForce,
     /// Samples of `force` that follow those of the chunk before.
     pub samples: Range<usize>,
-    /// Whether its standard error counts the noise of the record.
+    /// `true` if its standard error counts the noise of the record.
     pub counts_noise: bool,
 }
 
@@ -109,7 +109,7 @@ pub fn reconstruct(
     reconstruct_with(run, machine, how, &mut |_| Ok(()))
 }
 
-/// As [`reconstruct`], and passes the force on to `take`.
+/// Reconstructs a force as [`reconstruct`] does, and passes the force on to `take`.
 ///
 /// # Errors
 /// As [`reconstruct`], and whatever `take` gives.
@@ -126,7 +126,8 @@ pub fn reconstruct_with(
     Ok(Reconstructed { summary, force, forced, lines })
 }
 
-/// As [`reconstruct`] for a record of any length: passes the force on to `take` as it is found, chunk
+/// Reconstructs the force of a record of any length: passes the force on to `take` as it is found,
+/// chunk
 /// by chunk in order, and holds no more of it than the method needs.
 ///
 /// # Errors

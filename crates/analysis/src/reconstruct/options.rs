@@ -4,7 +4,7 @@ use mechid_force::Rule;
 use mechid_io::LineSpec;
 use serde::{Deserialize, Serialize};
 
-/// How to reconstruct the force that drove a known machine.
+/// Settings of the reconstruction of the force that drove a known machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Reconstruct {
@@ -14,12 +14,12 @@ pub struct Reconstruct {
     pub forced: Vec<usize>,
     /// Spectral lines with force; `None`: not known.
     pub lines: Option<LineSpec>,
-    /// Whether an open record begins at rest.
+    /// `true` if an open record begins at rest.
     pub at_rest: bool,
     /// Standard deviation of the noise in each measured column, in its unit, before periods are
     /// averaged; empty: estimated.
     pub noise: Vec<f64>,
-    /// How to choose the regularisation parameter.
+    /// Choice of the regularisation parameter.
     pub rule: ParameterRule,
 }
 
@@ -47,7 +47,7 @@ pub enum Method {
     Kalman,
 }
 
-/// How to choose the regularisation parameter.
+/// Choice of the regularisation parameter.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ParameterRule {
@@ -58,7 +58,7 @@ pub enum ParameterRule {
     Gcv,
     /// Corner of the L-curve.
     LCurve,
-    /// A given parameter.
+    /// A given parameter λ, in the unit of a scaled channel per N.
     Given(f64),
 }
 

@@ -1,4 +1,4 @@
-//! Whether the periods of a window are alike.
+//! Comparison of the periods of a window.
 
 use mechid_force::Unexplained;
 

@@ -27,9 +27,9 @@ pub struct ForceSummary {
     pub periods: Option<usize>,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// Whether the standard errors count the machine's own uncertainty.
+    /// `true` if the standard errors count the machine's own uncertainty.
     pub machine_uncertainty: bool,
-    /// Whether they count the noise of the record.
+    /// `true` if they count the noise of the record.
     pub noise_uncertainty: bool,
     /// Parameters that the method chose.
     pub chosen: Vec<Chosen>,
@@ -59,13 +59,13 @@ pub struct Chosen {
 pub struct ForceRow {
     /// Counted from 1.
     pub dof: usize,
-    /// Whether a force was sought here.
+    /// `true` if a force was sought here.
     pub sought: bool,
     /// RMS value, in the unit of the channel.
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// RMS of the standard error over the record; nothing where it is not known.
+    /// RMS of the standard error over the record, in the unit of the channel; `None` where it is not known.
     pub standard_error: Option<f64>,
     /// Frequency of the strongest line, in Hz.
     pub strongest_hz: f64,

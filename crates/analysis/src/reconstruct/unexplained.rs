@@ -10,12 +10,12 @@ use crate::text::significant;
 /// A measured channel, and how much of it the forces found do not explain.
 #[derive(Debug, Serialize)]
 pub struct Measured {
-    /// Counted from 1.
+    /// Number of the channel, counted from 1.
     pub channel: usize,
-    /// Column.
+    /// Name of the column.
     pub column: String,
-    /// RMS of what is left over that of the motion; nothing where as many forces are sought as
-    /// channels were measured, or where nothing was compared.
+    /// RMS of the unexplained part over the RMS of the response, a ratio; `None` where as many forces are sought
+    /// as channels were measured, or where none was compared.
     pub unexplained: Option<f64>,
     /// Part that noise and the uncertainty of the machine may leave, likewise; `None` where the noise is not
     /// known apart from the fit.

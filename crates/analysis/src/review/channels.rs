@@ -21,10 +21,10 @@ pub struct Channel {
     pub rms: f64,
     /// Largest magnitude, in the unit of the channel.
     pub peak: f64,
-    /// `None` for a channel of zeros.
+    /// Peak over RMS, a ratio; `None` for a channel of zeros.
     pub crest_factor: Option<f64>,
-    /// RMS of what differs from period to period over RMS of what repeats, both without their mean;
-    /// nothing for one period.
+    /// RMS of the part that differs from period to period over the RMS of the part that repeats, both without
+    /// their mean; a ratio, `None` for one period.
     pub scatter: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! Whether the force drives the machine as an identification needs it.
+//! Excitation by the force, as an identification needs it.
 
 use mechid_signal::measures::{self, Band};
 use mechid_signal::{Record, Spectrum};
@@ -11,24 +11,30 @@ pub const DROP_DB: f64 = 20.0;
 
 /// Numbers of one force that acts.
 pub struct Excitation {
-    /// Counted from 1.
+    /// Degree of freedom, counted from 1.
     pub dof: usize,
-    /// Peak over RMS.
+    /// Peak over RMS, a ratio.
     pub crest_factor: f64,
-    /// `None` for a force that does not vary.
+    /// Peak factor, half the range over √2 times the RMS, a ratio; `None` for a force that does not vary.
     pub peak_factor: Option<f64>,
     /// Lines driven.
     pub lines: usize,
     /// Band of the lines driven.
     pub band: Option<Band>,
-    /// Spectral flatness of the driven lines.
+    /// Spectral flatness of the driven lines, a ratio from 0 to 1.
     pub flatness: Option<f64>,
     /// Order of persistent excitation.
     pub order: usize,
 }
 
 /// Returns the measures of every force that is not zero throughout, in one period.
-pub fn excitations(force: &Record) -> Result<Vec<Excitation>, AnalysisError> {
+///
+/// # Errors
+/// [`AnalysisError::Signal`] if a measure cannot be computed.
+///
+/// # Source
+/// See [`mechid_signal::measures`].
+pub(crate) fn excitations(force: &Record) -> Result<Vec<Excitation>, AnalysisError> {
     let spectrum = Spectrum::of(force);
     let floor = 10f64.powf(-DROP_DB / 20.0);
     let acting = (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0);

@@ -89,7 +89,7 @@ fn is_predicted(fit_percent: f64) -> bool {
     fit_percent >= POOR_FIT
 }
 
-/// Whether samples that were predicted had been fitted: then the prediction proves little.
+/// `true` if samples that were predicted had been fitted: then the prediction proves little.
 pub fn was_fitted(contents: &Review<'_>) -> bool {
     let report = &contents.found.summary();
     report.validation.iter().any(|predicted| {

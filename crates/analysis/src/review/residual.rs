@@ -24,7 +24,7 @@ pub struct Residual {
 
 /// Correlations of one channel of a residual.
 pub struct Correlations {
-    /// With itself.
+    /// Correlation with itself; `None` if there are too few lines.
     pub own: Option<OwnCorrelation>,
     /// Time between two lags of the correlation with a force, in s.
     pub lag: f64,
@@ -65,7 +65,8 @@ impl Residual {
     }
 }
 
-/// RMS of the measured motion, and of what the prediction leaves of it, of one channel.
+/// Returns the RMS of one channel of the measured response, and of its part that the prediction leaves, both
+/// in the unit of the channel.
 pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     let measured = compared.measured.channel(channel);
     let apart: Vec<f64> =

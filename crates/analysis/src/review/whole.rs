@@ -12,7 +12,7 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
 pub struct Whole {
     /// Force, samples × degrees of freedom, in N.
     pub force: Gathered,
-    /// In the order of [`Block::responses`].
+    /// Measured responses, in the order of [`Block::responses`].
     pub motions: Vec<Gathered>,
     /// The mean period; nothing where the window is one period.
     pub mean: Option<Block>,
@@ -29,8 +29,8 @@ pub struct Gathered {
 }
 
 impl Whole {
-    /// Goes through the window once.
-    pub fn of(recorded: &Windowed) -> Result<Self, AnalysisError> {
+    /// Reads the window once.
+    pub(crate) fn of(recorded: &Windowed) -> Result<Self, AnalysisError> {
         let held = &recorded.held;
         let mut force = Gathered::new(held, &held.force);
         let mut motions: Vec<Gathered> =
@@ -106,8 +106,8 @@ impl Gathered {
         Ok(())
     }
 
-    /// RMS over all samples of what differs from the mean period, of one channel; nothing for one
-    /// period.
+    /// Returns the RMS, over all samples of one channel, of the deviation from the mean period, in the unit of
+    /// the channel; `None` for one period.
     pub fn scatter(&self, channel: usize) -> Option<f64> {
         self.periods.as_ref().map(|periods| periods.scatter(channel))
     }

@@ -15,11 +15,12 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Hold};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
-    /// From sample to sample by Euler's rule, the dissertation's; biased in proportion to the step.
+    /// Steps from sample to sample by Euler's rule, the dissertation's; biased in proportion to the
+    /// step.
     Euler,
-    /// From sample to sample, the force held between them.
+    /// Steps from sample to sample, the force held between them.
     Held,
-    /// From sample to sample, the force linear between them.
+    /// Steps from sample to sample, the force linear between them.
     #[default]
     Linear,
     /// The equation of motion at the samples, with the acceleration.
@@ -43,7 +44,7 @@ impl Estimator {
         }
     }
 
-    /// Whether it takes whole periods.
+    /// Returns whether it takes whole periods.
     pub fn is_of_spectra(self) -> bool {
         matches!(self, Estimator::LeastSquares | Estimator::MaximumLikelihood)
     }
@@ -61,7 +62,7 @@ impl Estimator {
 
 /// Sums that an estimator needs of the samples it has seen.
 #[derive(Debug)]
-pub enum Gathered {
+pub(crate) enum Gathered {
     /// Steps from sample to sample.
     Steps(Discretisation, Transitions),
     /// Samples of the equation of motion.
@@ -72,7 +73,7 @@ pub enum Gathered {
 
 impl Gathered {
     /// Starts with no samples; they begin like these, and `period` of them are one of so many `periods`.
-    pub fn new(
+    pub(crate) fn new(
         estimator: Estimator,
         beginning: &Samples<'_>,
         period: usize,
@@ -96,7 +97,7 @@ impl Gathered {
     }
 
     /// Takes some samples: of whole periods one or more.
-    pub fn push(&mut self, samples: &Samples<'_>) -> Result<(), AnalysisError> {
+    pub(crate) fn push(&mut self, samples: &Samples<'_>) -> Result<(), AnalysisError> {
         let force = &samples.force;
         match self {
             Self::Steps(_, rows) => {
@@ -117,7 +118,7 @@ impl Gathered {
     }
 
     /// The machine behind all of them.
-    pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, AnalysisError> {
+    pub(crate) fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, AnalysisError> {
         Ok(match self {
             Self::Steps(discretisation, rows) => {
                 rows.fit(*discretisation, unknowns)?.into_estimate()

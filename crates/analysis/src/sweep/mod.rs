@@ -25,13 +25,13 @@ use crate::AnalysisError;
 use crate::identify::KnownMass;
 use crate::measurement::{Measurement, Windowed};
 
-/// How to sweep the sampling step of an identification.
+/// Settings of a sweep over the sampling step of an identification.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SweepSettings {
     /// Quantity that is swept.
     pub kind: Kind,
-    /// Its values, each positive.
+    /// Values of the setting, each positive.
     pub settings: Settings,
     /// Estimator.
     pub estimator: Estimator,
@@ -41,14 +41,14 @@ pub struct SweepSettings {
     pub natural_frequency_hz: Option<f64>,
 }
 
-/// What an experiment measures when it is simulated.
+/// Record of a simulated experiment.
 #[derive(Debug, Clone)]
 pub struct Simulated {
     /// Measured force, samples × degrees of freedom, in N.
     pub force: Record,
     /// Measured response.
     pub response: Response,
-    /// Whether the record is whole periods of a steady state.
+    /// `true` if the record is whole periods of a steady state.
     pub whole_periods: bool,
 }
 

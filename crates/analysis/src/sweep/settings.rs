@@ -21,7 +21,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// As it stands above a column and on an axis: name and unit.
+    /// Name and unit, as above a column and on an axis.
     pub fn label(self) -> (&'static str, &'static str) {
         match self {
             Kind::Npi => ("NPI", ""),
@@ -31,7 +31,7 @@ impl Kind {
     }
 }
 
-/// The whole number, one or more, that a setting means.
+/// Returns the whole number, one or more, that a setting (a pure number, to rounding) means.
 pub fn whole(value: f64) -> Option<usize> {
     let nearest = value.round();
     // Rates read from files differ by rounding.
@@ -39,10 +39,14 @@ pub fn whole(value: f64) -> Option<usize> {
     is_whole.then_some(nearest as usize)
 }
 
-/// Settings of a sweep, each positive: numbers and ranges first:step:last, separated by commas.
+/// Settings of a sweep, a list of positive numbers: rates in Hz, or pure numbers such as samples per
+/// period; written as numbers and ranges first:step:last, separated by commas.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
-pub struct Settings(pub Vec<f64>);
+pub struct Settings(
+    /// Values, one per point: rates in Hz, or pure numbers such as samples per period.
+    pub Vec<f64>,
+);
 
 impl FromStr for Settings {
     type Err = String;

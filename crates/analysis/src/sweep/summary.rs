@@ -27,13 +27,13 @@ pub struct SweepSummary {
     pub samples_per_period: usize,
     /// Natural frequency, in Hz; `None` for a record without a reference.
     pub natural_frequency_hz: Option<f64>,
-    /// Level of the intervals.
+    /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
     /// Result at each setting.
     pub points: Vec<Point>,
-    /// The setting with the smallest error.
+    /// Setting with the smallest error, in the unit of its [`Kind`].
     pub best_setting: f64,
-    /// The same, where the settings are NPI.
+    /// Best setting where the settings are NPI, a pure number: cycles in a period.
     pub best_npi: Option<f64>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
@@ -44,16 +44,16 @@ pub struct SweepSummary {
 /// Result at one setting.
 #[derive(Debug, Serialize)]
 pub struct Point {
-    /// The setting.
+    /// Value of the setting, in the unit of its [`Kind`].
     pub setting: f64,
-    /// Cycles of the natural frequency in a period.
+    /// Cycles of the natural frequency in a period, a pure number.
     pub npi: Option<f64>,
     /// Time step, in s.
     pub step_s: f64,
-    /// Samples in one cycle of the natural frequency.
+    /// Samples in one cycle of the natural frequency, a pure number.
     pub samples_per_cycle: Option<f64>,
     /// Largest error of an entry relative to the largest entry of its matrix; without a reference
-    /// the largest standard error.
+    /// the largest standard error; a ratio.
     pub error: Option<f64>,
     /// Parameters, one each.
     pub parameters: Vec<SweptParameter>,
@@ -68,20 +68,20 @@ pub struct SweptParameter {
     pub name: String,
     /// SI unit.
     pub unit: &'static str,
-    /// Estimate.
+    /// Estimate, in that unit.
     pub value: f64,
-    /// In the same unit.
+    /// Standard error, in the same unit.
     pub standard_error: f64,
-    /// Confidence interval.
+    /// Confidence interval, in the same unit.
     pub interval: [f64; 2],
-    /// `None` without a reference.
+    /// Value of the reference, in the same unit; `None` without one.
     pub true_value: Option<f64>,
 }
 
 /// Failure at a setting, or at all that take the same samples.
 pub type Failure = Arc<AnalysisError>;
 
-/// Returns the reason why a setting gave no estimate.
+/// Returns the reason why a setting (a pure number, or Hz) gave no estimate.
 pub fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
     match &point.outcome {
         Ok(found) => found.system().err().map(|reason| reason.to_string()),
@@ -132,7 +132,7 @@ impl Point {
 }
 
 impl SweepSummary {
-    /// Whether the errors are measured against a reference.
+    /// Returns whether the errors are measured against a reference.
     pub fn has_reference(&self) -> bool {
         self.points.iter().flat_map(|p| &p.parameters).any(|p| p.true_value.is_some())
     }

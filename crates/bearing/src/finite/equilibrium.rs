@@ -1,4 +1,4 @@
-//! Where the journal carries its load: Newton's method on pressure, fronts and journal together.
+//! Equilibrium of the journal: Newton's method on pressure, fronts and journal together.
 
 use std::f64::consts::FRAC_PI_3;
 

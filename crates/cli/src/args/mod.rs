@@ -56,6 +56,10 @@ pub struct RecordArgs {
     /// Number of header lines to skip above the table
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub skip_lines: u64,
+    /// Factor by which to raise the limits on memory: 4 MiB a row of text, 65536 columns, 1 GiB of a
+    /// compressed file, 2^28 numbers held
+    #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
+    pub raise_limits: Option<usize>,
     /// Time column: name or number, counted from 1; in the unit of its name (time_ms, Time [s]) or
     /// of the line of units below it, otherwise in s [default: the file's own time axis, or a
     /// column called time or t]
@@ -103,6 +107,7 @@ impl RecordArgs {
             time: self.time.clone(),
             sample_rate_hz: self.sample_rate,
             detrend: self.detrend.map_or(Detrend::None, Detrend::from),
+            limits_factor: self.raise_limits,
         }
     }
 

@@ -84,7 +84,7 @@ impl Programs {
 }
 
 /// A command of the pages that takes longer than this is stopped and named.
-const LONGEST: Duration = Duration::from_mins(10);
+const LONGEST: Duration = Duration::from_secs(600);
 
 /// What a command prints, which must be something, and its exit code 0.
 fn said(command: Command) -> Result<String, String> {

@@ -183,3 +183,29 @@ fn a_window_counts_the_samples_of_its_columns() {
     );
     assert!(message.contains("samples 500 to 755") && message.contains("has 512"), "{message}");
 }
+
+#[test]
+fn limits_on_memory_can_be_raised() {
+    let folder = tempfile::tempdir().unwrap();
+    let columns = mechid::io::Limits::DEFAULT.columns + 1;
+    let row = |value: &str| format!("{}\n", vec![value; columns].join(","));
+    fs::write(folder.path().join("wide.csv"), row("0") + &row("1") + &row("0")).unwrap();
+    let told = refused(folder.path(), "info wide.csv --sample-rate 10 --columns 1,2");
+    assert!(told.contains("more than 65536 columns") && told.contains("--raise-limits"), "{told}");
+    let told =
+        mechid(folder.path(), "info wide.csv --sample-rate 10 --columns 1,2 --raise-limits 2");
+    assert!(told.contains("3 samples"), "{told}");
+}
+
+/// A logger reserves a file and is stopped before it is full.
+#[test]
+fn what_was_left_out_of_a_file_is_told() {
+    let (folder, _) = records();
+    let mut bytes = fs::read(folder.path().join("rec.csv")).unwrap();
+    bytes.resize(bytes.len() + 4096, 0);
+    fs::write(folder.path().join("reserved.csv"), bytes).unwrap();
+    for command in ["info reserved.csv", "identify reserved.csv --force force --displacement 3"] {
+        let told = mechid(folder.path(), command);
+        assert!(told.contains("4096 zero bytes behind the last line"), "{command}: {told}");
+    }
+}

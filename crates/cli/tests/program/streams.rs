@@ -217,3 +217,28 @@ fn names_that_a_terminal_would_obey_are_written_out() {
         assert!(!told.contains('\u{1b}') && !told.contains('\u{202e}'), "{line}: {told:?}");
     }
 }
+
+/// A signal ends the program as it ends any other, and nothing is left of what it was writing.
+#[test]
+fn a_signal_leaves_no_unfinished_file() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(
+        folder.path().join("long.json"),
+        r#"{ "system": { "mass": [[25]], "damping": [[3]], "stiffness": [[1000]] },
+             "sampling": { "samples": 50000000, "rate_hz": 1000 }, "scheme": { "name": "newmark" },
+             "excitation": [{ "kind": "harmonic", "dof": 1, "amplitude": 1, "frequency_hz": 4 }] }"#,
+    )
+    .unwrap();
+    for (signal, code) in [("INT", 130), ("TERM", 143)] {
+        let line = format!(
+            "timeout --preserve-status --signal {signal} 0.5 \
+             mechid simulate long.json --output long.csv"
+        );
+        let ended = shell(folder.path(), &line);
+        assert_eq!(ended.status.code(), Some(code), "{signal}: {}", text(&ended.stderr));
+        let mut left: Vec<_> =
+            fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["long.json", "machine.csv", "machine.json"]);
+    }
+}

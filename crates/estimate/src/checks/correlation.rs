@@ -189,7 +189,7 @@ pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f6
 
 /// Power of two that brings a positive finite value near 1; 1 for any other.
 fn power_of_two(value: f64) -> f64 {
-    if value.is_normal() { (-value.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
+    if value > 0.0 { (-value.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
 }
 
 fn products(a: &[f64], b: &[f64]) -> f64 {

@@ -58,7 +58,7 @@ pub enum Finding {
     WrongPeriod {
         /// Period claimed, in samples.
         claimed: usize,
-        /// How the force contradicts it.
+        /// Contradiction by the force.
         #[cfg_attr(feature = "serde", serde(flatten))]
         fault: PeriodFault,
     },
@@ -68,7 +68,7 @@ pub enum Finding {
         frequency_hz: f64,
         /// Samples per period of that mode (pure number).
         samples_per_period: f64,
-        /// What the step or the band must suit.
+        /// Motion that the step or the band must suit.
         #[cfg_attr(feature = "serde", serde(flatten))]
         limit: ModeLimit,
     },
@@ -161,9 +161,9 @@ pub enum Finding {
         /// The parameter that changes most, in standard errors.
         #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
         parameter: Parameter,
-        /// Its value, in the unit of the parameter.
+        /// Value, in the unit of the parameter.
         estimate: f64,
-        /// Its value by the other estimator (unit of the parameter).
+        /// Value by the other estimator (unit of the parameter).
         unbiased: f64,
         /// Standard error of `estimate` (unit of the parameter).
         standard_error: f64,
@@ -221,7 +221,7 @@ pub enum Finding {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct PValue {
-    /// Of this test alone (pure number).
+    /// Probability of this test alone (pure number).
     #[cfg_attr(feature = "serde", serde(rename = "p_value"))]
     pub raw: f64,
     /// Adjusted for the number of tests made on the same fit; as `raw` before that (pure number).
@@ -229,7 +229,7 @@ pub struct PValue {
     pub adjusted: f64,
 }
 
-/// How a force contradicts a claimed period.
+/// Contradiction of a claimed period by the force.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -237,7 +237,7 @@ pub struct PValue {
     serde(tag = "fault", rename_all = "snake_case")
 )]
 pub enum PeriodFault {
-    /// It returns to itself better after one or two samples more or less.
+    /// The force returns to itself better after one or two samples more or less.
     Neighbour {
         /// Number of samples after which it repeats best.
         period: usize,
@@ -246,7 +246,7 @@ pub enum PeriodFault {
         /// The same after the claimed period (pure number).
         claimed_mismatch: f64,
     },
-    /// It returns after the claimed period except in one place: samples are missing or too many.
+    /// The force returns after the claimed period except in one place: samples are missing or too many.
     Interruption {
         /// The sample that does not follow, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
@@ -254,7 +254,7 @@ pub enum PeriodFault {
         /// RMS difference elsewhere, over the RMS of the force (pure number).
         mismatch: f64,
     },
-    /// It repeats after a number of samples of which the claimed one is no multiple.
+    /// The force repeats after a number of samples of which the claimed one is no multiple.
     Other {
         /// Number of samples after which it repeats.
         period: usize,
@@ -265,7 +265,7 @@ pub enum PeriodFault {
     },
 }
 
-/// What the sampling step or the band fitted must suit in the highest mode.
+/// Motion in the highest mode that the sampling step or the band fitted must suit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(
     feature = "serde",
@@ -386,7 +386,7 @@ pub struct CorrelationTest {
     /// Probability that noise alone is correlated as much.
     #[cfg_attr(feature = "serde", serde(flatten))]
     pub p_value: PValue,
-    /// Whether the residual is rounding, of which correlations mean nothing.
+    /// Returns whether the residual is rounding, of which correlations mean nothing.
     pub rounding: bool,
 }
 
@@ -408,21 +408,21 @@ impl PValue {
         Self { raw, adjusted: raw }
     }
 
-    /// Whether noise alone hardly gives such a statistic in any of the tests.
+    /// Returns whether noise alone hardly gives such a statistic in any of the tests.
     pub fn is_significant(self) -> bool {
         self.adjusted < SIGNIFICANCE
     }
 }
 
 impl CorrelationTest {
-    /// Whether the residual is more than rounding, and correlated more than noise is.
+    /// Returns whether the residual is more than rounding, and correlated more than noise is.
     pub fn is_significant(&self) -> bool {
         !self.rounding && self.p_value.is_significant()
     }
 }
 
 impl Finding {
-    /// What was checked.
+    /// Subject of the check.
     pub fn subject(&self) -> Subject {
         match self {
             Finding::PersistentExcitation { .. } | Finding::ExcitedLines { .. } => {
@@ -449,7 +449,7 @@ impl Finding {
         }
     }
 
-    /// How far the finding speaks against the data or the fit.
+    /// Degree to which the finding speaks against the data or the fit.
     pub fn verdict(&self) -> Verdict {
         if let Some(p_value) = self.p_value() {
             return if p_value.is_significant() { Verdict::Doubtful } else { Verdict::Good };

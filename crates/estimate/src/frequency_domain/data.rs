@@ -73,7 +73,7 @@ impl FrequencyData {
         Self::from_amplitudes(lines.omega(), rows(force), rows(motion), measured)
     }
 
-    /// From complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
+    /// Takes complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
     ///
     /// # Errors
     /// [`EstimateError::Size`] if the shapes differ, [`EstimateError::NoExcitedLine`]
@@ -191,7 +191,7 @@ impl FrequencyData {
         self.measured
     }
 
-    /// What is known of the noise: covariances of displacement (m) and force (N) for every row.
+    /// Covariances of the noise: of displacement (m) and force (N) for every row.
     pub fn noise(&self) -> Option<&NoiseSpectrum> {
         self.noise.as_ref()
     }

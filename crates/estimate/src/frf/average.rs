@@ -10,7 +10,7 @@ use super::{Frf, FrfEstimator, Segments};
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
 
-/// What frequency responses are estimated from, gathered stretch by stretch; memory does not grow
+/// Sums from which frequency responses are estimated, gathered stretch by stretch; memory does not grow
 /// with the record.
 #[derive(Debug, Clone)]
 pub struct FrfAverage {

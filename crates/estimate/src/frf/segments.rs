@@ -15,7 +15,7 @@ const INDEPENDENT: f64 = 0.01;
 /// Lines further apart than this are not looked at: no window ties them together.
 const FARTHEST_LINES: usize = 16;
 
-/// How a record is cut into pieces to average over.
+/// Segments of a record to average over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -29,12 +29,12 @@ pub enum Segments {
         len: usize,
         /// Samples from the start of one piece to that of the next, 1 to `len`.
         hop: usize,
-        /// What the samples are weighted with.
+        /// Window that the samples are weighted with.
         window: Window,
     },
 }
 
-/// What the samples of a piece are weighted with.
+/// Window that the samples of a segment are weighted with.
 ///
 /// # Source
 /// Harris (1978), Proceedings of the IEEE 66, 51–83.

@@ -1,4 +1,4 @@
-//! What an identified machine predicts wrong from one measured sample to the next.
+//! Errors of prediction from one measured sample to the next.
 
 use mechid_model::{Discretisation, Matrix};
 use mechid_signal::Extent;

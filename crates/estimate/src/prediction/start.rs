@@ -1,4 +1,4 @@
-//! Where a machine started, from how it moved.
+//! Initial state of a machine, from its response.
 
 use mechid_model::linear_algebra::svd;
 use mechid_model::{Discretisation, InitialState, Response, ResponseQuantity, SecondOrderSystem};
@@ -57,7 +57,7 @@ pub struct StartFit {
 }
 
 impl StartFit {
-    /// Nothing seen yet.
+    /// Creates sums without a sample.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if the machine has no degree of freedom.

@@ -1,4 +1,4 @@
-//! From the motion between samples to the motion in time, and how errors follow.
+//! Continuous-time system from the transition between samples, with its covariance.
 
 use mechid_model::Discretisation;
 use nalgebra::DMatrix;

@@ -88,7 +88,7 @@ impl TimeDomainFit {
         &self.state_matrix
     }
 
-    /// How far the identified dx/dt is from the measured velocity: the largest deviation of the
+    /// Inconsistency of the identified dx/dt with the measured velocity: the largest deviation of the
     /// upper half of A from \[0 I\], relative (a pure number), displacements counted in steps of velocity.
     ///
     /// A velocity of the wrong scale shows here, as does a discretisation that does not fit.
@@ -102,7 +102,7 @@ impl TimeDomainFit {
         of_velocity.amax().max(of_displacement.amax())
     }
 
-    /// What one step ahead was predicted wrong, on this or another record: rows × 2n, first the
+    /// Errors of prediction one step ahead, on this or another record: rows × 2n, first the
     /// errors of x⁺ (m), then those of ẋ⁺ (m/s).
     ///
     /// # Errors

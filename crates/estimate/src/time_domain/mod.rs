@@ -71,7 +71,7 @@ impl TimeDomain {
         self.discretisation
     }
 
-    /// What the records are.
+    /// Extent of the records.
     pub fn extent(&self) -> Extent {
         self.extent
     }

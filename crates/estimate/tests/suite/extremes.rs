@@ -14,7 +14,8 @@ fn correlations_do_not_depend_on_the_unit() {
     let (e, u) = (noise(3), noise(5));
     let (white, cross) = (whiteness(&e, 20).unwrap(), cross_correlation(&e, &u, 20).unwrap());
     for power in [-1070, -500, -30, 0, 30, 500, 1000] {
-        let scaled = |x: &[f64]| -> Vec<f64> { x.iter().map(|v| v * 2f64.powi(power)).collect() };
+        let scaled =
+            |x: &[f64]| -> Vec<f64> { x.iter().map(|v| v * f64::from(power).exp2()).collect() };
         // Below 2⁻¹⁰²² numbers have fewer digits.
         let tolerance = if power == -1070 { 0.3 } else { 0.0 };
         for (found, expected) in [
@@ -32,9 +33,9 @@ fn correlations_do_not_depend_on_the_unit() {
 
 /// m ẍ + c ẋ + k x = F at random instants, each quantity in a unit of its own.
 fn equations(response_unit: f64, force_unit: f64) -> Result<f64, EstimateError> {
-    let column = |seed, unit| DMatrix::from_iterator(200, 1, noise(seed)) * unit;
-    let [a, v, x] = [3, 5, 8].map(|seed| column(seed, response_unit));
-    let force = (&a * 2.0 + &v * 0.3 + &x * 50.0) * (force_unit / response_unit);
+    let motion = [3, 5, 8].map(|seed| DMatrix::from_iterator(200, 1, noise(seed)));
+    let force = (&motion[0] * 2.0 + &motion[1] * 0.3 + &motion[2] * 50.0) * force_unit;
+    let [a, v, x] = motion.map(|column| column * response_unit);
     let mut rows = EquationOfMotion::new(1);
     rows.push_rows(a.as_view(), v.as_view(), x.as_view(), force.as_view())?;
     let estimate = rows.solve(&Unknowns::unknown_mass(1)?)?;

@@ -50,7 +50,7 @@ pub struct Experiment {
     /// Kind of the response: the periodic steady state, or from initial conditions.
     #[serde(default)]
     pub response: ResponseKind,
-    /// Whether unstable time steps are allowed.
+    /// `true` if unstable time steps are allowed.
     #[serde(default)]
     pub allow_unstable: bool,
     /// Number of periods of the excitation in the record.

@@ -7,13 +7,13 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Noise {
-    /// On the force.
+    /// Noise on the force.
     pub force: Option<Level>,
-    /// On the displacement.
+    /// Noise on the displacement.
     pub displacement: Option<Level>,
-    /// On the velocity.
+    /// Noise on the velocity.
     pub velocity: Option<Level>,
-    /// On the acceleration.
+    /// Noise on the acceleration.
     pub acceleration: Option<Level>,
     /// Seed of the generator.
     pub seed: u64,

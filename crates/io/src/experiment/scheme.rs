@@ -80,7 +80,7 @@ pub enum MiddleLoad {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FirstDisplacements {
-    /// By the Taylor step with the consistent acceleration.
+    /// Taylor step with the consistent acceleration.
     #[default]
     Taylor,
     /// The displacement of the first sample: at rest until then.
@@ -91,10 +91,10 @@ pub enum FirstDisplacements {
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FirstSteps {
-    /// By Newmark's average acceleration.
+    /// Newmark's average acceleration.
     #[default]
     AverageAcceleration,
-    /// By central difference.
+    /// Central difference.
     CentralDifference,
     /// Displacements given in the description.
     Given {
@@ -109,9 +109,9 @@ pub enum FirstSteps {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LoadBeyond {
-    /// On the line through both ends of the step.
+    /// Force on the line through both ends of the step.
     #[default]
     Projected,
-    /// Between the samples around it.
+    /// Force between the samples around it.
     Interpolated,
 }

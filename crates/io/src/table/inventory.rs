@@ -29,7 +29,7 @@ pub struct Inventory {
 pub struct Tally {
     /// Number of its samples.
     pub samples: usize,
-    /// Their mean, in the unit of the column.
+    /// Mean of the samples, in the unit of the column.
     pub mean: f64,
 }
 

@@ -173,7 +173,7 @@ impl Table {
         self.contents.samples
     }
 
-    /// Whether no column is usable, as in a universal file of spectra.
+    /// Returns whether no column is usable, as in a universal file of spectra.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -233,7 +233,8 @@ impl Table {
         &self.contents.remarks
     }
 
-    /// Whether columns have a time axis in the file, [`TimeAxis::OfFile`]: that of a universal file,
+    /// Returns whether columns have a time axis in the file, [`TimeAxis::OfFile`]: that of a universal
+    /// file,
     /// or the rate that a number in a MATLAB file states by its name (`Fs`, `dt`) where no column is
     /// called time.
     pub fn has_time_axis(&self) -> bool {
@@ -249,7 +250,8 @@ impl Table {
         self.names.iter().map(String::as_str).find(|name| time_unit::is_time(name))
     }
 
-    /// Whether a time column, by its index counted from 0, states its unit, in its name or in the line
+    /// Returns whether a time column, by its index counted from 0, states its unit, in its name or in
+    /// the line
     /// of units; otherwise it is taken as seconds.
     ///
     /// # Panics

@@ -56,7 +56,7 @@ pub struct RecordFile {
 /// Result of one pass over some columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Survey {
-    /// Their time axis.
+    /// Time axis of the columns.
     pub sampling: Sampling,
     /// Mean of each, in its unit.
     pub means: Vec<f64>,
@@ -102,7 +102,7 @@ impl RecordFile {
         &self.head
     }
 
-    /// Whether [`RecordFile::head`] has all samples.
+    /// Returns whether [`RecordFile::head`] has all samples.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
@@ -124,6 +124,7 @@ impl RecordFile {
         };
         columns.extend(instants);
         let (mut len, mut sums, mut peaks) = (0, vec![0.0; count], vec![0.0_f64; count]);
+        let mut lengths = vec![0; columns.len()];
         let mut steps = Steps::default();
         let end = self.chunks(&columns, &mut |chunk| {
             for (c, values) in chunk.columns[..count].iter().enumerate() {
@@ -136,17 +137,24 @@ impl RecordFile {
                 }
             }
             len = chunk.first + chunk.columns.first().map_or(0, |values| values.len());
+            for (length, values) in lengths.iter_mut().zip(chunk.columns) {
+                *length += values.len();
+            }
             Ok::<_, IoError>(ControlFlow::Continue(()))
         })?;
         let sampling = match (self.whole, instants) {
             (true, _) => self.head.sampling(time, wanted)?,
-            (false, Some(column)) => self.sampling_of(column, steps, len)?,
+            (false, Some(column)) => self.sampling_of(column, steps, lengths[count])?,
             (false, None) => match time {
                 TimeAxis::RateHz(rate_hz) => time_axis::at_rate(self.head.file(), *rate_hz, len)?,
                 // A text has none, which is the error.
                 _ => self.head.sampling(time, wanted)?,
             },
         };
+        // The time column first, as in a table held whole.
+        let order = (count..columns.len()).chain(0..count);
+        let order: Vec<_> = order.map(|c| (columns[c], lengths[c])).collect();
+        time_axis::same_length(&self.head, &order)?;
         let means = sums.into_iter().map(|sum| sum / len as f64).collect();
         let remarks = match end {
             Some(end) => end.remark().into_iter().collect(),

@@ -69,8 +69,16 @@ pub(super) fn common_length(table: &Table, columns: &[usize]) -> Result<usize, I
     for column in columns {
         lengths.push((*column, table.values(*column)?.len()));
     }
-    let Some((_, len)) = lengths.first().copied() else { return Ok(table.len()) };
-    if lengths.iter().all(|(_, other)| *other == len) {
+    Ok(same_length(table, &lengths)?.unwrap_or(table.len()))
+}
+
+/// The length of all columns (index, number of samples); `None` without columns.
+pub(super) fn same_length(
+    table: &Table,
+    lengths: &[(usize, usize)],
+) -> Result<Option<usize>, IoError> {
+    let len = lengths.first().map(|(_, len)| *len);
+    if lengths.iter().all(|(_, other)| Some(*other) == len) {
         return Ok(len);
     }
     let told = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));

@@ -20,7 +20,7 @@ impl Quantity {
     const VELOCITY: Self = Self::Response(ResponseQuantity::Velocity);
     const ACCELERATION: Self = Self::Response(ResponseQuantity::Acceleration);
 
-    /// Its unit in the SI.
+    /// SI unit of the quantity.
     pub fn si(self) -> &'static str {
         match self {
             Self::Force => "N",

@@ -64,7 +64,7 @@ impl Trace {
         trace
     }
 
-    /// Whether there is no point.
+    /// Returns whether there is no point.
     pub fn is_empty(&self) -> bool {
         self.magnitude.is_empty()
     }

@@ -35,7 +35,7 @@ const SECTIONS: [(&str, &str); 7] = [
 pub struct PageSettings {
     /// Heading; `None`: the name of the record.
     pub title: Option<String>,
-    /// Whether to reconstruct the force with the identified machine and compare it.
+    /// `true` to reconstruct the force with the identified machine and compare it.
     pub reconstruct_force: bool,
     /// Command that writes the page again; `None`: only the saved settings are shown.
     pub command: Option<String>,
