@@ -36,6 +36,8 @@ pub fn fit(
     let first = all.remove(0);
     let data = all.iter().try_fold(first, |data, own| data.and(own))?;
     let (name, found, misfit) = found(&data, unknowns, *method)?;
+    // Says what the data leave open, before anything is made of it.
+    found.system()?;
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {

@@ -110,6 +110,8 @@ pub(super) fn fit(
     let data = together(&spectra, &RepeatedPeriods::mean)?;
     let Found { estimator, estimate, mut misfit, remark } =
         found(&spectra, &data, unknowns, method)?;
+    // Says what the data leave open, before anything is made of it.
+    estimate.system()?;
     let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
     for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
         let (motion, kind) = held.response();

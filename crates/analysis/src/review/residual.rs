@@ -34,14 +34,14 @@ pub struct Correlations {
 
 /// Correlation of a channel of a residual with itself.
 pub enum OwnCorrelation {
-    /// From sample to sample, at the lags 1, 2 …
+    /// Correlation from sample to sample, at the lags 1, 2 …
     Samples {
         /// Autocorrelation.
         correlation: Correlation,
         /// Number of lags over which noise on the response correlates it.
         span: usize,
     },
-    /// From line to line: real and imaginary part at the distances 1, 2 …
+    /// Correlation from line to line: real and imaginary part at the distances 1, 2 …
     Lines(Correlation),
 }
 

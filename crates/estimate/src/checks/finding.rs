@@ -124,7 +124,7 @@ pub enum Finding {
         /// The sample, counted from 0 in the window.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
         sample: usize,
-        /// Its second difference over the largest of the others (pure number).
+        /// Second difference at the sample over the largest of the others (pure number).
         ratio: f64,
     },
     /// Two measured response quantities of one degree of freedom are not derivatives of each other.

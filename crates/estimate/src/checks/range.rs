@@ -65,11 +65,13 @@ pub fn quantised_channels(quantity: Quantity, response: &Record) -> Vec<Finding>
 fn quantisation(x: &[f64]) -> Option<(usize, f64)> {
     let mut levels: Vec<f64> = Vec::new();
     for value in x {
-        if let Err(at) = levels.binary_search_by(|level| level.total_cmp(value)) {
+        // Zero has one sign.
+        let value = value + 0.0;
+        if let Err(at) = levels.binary_search_by(|level| level.total_cmp(&value)) {
             if levels.len() == QUANTISATION_LEVELS {
                 return None;
             }
-            levels.insert(at, *value);
+            levels.insert(at, value);
         }
     }
     let steps = || levels.windows(2).map(|pair| pair[1] - pair[0]);
