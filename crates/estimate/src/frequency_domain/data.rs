@@ -149,6 +149,17 @@ impl FrequencyData {
         })
     }
 
+    /// The same data with the force `delay` seconds later.
+    pub(crate) fn with_later_force(&self, delay: f64) -> Self {
+        let mut later = self.clone();
+        for (row, omega) in self.omega.iter().enumerate() {
+            let turn = Complex::cis(-omega * delay);
+            later.force.row_mut(row).apply(|f| *f *= turn);
+        }
+        later.noise = self.noise.as_ref().map(|noise| noise.with_later_force(delay));
+        later
+    }
+
     /// Degrees of freedom n.
     pub fn dof(&self) -> usize {
         self.force.ncols()
