@@ -112,7 +112,7 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     choice: &LineChoice,
-    method: Method,
+    method: Option<Method>,
     how: &Nonlinear,
 ) -> Result<Fitted, AnalysisError> {
     let first = &records[0].held;
@@ -125,7 +125,7 @@ pub(super) fn fit(
     }
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     let start = equation_error(&data, unknowns, &how.terms, &options)?;
-    let (estimator, found) = match method {
+    let (estimator, found) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
         }

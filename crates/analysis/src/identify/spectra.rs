@@ -93,6 +93,10 @@ pub struct SampleResidual {
     pub noise_span: usize,
 }
 
+/// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
+/// degrees of freedom, which take seconds.
+const LIKELIHOOD_PARAMETERS: usize = 1200;
+
 /// The periods of a record on the lines found in its force.
 type Spectra = (RepeatedPeriods, Lines);
 
@@ -102,7 +106,7 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     lines: &LineChoice,
-    method: Method,
+    method: Option<Method>,
 ) -> Result<Fitted, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
@@ -162,45 +166,62 @@ struct Found {
     remark: Option<String>,
 }
 
-/// Returns the estimate of a method from the spectra, of which `data` are the means.
+/// Returns the estimate of a method from the spectra, of which `data` are the means; without a method, of
+/// maximum likelihood if the periods show the noise and the search ends well, otherwise of least squares.
 fn found(
     spectra: &[Spectra],
     data: &FrequencyData,
     unknowns: &Unknowns,
-    method: Method,
+    method: Option<Method>,
 ) -> Result<Found, AnalysisError> {
-    let plain = |estimator, estimate| Found { estimator, estimate, misfit: None, remark: None };
-    Ok(match method {
-        Method::LeastSquares => plain(
-            "least squares on the equation of motion, in the frequency domain",
-            equation_error(data, unknowns)?,
-        ),
-        Method::Instrumental => {
+    let least_squares = |remark| -> Result<Found, AnalysisError> {
+        let estimator = "least squares on the equation of motion, in the frequency domain";
+        let estimate = equation_error(data, unknowns)?;
+        Ok(Found { estimator, estimate, misfit: None, remark })
+    };
+    let likelihood = |noisy: &FrequencyData| -> Result<Found, EstimateError> {
+        let (fit, noise) = (output_error(noisy, unknowns)?, "estimated from the periods");
+        let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
+        Ok(Found {
+            estimator: "maximum likelihood, in the frequency domain",
+            estimate: fit.estimate,
+            misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise }),
+            remark: of_pooling(fewest, noisy.noise().is_some()),
+        })
+    };
+    match method {
+        Some(Method::LeastSquares) => least_squares(None),
+        Some(Method::Instrumental) => {
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
-            plain(
-                "instrumental variables, half of the periods against the other",
-                instrumental_variables(&first, &second, unknowns)?,
-            )
+            Ok(Found {
+                estimator: "instrumental variables, half of the periods against the other",
+                estimate: instrumental_variables(&first, &second, unknowns)?,
+                misfit: None,
+                remark: None,
+            })
         }
-        Method::MaximumLikelihood => {
-            let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
-            let fit = match pooling(fewest) {
-                None => output_error(data, unknowns)?,
-                Some(pooling) => {
-                    let noisy = together(spectra, &|periods| periods.mean_with_noise(pooling))?;
-                    output_error(&noisy, unknowns)?
-                }
-            };
-            let noise = "estimated from the periods";
-            Found {
-                estimator: "maximum likelihood, in the frequency domain",
-                estimate: fit.estimate,
-                misfit: (fewest > 1).then_some(Misfit { ratio: fit.misfit_ratio, noise }),
-                remark: of_pooling(fewest),
+        Some(Method::MaximumLikelihood) => Ok(likelihood(&together(spectra, &with_noise)?)?),
+        None => {
+            let noisy = together(spectra, &with_noise)?;
+            if noisy.noise().is_none() {
+                return least_squares(None);
+            }
+            if unknowns.free().len() > LIKELIHOOD_PARAMETERS {
+                return least_squares(Some(format!(
+                    "least squares was used, for {} parameters: noise on the response biases it. \
+                     Maximum likelihood takes minutes; --method maximum-likelihood chooses it",
+                    unknowns.free().len()
+                )));
+            }
+            match likelihood(&noisy) {
+                Err(error @ EstimateError::NotConverged { .. }) => least_squares(Some(format!(
+                    "least squares was used, which noise on the response biases: {error}"
+                ))),
+                other => Ok(other?),
             }
         }
-    })
+    }
 }
 
 /// The rows of all records.
@@ -226,12 +247,11 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(all)
 }
 
-/// The mean of the periods, with their noise if it shows.
+/// The mean of the periods, with their noise if they show more than rounding.
 fn with_noise(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
-    match pooling(periods.count()) {
-        Some(pooling) => periods.mean_with_noise(pooling),
-        None => periods.mean(),
-    }
+    let Some(pooling) = pooling(periods.count()) else { return periods.mean() };
+    let noisy = periods.mean_with_noise(pooling)?;
+    if noisy.noise_above_rounding().is_some() { Ok(noisy) } else { periods.mean() }
 }
 
 /// Returns how the noise of `periods` periods is averaged over the lines; `None` for one period.
@@ -243,12 +263,17 @@ fn pooling(periods: usize) -> Option<Pooling> {
     }
 }
 
-/// Returns the remark on weights from `periods` periods.
-fn of_pooling(periods: usize) -> Option<String> {
+/// Returns the remark on weights from `periods` periods, whose noise shows or not.
+fn of_pooling(periods: usize, shows: bool) -> Option<String> {
     match periods {
         0 | 1 => Some(
             "one period does not show its noise: it was taken as white on the motion, of the level \
              the residual has"
+                .into(),
+        ),
+        _ if !shows => Some(
+            "the periods differ by rounding only: the noise was taken as white on the motion, of the \
+             level the residual has"
                 .into(),
         ),
         few @ 2..8 => Some(format!("{few} periods are few: one noise level for all lines")),

@@ -102,7 +102,9 @@ fn of_lines(residual: &SpectralResidual) -> Vec<Correlations> {
         lag: residual.lag(),
         forces: with_forces(channel),
     };
-    (0..residual.dof()).map(of).collect()
+    let all: Vec<Correlations> = (0..residual.dof()).map(of).collect();
+    let any = all.iter().any(|channel| channel.own.is_some() || !channel.forces.is_empty());
+    if any { all } else { Vec::new() }
 }
 
 fn varies(force: &Record, channel: usize) -> bool {

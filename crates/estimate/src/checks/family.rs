@@ -1,16 +1,28 @@
-//! One error rate for all tests on a fit.
+//! Error rates of all tests on a fit.
 
-use super::finding::{Finding, PValue};
+use super::finding::{Finding, PValue, Reference};
 
-/// Adjusts the p-values of all tests made on one fit for their number: if nothing but noise speaks
-/// against the fit, the probability that any finding becomes a warning is at most
-/// [`SIGNIFICANCE`](super::thresholds::SIGNIFICANCE), however the tests depend on one another.
+/// Adjusts the p-values of all tests made on one fit for their number; the comparison of the parameters with
+/// those of maximum likelihood apart from the tests of data and residual.
+///
+/// If nothing but noise speaks against the fit, the probability that any finding of either group becomes a
+/// warning is at most [`SIGNIFICANCE`](super::thresholds::SIGNIFICANCE), twice that for both together,
+/// however the tests depend on one another.
 ///
 /// # Source
 /// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
 pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) {
-    let mut family: Vec<&mut PValue> =
-        findings.into_iter().filter_map(Finding::p_value_mut).collect();
+    let of_parameters = |finding: &&mut Finding| {
+        matches!(finding, Finding::Bias { reference: Reference::MaximumLikelihood, .. })
+    };
+    let (bias, others): (Vec<&mut Finding>, Vec<&mut Finding>) =
+        findings.into_iter().partition(of_parameters);
+    for group in [bias, others] {
+        adjust_together(group.into_iter().filter_map(Finding::p_value_mut).collect());
+    }
+}
+
+fn adjust_together(mut family: Vec<&mut PValue>) {
     family.sort_by(|a, b| a.raw.total_cmp(&b.raw));
     let (count, mut least) = (family.len(), 0.0_f64);
     for (rank, p_value) in family.into_iter().enumerate() {
@@ -21,6 +33,8 @@ pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) 
 
 #[cfg(test)]
 mod tests {
+    use mechid_model::{Matrix, Parameter};
+
     use super::super::finding::NoiseSource;
     use super::*;
 
@@ -51,5 +65,21 @@ mod tests {
         let mut findings = [0.9, 0.8].map(misfit);
         adjust_p_values(&mut findings);
         assert!(findings.iter().all(|finding| finding.p_value().unwrap().adjusted == 1.0));
+    }
+
+    #[test]
+    fn a_bias_is_no_matter_of_the_residual() {
+        let bias = Finding::Bias {
+            p_value: PValue::of(0.02),
+            parameter: Parameter::new(Matrix::Mass, 0, 0, 1).unwrap(),
+            estimate: 1.0,
+            unbiased: 1.1,
+            standard_error: 0.03,
+            reference: Reference::MaximumLikelihood,
+        };
+        let mut findings = [misfit(0.01), bias, misfit(0.5)];
+        adjust_p_values(&mut findings);
+        let adjusted = findings.map(|finding| finding.p_value().unwrap().adjusted);
+        assert_eq!(adjusted, [0.02, 0.02, 0.5]);
     }
 }

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use mechid_model::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::correlation::{Correlation, share_above_of};
 use super::finding::{Finding, NoiseSource, PValue, Reference, Residual};
@@ -12,9 +12,6 @@ use super::thresholds::{LAGS, ROUNDING};
 use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
-
-/// Scatter of periods relative to the response (RMS), below which it is rounding.
-const SCATTER_ROUNDING: f64 = 1e-10;
 
 /// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
 /// combination of parameters has no effect.
@@ -56,7 +53,8 @@ pub struct AfterSpectralFit {
 /// The covariance follows from the noise of force and response that the data state. Of the weighted
 /// residual, the part that other parameters explain is removed by a few Gauss–Newton steps of maximum
 /// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
-/// its bias has a test of its own, the sum of those steps against the standard errors of the estimate.
+/// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
+/// parameters together and the one that changes most alone.
 /// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
 /// response.
 ///
@@ -141,7 +139,8 @@ pub struct SpectralResidual {
 
 impl WeightedFit {
     fn of(records: &[FrequencyData], estimate: &Estimate) -> Option<Self> {
-        let noise: Option<Vec<&NoiseSpectrum>> = records.iter().map(stated_noise).collect();
+        let noise: Option<Vec<&NoiseSpectrum>> =
+            records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
         let weighted = |values: &DVector<f64>| -> Option<Vec<Whitened>> {
             let one = |(at, data): (usize, &FrequencyData)| {
@@ -196,11 +195,13 @@ impl WeightedFit {
             estimate.covariance()[(i, j)] / (scale[i] * scale[j])
         });
         let statistic = step.dot(&correlation.cholesky()?.solve(&step));
-        let distribution = ChiSquared::new(scale.len() as f64).expect("at least one parameter");
+        let count = scale.len() as f64;
+        let together = ChiSquared::new(count).expect("at least one parameter").sf(statistic);
         let largest = step.iamax();
+        let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
         let parameter = estimate.parameters().nth(largest)?;
         Some(Finding::Bias {
-            p_value: PValue::of(distribution.sf(statistic)),
+            p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
             parameter: parameter.parameter,
             estimate: parameter.value,
             unbiased: parameter.value + change[largest],
@@ -208,21 +209,6 @@ impl WeightedFit {
             reference: Reference::MaximumLikelihood,
         })
     }
-}
-
-/// The noise that a record states, unless it is rounding.
-fn stated_noise(data: &FrequencyData) -> Option<&NoiseSpectrum> {
-    let noise = data.noise()?;
-    let (n, mut scatter) = (data.dof(), [0.0; 2]);
-    for row in 0..data.len() {
-        let variance = noise.covariance(row).diagonal().map(|variance| variance.re);
-        scatter[0] += variance.rows(0, n).sum();
-        scatter[1] += variance.rows(n, n).sum();
-    }
-    let sizes = [data.displacement().norm_squared(), data.force().norm_squared()];
-    let rounding = SCATTER_ROUNDING * SCATTER_ROUNDING;
-    let noisy = scatter.iter().zip(sizes).any(|(scatter, size)| *scatter > rounding * size);
-    noisy.then_some(noise)
 }
 
 /// RMS residual of each channel in the quantity measured, over all records.

@@ -165,7 +165,7 @@ const ACCELERATION: Quantity = Quantity::Response(ResponseQuantity::Acceleration
 #[test]
 fn a_converter_of_few_bits_is_named() {
     let system = oscillator();
-    for (seed, bits) in (0..).zip([2, 3, 4]) {
+    for (seed, bits) in (0..).zip([2, 3]) {
         let force = force(&system, seed);
         let exact = exact_harmonic_periodic(&system, &force).unwrap();
         let x = exact.acceleration();
