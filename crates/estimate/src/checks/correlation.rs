@@ -148,11 +148,13 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
 /// Probability that a sum of squares of normal numbers is above `sum`, where their covariance has the
 /// trace `mean` and its square the trace `square`.
 pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
-    if mean <= 0.0 {
-        return if sum > 0.0 { 0.0 } else { 1.0 };
+    let unit = square.sqrt();
+    let ratio = mean / unit;
+    match ChiSquared::new(ratio * ratio) {
+        Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
+        // Nothing scatters.
+        _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
-    let distribution = ChiSquared::new(mean * mean / square).expect("positive degrees of freedom");
-    distribution.sf(sum * mean / square)
 }
 
 /// Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two

@@ -362,7 +362,7 @@ impl SpectralResidual {
 
     /// Correlation of the residual of a channel from line to line: real and imaginary part of
     /// Σ r̄(l) r(l + d), less their expectation, at the distances d = 1, 2 … in lines of the fit. `None` if
-    /// there are too few lines.
+    /// there are too few lines or the residual is zero.
     ///
     /// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
     /// gives the variances of the products and the covariances of their squares.
@@ -391,6 +391,9 @@ impl SpectralResidual {
             self.explained.column_iter().map(|q| complex(q.as_slice())).collect();
         let powers: Vec<f64> = residual.iter().map(|r| r.norm_sqr()).collect();
         let power: f64 = powers.iter().sum();
+        if power == 0.0 {
+            return None;
+        }
         let explained_power: f64 = explained.iter().flatten().map(|q| q.norm_sqr()).sum();
         // Variance of a real or imaginary part that the parameters do not reduce.
         let unit = power / (2.0 * rows.len() as f64 - explained_power);
