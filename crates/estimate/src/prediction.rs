@@ -72,7 +72,7 @@ pub fn predict(
     let loads = force.data()
         - &velocity * system.damping().transpose()
         - &displacement * system.stiffness().transpose();
-    let acceleration = solve_mass(system, &loads.transpose()).transpose();
+    let acceleration = over_mass(system, loads);
     let record = |data| Record::new(force.sampling(), data);
     Ok(Response::new(record(displacement)?, record(velocity)?, record(acceleration)?)?)
 }
@@ -81,8 +81,8 @@ pub fn predict(
 struct Step {
     dt: f64,
     transition: DMatrix<f64>,
-    now: DMatrix<f64>,
-    next: DMatrix<f64>,
+    /// Row by row, Φ beside Γ₀ and Γ₁: what multiplies (z, F, F⁺).
+    rows: Vec<f64>,
 }
 
 impl Step {
@@ -94,40 +94,43 @@ impl Step {
         let input = StateTransition::force_input(system, dt);
         let StateTransition { state: transition, held, ramp } =
             StateTransition::exact(system, dt, &input)?;
-        Ok(match discretisation {
-            Discretisation::FirstOrderHold => {
-                Self { dt, transition, now: held - &ramp, next: ramp }
-            }
-            Discretisation::Euler | Discretisation::ZeroOrderHold => {
-                Self { dt, transition, now: held, next: ramp * 0.0 }
-            }
-        })
+        let (now, next) = match discretisation {
+            Discretisation::FirstOrderHold => (held - &ramp, ramp),
+            Discretisation::Euler | Discretisation::ZeroOrderHold => (held, ramp * 0.0),
+        };
+        let beside = [&transition, &now, &next];
+        let of_row = |row: usize| beside.into_iter().flat_map(move |matrix| matrix.row(row));
+        let rows = (0..transition.nrows()).flat_map(|row| of_row(row).copied()).collect();
+        Ok(Self { dt, transition, rows })
     }
 
     /// States at the samples (samples × 2n), and one step after the last.
-    fn run(&self, force: &Record, mut state: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        let (samples, loads) = (force.len(), force.data().transpose());
-        let mut states = DMatrix::zeros(state.len(), samples);
-        let mut next = state.clone();
+    fn run(&self, force: &Record, start: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+        let (samples, size) = (force.len(), start.len());
+        let mut states = DMatrix::zeros(samples, size);
+        let mut at = At::new(start.as_slice());
         for k in 0..samples {
-            states.set_column(k, &state);
-            self.advance(&loads, k, &state, &mut next);
-            std::mem::swap(&mut state, &mut next);
+            for (column, z) in at.state().iter().enumerate() {
+                states[(k, column)] = *z;
+            }
+            self.advance(force, k, &mut at);
         }
-        (states.transpose(), state)
+        (states, DVector::from_column_slice(at.state()))
     }
 
-    /// From the state at a column of the loads to the next; the first column follows the last.
-    fn advance(
-        &self,
-        loads: &DMatrix<f64>,
-        at: usize,
-        state: &DVector<f64>,
-        next: &mut DVector<f64>,
-    ) {
-        next.gemv(1.0, &self.transition, state, 0.0);
-        next.gemv(1.0, &self.now, &loads.column(at), 1.0);
-        next.gemv(1.0, &self.next, &loads.column((at + 1) % loads.ncols()), 1.0);
+    /// From the state at a sample of the force to the next; the first sample follows the last.
+    fn advance(&self, force: &Record, sample: usize, at: &mut At) {
+        let (loads, next) = (force.data(), (sample + 1) % force.len());
+        let size = at.next.len();
+        let (now, later) = at.now[size..].split_at_mut(loads.ncols());
+        for (dof, (now, later)) in now.iter_mut().zip(later).enumerate() {
+            (*now, *later) = (loads[(sample, dof)], loads[(next, dof)]);
+        }
+        for (next, row) in at.next.iter_mut().zip(self.rows.chunks_exact(at.now.len())) {
+            let products = row.iter().zip(&at.now).map(|(a, b)| a * b);
+            *next = products.reduce(|sum, term| sum + term).unwrap_or(0.0);
+        }
+        at.now[..size].copy_from_slice(&at.next);
     }
 
     /// The state that returns after the period: (I − Φᴺ) z = what rest leads to.
@@ -147,6 +150,34 @@ impl Step {
     }
 }
 
-fn solve_mass(system: &SecondOrderSystem, right: &DMatrix<f64>) -> DMatrix<f64> {
-    system.mass().clone().lu().solve(right).expect("the mass of a system is invertible")
+/// Where a step begins, (z, F, F⁺), and the state that it leads to.
+struct At {
+    now: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl At {
+    fn new(state: &[f64]) -> Self {
+        let mut now = state.to_vec();
+        now.resize(2 * state.len(), 0.0);
+        Self { now, next: state.to_vec() }
+    }
+
+    fn state(&self) -> &[f64] {
+        &self.now[..self.next.len()]
+    }
+
+    fn set_state(&mut self, values: impl Iterator<Item = f64>) {
+        self.now[..self.next.len()].iter_mut().zip(values).for_each(|(z, value)| *z = value);
+    }
+}
+
+/// M⁻¹ times each row of the loads.
+fn over_mass(system: &SecondOrderSystem, mut loads: DMatrix<f64>) -> DMatrix<f64> {
+    if let [mass] = system.mass().as_slice() {
+        loads.iter_mut().for_each(|load| *load /= mass);
+        return loads;
+    }
+    let solved = system.mass().clone().lu().solve(&loads.transpose());
+    solved.expect("the mass of a system is invertible").transpose()
 }

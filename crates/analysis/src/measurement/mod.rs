@@ -292,7 +292,7 @@ impl Measurement {
         // Finite, or an error that says where not.
         let record = Record::new(sampling, data)?;
         let units = ToSi::new("the record", labels.into_iter(), &roles)?;
-        let data = record.data();
+        let data = record.into_data();
         let source = Source {
             name: "the record".into(),
             path: None,
@@ -302,7 +302,7 @@ impl Measurement {
             peaks: data.column_iter().map(|column| column.amax()).collect(),
             offsets: vec![0.0; roles.len()],
             units,
-            samples: Samples::Memory(data.clone()),
+            samples: Samples::Memory(data),
         };
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }

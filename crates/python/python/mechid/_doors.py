@@ -50,7 +50,18 @@ ForceMethod: TypeAlias = Literal[
     "kalman",
 ]
 Scheme: TypeAlias = Literal[
-    "exact", "newmark", "central-difference", "houbolt", "wilson-theta", "runge-kutta-4"
+    "exact",
+    "newmark",
+    "central-difference",
+    "houbolt",
+    "wilson-theta",
+    "generalised-alpha",
+    "hht-alpha",
+    "wbz-alpha",
+    "bathe",
+    "rho-infinity-bathe",
+    "matrix-exponential",
+    "runge-kutta-4",
 ]
 SweepEstimator: TypeAlias = Literal[
     "euler", "held", "linear", "equation-of-motion", "least-squares", "maximum-likelihood"
@@ -74,6 +85,9 @@ def identify(
     derivatives: str | None = None,
     refine: int | None = None,
     interpolation: Literal["linear", "spline", "band-limited"] | None = None,
+    nonlinear: str | None = None,
+    search: Sequence[Literal["laws", "delay", "phase"]] = (),
+    weighting: Literal["automatic", "white-force", "response", "smooth-spectrum"] | None = None,
     validate: Measurement | None = None,
     validate_start: int | None = None,
     validate_samples: int | None = None,
@@ -116,6 +130,14 @@ def identify(
         How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
     refine, interpolation : optional
         Steps in every sampling interval, and the interpolation between the samples.
+    nonlinear : str, optional
+        Springs and dampers to fit beside mass, damping and stiffness, such as
+        ``"k3: x1^3, c2: |v1| v1"``.
+    search : sequence of {"laws", "delay", "phase"}
+        Constants to search for besides: those inside the laws, the delay of the force, the phase that
+        all channels have in common.
+    weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
+        Weighting of the lines of a fit with nonlinear terms.
     validate, validate_start, validate_samples : optional
         Record to predict that is not fitted, its first sample counted from 1 and their number.
     settings : dict, optional
@@ -154,7 +176,12 @@ def identify(
         )
         if domain == "time" and (lines is not None or band_hz is not None):
             raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
-        settings = {"fit": fit, "lines": _lines(lines, band_hz), "mass": _mass(mass)}
+        settings = {
+            "fit": fit,
+            "lines": _lines(lines, band_hz),
+            "mass": _mass(mass),
+            "nonlinear": _nonlinear(nonlinear, search, weighting),
+        }
     predicted = None
     if validate is not None or validate_start is not None or validate_samples is not None:
         if validate is None and validate_start is None:
@@ -447,8 +474,10 @@ def integrate(
         Sampling rate, in Hz.
     scheme : str or mapping
         ``"newmark"``, ``"central-difference"``, ``"houbolt"``, ``"wilson-theta"``,
-        ``"runge-kutta-4"`` (the force linear between samples), ``"exact"`` (periodic responses), or a
-        mapping of its ``name`` and parameters, as in the JSON of an experiment.
+        ``"generalised-alpha"``, ``"hht-alpha"``, ``"wbz-alpha"``, ``"bathe"``,
+        ``"rho-infinity-bathe"``, ``"matrix-exponential"`` and ``"runge-kutta-4"`` (the force linear
+        between samples), ``"exact"`` (periodic responses), or a mapping of its ``name`` and
+        parameters, as in the JSON of an experiment.
     response : {"from-rest", "periodic"}
         Whether the motion begins at the first sample, or repeats with the force.
     displacement, velocity : array_like, optional
@@ -474,7 +503,7 @@ def integrate(
     known = machine_of(machine)
     forces = matrix("force", force)
     named: dict[str, Any] = {"name": scheme} if isinstance(scheme, str) else dict(scheme)
-    if named.get("name") == "runge-kutta-4":
+    if named.get("name") in ("matrix-exponential", "runge-kutta-4"):
         named.setdefault("load", "linear")
     rows = {
         name: getattr(known, name).tolist() for name in ("mass", "damping", "stiffness")
@@ -672,6 +701,23 @@ def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
         low, high = band_hz
         return {"band": {"low_hz": float(low), "high_hz": float(high)}}
     return "driven"
+
+
+def _nonlinear(
+    terms: str | None, search: Sequence[str], weighting: str | None
+) -> dict[str, Any] | None:
+    if terms is None:
+        _refuse({"search": search or None, "weighting": weighting}, "belongs to `nonlinear`")
+        return None
+    constants = ("laws", "delay", "phase")
+    for name in search:
+        if name not in constants:
+            raise ValueError(f"`search` names {', '.join(constants)}, got {name!r}")
+    return {
+        "terms": terms,
+        "search": {name: name in search for name in constants},
+        "weighting": weighting or "automatic",
+    }
 
 
 def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:

@@ -15,8 +15,6 @@ _TOKEN = re.compile(
     )""",
     re.VERBOSE,
 )
-# Layers of the library that only pass a failure on.
-_LAYERS = frozenset({"analysis"})
 _ESCAPE = re.compile(r"\\(?:u\{([0-9a-f]+)\}|(.))")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
@@ -27,8 +25,8 @@ class MechidError(ValueError):
     Attributes
     ----------
     code : str
-        What kind of failure it is, such as ``"window"`` or ``"estimate.too-few-rows"``: stable,
-        for programs.
+        Which failure it is, such as ``"analysis.window"`` or ``"estimate.too-few-rows"``: stable,
+        for programs; the reference of the book lists all of them.
     fields : mapping
         The numbers and names of the message, such as ``{"first": 1, "last": 600, "len": 512}``.
     """
@@ -38,7 +36,8 @@ class MechidError(ValueError):
         super().__init__(message.replace("`sample_rate`", "`fs`"))
         self._variant = variant
         names, fields = _read(variant)
-        self.code: str = ".".join(_kebab(name) for name in names)
+        # The layers in between only pass a failure on.
+        self.code: str = ".".join(_kebab(name) for name in names[-2:])
         self.fields: Mapping[str, object] = MappingProxyType(fields)
 
     def __reduce__(self) -> tuple[type[MechidError], tuple[str, str]]:
@@ -66,8 +65,7 @@ def _read(variant: str) -> tuple[list[str], dict[str, object]]:
     fields: dict[str, object] = {}
     if isinstance(value, _Named) and isinstance(value.content, dict):
         fields = {name: _plain(inner) for name, inner in value.content.items()}
-    kept = [name for name in names if name.lower() not in _LAYERS or name == names[-1]]
-    return kept, fields
+    return names, fields
 
 
 class _Named:

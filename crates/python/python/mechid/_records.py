@@ -379,7 +379,7 @@ def plan_of(
 
 def matrix(name: str, values: object) -> NDArray[np.float64]:
     """Return an array of samples × degrees of freedom of real numbers."""
-    return np.stack(_columns(name, values), axis=1)
+    return _array(name, values)
 
 
 def _is_table(source: object) -> bool:
@@ -452,12 +452,17 @@ def _no_column(name: str, known: object) -> Exception:
     quoted = json.dumps(name), json.dumps(available)
     return MechidError(
         f'there is no column "{name}"; the columns are {available}',
-        f"NoColumn {{ column: {quoted[0]}, available: {quoted[1]} }}",
+        f"Analysis(NoColumn {{ column: {quoted[0]}, available: {quoted[1]} }})",
     )
 
 
 def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
-    """Return the columns of an array of real numbers, each contiguous."""
+    """Return the columns of an array of real numbers."""
+    return list(_array(name, values).T)
+
+
+def _array(name: str, values: object) -> NDArray[np.float64]:
+    """Return an array of samples × degrees of freedom, of any layout; no copy where none is needed."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ValueError(f"`{name}` has masked values: fill or leave them out")
     array = np.asarray(values)
@@ -470,4 +475,5 @@ def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
         raise ValueError(
             f"`{name}` has the shape (samples,) or (samples, degrees of freedom), got {shape}"
         )
-    return [np.ascontiguousarray(column, dtype=np.float64) for column in array.T]
+    array = array.astype(np.float64, copy=False)
+    return array if array.flags.aligned else array.copy()
