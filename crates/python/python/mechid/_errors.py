@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from types import MappingProxyType
 
 _TOKEN = re.compile(
@@ -35,10 +36,22 @@ class MechidError(ValueError):
         # The settings are spelled as the keywords of this package.
         super().__init__(message.replace("`sample_rate`", "`fs`"))
         self._variant = variant
-        names, fields = _read(variant)
+
+    @cached_property
+    def _parts(self) -> tuple[list[str], dict[str, object]]:
+        # Read when it is asked for: a caller that only goes on does not wait for it.
+        return _read(self._variant)
+
+    @property
+    def code(self) -> str:
+        """Which failure it is, such as ``"analysis.window"``."""
         # The layers in between only pass a failure on.
-        self.code: str = ".".join(_kebab(name) for name in names[-2:])
-        self.fields: Mapping[str, object] = MappingProxyType(fields)
+        return ".".join(_kebab(name) for name in self._parts[0][-2:])
+
+    @property
+    def fields(self) -> Mapping[str, object]:
+        """Numbers and names of the message."""
+        return MappingProxyType(self._parts[1])
 
     def __reduce__(self) -> tuple[type[MechidError], tuple[str, str]]:
         return type(self), (str(self), self._variant)
