@@ -66,15 +66,9 @@ pub fn predict(
         }
         Extent::WholePeriod => state = step.steady_state(force)?,
     }
-    let states = step.run(force, state).0;
-    let displacement = states.columns(0, n).into_owned();
-    let velocity = states.columns(n, n) / step.dt;
-    let loads = force.data()
-        - &velocity * system.damping().transpose()
-        - &displacement * system.stiffness().transpose();
-    let acceleration = over_mass(system, loads);
+    let [x, v, a] = step.responses(system, force, &state);
     let record = |data| Record::new(force.sampling(), data);
-    Ok(Response::new(record(displacement)?, record(velocity)?, record(acceleration)?)?)
+    Ok(Response::new(record(x)?, record(v)?, record(a)?)?)
 }
 
 /// z⁺ = Φ z + Γ₀ F + Γ₁ F⁺ on the state (x, Δt ẋ).
@@ -104,18 +98,51 @@ impl Step {
         Ok(Self { dt, transition, rows })
     }
 
-    /// States at the samples (samples × 2n), and one step after the last.
-    fn run(&self, force: &Record, start: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        let (samples, size) = (force.len(), start.len());
-        let mut states = DMatrix::zeros(samples, size);
+    /// Displacement, velocity and acceleration at the samples, each samples × n, in one pass.
+    fn responses(
+        &self,
+        system: &SecondOrderSystem,
+        force: &Record,
+        start: &DVector<f64>,
+    ) -> [DMatrix<f64>; 3] {
+        let (samples, n, loads) = (force.len(), system.dof(), force.data());
+        let mut found = [(); 3].map(|()| DMatrix::zeros(samples, n));
+        let [x, v, a] = &mut found;
+        let (damping, stiffness) = (system.damping(), system.stiffness());
+        let mass = system.mass().clone().lu();
+        let (mut velocity, mut inertia) = (vec![0.0; n], DVector::zeros(n));
         let mut at = At::new(start.as_slice());
         for k in 0..samples {
-            for (column, z) in at.state().iter().enumerate() {
-                states[(k, column)] = *z;
+            let (displacement, scaled) = at.state().split_at(n);
+            for (velocity, scaled) in velocity.iter_mut().zip(scaled) {
+                *velocity = scaled / self.dt;
+            }
+            for (i, left) in inertia.iter_mut().enumerate() {
+                *left = loads[(k, i)]
+                    - sum_of_products(damping.row(i).iter(), &velocity)
+                    - sum_of_products(stiffness.row(i).iter(), displacement);
+            }
+            if n == 1 {
+                inertia[0] /= system.mass()[0];
+            } else {
+                assert!(mass.solve_mut(&mut inertia), "the mass of a system is invertible");
+            }
+            for dof in 0..n {
+                (x[(k, dof)], v[(k, dof)]) = (displacement[dof], velocity[dof]);
+                a[(k, dof)] = inertia[dof];
             }
             self.advance(force, k, &mut at);
         }
-        (states, DVector::from_column_slice(at.state()))
+        found
+    }
+
+    /// The state one step after the last sample.
+    fn run(&self, force: &Record, start: &DVector<f64>) -> DVector<f64> {
+        let mut at = At::new(start.as_slice());
+        for k in 0..force.len() {
+            self.advance(force, k, &mut at);
+        }
+        DVector::from_column_slice(at.state())
     }
 
     /// From the state at a sample of the force to the next; the first sample follows the last.
@@ -127,8 +154,7 @@ impl Step {
             (*now, *later) = (loads[(sample, dof)], loads[(next, dof)]);
         }
         for (next, row) in at.next.iter_mut().zip(self.rows.chunks_exact(at.now.len())) {
-            let products = row.iter().zip(&at.now).map(|(a, b)| a * b);
-            *next = products.reduce(|sum, term| sum + term).unwrap_or(0.0);
+            *next = sum_of_products(row.iter(), &at.now);
         }
         at.now[..size].copy_from_slice(&at.next);
     }
@@ -136,7 +162,7 @@ impl Step {
     /// The state that returns after the period: (I − Φᴺ) z = what rest leads to.
     fn steady_state(&self, force: &Record) -> Result<DVector<f64>, EstimateError> {
         let size = self.transition.nrows();
-        let (_, from_rest) = self.run(force, DVector::zeros(size));
+        let from_rest = self.run(force, &DVector::zeros(size));
         let over = self.transition.pow(u32::try_from(force.len()).unwrap_or(u32::MAX));
         let growth = over.norm();
         let closing = DMatrix::identity(size, size) - over;
@@ -172,12 +198,7 @@ impl At {
     }
 }
 
-/// M⁻¹ times each row of the loads.
-fn over_mass(system: &SecondOrderSystem, mut loads: DMatrix<f64>) -> DMatrix<f64> {
-    if let [mass] = system.mass().as_slice() {
-        loads.iter_mut().for_each(|load| *load /= mass);
-        return loads;
-    }
-    let solved = system.mass().clone().lu().solve(&loads.transpose());
-    solved.expect("the mass of a system is invertible").transpose()
+/// Σ a_j b_j, from the first term to the last.
+fn sum_of_products<'a>(a: impl Iterator<Item = &'a f64>, b: &[f64]) -> f64 {
+    a.zip(b).map(|(a, b)| a * b).reduce(|sum, term| sum + term).unwrap_or(0.0)
 }

@@ -6,17 +6,21 @@ a process that imports NumPy alone.
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 import mechid
+from mechid import _mechid
+
+MACHINE = mechid.Machine(25.0, 188.5, 142_122.0)
 
 
 def least(work: Callable[[], object], repeats: int) -> float:
@@ -35,46 +39,59 @@ def process(words: Sequence[str], repeats: int = 15) -> float:
 
 
 def call() -> None:
-    """A call of 1,024 × 2 samples: all of it, and beyond the work in Rust."""
+    """A call of 1,024 × 2 samples: what the compiled module does of it, and what lies around that."""
     force, x = np.random.default_rng(5).standard_normal((2, 1024))
     record = mechid.Measurement.from_arrays(force, x, fs=128.0)
+    told = json.dumps(mechid.identify(record, period=512).settings)
+    inner = record.window(period=512)._inner
 
-    def refused() -> None:
-        # Goes to the other thread and back, for the fit refuses at once.
-        try:
-            mechid.identify(force, x, fs=128.0, lines="2000")
-        except mechid.MechidError:
-            pass
-
+    whole = least(lambda: mechid.identify(force, x, fs=128.0, period=512), 1000)
+    work = least(lambda: _mechid.identify([inner], told, None, None), 1000)
     copy = least(lambda: mechid.Measurement.from_arrays(force, x, fs=128.0), 5000)
-    beyond = least(refused, 5000)
-    frf = least(lambda: mechid.frf(record, segment=128), 2000)
-    fit = least(lambda: mechid.identify(force, x, fs=128.0, period=512), 500)
-    print("| 1,024 × 2 samples | µs |")
+    hop = least(lambda: record.force, 5000)
+    lines = json.dumps({"fit": {"domain": "spectra", "method": "least-squares"}, "lines": {"lines": "999"}})
+    around = least(lambda: refused(lambda: mechid.identify(record, lines="999")), 5000) - least(
+        lambda: refused(lambda: _mechid.identify([record._inner], lines, None, None)), 5000
+    )
+    print("| Call of 1,024 × 2 samples | µs |")
     print("|---|---|")
-    print(f"| copied in | {1e6 * copy:.0f} |")
-    print(f"| copied in, to the other thread and back, a failure told: the call without work | {1e6 * beyond:.0f} |")
-    print(f"| `frf` of a `Measurement` | {1e6 * frf:.0f} |")
-    print(f"| `identify` of arrays | {1e6 * fit:.0f} |")
+    print(f"| `identify(force, x, fs=128.0, period=512)` | {1e6 * whole:.0f} |")
+    print(f"| of that, the compiled `identify` | {1e6 * work:.0f} |")
+    print(f"| arrays checked and copied in | {1e6 * copy:.1f} |")
+    print(f"| keywords to settings | {1e6 * around:.1f} |")
+    print(f"| to a thread of the pool and back, with 1,024 samples out | {1e6 * hop:.1f} |")
+    print(f"| the last three: beyond the work | {1e6 * (copy + around + hop):.1f} |")
+
+
+def refused(call: Callable[[], object]) -> None:
+    """A call that fails at once, as there is no such line."""
+    try:
+        call()
+    except mechid.MechidError:
+        return
+    raise AssertionError("it succeeded")
+
+
+def work(_: int) -> float:
+    """Some ten milliseconds on one thread."""
+    force = np.random.default_rng(6).standard_normal(100_000)
+    moved = mechid.predict(MACHINE, force, 128.0)
+    found = mechid.identify(
+        force, moved["displacement"], velocity=moved["velocity"], fs=128.0, domain="time", threads=1
+    )
+    return found.parameters["k"].value
 
 
 def threads() -> None:
-    """Two threads against one, each call in a thread of its own."""
-    force = np.random.default_rng(6).standard_normal(100_000)
-    moved = mechid.predict(mechid.Machine(25.0, 188.5, 142_122.0), force, 128.0)
-    record = mechid.Measurement.from_arrays(
-        force, moved["displacement"], velocity=moved["velocity"], fs=128.0
-    )
+    """Two threads against one, and two processes against one, which share no lock."""
 
-    def work(_: int) -> None:
-        mechid.identify(record, domain="time", threads=1)
+    def by(pool: Executor) -> float:
+        with pool:
+            return least(lambda: list(pool.map(work, range(16))), 8)
 
-    def by(workers: int) -> float:
-        with ThreadPoolExecutor(workers) as pool:
-            return least(lambda: list(pool.map(work, range(8))), 5)
-
-    one, two = by(1), by(2)
-    print(f"\nTwo threads are {one / two:.2f} × as fast as one.")
+    one, two = by(ThreadPoolExecutor(1)), by(ThreadPoolExecutor(2))
+    alone, apart = by(ProcessPoolExecutor(1)), by(ProcessPoolExecutor(2))
+    print(f"\nTwo threads are {one / two:.2f} × as fast as one, two processes {alone / apart:.2f} ×.")
 
 
 def starts() -> None:

@@ -6,7 +6,7 @@ use mechid::estimate::EstimateError;
 use mechid::io::{Experiment, LineSpec};
 use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity};
 use mechid::signal::{CrestSearch, Extent, Multisine, Phases, Record, Sampling, SignalError};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -135,5 +135,5 @@ pub fn multisine<'py>(
 
 fn responses(py: Python<'_>, response: Response) -> PyResult<Vec<Named<'_>>> {
     let kinds = ResponseQuantity::ALL.into_iter();
-    arrays::responses(py, kinds.map(|kind| (kind, response.quantity(kind).clone())).collect())
+    arrays::responses(py, kinds.zip(response.into_records()).collect())
 }

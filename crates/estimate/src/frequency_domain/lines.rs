@@ -153,7 +153,10 @@ impl LineReader<'_> {
         let Self { lines, input, output, scratch } = self;
         let scale = 2.0 / input.len() as f64;
         fill(input);
-        lines.plan.process_with_scratch(input, output, scratch).expect("buffers come from the plan");
+        lines
+            .plan
+            .process_with_scratch(input, output, scratch)
+            .expect("buffers come from the plan");
         for (z, &line) in into.zip(&lines.lines) {
             *z = output[line] * scale;
         }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
@@ -170,18 +171,14 @@ def identify(
     """
     records = measurements(sources, "identify", record)
     if settings is None:
-        fit = _fit(
-            method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
-            between_samples, extent, derivatives, refine, interpolation,
+        band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
+        told = _identify_settings(
+            method, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
+            extent, derivatives, refine, interpolation, lines, band, tuple(_mass(mass)), nonlinear,
+            tuple(search), weighting,
         )
-        if domain == "time" and (lines is not None or band_hz is not None):
-            raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
-        settings = {
-            "fit": fit,
-            "lines": _lines(lines, band_hz),
-            "mass": _mass(mass),
-            "nonlinear": _nonlinear(nonlinear, search, weighting),
-        }
+    else:
+        told = json.dumps(settings)
     predicted = None
     if validate is not None or validate_start is not None or validate_samples is not None:
         if validate is None and validate_start is None:
@@ -190,7 +187,7 @@ def identify(
         window = {"start": validate_start, "samples": validate_samples}
         predicted = (other._inner, json.dumps(window))
     inner = _mechid.identify(
-        [record._inner for record in records], json.dumps(settings), predicted, threads
+        [record._inner for record in records], told, predicted, threads
     )
     return Identified(inner)
 
@@ -629,6 +626,42 @@ def multisine(
         given[0] if given else ("amplitude", 1.0),
     )
     return Multisine._of(float(fs), found)
+
+
+@lru_cache(maxsize=64, typed=True)
+def _identify_settings(
+    method: str | None,
+    domain: str,
+    from_frf: str | None,
+    segment: int | None,
+    segment_window: str | None,
+    segment_overlap: float | None,
+    between_samples: str | None,
+    extent: str | None,
+    derivatives: str | None,
+    refine: int | None,
+    interpolation: str | None,
+    lines: str | None,
+    band_hz: tuple[float, float] | None,
+    mass: tuple[float | None, ...],
+    nonlinear: str | None,
+    search: tuple[str, ...],
+    weighting: str | None,
+) -> str:
+    """Return the settings of `identify` as JSON; kept, for studies call with the same ones."""
+    fit = _fit(
+        method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
+        between_samples, extent, derivatives, refine, interpolation,
+    )
+    if domain == "time" and (lines is not None or band_hz is not None):
+        raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
+    settings = {
+        "fit": fit,
+        "lines": _lines(lines, band_hz),
+        "mass": list(mass),
+        "nonlinear": _nonlinear(nonlinear, search, weighting),
+    }
+    return json.dumps(settings)
 
 
 def _fit(
