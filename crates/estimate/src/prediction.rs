@@ -127,8 +127,8 @@ impl Step {
             } else {
                 assert!(mass.solve_mut(&mut inertia), "the mass of a system is invertible");
             }
-            for dof in 0..n {
-                (x[(k, dof)], v[(k, dof)]) = (displacement[dof], velocity[dof]);
+            for (dof, (displacement, velocity)) in displacement.iter().zip(&velocity).enumerate() {
+                (x[(k, dof)], v[(k, dof)]) = (*displacement, *velocity);
                 a[(k, dof)] = inertia[dof];
             }
             self.advance(force, k, &mut at);

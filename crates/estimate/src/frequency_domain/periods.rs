@@ -117,7 +117,7 @@ impl RepeatedPeriods {
             let weight = Complex::from(before / (before + 1.0));
             let mut deviation = DVector::zeros(period.ncols());
             for (line, scatter) in self.scatter.iter_mut().enumerate() {
-                let both = period.row(line).into_iter().zip(self.sum.row(line).into_iter());
+                let both = period.row(line).into_iter().zip(self.sum.row(line));
                 for (apart, (z, sum)) in deviation.iter_mut().zip(both) {
                     *apart = z - sum / before;
                 }
