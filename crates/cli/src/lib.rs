@@ -37,7 +37,8 @@ const BROKEN_PIPE: u8 = 141;
 /// assert_eq!(mechid_cli::run(arguments), ExitCode::SUCCESS);
 /// ```
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(message) => {
             // Help and version go to standard output and are no failure.
@@ -48,7 +49,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             return if failed { ExitCode::from(FAILURE) } else { ExitCode::SUCCESS };
         }
     };
-    match outcome(&cli) {
+    match outcome(&cli, arguments.get(1..).unwrap_or_default()) {
         Ok(()) => ExitCode::SUCCESS,
         // The reader has seen enough (`mechid … | head`).
         Err(CliError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {
@@ -63,11 +64,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-fn outcome(cli: &Cli) -> Result<(), CliError> {
+fn outcome(cli: &Cli, words: &[OsString]) -> Result<(), CliError> {
     cli.command.files().check()?;
     let outcome = match cli.command.waiting() {
-        Some(message) => progress::watched(message, || cli.command.run())?,
-        None => cli.command.run()?,
+        Some(message) => progress::watched(message, || cli.command.run(words))?,
+        None => cli.command.run(words)?,
     };
     outcome.deliver(cli.command.report(), options::spelled)
 }

@@ -66,23 +66,17 @@ pub fn predict(
         }
         Extent::WholePeriod => state = step.steady_state(force)?,
     }
-    let states = step.run(force, state).0;
-    let displacement = states.columns(0, n).into_owned();
-    let velocity = states.columns(n, n) / step.dt;
-    let loads = force.data()
-        - &velocity * system.damping().transpose()
-        - &displacement * system.stiffness().transpose();
-    let acceleration = solve_mass(system, &loads.transpose()).transpose();
+    let [x, v, a] = step.responses(system, force, &state);
     let record = |data| Record::new(force.sampling(), data);
-    Ok(Response::new(record(displacement)?, record(velocity)?, record(acceleration)?)?)
+    Ok(Response::new(record(x)?, record(v)?, record(a)?)?)
 }
 
 /// z⁺ = Φ z + Γ₀ F + Γ₁ F⁺ on the state (x, Δt ẋ).
 struct Step {
     dt: f64,
     transition: DMatrix<f64>,
-    now: DMatrix<f64>,
-    next: DMatrix<f64>,
+    /// Row by row, Φ beside Γ₀ and Γ₁: what multiplies (z, F, F⁺).
+    rows: Vec<f64>,
 }
 
 impl Step {
@@ -94,46 +88,81 @@ impl Step {
         let input = StateTransition::force_input(system, dt);
         let StateTransition { state: transition, held, ramp } =
             StateTransition::exact(system, dt, &input)?;
-        Ok(match discretisation {
-            Discretisation::FirstOrderHold => {
-                Self { dt, transition, now: held - &ramp, next: ramp }
-            }
-            Discretisation::Euler | Discretisation::ZeroOrderHold => {
-                Self { dt, transition, now: held, next: ramp * 0.0 }
-            }
-        })
+        let (now, next) = match discretisation {
+            Discretisation::FirstOrderHold => (held - &ramp, ramp),
+            Discretisation::Euler | Discretisation::ZeroOrderHold => (held, ramp * 0.0),
+        };
+        let beside = [&transition, &now, &next];
+        let of_row = |row: usize| beside.into_iter().flat_map(move |matrix| matrix.row(row));
+        let rows = (0..transition.nrows()).flat_map(|row| of_row(row).copied()).collect();
+        Ok(Self { dt, transition, rows })
     }
 
-    /// States at the samples (samples × 2n), and one step after the last.
-    fn run(&self, force: &Record, mut state: DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
-        let (samples, loads) = (force.len(), force.data().transpose());
-        let mut states = DMatrix::zeros(state.len(), samples);
-        let mut next = state.clone();
-        for k in 0..samples {
-            states.set_column(k, &state);
-            self.advance(&loads, k, &state, &mut next);
-            std::mem::swap(&mut state, &mut next);
-        }
-        (states.transpose(), state)
-    }
-
-    /// From the state at a column of the loads to the next; the first column follows the last.
-    fn advance(
+    /// Displacement, velocity and acceleration at the samples, each samples × n, in one pass.
+    fn responses(
         &self,
-        loads: &DMatrix<f64>,
-        at: usize,
-        state: &DVector<f64>,
-        next: &mut DVector<f64>,
-    ) {
-        next.gemv(1.0, &self.transition, state, 0.0);
-        next.gemv(1.0, &self.now, &loads.column(at), 1.0);
-        next.gemv(1.0, &self.next, &loads.column((at + 1) % loads.ncols()), 1.0);
+        system: &SecondOrderSystem,
+        force: &Record,
+        start: &DVector<f64>,
+    ) -> [DMatrix<f64>; 3] {
+        let (samples, n, loads) = (force.len(), system.dof(), force.data());
+        let mut found = [(); 3].map(|()| DMatrix::zeros(samples, n));
+        let [x, v, a] = &mut found;
+        let (damping, stiffness) = (system.damping(), system.stiffness());
+        let mass = system.mass().clone().lu();
+        let (mut velocity, mut inertia) = (vec![0.0; n], DVector::zeros(n));
+        let mut at = At::new(start.as_slice());
+        for k in 0..samples {
+            let (displacement, scaled) = at.state().split_at(n);
+            for (velocity, scaled) in velocity.iter_mut().zip(scaled) {
+                *velocity = scaled / self.dt;
+            }
+            for (i, left) in inertia.iter_mut().enumerate() {
+                *left = loads[(k, i)]
+                    - sum_of_products(damping.row(i).iter(), &velocity)
+                    - sum_of_products(stiffness.row(i).iter(), displacement);
+            }
+            if n == 1 {
+                inertia[0] /= system.mass()[0];
+            } else {
+                assert!(mass.solve_mut(&mut inertia), "the mass of a system is invertible");
+            }
+            for (dof, (displacement, velocity)) in displacement.iter().zip(&velocity).enumerate() {
+                (x[(k, dof)], v[(k, dof)]) = (*displacement, *velocity);
+                a[(k, dof)] = inertia[dof];
+            }
+            self.advance(force, k, &mut at);
+        }
+        found
+    }
+
+    /// The state one step after the last sample.
+    fn run(&self, force: &Record, start: &DVector<f64>) -> DVector<f64> {
+        let mut at = At::new(start.as_slice());
+        for k in 0..force.len() {
+            self.advance(force, k, &mut at);
+        }
+        DVector::from_column_slice(at.state())
+    }
+
+    /// From the state at a sample of the force to the next; the first sample follows the last.
+    fn advance(&self, force: &Record, sample: usize, at: &mut At) {
+        let (loads, next) = (force.data(), (sample + 1) % force.len());
+        let size = at.next.len();
+        let (now, later) = at.now[size..].split_at_mut(loads.ncols());
+        for (dof, (now, later)) in now.iter_mut().zip(later).enumerate() {
+            (*now, *later) = (loads[(sample, dof)], loads[(next, dof)]);
+        }
+        for (next, row) in at.next.iter_mut().zip(self.rows.chunks_exact(at.now.len())) {
+            *next = sum_of_products(row.iter(), &at.now);
+        }
+        at.now[..size].copy_from_slice(&at.next);
     }
 
     /// The state that returns after the period: (I − Φᴺ) z = what rest leads to.
     fn steady_state(&self, force: &Record) -> Result<DVector<f64>, EstimateError> {
         let size = self.transition.nrows();
-        let (_, from_rest) = self.run(force, DVector::zeros(size));
+        let from_rest = self.run(force, &DVector::zeros(size));
         let over = self.transition.pow(u32::try_from(force.len()).unwrap_or(u32::MAX));
         let growth = over.norm();
         let closing = DMatrix::identity(size, size) - over;
@@ -147,6 +176,29 @@ impl Step {
     }
 }
 
-fn solve_mass(system: &SecondOrderSystem, right: &DMatrix<f64>) -> DMatrix<f64> {
-    system.mass().clone().lu().solve(right).expect("the mass of a system is invertible")
+/// Where a step begins, (z, F, F⁺), and the state that it leads to.
+struct At {
+    now: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl At {
+    fn new(state: &[f64]) -> Self {
+        let mut now = state.to_vec();
+        now.resize(2 * state.len(), 0.0);
+        Self { now, next: state.to_vec() }
+    }
+
+    fn state(&self) -> &[f64] {
+        &self.now[..self.next.len()]
+    }
+
+    fn set_state(&mut self, values: impl Iterator<Item = f64>) {
+        self.now[..self.next.len()].iter_mut().zip(values).for_each(|(z, value)| *z = value);
+    }
+}
+
+/// Σ a_j b_j, from the first term to the last.
+fn sum_of_products<'a>(a: impl Iterator<Item = &'a f64>, b: &[f64]) -> f64 {
+    a.zip(b).map(|(a, b)| a * b).reduce(|sum, term| sum + term).unwrap_or(0.0)
 }

@@ -57,6 +57,11 @@ impl Response {
         }
     }
 
+    /// Returns the records of [`ResponseQuantity::ALL`], in m, m/s and m/s²: samples × degrees of freedom.
+    pub fn into_records(self) -> [Record; 3] {
+        [self.displacement, self.velocity, self.acceleration]
+    }
+
     /// The common time axis.
     pub fn sampling(&self) -> Sampling {
         self.displacement.sampling()

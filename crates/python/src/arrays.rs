@@ -3,7 +3,7 @@
 use mechid::model::ResponseQuantity;
 use mechid::signal::Record;
 use nalgebra::DMatrix;
-use numpy::{Element, IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _};
+use numpy::{Element, IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// Returns an array of rows × columns of its own.
@@ -16,6 +16,13 @@ pub fn matrix<'py, T: Element + nalgebra::Scalar>(
     // nalgebra stores column by column.
     let transposed = values.into_pyarray(py).reshape([columns, rows])?;
     transposed.transpose()
+}
+
+/// Copies an array of any layout.
+pub fn copied(given: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
+    let given = given.as_array();
+    // nalgebra stores column by column.
+    DMatrix::from_iterator(given.nrows(), given.ncols(), given.t().iter().copied())
 }
 
 /// Returns an array of samples × channels of its own.

@@ -2,17 +2,64 @@
 
 use std::error::Error;
 
+use mechid::SimulateError;
+use mechid::analysis::AnalysisError;
+use mechid::estimate::EstimateError;
+use mechid::io::IoError;
+use mechid::model::ModelError;
+use mechid::report::ReportError;
+use mechid::signal::SignalError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::PyType;
+use rayon::ThreadPoolBuildError;
 use serde::de::DeserializeOwned;
 
 static EXCEPTION: PyOnceLock<Py<PyType>> = PyOnceLock::new();
 
-/// Returns the exception for a failure: its message, and its variant with all numbers, from which the
-/// Python class takes `code` and `fields`.
-pub fn exception(py: Python<'_>, failure: &dyn Error) -> PyErr {
-    raised(py, failure.to_string(), format!("{failure:?}"))
+/// A failure of a library crate.
+pub trait Failure: Error {
+    /// Name of the crate, as the layers of nested failures are called.
+    const CRATE: &'static str;
+}
+
+impl Failure for AnalysisError {
+    const CRATE: &'static str = "Analysis";
+}
+
+impl Failure for EstimateError {
+    const CRATE: &'static str = "Estimate";
+}
+
+impl Failure for IoError {
+    const CRATE: &'static str = "Io";
+}
+
+impl Failure for ModelError {
+    const CRATE: &'static str = "Model";
+}
+
+impl Failure for ReportError {
+    const CRATE: &'static str = "Report";
+}
+
+impl Failure for SignalError {
+    const CRATE: &'static str = "Signal";
+}
+
+impl Failure for SimulateError {
+    const CRATE: &'static str = "Simulate";
+}
+
+/// Returns the exception for a failure: its message, and crate and variant with all numbers, from which
+/// the Python class takes `code` and `fields`.
+pub fn exception<E: Failure>(py: Python<'_>, failure: &E) -> PyErr {
+    raised(py, failure.to_string(), format!("{}({failure:?})", E::CRATE))
+}
+
+/// Returns the exception for threads that the system does not give.
+pub fn no_threads(py: Python<'_>, failure: &ThreadPoolBuildError) -> PyErr {
+    raised(py, failure.to_string(), "Threads".into())
 }
 
 /// Returns the exception for a panic, which only a defect of the program causes.
@@ -38,7 +85,7 @@ pub fn settings<T: DeserializeOwned>(py: Python<'_>, json: &str) -> PyResult<T> 
 /// # Errors
 /// `MechidError` if it has no JSON form.
 pub fn json(py: Python<'_>, result: &impl serde::Serialize) -> PyResult<String> {
-    serde_json::to_string_pretty(result).map_err(|wrong| exception(py, &wrong))
+    serde_json::to_string_pretty(result).map_err(|wrong| panicked(py, &wrong.to_string()))
 }
 
 fn raised(py: Python<'_>, message: String, variant: String) -> PyErr {

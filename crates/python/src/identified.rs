@@ -5,8 +5,10 @@ use std::sync::Arc;
 use mechid::Identify;
 use mechid::analysis::AnalysisError;
 use mechid::analysis::identify::ValidationWindow;
+use mechid::analysis::review::Review;
+use mechid::analysis::review::receptance::acts_alone;
 use mechid::report::{PageSettings, page};
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 
@@ -119,6 +121,34 @@ impl Identified {
             arrays::matrix(py, data.force().clone())?,
             arrays::matrix(py, data.displacement().clone())?,
         )))
+    }
+
+    /// Frequencies in rad/s, and receptances of frequencies × motions · forces in m/N: measured where one
+    /// force acts alone, NaN elsewhere, and of the identified system.
+    fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
+        let found = Arc::clone(&self.0);
+        let compare = move || -> Result<_, AnalysisError> {
+            let data = match found.spectra() {
+                Some(data) => data.clone(),
+                None => match Review::of(&found, false)?.receptance {
+                    Ok(shown) => shown.data,
+                    Err(_) => return Err(AnalysisError::NoReceptance),
+                },
+            };
+            let (n, models) = (data.dof(), found.system()?.receptances(data.omega())?);
+            let none = Complex::new(f64::NAN, f64::NAN);
+            let measured = DMatrix::from_fn(data.len(), n * n, |row, at| match at % n {
+                force if acts_alone(&data, row, force) => {
+                    data.displacement()[(row, at / n)] / data.force()[(row, force)]
+                }
+                _ => none,
+            });
+            let model =
+                DMatrix::from_fn(data.len(), n * n, |row, at| models[row][(at / n, at % n)]);
+            Ok((data.omega().to_vec(), measured, model))
+        };
+        let (omega, measured, model) = work::watched(py, None, || Ok(()), compare)?;
+        Ok((arrays::vector(py, omega), arrays::matrix(py, measured)?, arrays::matrix(py, model)?))
     }
 
     /// Confidence interval of a parameter.

@@ -12,6 +12,7 @@ mod failure;
 mod identified;
 mod machine;
 mod measurement;
+mod predicted;
 mod program;
 mod questions;
 mod reconstructed;
@@ -28,6 +29,8 @@ mod _mechid {
     use super::machine::Machine;
     #[pymodule_export]
     use super::measurement::Measurement;
+    #[pymodule_export]
+    use super::predicted::{Predicted, predict_record};
     #[pymodule_export]
     use super::program::program;
     #[pymodule_export]

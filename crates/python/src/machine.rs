@@ -25,10 +25,8 @@ impl Machine {
         damping: PyReadonlyArray2<'_, f64>,
         stiffness: PyReadonlyArray2<'_, f64>,
     ) -> PyResult<Self> {
-        let [mass, damping, stiffness] = [mass, damping, stiffness].map(|given| {
-            let given = given.as_array();
-            DMatrix::from_fn(given.nrows(), given.ncols(), |row, column| given[[row, column]])
-        });
+        let [mass, damping, stiffness] =
+            [mass, damping, stiffness].map(|given| arrays::copied(&given));
         let system = work::brief(py, || SecondOrderSystem::new(mass, damping, stiffness))?;
         Ok(Self(mechid::Machine::known(system)))
     }

@@ -6,7 +6,7 @@ use mechid::estimate::EstimateError;
 use mechid::io::{Experiment, LineSpec};
 use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity};
 use mechid::signal::{CrestSearch, Extent, Multisine, Phases, Record, Sampling, SignalError};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
@@ -43,7 +43,7 @@ pub fn integrate<'py>(
     fs: f64,
 ) -> PyResult<Vec<Named<'py>>> {
     let experiment = work::brief(py, || Experiment::parse("the description", description))?;
-    let force = copied(&force);
+    let force = arrays::copied(&force);
     let step = move || -> Result<Response, SimulateError> {
         let sampling = Sampling::from_rate_hz(fs, force.nrows())?;
         mechid::respond(&experiment, &Record::new(sampling, force)?)
@@ -66,7 +66,7 @@ pub fn predict<'py>(
 ) -> PyResult<Vec<Named<'py>>> {
     let between: Discretisation = failure::settings(py, between_samples)?;
     let extent: Extent = failure::settings(py, extent)?;
-    let (system, force) = (machine.0.system().clone(), copied(&force));
+    let (system, force) = (machine.0.system().clone(), arrays::copied(&force));
     let vector = |given: PyReadonlyArray1<'_, f64>| DVector::from_vec(given.as_array().to_vec());
     let start = start.map(|(x, v)| (vector(x), vector(v)));
     let step = move || -> Result<Response, EstimateError> {
@@ -133,12 +133,7 @@ pub fn multisine<'py>(
     Ok((vector(&period), made.lines().to_vec(), amplitudes, phases, measures))
 }
 
-fn copied(given: &PyReadonlyArray2<'_, f64>) -> DMatrix<f64> {
-    let given = given.as_array();
-    DMatrix::from_fn(given.nrows(), given.ncols(), |row, column| given[[row, column]])
-}
-
 fn responses(py: Python<'_>, response: Response) -> PyResult<Vec<Named<'_>>> {
     let kinds = ResponseQuantity::ALL.into_iter();
-    arrays::responses(py, kinds.map(|kind| (kind, response.quantity(kind).clone())).collect())
+    arrays::responses(py, kinds.zip(response.into_records()).collect())
 }

@@ -1,7 +1,6 @@
 //! Work without the interpreter's lock, in threads of this process, that Ctrl-C ends.
 
 use std::any::Any;
-use std::error::Error;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process;
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
@@ -11,7 +10,7 @@ use std::time::Duration;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::failure;
+use crate::failure::{self, Failure};
 
 /// Time between two looks at the signals that the interpreter has received.
 const POLL: Duration = Duration::from_millis(50);
@@ -24,7 +23,7 @@ static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 ///
 /// # Errors
 /// `MechidError` for a failure or a panic of `work`.
-pub fn brief<T: Send, E: Error + Send>(
+pub fn brief<T: Send, E: Failure + Send>(
     py: Python<'_>,
     work: impl FnOnce() -> Result<T, E> + Send,
 ) -> PyResult<T> {
@@ -39,7 +38,7 @@ pub fn brief<T: Send, E: Error + Send>(
 ///
 /// # Errors
 /// `MechidError` for a failure or a panic of `work`, `KeyboardInterrupt`, and what `poll` gives.
-pub fn watched<T: Send + 'static, E: Error + Send + 'static>(
+pub fn watched<T: Send + 'static, E: Failure + Send + 'static>(
     py: Python<'_>,
     threads: Option<usize>,
     mut poll: impl FnMut() -> PyResult<()>,
@@ -75,7 +74,7 @@ pub fn watched<T: Send + 'static, E: Error + Send + 'static>(
     }
 }
 
-fn outcome<T, E: Error>(
+fn outcome<T, E: Failure>(
     py: Python<'_>,
     result: Result<Result<T, E>, Box<dyn Any + Send>>,
 ) -> PyResult<T> {
@@ -91,7 +90,7 @@ fn outcome<T, E: Error>(
 
 fn made(py: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Arc::new).map_err(|error| failure::exception(py, &error))
+    pool.map(Arc::new).map_err(|error| failure::no_threads(py, &error))
 }
 
 fn shared(py: Python<'_>) -> PyResult<Arc<ThreadPool>> {

@@ -31,7 +31,9 @@ def arrays(draw: st.DrawFn) -> Any:
     if draw(st.integers(0, 4)) == 0:
         values = values * 10.0 ** draw(st.sampled_from([-320, -200, 0, 150, 307]))
     with np.errstate(all="ignore"):
-        values = values.astype(dtype) if dtype.kind != "M" else np.zeros(shape, dtype)
+        # Arrays of no dimension become numbers on the way.
+        values = np.asarray(values).astype(dtype) if dtype.kind != "M" else np.zeros(shape, dtype)
+    values = np.asarray(values)
     if draw(st.integers(0, 9)) == 0 and values.size and values.dtype.kind == "f":
         values = np.array(values)
         values.flat[0] = draw(st.sampled_from([np.nan, np.inf, -np.inf]))

@@ -12,6 +12,8 @@ import pytest
 import mechid
 from mechid._errors import _read
 
+from .test_codes import listed
+
 FILE = "examples/machine.csv"
 ONE = np.arange(64.0)
 
@@ -27,7 +29,7 @@ def test_the_message_is_that_of_the_program(program: Callable[..., str]) -> None
         spelled = spelled.replace(f"`{name}`", f"--{name}")
     assert told == f"error: {spelled}\n"
     assert isinstance(caught.value, ValueError)
-    assert caught.value.code == "window"
+    assert caught.value.code == "analysis.window"
     assert caught.value.fields == {"file": FILE, "first": 1, "last": 600, "len": 512}
 
 
@@ -37,21 +39,22 @@ def test_the_message_is_that_of_the_program(program: Callable[..., str]) -> None
         (lambda: mechid.identify("missing.csv", force="f", displacement="x"), "io.read"),
         (lambda: mechid.identify(FILE, force="Force", displacement="displacement"), "io.missing-column"),
         (lambda: mechid.identify(ONE, ONE * np.nan, fs=1), "signal.not-finite"),
-        (lambda: mechid.identify(ONE, ONE[:3], fs=1), "array-shape"),
+        (lambda: mechid.identify(ONE, ONE[:3], fs=1), "analysis.array-shape"),
         (lambda: mechid.identify(ONE, ONE, fs=-1), "signal.not-positive"),
-        (lambda: mechid.identify(ONE * 0, ONE, fs=1), "zero-force"),
-        (lambda: mechid.identify(ONE, fs=1), "no-motion"),
+        (lambda: mechid.identify(ONE * 0, ONE, fs=1), "analysis.zero-force"),
+        (lambda: mechid.identify(ONE, fs=1), "analysis.no-motion"),
         (lambda: mechid.identify(ONE, ONE, fs=1, lines="1:x"), "settings"),
         (lambda: mechid.identify(ONE, ONE, fs=1, method="guess"), "settings"),
-        (lambda: mechid.identify(ONE, ONE, fs=1, domain="time"), "time-domain-motions"),
-        (lambda: mechid.Machine([[0.0]], [[1.0]], [[1.0]]), "singular-mass"),
-        (lambda: mechid.identify({"f": ONE}, force="f", displacement="x", fs=1), "no-column"),
+        (lambda: mechid.identify(ONE, ONE, fs=1, domain="time"), "analysis.time-domain-motions"),
+        (lambda: mechid.Machine([[0.0]], [[1.0]], [[1.0]]), "model.singular-mass"),
+        (lambda: mechid.identify({"f": ONE}, force="f", displacement="x", fs=1), "analysis.no-column"),
     ],
 )
 def test_failures_have_codes(call: Callable[[], Any], code: str) -> None:
     with pytest.raises(mechid.MechidError) as caught:
         call()
     assert caught.value.code == code, str(caught.value)
+    assert code in listed()
     assert len(str(caught.value)) > 15
 
 

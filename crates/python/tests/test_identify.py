@@ -45,6 +45,9 @@ CASES = [
     case(X, domain="time", derivatives="spectral", period=256),
     case(X, V, domain="time", between_samples="euler", refine=4, interpolation="spline"),
     case(X, V, A, domain="time", mass=25.0),
+    case(X, period=256, nonlinear="k3: x1^3"),
+    case(X, period=256, nonlinear="c2: |v1| v1", weighting="response"),
+    case(X, period=256, nonlinear="k3: x1^3", method="maximum-likelihood", search=["delay"]),
     case(X, period=256, periods=1, validate_start=257),
     case(X, V, domain="time", validate_start=100, validate_samples=200),
 ]
@@ -56,6 +59,8 @@ def words(kinds: dict[str, str], options: dict[str, Any]) -> list[str]:
     for name, value in {**kinds, **options}.items():
         if isinstance(value, tuple):
             value = ":".join(str(part) for part in value)
+        if isinstance(value, list):
+            value = ",".join(value)
         told += [f"--{name.replace('_', '-')}", str(value)]
     return told
 

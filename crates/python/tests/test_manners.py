@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import html
 import multiprocessing
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -11,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -106,3 +109,13 @@ def test_the_program_fails_as_it_does_elsewhere(program: Callable[..., str]) -> 
     assert program("identify", "missing.csv", code=2).startswith("error: ")
     told = subprocess.run([sys.executable, "-m", "mechid", "--version"], capture_output=True, text=True)
     assert told.stdout == program("--version")
+
+
+def test_a_report_of_the_program_says_how_it_is_made_again(
+    program: Callable[..., str], tmp_path: Path
+) -> None:
+    page = tmp_path / "rig.html"
+    arguments = ["--force", "force", "--displacement", "displacement", "--period", "256"]
+    program("report", FILE, *arguments, "--output", page)
+    command = shlex.join(["mechid", "report", FILE, *arguments, "--output", str(page)])
+    assert html.escape(command, quote=False) in page.read_text(encoding="utf-8")

@@ -59,8 +59,8 @@ impl Record {
                 return Err(SignalError::Length { channel, got, expected: sampling.len() });
             }
         }
-        let data = DMatrix::from_fn(sampling.len(), channels.len(), |k, c| channels[c].as_ref()[k]);
-        Self::new(sampling, data)
+        let data: Vec<&[f64]> = channels.iter().map(AsRef::as_ref).collect();
+        Self::new(sampling, DMatrix::from_vec(sampling.len(), channels.len(), data.concat()))
     }
 
     /// A record of one channel from its value at each instant, in seconds.

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub use self::table::FrfTable;
 use crate::AnalysisError;
 use crate::identify::lines::{LineChoice, choose_lines};
-use crate::measurement::{CHUNK_SAMPLES, Hold, Measurement, Windowed};
+use crate::measurement::{Hold, Measurement, Windowed};
 
 /// Settings of an estimate of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -195,9 +195,12 @@ pub(crate) fn average(
     let (motion, kind) = recorded.held.response();
     let channels = [driven.len(), motion.channels()];
     let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;
-    let (hop, at_once) = (segments.hop(), (CHUNK_SAMPLES / segments.hop()).max(1));
+    let (hop, at_once) = (segments.hop(), recorded.at_once().div_ceil(segments.hop()));
     let (samples, advance) = ((at_once - 1) * hop + segments.samples(), at_once * hop);
     recorded.chunks(samples, advance, &mut |chunk| {
+        if driven.len() == chunk.force.channels() {
+            return Ok(average.push(&chunk.force, chunk.response().0)?);
+        }
         let acting: Vec<&[f64]> = driven.iter().map(|dof| chunk.force.channel(*dof)).collect();
         let acting = Record::from_channels(chunk.force.sampling(), &acting)?;
         Ok(average.push(&acting, chunk.response().0)?)

@@ -20,7 +20,7 @@ use super::options::Method;
 use super::prediction::{Model, Prediction};
 use crate::AnalysisError;
 use crate::machine::NonlinearPart;
-use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
+use crate::measurement::{Block, Windowed};
 
 /// An estimate and how it came about.
 #[derive(Debug)]
@@ -241,7 +241,7 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     let Block { force, period, periods, .. } = &recorded.held;
     let kind = recorded.held.response().1;
     let mut all = RepeatedPeriods::expecting(lines, force.channels(), kind, *periods);
-    let samples = period * (CHUNK_SAMPLES / period).max(1);
+    let samples = period * recorded.at_once().div_ceil(*period);
     recorded
         .chunks(samples, samples, &mut |chunk| Ok(all.push(&chunk.force, chunk.response().0)?))?;
     Ok(all)

@@ -292,7 +292,7 @@ impl Measurement {
         // Finite, or an error that says where not.
         let record = Record::new(sampling, data)?;
         let units = ToSi::new("the record", labels.into_iter(), &roles)?;
-        let data = record.data();
+        let data = record.into_data();
         let source = Source {
             name: "the record".into(),
             path: None,
@@ -302,7 +302,7 @@ impl Measurement {
             peaks: data.column_iter().map(|column| column.amax()).collect(),
             offsets: vec![0.0; roles.len()],
             units,
-            samples: Samples::Memory(data.clone()),
+            samples: Samples::Memory(data),
         };
         Ok(Self { source: Arc::new(source), window: Window::default() })
     }
@@ -440,11 +440,14 @@ impl Source {
         take: &mut dyn FnMut(DMatrix<f64>) -> Result<(), AnalysisError>,
     ) -> Result<(), AnalysisError> {
         let mut converted = |mut block: DMatrix<f64>| {
-            for (mut column, offset) in block.column_iter_mut().zip(&self.offsets) {
-                column.add_scalar_mut(-offset);
-            }
-            for (mut column, factor) in block.column_iter_mut().zip(&self.units.factors) {
-                column *= *factor;
+            let constants = self.offsets.iter().zip(&self.units.factors);
+            for (mut column, (offset, factor)) in block.column_iter_mut().zip(constants) {
+                if *offset != 0.0 {
+                    column.add_scalar_mut(-offset);
+                }
+                if *factor != 1.0 {
+                    column *= *factor;
+                }
             }
             take(block)
         };
@@ -456,7 +459,11 @@ impl Source {
                 let mut first = window.start;
                 loop {
                     let end = window.end.min(first + rows);
-                    converted(data.rows(first, end - first).into_owned())?;
+                    let mut samples = Vec::with_capacity((end - first) * data.ncols());
+                    for column in data.as_slice().chunks_exact(data.nrows()) {
+                        samples.extend_from_slice(&column[first..end]);
+                    }
+                    converted(DMatrix::from_vec(end - first, data.ncols(), samples))?;
                     if end == window.end {
                         return Ok(());
                     }
@@ -469,14 +476,17 @@ impl Source {
     /// Sorts a block that begins with sample `first`, counted from 1, into forces and responses.
     pub fn sorted(&self, block: &DMatrix<f64>, first: usize) -> Result<Block, AnalysisError> {
         let sampling = self.sampling.with_len(block.nrows())?;
-        let mut next = block.column_iter();
+        let mut next = block.as_slice().chunks_exact(block.nrows());
         let mut take = |columns: &[String]| {
-            let mut data = DMatrix::zeros(sampling.len(), columns.len());
-            let used = columns.iter().enumerate().filter(|(_, c)| *c != ABSENT);
-            for (at, column) in used.map(|(at, _)| at).zip(&mut next) {
-                data.set_column(at, &column);
+            let mut data = Vec::with_capacity(sampling.len() * columns.len());
+            for name in columns {
+                let column = if name == ABSENT { None } else { next.next() };
+                match column {
+                    Some(column) => data.extend_from_slice(column),
+                    None => data.resize(data.len() + sampling.len(), 0.0),
+                }
             }
-            Record::new(sampling, data)
+            Record::new(sampling, DMatrix::from_vec(sampling.len(), columns.len(), data))
         };
         let force = take(&self.channels.force)?;
         let mut response = |columns: &[String]| {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::channels::ABSENT;
-use super::{Block, IN_MEMORY_SAMPLES, Measurement, Source};
+use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, Source};
 use crate::AnalysisError;
 
 /// Part of a record to use.
@@ -112,6 +112,14 @@ impl Windowed {
     /// Returns the samples held in memory and drops the rest.
     pub fn into_held(self) -> Block {
         self.held
+    }
+
+    /// Returns how many samples to take at a time: all of a window that is held.
+    pub(crate) fn at_once(&self) -> usize {
+        match self.held.held_to() {
+            None => self.held.force.len().max(CHUNK_SAMPLES),
+            Some(_) => CHUNK_SAMPLES,
+        }
     }
 
     /// Passes the window to `take` in chunks of `samples` samples, each beginning `advance` samples after

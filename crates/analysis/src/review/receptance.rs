@@ -21,12 +21,23 @@ const SEGMENTS: usize = 8;
 /// A line is shown if the force explains at least this part of the power of every motion.
 const EXPLAINED: f64 = 0.5;
 
+/// A force counts as acting alone on a line if the others have less than this part of it.
+const ALONE: f64 = 1e-3;
+
 /// A measured receptance, and where it comes from.
 pub struct Receptance {
     /// Receptance, line by line.
     pub data: FrequencyData,
     /// Origin of the receptance, in words.
     pub origin: String,
+}
+
+/// Returns `true` if on a row of the data, counted from 0, no force acts but the one on degree of freedom
+/// `dof`, counted from 0: motion over force is then the receptance.
+pub fn acts_alone(data: &FrequencyData, row: usize, dof: usize) -> bool {
+    let own = data.force()[(row, dof)].norm();
+    let absent = |k: usize| data.force()[(row, k)].norm() <= ALONE * own;
+    own > 0.0 && (0..data.dof()).all(|k| k == dof || absent(k))
 }
 
 impl Receptance {

@@ -18,6 +18,8 @@ mod simulate;
 mod stability;
 mod sweep;
 
+use std::ffi::OsString;
+
 use clap::{Parser, Subcommand};
 
 use crate::args::ReportArgs;
@@ -60,8 +62,9 @@ pub enum Command {
 }
 
 impl Command {
-    /// What the command found; nothing is printed or written yet.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    /// What the command found; nothing is printed or written yet. `words` are the arguments that name
+    /// it, for a report that tells how it is made again.
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match self {
             Command::Completions(args) => args.run(),
             Command::Force(args) => args.run(),
@@ -71,7 +74,7 @@ impl Command {
             Command::Modal(args) => args.run(),
             Command::Multisine(args) => args.run(),
             Command::Predict(args) => args.run(),
-            Command::Report(args) => args.run(),
+            Command::Report(args) => args.run(words),
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
             Command::Sweep(args) => args.run(),

@@ -1,5 +1,6 @@
 //! `mechid report`: one HTML file with everything an identification has to show.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -69,13 +70,13 @@ impl PageArgs {
         self.fit.files().writes([&self.output])
     }
 
-    /// Reads, identifies, draws and writes.
-    pub fn run(&self) -> Result<Outcome, CliError> {
+    /// Reads, identifies, draws and writes; `words` are the arguments of the program.
+    pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         let found = self.fit.identify()?;
         let settings = PageSettings {
             title: self.title.clone(),
             reconstruct_force: self.reconstruct_force,
-            command: Some(repeat::command(std::env::args_os().skip(1))),
+            command: Some(repeat::command(words)),
         };
         let page = options::spelled(&page(&found, &settings)?);
         let html = output_name(&self.output);

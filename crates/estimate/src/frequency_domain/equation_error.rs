@@ -114,11 +114,12 @@ fn weighted_rows(
     }
     let s = |row: usize| Complex::new(0.0, data.omega()[row]);
     let late = |row: usize| Complex::cis(-data.omega()[row] * delay);
+    let weight: Vec<f64> = (0..data.len()).map(weight).collect();
     let x = data.displacement();
-    let velocity = real_rows(x, |row, x| s(row) * x * weight(row));
-    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight(row));
-    let displacement = real_rows(x, |row, x| x * weight(row));
-    let force = real_rows(data.force(), |row, f| f * late(row) * weight(row));
+    let velocity = real_rows(x, |row, x| s(row) * x * weight[row]);
+    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight[row]);
+    let displacement = real_rows(x, |row, x| x * weight[row]);
+    let force = real_rows(data.force(), |row, f| f * late(row) * weight[row]);
     let mut rows = EquationOfMotion::new(data.dof());
     rows.push_rows(
         acceleration.as_view(),

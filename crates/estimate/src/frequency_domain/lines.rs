@@ -114,21 +114,52 @@ impl Lines {
 
     /// As [`Lines::read`], from the samples starting at `start` of a longer record.
     pub(crate) fn read_window(&self, record: &Record, start: usize) -> DMatrix<Complex<f64>> {
-        let len = self.sampling.len();
-        let scale = 2.0 / len as f64;
-        let (mut input, mut output) = (self.plan.make_input_vec(), self.plan.make_output_vec());
-        let mut scratch = self.plan.make_scratch_vec();
         let mut amplitudes = DMatrix::zeros(self.lines.len(), record.channels());
+        let mut reader = self.reader();
         for (channel, mut column) in amplitudes.column_iter_mut().enumerate() {
-            input.copy_from_slice(&record.channel(channel)[start..start + len]);
-            self.plan
-                .process_with_scratch(&mut input, &mut output, &mut scratch)
-                .expect("buffers come from the plan");
-            for (z, &line) in column.iter_mut().zip(&self.lines) {
-                *z = output[line] * scale;
-            }
+            let samples = &record.channel(channel)[start..start + self.sampling.len()];
+            reader.read(|input| input.copy_from_slice(samples), column.iter_mut());
         }
         amplitudes
+    }
+
+    /// Returns what reads one window after the other with the same buffers.
+    pub(crate) fn reader(&self) -> LineReader<'_> {
+        let plan = &self.plan;
+        LineReader {
+            lines: self,
+            input: plan.make_input_vec(),
+            output: plan.make_output_vec(),
+            scratch: plan.make_scratch_vec(),
+        }
+    }
+}
+
+/// The transform of chosen lines with its buffers.
+pub(crate) struct LineReader<'a> {
+    lines: &'a Lines,
+    input: Vec<f64>,
+    output: Vec<Complex<f64>>,
+    scratch: Vec<Complex<f64>>,
+}
+
+impl LineReader<'_> {
+    /// Reads the amplitudes of the samples that `fill` writes, into one place per line.
+    pub(crate) fn read<'z>(
+        &mut self,
+        fill: impl FnOnce(&mut [f64]),
+        into: impl Iterator<Item = &'z mut Complex<f64>>,
+    ) {
+        let Self { lines, input, output, scratch } = self;
+        let scale = 2.0 / input.len() as f64;
+        fill(input);
+        lines
+            .plan
+            .process_with_scratch(input, output, scratch)
+            .expect("buffers come from the plan");
+        for (z, &line) in into.zip(&lines.lines) {
+            *z = output[line] * scale;
+        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::{FrequencyData, Lines, NoiseSpectrum, Pooling};
 use crate::EstimateError;
@@ -94,10 +94,16 @@ impl RepeatedPeriods {
                 return Err(EstimateError::Size { what, got, expected: dof });
             }
         }
+        let lines = self.lines.clone();
+        let mut reader = lines.reader();
+        let mut both = DMatrix::zeros(self.sum.nrows(), 2 * dof);
         for start in (0..force.len() / period).map(|p| p * period) {
-            let mut both = DMatrix::zeros(self.sum.nrows(), 2 * dof);
-            both.columns_mut(0, dof).copy_from(&self.lines.read_window(motion, start));
-            both.columns_mut(dof, dof).copy_from(&self.lines.read_window(force, start));
+            let channels = [motion, force].into_iter().flat_map(|record| {
+                (0..dof).map(move |channel| &record.channel(channel)[start..start + period])
+            });
+            for (mut column, samples) in both.column_iter_mut().zip(channels) {
+                reader.read(|input| input.copy_from_slice(samples), column.iter_mut());
+            }
             self.add(&both);
         }
         Ok(())
@@ -109,9 +115,12 @@ impl RepeatedPeriods {
         if self.count > 0 {
             let before = self.count as f64;
             let weight = Complex::from(before / (before + 1.0));
+            let mut deviation = DVector::zeros(period.ncols());
             for (line, scatter) in self.scatter.iter_mut().enumerate() {
-                let mean = self.sum.row(line).unscale(before);
-                let deviation = (period.row(line) - mean).transpose();
+                let both = period.row(line).into_iter().zip(self.sum.row(line));
+                for (apart, (z, sum)) in deviation.iter_mut().zip(both) {
+                    *apart = z - sum / before;
+                }
                 scatter.gerc(weight, &deviation, &deviation, Complex::from(1.0));
             }
         }

@@ -5,8 +5,8 @@ use mechid_signal::Record;
 use nalgebra::DMatrix;
 
 use super::cross_spectra::CrossSpectra;
-use super::segments::{amplitudes, overlap_loss};
-use super::{Frf, FrfEstimator, Segments};
+use super::segments::{overlap_loss, weigh};
+use super::{ComplexMatrix, Frf, FrfEstimator, Segments};
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
 
@@ -65,12 +65,20 @@ impl FrfAverage {
             self.lines.sampling(),
             force.sampling().with_len(len)?,
         )?;
+        let mut reader = self.lines.reader();
+        let amplitudes = |channels| ComplexMatrix::zeros(self.sums.len(), channels);
+        let (mut forces, mut motions) = (amplitudes(self.inputs), amplitudes(self.outputs));
         for piece in 0..=(force.len() - len) / self.segments.hop() {
             let start = piece * self.segments.hop();
-            let [forces, motions] = [force, motion]
-                .map(|record| amplitudes(&self.lines, record, start, self.weights.as_deref()));
+            for (record, amplitudes) in [(force, &mut forces), (motion, &mut motions)] {
+                for (channel, mut column) in amplitudes.column_iter_mut().enumerate() {
+                    let samples = &record.channel(channel)[start..start + len];
+                    let weights = self.weights.as_deref();
+                    reader.read(|input| weigh(samples, weights, input), column.iter_mut());
+                }
+            }
             for (line, sum) in self.sums.iter_mut().enumerate() {
-                sum.add(&forces.row(line).transpose(), &motions.row(line).transpose());
+                sum.add(&forces.row(line), &motions.row(line));
             }
             self.pieces += 1;
         }

@@ -1,7 +1,7 @@
 //! Averaged cross-spectra of forces and motions, and the responses they give.
 
 use mechid_model::linear_algebra::hermitian_eigen;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Dyn, MatrixView, U1};
 
 use super::ComplexMatrix;
 use crate::EstimateError;
@@ -9,12 +9,24 @@ use crate::EstimateError;
 /// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
 const FORCE_TOLERANCE: f64 = 1e-10;
 
+/// Amplitudes of all channels at one line.
+type Amplitudes<'a> = MatrixView<'a, Complex<f64>, U1, Dyn, U1, Dyn>;
+
 /// Cross-spectra of one line: summed over pieces, then averaged.
 #[derive(Debug, Clone)]
 pub(super) struct CrossSpectra {
     force: ComplexMatrix,
     pub(super) motion_force: ComplexMatrix,
     pub(super) motion: ComplexMatrix,
+}
+
+/// Adds a bᴴ, once per piece and line: nothing is allocated.
+fn accumulate(sum: &mut ComplexMatrix, a: &Amplitudes<'_>, b: &Amplitudes<'_>) {
+    for (mut column, b) in sum.column_iter_mut().zip(b.iter()) {
+        for (entry, a) in column.iter_mut().zip(a.iter()) {
+            *entry += a * b.conj();
+        }
+    }
 }
 
 impl CrossSpectra {
@@ -26,11 +38,11 @@ impl CrossSpectra {
         }
     }
 
-    /// Adds the amplitudes of one piece.
-    pub(super) fn add(&mut self, f: &DVector<Complex<f64>>, x: &DVector<Complex<f64>>) {
-        self.force += f * f.adjoint();
-        self.motion_force += x * f.adjoint();
-        self.motion += x * x.adjoint();
+    /// Adds the amplitudes of forces and motions in one piece.
+    pub(super) fn add(&mut self, f: &Amplitudes<'_>, x: &Amplitudes<'_>) {
+        accumulate(&mut self.force, f, f);
+        accumulate(&mut self.motion_force, x, f);
+        accumulate(&mut self.motion, x, x);
     }
 
     /// The mean over so many pieces.

@@ -2,12 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use mechid_signal::Record;
-use nalgebra::Complex;
+use nalgebra::{Complex, DVectorView};
 
-use super::ComplexMatrix;
 use crate::EstimateError;
-use crate::frequency_domain::Lines;
 
 /// Lines less correlated than this count as independent.
 const INDEPENDENT: f64 = 0.01;
@@ -127,27 +124,13 @@ impl Segments {
     }
 }
 
-/// Amplitudes of a piece, lines × channels.
-pub(super) fn amplitudes(
-    lines: &Lines,
-    record: &Record,
-    start: usize,
-    weights: Option<&[f64]>,
-) -> ComplexMatrix {
-    match weights {
-        None => lines.read_window(record, start),
-        Some(weights) => windowed(lines, record, start, weights),
+/// Writes a piece with its mean removed under a window, or as it is without one.
+pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) {
+    let Some(window) = window else { return weighed.copy_from_slice(piece) };
+    let mean = DVectorView::from_slice(piece, piece.len()).mean();
+    for ((to, x), w) in weighed.iter_mut().zip(piece).zip(window) {
+        *to = (x - mean) * w;
     }
-}
-
-fn windowed(lines: &Lines, record: &Record, start: usize, window: &[f64]) -> ComplexMatrix {
-    let mut piece = record.data().rows(start, window.len()).into_owned();
-    for mut column in piece.column_iter_mut() {
-        let mean = column.mean();
-        column.iter_mut().zip(window).for_each(|(x, w)| *x = (*x - mean) * w);
-    }
-    let piece = Record::new(lines.sampling(), piece).expect("finite, of the window's length");
-    lines.read_window(&piece, 0)
 }
 
 /// Variance of an average of overlapping windowed pieces over that of independent ones:

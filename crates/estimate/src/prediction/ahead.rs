@@ -6,7 +6,7 @@ use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record};
 use nalgebra::{DMatrix, DVector};
 
-use super::Step;
+use super::{At, Step};
 use crate::least_squares::{size, solve_compressed};
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
@@ -106,17 +106,17 @@ impl Step {
         velocity: DMatrix<f64>,
     ) -> DMatrix<f64> {
         let (intervals, n) = displacement.shape();
-        let loads = force.data().transpose();
         let mut found = DMatrix::zeros(intervals, n);
-        let (mut state, mut next) = (DVector::zeros(2 * n), DVector::zeros(2 * n));
+        let mut at = At::new(&vec![0.0; 2 * n]);
         for k in 0..intervals {
-            state.rows_mut(0, n).tr_copy_from(&displacement.row(k));
-            state.rows_mut(n, n).tr_copy_from(&(velocity.row(k) * self.dt));
-            for at in k * steps..(k + 1) * steps {
-                self.advance(&loads, at, &state, &mut next);
-                std::mem::swap(&mut state, &mut next);
+            let velocities = velocity.row(k) * self.dt;
+            at.set_state(displacement.row(k).iter().chain(velocities.iter()).copied());
+            for sample in k * steps..(k + 1) * steps {
+                self.advance(force, sample, &mut at);
             }
-            found.set_row(k, &(state.rows(n, n) / self.dt).transpose());
+            for (column, z) in at.state()[n..].iter().enumerate() {
+                found[(k, column)] = z / self.dt;
+            }
         }
         found
     }

@@ -31,7 +31,9 @@ pub fn predict_periodic(
         let x = system.receptance(omega)? * forces.lines().row(n).transpose();
         for (power, quantity) in lines.iter_mut().enumerate() {
             let factor = Complex::new(0.0, omega).powi(power as i32);
-            quantity.set_row(n, &x.map(|z| z * factor).transpose());
+            for (dof, z) in x.iter().enumerate() {
+                quantity[(n, dof)] = z * factor;
+            }
         }
     }
     let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
     from ._results import Mode as Mode
     from ._results import Multisine as Multisine
     from ._results import Parameter as Parameter
+    from ._results import Predicted as Predicted
+    from ._results import Receptances as Receptances
     from ._results import Reconstructed as Reconstructed
     from ._results import Simulation as Simulation
     from ._results import Sweep as Sweep
@@ -64,6 +66,8 @@ _HOMES = {
     "Mode": "_results",
     "Multisine": "_results",
     "Parameter": "_results",
+    "Predicted": "_results",
+    "Receptances": "_results",
     "Reconstructed": "_results",
     "Simulation": "_results",
     "Sweep": "_results",
@@ -82,6 +86,8 @@ __all__ = [
     "Mode",
     "Multisine",
     "Parameter",
+    "Predicted",
+    "Receptances",
     "Reconstructed",
     "Simulation",
     "Sweep",

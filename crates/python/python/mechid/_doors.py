@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
 
@@ -50,7 +51,18 @@ ForceMethod: TypeAlias = Literal[
     "kalman",
 ]
 Scheme: TypeAlias = Literal[
-    "exact", "newmark", "central-difference", "houbolt", "wilson-theta", "runge-kutta-4"
+    "exact",
+    "newmark",
+    "central-difference",
+    "houbolt",
+    "wilson-theta",
+    "generalised-alpha",
+    "hht-alpha",
+    "wbz-alpha",
+    "bathe",
+    "rho-infinity-bathe",
+    "matrix-exponential",
+    "runge-kutta-4",
 ]
 SweepEstimator: TypeAlias = Literal[
     "euler", "held", "linear", "equation-of-motion", "least-squares", "maximum-likelihood"
@@ -74,6 +86,9 @@ def identify(
     derivatives: str | None = None,
     refine: int | None = None,
     interpolation: Literal["linear", "spline", "band-limited"] | None = None,
+    nonlinear: str | None = None,
+    search: Sequence[Literal["laws", "delay", "phase"]] = (),
+    weighting: Literal["automatic", "white-force", "response", "smooth-spectrum"] | None = None,
     validate: Measurement | None = None,
     validate_start: int | None = None,
     validate_samples: int | None = None,
@@ -116,6 +131,14 @@ def identify(
         How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
     refine, interpolation : optional
         Steps in every sampling interval, and the interpolation between the samples.
+    nonlinear : str, optional
+        Springs and dampers to fit beside mass, damping and stiffness, such as
+        ``"k3: x1^3, c2: |v1| v1"``.
+    search : sequence of {"laws", "delay", "phase"}
+        Constants to search for besides: those inside the laws, the delay of the force, the phase that
+        all channels have in common.
+    weighting : {"automatic", "white-force", "response", "smooth-spectrum"}, optional
+        Weighting of the lines of a fit with nonlinear terms.
     validate, validate_start, validate_samples : optional
         Record to predict that is not fitted, its first sample counted from 1 and their number.
     settings : dict, optional
@@ -148,13 +171,14 @@ def identify(
     """
     records = measurements(sources, "identify", record)
     if settings is None:
-        fit = _fit(
-            method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
-            between_samples, extent, derivatives, refine, interpolation,
+        band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
+        told = _identify_settings(
+            method, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
+            extent, derivatives, refine, interpolation, lines, band, tuple(_mass(mass)), nonlinear,
+            tuple(search), weighting,
         )
-        if domain == "time" and (lines is not None or band_hz is not None):
-            raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
-        settings = {"fit": fit, "lines": _lines(lines, band_hz), "mass": _mass(mass)}
+    else:
+        told = json.dumps(settings)
     predicted = None
     if validate is not None or validate_start is not None or validate_samples is not None:
         if validate is None and validate_start is None:
@@ -163,7 +187,7 @@ def identify(
         window = {"start": validate_start, "samples": validate_samples}
         predicted = (other._inner, json.dumps(window))
     inner = _mechid.identify(
-        [record._inner for record in records], json.dumps(settings), predicted, threads
+        [record._inner for record in records], told, predicted, threads
     )
     return Identified(inner)
 
@@ -447,8 +471,10 @@ def integrate(
         Sampling rate, in Hz.
     scheme : str or mapping
         ``"newmark"``, ``"central-difference"``, ``"houbolt"``, ``"wilson-theta"``,
-        ``"runge-kutta-4"`` (the force linear between samples), ``"exact"`` (periodic responses), or a
-        mapping of its ``name`` and parameters, as in the JSON of an experiment.
+        ``"generalised-alpha"``, ``"hht-alpha"``, ``"wbz-alpha"``, ``"bathe"``,
+        ``"rho-infinity-bathe"``, ``"matrix-exponential"`` and ``"runge-kutta-4"`` (the force linear
+        between samples), ``"exact"`` (periodic responses), or a mapping of its ``name`` and
+        parameters, as in the JSON of an experiment.
     response : {"from-rest", "periodic"}
         Whether the motion begins at the first sample, or repeats with the force.
     displacement, velocity : array_like, optional
@@ -474,7 +500,7 @@ def integrate(
     known = machine_of(machine)
     forces = matrix("force", force)
     named: dict[str, Any] = {"name": scheme} if isinstance(scheme, str) else dict(scheme)
-    if named.get("name") == "runge-kutta-4":
+    if named.get("name") in ("matrix-exponential", "runge-kutta-4"):
         named.setdefault("load", "linear")
     rows = {
         name: getattr(known, name).tolist() for name in ("mass", "damping", "stiffness")
@@ -602,6 +628,42 @@ def multisine(
     return Multisine._of(float(fs), found)
 
 
+@lru_cache(maxsize=64, typed=True)
+def _identify_settings(
+    method: str | None,
+    domain: str,
+    from_frf: str | None,
+    segment: int | None,
+    segment_window: str | None,
+    segment_overlap: float | None,
+    between_samples: str | None,
+    extent: str | None,
+    derivatives: str | None,
+    refine: int | None,
+    interpolation: str | None,
+    lines: str | None,
+    band_hz: tuple[float, float] | None,
+    mass: tuple[float | None, ...],
+    nonlinear: str | None,
+    search: tuple[str, ...],
+    weighting: str | None,
+) -> str:
+    """Return the settings of `identify` as JSON; kept, for studies call with the same ones."""
+    fit = _fit(
+        method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
+        between_samples, extent, derivatives, refine, interpolation,
+    )
+    if domain == "time" and (lines is not None or band_hz is not None):
+        raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
+    settings = {
+        "fit": fit,
+        "lines": _lines(lines, band_hz),
+        "mass": list(mass),
+        "nonlinear": _nonlinear(nonlinear, search, weighting),
+    }
+    return json.dumps(settings)
+
+
 def _fit(
     method: str | None,
     domain: str,
@@ -672,6 +734,23 @@ def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
         low, high = band_hz
         return {"band": {"low_hz": float(low), "high_hz": float(high)}}
     return "driven"
+
+
+def _nonlinear(
+    terms: str | None, search: Sequence[str], weighting: str | None
+) -> dict[str, Any] | None:
+    if terms is None:
+        _refuse({"search": search or None, "weighting": weighting}, "belongs to `nonlinear`")
+        return None
+    constants = ("laws", "delay", "phase")
+    for name in search:
+        if name not in constants:
+            raise ValueError(f"`search` names {', '.join(constants)}, got {name!r}")
+    return {
+        "terms": terms,
+        "search": {name: name in search for name in constants},
+        "weighting": weighting or "automatic",
+    }
 
 
 def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from types import MappingProxyType
 
 _TOKEN = re.compile(
@@ -15,8 +16,6 @@ _TOKEN = re.compile(
     )""",
     re.VERBOSE,
 )
-# Layers of the library that only pass a failure on.
-_LAYERS = frozenset({"analysis"})
 _ESCAPE = re.compile(r"\\(?:u\{([0-9a-f]+)\}|(.))")
 _ESCAPED = {"n": "\n", "t": "\t", "r": "\r", "0": "\0"}
 
@@ -27,8 +26,8 @@ class MechidError(ValueError):
     Attributes
     ----------
     code : str
-        What kind of failure it is, such as ``"window"`` or ``"estimate.too-few-rows"``: stable,
-        for programs.
+        Which failure it is, such as ``"analysis.window"`` or ``"estimate.too-few-rows"``: stable,
+        for programs; the reference of the book lists all of them.
     fields : mapping
         The numbers and names of the message, such as ``{"first": 1, "last": 600, "len": 512}``.
     """
@@ -37,9 +36,22 @@ class MechidError(ValueError):
         # The settings are spelled as the keywords of this package.
         super().__init__(message.replace("`sample_rate`", "`fs`"))
         self._variant = variant
-        names, fields = _read(variant)
-        self.code: str = ".".join(_kebab(name) for name in names)
-        self.fields: Mapping[str, object] = MappingProxyType(fields)
+
+    @cached_property
+    def _parts(self) -> tuple[list[str], dict[str, object]]:
+        # Read when it is asked for: a caller that only goes on does not wait for it.
+        return _read(self._variant)
+
+    @property
+    def code(self) -> str:
+        """Which failure it is, such as ``"analysis.window"``."""
+        # The layers in between only pass a failure on.
+        return ".".join(_kebab(name) for name in self._parts[0][-2:])
+
+    @property
+    def fields(self) -> Mapping[str, object]:
+        """Numbers and names of the message."""
+        return MappingProxyType(self._parts[1])
 
     def __reduce__(self) -> tuple[type[MechidError], tuple[str, str]]:
         return type(self), (str(self), self._variant)
@@ -66,8 +78,7 @@ def _read(variant: str) -> tuple[list[str], dict[str, object]]:
     fields: dict[str, object] = {}
     if isinstance(value, _Named) and isinstance(value.content, dict):
         fields = {name: _plain(inner) for name, inner in value.content.items()}
-    kept = [name for name in names if name.lower() not in _LAYERS or name == names[-1]]
-    return kept, fields
+    return names, fields
 
 
 class _Named:

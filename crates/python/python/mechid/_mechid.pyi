@@ -12,6 +12,7 @@ __all__ = [
     "Identified",
     "Machine",
     "Measurement",
+    "Predicted",
     "Reconstructed",
     "__version__",
     "frf",
@@ -20,6 +21,7 @@ __all__ = [
     "integrate",
     "multisine",
     "predict",
+    "predict_record",
     "program",
     "reconstruct",
     "simulate",
@@ -89,6 +91,9 @@ class Identified:
     def spectra(
         self,
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]] | None: ...
+    def receptances(
+        self,
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]]: ...
     def interval(self, name: str, level: float) -> list[float]: ...
     def machine(self) -> Machine: ...
     def validate(self, other: Measurement, samples: str) -> str: ...
@@ -132,6 +137,13 @@ _Sampled: TypeAlias = tuple[
     tuple[float, float, float],
 ]
 
+@final
+class Predicted:
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def responses(self) -> list[tuple[str, NDArray[np.float64]]]: ...
+
+def predict_record(record: Measurement, machine: Machine, settings: str) -> Predicted: ...
 def frf(record: Measurement, settings: str, threads: int | None) -> Answer: ...
 def inspect(plan: str, settings: str) -> Answer: ...
 def sweep(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypedDict, Unpack, final, runtime_checkable
 
@@ -153,16 +154,15 @@ class Measurement:
         MechidError
             If arrays differ in length, hold NaN or infinity, or have not the samples of the window.
         """
-        channels: dict[str, list[str]] = {}
-        columns: list[tuple[str, NDArray[np.float64]]] = []
+        columns: list[NDArray[np.float64]] = []
+        counts: list[int] = []
         arrays = (force, displacement, velocity, acceleration)
         for kind, given in zip(_KINDS, arrays, strict=True):
-            if given is None:
-                continue
-            found = _columns(kind, given)
-            channels[kind] = [f"{kind} {dof}" for dof in range(1, len(found) + 1)]
-            columns.extend(zip(channels[kind], found, strict=True))
-        return cls._of(name, fs, columns, channels, window)
+            found = [] if given is None else _columns(kind, given)
+            counts.append(len(found))
+            columns += found
+        names, channels = _named(tuple(counts))
+        return cls._of(name, fs, list(zip(names, columns, strict=True)), channels, window)
 
     @classmethod
     def from_table(
@@ -217,7 +217,7 @@ class Measurement:
         rate = source.fs(given) if source and fs is None else fs
         if rate is None:
             raise TypeError("a table needs its sampling rate: give `fs`, in Hz")
-        return cls._of(name, rate, columns, channels, window)
+        return cls._of(name, rate, columns, json.dumps(channels), window)
 
     @classmethod
     def _of(
@@ -225,16 +225,15 @@ class Measurement:
         name: str,
         fs: float,
         columns: list[tuple[str, NDArray[np.float64]]],
-        channels: dict[str, list[str]],
+        channels: str,
         window: Window,
     ) -> Measurement:
         rate = _rate(fs)
         if rate is None:
             raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
-        inner = _mechid.Measurement.from_columns(
-            name, rate, columns, json.dumps(channels), json.dumps(_window(window))
+        return cls(
+            _mechid.Measurement.from_columns(name, rate, columns, channels, _window_json(window))
         )
-        return cls(inner)
 
     def window(self, **window: Unpack[Window]) -> Measurement:
         """Return another window of the same record.
@@ -253,7 +252,7 @@ class Measurement:
         MechidError
             If the record has not all of these samples.
         """
-        return Measurement(self._inner.window(json.dumps(_window(window))))
+        return Measurement(self._inner.window(_window_json(window)))
 
     @property
     def name(self) -> str:
@@ -377,9 +376,19 @@ def plan_of(
     }
 
 
+@lru_cache(maxsize=64)
+def _named(counts: tuple[int, ...]) -> tuple[list[str], str]:
+    """Return names for so many columns of each kind, and the channels that they are, as JSON."""
+    channels = {
+        kind: [f"{kind} {dof}" for dof in range(1, count + 1)]
+        for kind, count in zip(_KINDS, counts, strict=True)
+    }
+    return [name for names in channels.values() for name in names], json.dumps(channels)
+
+
 def matrix(name: str, values: object) -> NDArray[np.float64]:
     """Return an array of samples × degrees of freedom of real numbers."""
-    return np.stack(_columns(name, values), axis=1)
+    return _array(name, values)
 
 
 def _is_table(source: object) -> bool:
@@ -408,6 +417,12 @@ def _window(window: Window) -> dict[str, int | None]:
             raise TypeError(f"there is no setting `{name}` of a window")
         kept[name] = _count(name, value)
     return kept
+
+
+def _window_json(window: Window) -> str:
+    # Whole numbers: four times as fast as the general way.
+    kept = (f'"{name}": {"null" if count is None else count}' for name, count in _window(window).items())
+    return f"{{{', '.join(kept)}}}"
 
 
 def _count(name: str, value: object) -> int | None:
@@ -452,12 +467,17 @@ def _no_column(name: str, known: object) -> Exception:
     quoted = json.dumps(name), json.dumps(available)
     return MechidError(
         f'there is no column "{name}"; the columns are {available}',
-        f"NoColumn {{ column: {quoted[0]}, available: {quoted[1]} }}",
+        f"Analysis(NoColumn {{ column: {quoted[0]}, available: {quoted[1]} }})",
     )
 
 
 def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
-    """Return the columns of an array of real numbers, each contiguous."""
+    """Return the columns of an array of real numbers."""
+    return list(_array(name, values).T)
+
+
+def _array(name: str, values: object) -> NDArray[np.float64]:
+    """Return an array of samples × degrees of freedom, of any layout; no copy where none is needed."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise ValueError(f"`{name}` has masked values: fill or leave them out")
     array = np.asarray(values)
@@ -470,4 +490,5 @@ def _columns(name: str, values: object) -> list[NDArray[np.float64]]:
         raise ValueError(
             f"`{name}` has the shape (samples,) or (samples, degrees of freedom), got {shape}"
         )
-    return [np.ascontiguousarray(column, dtype=np.float64) for column in array.T]
+    array = array.astype(np.float64, copy=False)
+    return array if array.flags.aligned else array.copy()

@@ -19,6 +19,7 @@ from ._records import Measurement, RecordOptions, Window, measurements
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+    from xarray import Dataset
 
 
 @final
@@ -253,6 +254,27 @@ class Drawn(Result):
 
 
 @final
+@dataclass(frozen=True, slots=True)
+class Receptances:
+    """Measured and identified receptance of a machine.
+
+    Attributes
+    ----------
+    frequency_hz : array
+        Frequencies, in Hz.
+    measured : array of complex
+        Motion over force in m/N, shape (frequencies, motions, forces); NaN where another force acts at
+        the same frequency.
+    model : array of complex
+        Receptance of the identified machine, likewise.
+    """
+
+    frequency_hz: NDArray[np.float64]
+    measured: NDArray[np.complex128]
+    model: NDArray[np.complex128]
+
+
+@final
 class Identified(Drawn):
     """An identified machine, with what speaks for and against it.
 
@@ -340,6 +362,12 @@ class Identified(Drawn):
         return MappingProxyType(self._told["fit"])
 
     @property
+    def nonlinear(self) -> Mapping[str, Any] | None:
+        """Nonlinear terms with their coefficients and standard errors; None for a linear system."""
+        told = self.to_dict()["nonlinear"]
+        return None if told is None else MappingProxyType(told)
+
+    @property
     def validation(self) -> Validation | None:
         """Prediction of the record given as ``validate``."""
         told = self.to_dict()["validation"]
@@ -380,6 +408,33 @@ class Identified(Drawn):
         return MappingProxyType({kind: (m, p) for kind, m, p in self._inner.compared()})
 
     @property
+    def residual(self) -> Mapping[str, NDArray[np.float64]]:
+        """Measured minus predicted response of the first record by quantity, in SI units.
+
+        Shape (samples, degrees of freedom); without their means where the steady state was fitted.
+        """
+        return MappingProxyType({kind: m - p for kind, m, p in self._inner.compared()})
+
+    @cached_property
+    def frf(self) -> Receptances:
+        """Measured and identified receptance, at the frequencies at which it was measured.
+
+        Those of the lines fitted; of a fit in the time domain, those of whole periods, or averaged over
+        segments.
+
+        Raises
+        ------
+        MechidError
+            If the records show none.
+        """
+        omega, measured, model = self._inner.receptances()
+        n = len(self.mass)
+        arrays = (omega / (2 * np.pi), measured.reshape(-1, n, n), model.reshape(-1, n, n))
+        for array in arrays:
+            array.setflags(write=False)
+        return Receptances(*arrays)
+
+    @property
     def spectra(
         self,
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]] | None:
@@ -418,6 +473,18 @@ class Identified(Drawn):
             with open(path, "w", encoding="utf-8") as file:
                 file.write(page)
         return page
+
+    def to_xarray(self) -> Dataset:
+        """Return measured, predicted and residual responses, receptances, and M, C and K with their covariance, as an xarray dataset with units.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed: ``pip install "mechid[tables]"``.
+        """
+        from . import _labelled
+
+        return _labelled.identified(self)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{p.name}={p.value:.6g} {p.unit}" for p in self.parameters.values())
@@ -531,6 +598,31 @@ class Machine(Drawn):
         d = b[n:] if output == "acceleration" else np.zeros((n, n))
         return a, b, rows[output], d
 
+    def predict(
+        self, *sources: object, settle: int | None = None, **record: Unpack[RecordOptions]
+    ) -> Predicted:
+        """Predict the response to the force of a record, and compare it with what was measured.
+
+        With a period it is the steady state under the mean period, otherwise the whole window from
+        its first sample on; between the samples the force is band-limited. Nonlinear terms count.
+
+        Parameters
+        ----------
+        *sources, **record
+            The record, as in `identify`; arrays of force and, if measured, response.
+        settle : int, optional
+            Number of first samples that the initial state is fitted to, and that do not count in the
+            errors; at rest, without.
+
+        Raises
+        ------
+        MechidError
+            If the record does not fit the machine, or the response diverges.
+        """
+        found = one(sources, "predict", record)
+        settings = json.dumps({"settle": settle})
+        return Predicted(_mechid.predict_record(found._inner, self._inner, settings))
+
     def to_json(self) -> str:
         """Return the modes and the system as ``mechid modal --json`` prints them."""
         return self._modal[0]
@@ -618,6 +710,18 @@ class FrequencyResponses(Drawn):
                 return found
         raise KeyError((motion, force))
 
+    def to_xarray(self) -> Dataset:
+        """Return responses, standard errors and coherence, as an xarray dataset with units.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed: ``pip install "mechid[tables]"``.
+        """
+        from . import _labelled
+
+        return _labelled.frequency_responses(self)
+
     def __repr__(self) -> str:
         told = self._told
         return f"<FrequencyResponses {told['file']!r}: {len(told['frequency_hz'])} lines>"
@@ -678,6 +782,18 @@ class Sweep(Drawn):
         """Everything at each setting."""
         return tuple(MappingProxyType(point) for point in self._told["points"])
 
+    def to_xarray(self) -> Dataset:
+        """Return error and estimates at each setting, as an xarray dataset with units.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed: ``pip install "mechid[tables]"``.
+        """
+        from . import _labelled
+
+        return _labelled.sweep(self)
+
     def __repr__(self) -> str:
         return f"<Sweep {self._told['file']!r}: best at {self.best:g} of {len(self.values)} settings>"
 
@@ -711,9 +827,71 @@ class Reconstructed(Drawn):
         """Frequencies in Hz, and complex amplitudes, shape (frequencies, degrees of freedom), in N."""
         return self._inner.spectrum()
 
+    def to_xarray(self) -> Dataset:
+        """Return force, standard error and spectrum, as an xarray dataset with units.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed: ``pip install "mechid[tables]"``.
+        """
+        from . import _labelled
+
+        return _labelled.reconstructed(self)
+
     def __repr__(self) -> str:
         told = self._told
         return f"<Reconstructed {told['file']!r}: {told['method']}, {told['samples']} samples>"
+
+
+@final
+class Predicted(Result):
+    """The response of a machine to the force of a record, and its error."""
+
+    _inner: _mechid.Predicted
+
+    def __init__(self, inner: _mechid.Predicted) -> None:
+        self.__dict__["_inner"] = inner
+
+    @cached_property
+    def _responses(self) -> Mapping[str, NDArray[np.float64]]:
+        return MappingProxyType(dict(self._inner.responses()))
+
+    @property
+    def displacement(self) -> NDArray[np.float64]:
+        """Predicted displacement, shape (samples, degrees of freedom), in m."""
+        return self._responses["displacement"].copy()
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """Predicted velocity, likewise, in m/s."""
+        return self._responses["velocity"].copy()
+
+    @property
+    def acceleration(self) -> NDArray[np.float64]:
+        """Predicted acceleration, likewise, in m/s²."""
+        return self._responses["acceleration"].copy()
+
+    @property
+    def channels(self) -> tuple[Mapping[str, Any], ...]:
+        """Error of each measured channel: ``quantity``, ``degree_of_freedom``, ``rmse``, ``nrmse`` …"""
+        return tuple(MappingProxyType(row) for row in self.to_dict()["channels"])
+
+    def to_json(self) -> str:
+        """Return the result as the program prints it with ``--json``."""
+        return self._inner.to_json()
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing: a prediction has no remarks."""
+        return ()
+
+    def __str__(self) -> str:
+        return self._inner.text()
+
+    def __repr__(self) -> str:
+        told = self._told
+        return f"<Predicted {told['file']!r}: samples {told['first_sample']} to {told['last_sample']}>"
 
 
 @final
@@ -753,6 +931,18 @@ class Simulation:
         """Return force and the responses named (the displacement, without) as a record."""
         chosen: dict[str, Any] = {name: getattr(self, name) for name in quantities or ("displacement",)}
         return Measurement.from_arrays(self.force, fs=self.fs, **chosen, **window)
+
+    def to_xarray(self) -> Dataset:
+        """Return force and responses with noise and without, as an xarray dataset with units.
+
+        Raises
+        ------
+        ImportError
+            If xarray is not installed: ``pip install "mechid[tables]"``.
+        """
+        from . import _labelled
+
+        return _labelled.simulation(self)
 
     def __repr__(self) -> str:
         return f"<Simulation: {len(self.force)} samples at {self.fs:g} Hz, {self.scheme}>"

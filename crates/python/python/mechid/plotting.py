@@ -23,7 +23,7 @@ def receptance(
     Parameters
     ----------
     found : Identified
-        A fit in the frequency domain.
+        An identification.
     motion, force : int
         Degree of freedom that moves and the one that is driven. Measured points are shown on lines
         where no other force acts.
@@ -38,22 +38,17 @@ def receptance(
 
     Raises
     ------
-    ValueError
-        If the fit is one in the time domain.
+    MechidError
+        If the records show no receptance.
     """
-    spectra = found.spectra
-    if spectra is None:
-        raise ValueError("a fit in the time domain has no lines: plot `response` instead")
-    frequency, forces, motions = spectra
-    others = np.delete(np.abs(forces), force - 1, axis=1).sum(axis=1)
-    alone = others <= 1e-3 * np.abs(forces[:, force - 1])
+    table = found.frf
+    frequency, measured = table.frequency_hz, table.measured[:, motion - 1, force - 1]
     fine = np.linspace(frequency.min(), frequency.max(), 801)
     model = found.machine().receptance(fine)[:, motion - 1, force - 1]
-    measured = motions[alone, motion - 1] / forces[alone, force - 1]
     shown = _degrees if phase else np.abs
     axes = _axes(ax)
     axes.plot(fine, shown(model), label="identified")
-    axes.plot(frequency[alone], shown(measured), ".", label="measured")
+    axes.plot(frequency, shown(measured), ".", label="measured")
     axes.set_xlabel("Frequency (Hz)")
     axes.set_ylabel("Phase (°)" if phase else "Receptance (m/N)")
     if not phase:

@@ -1,5 +1,6 @@
 //! Measured and fitted receptance.
 
+use mechid_analysis::review::receptance::acts_alone;
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
 use mechid_plot::charts::{Quantity, bode};
@@ -10,9 +11,6 @@ use crate::ReportError;
 
 /// Points of a fitted curve.
 const FINE: usize = 800;
-
-/// A force counts as acting alone on a line if the others have less than this part of it.
-const ALONE: f64 = 1e-3;
 
 /// Magnitude and phase of x_i / F_j, measured and fitted, for every pair of degrees of freedom that
 /// the record shows: on the lines where F_j acts alone.
@@ -50,11 +48,6 @@ pub fn receptance(
         .map(|traces| traces.iter().map(Trace::as_response).collect::<Vec<_>>());
     let frequency = Axis::linear("Frequency", "Hz");
     Ok(bode(title, frequency, Quantity::new("Receptance", "m/N"), &measured, &fitted))
-}
-
-fn acts_alone(data: &FrequencyData, row: usize, j: usize) -> bool {
-    let own = data.force()[(row, j)].norm();
-    own > 0.0 && (0..data.dof()).all(|k| k == j || data.force()[(row, k)].norm() <= ALONE * own)
 }
 
 fn fine_grid(omega: &[f64]) -> Vec<f64> {

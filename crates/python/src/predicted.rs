@@ -1,0 +1,47 @@
+//! The response of a machine to the force of a record.
+
+use mechid::Predict;
+use mechid::model::ResponseQuantity;
+use pyo3::prelude::*;
+
+use crate::arrays::{self, Named};
+use crate::machine::Machine;
+use crate::measurement::Measurement;
+use crate::{failure, work};
+
+/// A predicted response, and its error against what was measured.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct Predicted(mechid::Predicted);
+
+/// Predicts the response of a machine to the force of a record; settings are JSON.
+#[pyfunction]
+pub fn predict_record(
+    py: Python<'_>,
+    record: PyRef<'_, Measurement>,
+    machine: PyRef<'_, Machine>,
+    settings: &str,
+) -> PyResult<Predicted> {
+    let how: Predict = failure::settings(py, settings)?;
+    let (record, machine) = (record.0.clone(), machine.0.clone());
+    let find = move || mechid::predict(&record, &machine, &how);
+    work::watched(py, None, || Ok(()), find).map(Predicted)
+}
+
+#[pymethods]
+impl Predicted {
+    /// The result as the program prints it with `--json`.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        failure::json(py, &self.0)
+    }
+
+    /// The result as a person reads it.
+    fn text(&self) -> String {
+        self.0.to_string()
+    }
+
+    /// Every kind of response.
+    fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Named<'py>>> {
+        let of = |kind| (kind, self.0.response().quantity(kind).clone());
+        arrays::responses(py, ResponseQuantity::ALL.map(of).into())
+    }
+}
