@@ -293,10 +293,11 @@ pub enum AnalysisError {
         /// The names there can be.
         known: String,
     },
-    /// The machine has nonlinear terms, which the analysis cannot take.
+    /// The machine has nonlinear terms, and what is known of its motion is not enough for them.
     #[error(
-        "{file}: this machine has nonlinear terms ({terms}); a force is reconstructed with a linear \
-         machine only"
+        "{file}: this machine has nonlinear terms ({terms}); its force is reconstructed by the equation \
+         of motion from displacement, velocity and acceleration of every degree of freedom, all of \
+         which a force may act on"
     )]
     NonlinearMachine {
         /// The file of the machine.

@@ -5,7 +5,10 @@ use std::path::Path;
 use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, identified_modes};
 use mechid_io::{ParameterCovariance, input_name, read_covariance, read_nonlinear, read_system};
-use mechid_model::{NonlinearSystem, Parameter, SecondOrderSystem, Terms, UncertainSystem};
+use mechid_model::{
+    NonlinearParameter, NonlinearSystem, Parameter, SecondOrderSystem, Terms,
+    UncertainNonlinearSystem, UncertainSystem,
+};
 use nalgebra::DMatrix;
 
 use crate::AnalysisError;
@@ -26,10 +29,21 @@ pub struct Machine {
 /// A system with nonlinear terms, as its channels show it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NonlinearPart {
-    /// M, C and K with the terms and their coefficients.
-    pub system: NonlinearSystem,
+    /// M, C and K with the terms and their coefficients, and the covariance of those of them that are
+    /// uncertain.
+    pub uncertain: UncertainNonlinearSystem,
     /// Delay and phase that the channels add.
     pub channels: ChannelPhase,
+    /// Largest displacement (m) that a term saw in the data of its identification; `None` if there were
+    /// none.
+    pub largest_displacement: Option<f64>,
+}
+
+impl NonlinearPart {
+    /// Returns M, C and K with the terms and their coefficients.
+    pub fn system(&self) -> &NonlinearSystem {
+        self.uncertain.system()
+    }
 }
 
 impl Machine {
@@ -67,16 +81,36 @@ impl Machine {
             Some(read) => {
                 let [delay, cubic, quintic] = read.channels();
                 let channels = ChannelPhase { delay, cubic, quintic };
+                let largest_displacement = read.largest_displacement();
                 let system = NonlinearSystem::new(system.clone(), read.terms, read.coefficients)?;
-                Some(NonlinearPart { system, channels })
+                Some(NonlinearPart {
+                    uncertain: UncertainNonlinearSystem::exact(system),
+                    channels,
+                    largest_displacement,
+                })
             }
         };
         let Some(found) = read_covariance(path)? else {
             return Ok(Self { name, nonlinear, ..Self::known(system) });
         };
-        let found = match &nonlinear {
-            None => found,
-            Some(part) => of_linear_part(&found, part.system.terms()),
+        let (nonlinear, found) = match nonlinear {
+            None => (None, found),
+            Some(part) => {
+                let system = part.system().clone();
+                let entries = part_of(&found, |name| Parameter::named(name, system.dof()).is_ok());
+                let of_channels = |name: &str| {
+                    CHANNELS.contains(&name) && NonlinearParameter::named(name, &system).is_err()
+                };
+                let own = part_of(&found, |name| !of_channels(name));
+                let names = own.parameters.iter();
+                let parameters = names.map(|parameter| {
+                    NonlinearParameter::named(parameter, &system)
+                        .map_err(|_| unknown_parameter(&name, parameter, &system))
+                });
+                let parameters = parameters.collect::<Result<_, AnalysisError>>()?;
+                let uncertain = UncertainNonlinearSystem::new(system, parameters, own.matrix())?;
+                (Some(NonlinearPart { uncertain, ..part }), entries)
+            }
         };
         let parameters = parameters(&name, &system, &found)?;
         let degrees_of_freedom = found.degrees_of_freedom;
@@ -84,11 +118,11 @@ impl Machine {
         Ok(Self { name, uncertain, degrees_of_freedom, nonlinear })
     }
 
-    /// Returns an error for a system with nonlinear terms, which the analysis would leave out.
-    pub(crate) fn require_linear(&self) -> Result<(), AnalysisError> {
-        let Some(part) = &self.nonlinear else { return Ok(()) };
-        let (file, terms) = (self.name.clone(), part.system.terms().to_string());
-        Err(AnalysisError::NonlinearMachine { file, terms })
+    /// Returns the error for a method that would leave out the nonlinear terms.
+    pub(crate) fn not_linear(&self) -> AnalysisError {
+        let terms =
+            self.nonlinear.as_ref().map_or_else(Terms::none, |p| p.system().terms().clone());
+        AnalysisError::NonlinearMachine { file: self.name.clone(), terms: terms.to_string() }
     }
 
     /// Returns the system with its nonlinear terms, none for a linear one, and what its channels add.
@@ -96,8 +130,13 @@ impl Machine {
         match &self.nonlinear {
             Some(part) => Ok(part.clone()),
             None => Ok(NonlinearPart {
-                system: NonlinearSystem::new(self.system().clone(), Terms::none(), Vec::new())?,
+                uncertain: UncertainNonlinearSystem::exact(NonlinearSystem::new(
+                    self.system().clone(),
+                    Terms::none(),
+                    Vec::new(),
+                )?),
                 channels: ChannelPhase::default(),
+                largest_displacement: None,
             }),
         }
     }
@@ -107,9 +146,10 @@ impl Machine {
         self.uncertain.system()
     }
 
-    /// Returns whether the system is taken as exactly known.
+    /// Returns whether the system, its nonlinear terms included, is taken as exactly known.
     pub fn is_exact(&self) -> bool {
-        self.uncertain.parameters().is_empty()
+        let terms = self.nonlinear.as_ref().is_none_or(|p| p.uncertain.parameters().is_empty());
+        terms && self.uncertain.parameters().is_empty()
     }
 
     /// Returns natural frequencies, damping ratios and mode shapes with their standard errors, which
@@ -122,18 +162,29 @@ impl Machine {
     }
 }
 
-/// Returns the covariance of the entries of M, C and K alone.
-fn of_linear_part(all: &ParameterCovariance, terms: &Terms) -> ParameterCovariance {
-    let nonlinear = |name: &str| {
-        let term = name.split('.').next().unwrap_or(name);
-        ["delay", "p3", "p5"].contains(&name) || terms.iter().any(|t| t.name() == term)
-    };
+/// Parameters of the channels, which are none of the system.
+const CHANNELS: [&str; 3] = ["delay", "p3", "p5"];
+
+/// Returns the covariance of some of the parameters, chosen by name.
+fn part_of(all: &ParameterCovariance, chosen: impl Fn(&str) -> bool) -> ParameterCovariance {
     let kept: Vec<usize> =
-        (0..all.parameters.len()).filter(|at| !nonlinear(&all.parameters[*at])).collect();
+        (0..all.parameters.len()).filter(|at| chosen(&all.parameters[*at])).collect();
     let names = kept.iter().map(|at| all.parameters[*at].clone()).collect();
     let entry = |row: usize, column: usize| all.matrix[kept[row]][kept[column]];
     let matrix = DMatrix::from_fn(kept.len(), kept.len(), entry);
     ParameterCovariance::new(names, &matrix, all.degrees_of_freedom)
+}
+
+/// Returns the error for a name that is no parameter of the system.
+fn unknown_parameter(file: &str, name: &str, system: &NonlinearSystem) -> AnalysisError {
+    let entries = Parameter::all(system.dof()).map(|entry| entry.to_string());
+    let terms = system.terms().iter().map(|term| term.name().to_owned());
+    let known: Vec<String> = entries.chain(terms).collect();
+    AnalysisError::UnknownParameter {
+        file: file.into(),
+        name: name.into(),
+        known: known.join(", "),
+    }
 }
 
 /// Returns the parameters of the system that a covariance names.

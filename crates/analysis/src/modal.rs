@@ -1,10 +1,11 @@
 //! Natural frequencies, damping ratios and mode shapes of a machine.
 
+use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_estimate::IdentifiedMode;
 use mechid_io::SystemMatrices;
-use mechid_model::Terms;
+use mechid_model::{ModelError, Terms};
 use serde::Serialize;
 
 use crate::AnalysisError;
@@ -26,6 +27,10 @@ pub struct ModalSummary {
     pub nonlinear_terms: Option<Terms>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ModeRow>,
+    /// Frequency of each mode without damping over its amplitude, as far as the data reached from which
+    /// nonlinear terms were identified; empty of a linear system.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub backbone: Vec<BackboneRow>,
     /// M, C and K.
     pub system: SystemMatrices,
 }
@@ -45,6 +50,17 @@ pub struct ModeRow {
     pub damping_ratio: Uncertain,
     /// One entry per degree of freedom; the largest is 1.
     pub shape: Vec<ShapeEntry>,
+}
+
+/// Frequency of a mode at one amplitude.
+#[derive(Debug, Clone, Serialize)]
+pub struct BackboneRow {
+    /// Number of the mode among those of M and K alone, from 1 by rising frequency.
+    pub mode: usize,
+    /// Amplitude of the fundamental where the mode moves most, in m.
+    pub amplitude: f64,
+    /// Frequency of the free vibration, in Hz.
+    pub frequency_hz: Uncertain,
 }
 
 /// One entry of a mode shape: real and imaginary part.
@@ -69,10 +85,49 @@ impl ModalSummary {
             file: machine.name.clone(),
             degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
-            nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system.terms().clone()),
+            nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system().terms().clone()),
             modes: rows.collect::<Result<_, _>>()?,
+            backbone: machine.backbone()?,
             system: SystemMatrices::from(machine.system()),
         })
+    }
+}
+
+/// Amplitudes of a backbone.
+const AMPLITUDES: usize = 10;
+
+impl Machine {
+    /// Returns the frequency of each mode without damping over its amplitude, up to the largest
+    /// displacement that the data of an identification held; nothing of a linear machine or where there
+    /// were no data.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Model`] if the covariance reaches where there is no such machine.
+    pub fn backbone(&self) -> Result<Vec<BackboneRow>, AnalysisError> {
+        let mut rows = Vec::new();
+        let Some(part) = &self.nonlinear else { return Ok(rows) };
+        let Some(largest) = part.largest_displacement.filter(|x| *x > 0.0) else { return Ok(rows) };
+        let amplitudes: Vec<f64> =
+            (1..=AMPLITUDES).map(|k| largest * k as f64 / AMPLITUDES as f64).collect();
+        for mode in 0..self.system().dof() {
+            let points = match part.uncertain.backbone(mode, &amplitudes) {
+                Err(ModelError::NoSuchMode { .. }) => break,
+                points => points?,
+            };
+            for point in points {
+                let frequency = mechid_estimate::Uncertain {
+                    value: point.omega / TAU,
+                    standard_error: point.standard_error / TAU,
+                    degrees_of_freedom: self.degrees_of_freedom,
+                };
+                let frequency_hz = match part.uncertain.parameters().is_empty() {
+                    true => Uncertain::known(frequency.value),
+                    false => Uncertain::of(&frequency)?,
+                };
+                rows.push(BackboneRow { mode: mode + 1, amplitude: point.amplitude, frequency_hz });
+            }
+        }
+        Ok(rows)
     }
 }
 
@@ -122,7 +177,24 @@ impl ModalSummary {
             small.collect::<String>(),
             self.mode_table(),
             self.shape_table()
-        )
+        ) + &self.backbone_table()
+    }
+
+    fn backbone_table(&self) -> String {
+        if self.backbone.is_empty() {
+            return String::new();
+        }
+        let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
+        let header = ["backbone: mode", "amplitude, m", "frequency", "standard error", &interval];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for row in &self.backbone {
+            let mut cells = vec![row.mode.to_string(), significant(row.amplitude, 3)];
+            cells.extend(row.frequency_hz.cells());
+            cells.push("Hz".into());
+            rows.push(cells);
+        }
+        rows[0].push("unit".into());
+        format!("\n{}", text_table(&rows))
     }
 
     fn mode_table(&self) -> String {

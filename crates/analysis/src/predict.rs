@@ -91,12 +91,13 @@ pub fn predict(
     if got != dofs {
         return Err(AnalysisError::DegreesOfFreedom { file: block.file, got, dofs });
     }
-    let NonlinearPart { system, channels: phase } = machine.with_terms()?;
+    let NonlinearPart { uncertain, channels: phase, .. } = machine.with_terms()?;
+    let system = uncertain.system();
     let settle = settle(how, measured, &block, steady)?;
     let response = match steady {
-        true if block.responses().is_empty() => steady_from_rest(&system, phase, &block)?,
-        true => steady_state(&system, phase, &block)?,
-        false => open(&system, phase, &block, settle)?,
+        true if block.responses().is_empty() => steady_from_rest(system, phase, &block)?,
+        true => steady_state(system, phase, &block)?,
+        false => open(system, phase, &block, settle)?,
     };
     let mut errors = Vec::new();
     for (kind, seen) in block.responses() {

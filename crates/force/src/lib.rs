@@ -3,6 +3,7 @@
 //! | Function | Needs | Use it when |
 //! |---|---|---|
 //! | [`continuous`] | x, ẋ, ẍ of every degree of freedom | all three are measured or simulated |
+//! | [`continuous_nonlinear`] | the same of a machine with nonlinear terms | its springs or dampers bend |
 //! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
 //! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
@@ -63,6 +64,7 @@ mod measures;
 mod motion_noise;
 mod nelder_mead;
 mod noise;
+mod nonlinear;
 mod open_operator;
 mod period_operator;
 mod regularised;
@@ -84,8 +86,9 @@ pub use measurement::{Channel, Measurement, Start};
 pub use measures::{channel_errors, line_errors, relative_error, spectrum_ratio, spurious_ratio};
 pub use motion_noise::{MotionNoise, continuous_with_noise, discretised_with_noise};
 pub use noise::{MIN_OUTSIDE_LINES, Noise};
+pub use nonlinear::{continuous_nonlinear, continuous_nonlinear_with_noise};
 pub use open_operator::OPEN_UNKNOWNS;
 pub use regularised::{ForceUnknowns, RegularisedForce, regularised};
 pub use rule::{Filter, Rule};
-pub use uncertainty::with_uncertain_system;
+pub use uncertainty::{with_uncertain_nonlinear_system, with_uncertain_system};
 pub use unexplained::Unexplained;

@@ -13,9 +13,9 @@ use crate::{ForceError, IdentifiedForce, continuous, discretised};
 /// independent from channel to channel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionNoise {
-    displacement: DVector<f64>,
-    velocity: DVector<f64>,
-    acceleration: DVector<f64>,
+    pub(crate) displacement: DVector<f64>,
+    pub(crate) velocity: DVector<f64>,
+    pub(crate) acceleration: DVector<f64>,
 }
 
 impl MotionNoise {
@@ -41,7 +41,7 @@ impl MotionNoise {
         })
     }
 
-    fn check(levels: &DVector<f64>, dofs: usize) -> Result<(), ForceError> {
+    pub(crate) fn check(levels: &DVector<f64>, dofs: usize) -> Result<(), ForceError> {
         if levels.len() == dofs {
             return Ok(());
         }
@@ -187,6 +187,6 @@ fn error(
 }
 
 /// Σⱼ (matrixᵢⱼ σⱼ)² of every row i.
-fn through(matrix: &DMatrix<f64>, levels: &DVector<f64>) -> DVector<f64> {
+pub(crate) fn through(matrix: &DMatrix<f64>, levels: &DVector<f64>) -> DVector<f64> {
     matrix.component_mul(matrix) * levels.component_mul(levels)
 }

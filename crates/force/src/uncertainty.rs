@@ -1,6 +1,6 @@
 //! Propagation of the uncertainty of an identified machine to the force.
 
-use mechid_model::{Matrix, Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_model::{NonlinearSystem, SecondOrderSystem, UncertainNonlinearSystem, UncertainSystem};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 
@@ -52,18 +52,66 @@ pub fn with_uncertain_system(
     machine: &UncertainSystem,
     find: impl Fn(&SecondOrderSystem) -> Result<IdentifiedForce, ForceError>,
 ) -> Result<IdentifiedForce, ForceError> {
-    let (system, covariance) = (machine.system(), machine.covariance());
-    let force = find(system)?;
+    let system = machine.system();
+    propagate(find(system)?, machine.covariance(), |at, by| {
+        find(&system.changed(machine.parameters()[at], by)?)
+    })
+}
+
+/// The force that `find` gives for a system with nonlinear terms, the uncertainty of all its parameters
+/// added to its standard error, as [`with_uncertain_system`] does for a linear one.
+///
+/// # Errors
+/// What `find` returns; [`ForceError::Model`] if a changed system is impossible.
+///
+/// ```
+/// use mechid_force::{continuous_nonlinear, with_uncertain_nonlinear_system};
+/// use mechid_model::{
+///     NonlinearParameter, NonlinearSystem, Response, Sdof, UncertainNonlinearSystem,
+/// };
+/// use mechid_signal::{Record, Sampling};
+/// use nalgebra::dmatrix;
+///
+/// let sampling = Sampling::new(0.1, 3)?;
+/// let wave = |values: [f64; 3]| Record::from_channel(sampling, values.to_vec());
+/// let response = Response::new(wave([1.0, 2.0, 0.0])?, wave([0.5; 3])?, wave([0.0; 3])?)?;
+/// let linear = Sdof::new(2.0, 3.0, 8.0)?.system();
+/// let system = NonlinearSystem::new(linear, "k3: x^3".parse()?, vec![4.0])?;
+///
+/// // k3 is known to ±0.1 N/m³: where x is 2 m, F is known to ±0.8 N.
+/// let cubic = NonlinearParameter::named("k3", &system)?;
+/// let machine = UncertainNonlinearSystem::new(system, vec![cubic], dmatrix![0.1 * 0.1])?;
+/// let force = with_uncertain_nonlinear_system(&machine, |s| continuous_nonlinear(s, &response))?;
+/// let error = force.standard_error().unwrap();
+/// assert!((error.channel(0)[1] - 0.8).abs() < 1e-12);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn with_uncertain_nonlinear_system(
+    machine: &UncertainNonlinearSystem,
+    find: impl Fn(&NonlinearSystem) -> Result<IdentifiedForce, ForceError>,
+) -> Result<IdentifiedForce, ForceError> {
+    let system = machine.system();
+    propagate(find(system)?, machine.covariance(), |at, by| {
+        find(&system.changed(machine.parameters()[at], by)?)
+    })
+}
+
+/// A force with the uncertainty of parameters of this covariance; `changed` gives it with one of them
+/// larger.
+fn propagate(
+    force: IdentifiedForce,
+    covariance: &DMatrix<f64>,
+    changed: impl Fn(usize, f64) -> Result<IdentifiedForce, ForceError>,
+) -> Result<IdentifiedForce, ForceError> {
     let (mut forces, mut rests) = (Vec::new(), Vec::new());
-    for (i, &parameter) in machine.parameters().iter().enumerate() {
-        let step = STEP * covariance[(i, i)].sqrt();
+    for at in 0..covariance.nrows() {
+        let step = STEP * covariance[(at, at)].sqrt();
         if step == 0.0 {
-            forces.push(DMatrix::zeros(force.record().len(), system.dof()));
+            forces.push(force.record().data() * 0.0);
             rests.extend(force.rest().map(|rest| rest.left() * 0.0));
             continue;
         }
-        let above = find(&changed(system, parameter, step)?)?;
-        let below = find(&changed(system, parameter, -step)?)?;
+        let (above, below) = (changed(at, step)?, changed(at, -step)?);
         forces.push((above.record().data() - below.record().data()) / (2.0 * step));
         if let (Some(above), Some(below)) = (above.rest(), below.rest()) {
             rests.push((above.left() - below.left()) / (2.0 * step));
@@ -92,20 +140,4 @@ fn propagated(
         let g = DVector::from_iterator(derivatives.len(), derivatives.iter().map(|d| d[(k, i)]));
         g.dot(&(covariance * &g)).max(0.0)
     })
-}
-
-/// The system with one entry changed.
-fn changed(
-    system: &SecondOrderSystem,
-    entry: Parameter,
-    by: f64,
-) -> Result<SecondOrderSystem, ForceError> {
-    let [m, c, k] = Matrix::ALL.map(|which| {
-        let mut matrix = system.matrix(which).clone();
-        if which == entry.matrix() {
-            matrix[(entry.row(), entry.column())] += by;
-        }
-        matrix
-    });
-    Ok(SecondOrderSystem::new(m, c, k)?)
 }

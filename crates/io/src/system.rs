@@ -58,6 +58,14 @@ pub struct NonlinearDescription {
     pub coefficients: Vec<f64>,
     #[serde(default)]
     channels: ChannelDescription,
+    #[serde(default)]
+    parameters: Vec<RangeDescription>,
+}
+
+/// What the data of an identification held a parameter by.
+#[derive(Debug, Clone, PartialEq, Deserialize)]
+struct RangeDescription {
+    largest: Option<[f64; 2]>,
 }
 
 /// Delay and phase that the channels add.
@@ -75,6 +83,13 @@ impl NonlinearDescription {
     pub fn channels(&self) -> [f64; 3] {
         let ChannelDescription { delay, cubic, quintic } = self.channels;
         [delay, cubic, quintic]
+    }
+
+    /// Returns the largest displacement (m) that a term saw in the data of its identification, if the
+    /// file tells.
+    pub fn largest_displacement(&self) -> Option<f64> {
+        let all = self.parameters.iter().filter_map(|parameter| parameter.largest);
+        all.map(|[displacement, _]| displacement).reduce(f64::max)
     }
 }
 

@@ -214,16 +214,16 @@ pub enum ModelError {
         variance = told(*variance)
     )]
     Covariance {
-        /// Parameter concerned.
-        parameter: Parameter,
+        /// Name of the parameter concerned.
+        parameter: String,
         /// The variance given, in the squared unit of the parameter.
         variance: f64,
     },
     /// The same parameter was named twice.
     #[error("{parameter} is named twice")]
     RepeatedParameter {
-        /// Parameter concerned.
-        parameter: Parameter,
+        /// Name of the parameter concerned.
+        parameter: String,
     },
     /// A text is no nonlinear term, or the term does not belong to the system.
     #[error("`{text}` is not usable as a nonlinear term: {reason}")]
@@ -246,6 +246,14 @@ pub enum ModelError {
         got: usize,
         /// Terms.
         terms: usize,
+    },
+    /// A mode that the system does not have.
+    #[error("there is no mode {mode}: {} without damping", counted(*modes, "oscillating mode"))]
+    NoSuchMode {
+        /// The one asked for, counted from 1.
+        mode: usize,
+        /// Number of those there are.
+        modes: usize,
     },
     /// A signal is not usable.
     #[error(transparent)]

@@ -34,6 +34,7 @@
 //! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | springs and dampers that are not linear | [`NonlinearSystem`], [`Terms`] |
+//! | frequency over amplitude | [`UncertainNonlinearSystem::backbone`] |
 //! | a time axis that suits the system | [`npi_sampling`] |
 
 mod closed_form;
@@ -66,8 +67,8 @@ pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
 pub use modes::Mode;
 pub use nonlinear::{
-    Constant, Coordinate, Law, NonlinearSystem, Power, QuadraticDamping, SaturatingDamping, Term,
-    Terms,
+    BackbonePoint, Constant, Coordinate, Law, NonlinearParameter, NonlinearSystem, Power,
+    QuadraticDamping, SaturatingDamping, Term, Terms, UncertainNonlinearSystem,
 };
 pub use parameter::Parameter;
 pub use real_schur::RealSchur;

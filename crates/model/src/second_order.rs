@@ -4,8 +4,8 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use crate::ModelError;
 use crate::linear_algebra::singular_values;
+use crate::{ModelError, Parameter};
 
 /// One of the three matrices of a [`SecondOrderSystem`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -127,6 +127,26 @@ impl SecondOrderSystem {
     /// K, n×n, in N/m.
     pub fn stiffness(&self) -> &DMatrix<f64> {
         &self.stiffness
+    }
+
+    /// The same system with one entry larger by `by` (kg, N·s/m or N/m).
+    ///
+    /// # Errors
+    /// [`ModelError::NoSuchParameter`] if the entry belongs to a system of other size; otherwise as
+    /// [`SecondOrderSystem::new`].
+    pub fn changed(&self, entry: Parameter, by: f64) -> Result<Self, ModelError> {
+        if entry.dof() != self.dof() {
+            let (name, dof) = (entry.to_string(), self.dof());
+            return Err(ModelError::NoSuchParameter { name, dof });
+        }
+        let [m, c, k] = Matrix::ALL.map(|which| {
+            let mut matrix = self.matrix(which).clone();
+            if which == entry.matrix() {
+                matrix[(entry.row(), entry.column())] += by;
+            }
+            matrix
+        });
+        Self::new(m, c, k)
     }
 
     /// One of the three matrices, n×n, in kg, N·s/m or N/m.

@@ -47,24 +47,12 @@ impl UncertainSystem {
         parameters: Vec<Parameter>,
         covariance: DMatrix<f64>,
     ) -> Result<Self, ModelError> {
-        let ((rows, columns), dof) = (covariance.shape(), system.dof());
-        if (rows, columns) != (parameters.len(), parameters.len()) {
-            let parameters = parameters.len();
-            return Err(ModelError::CovarianceShape { rows, columns, parameters });
+        let dof = system.dof();
+        if let Some(parameter) = parameters.iter().find(|parameter| parameter.dof() != dof) {
+            return Err(ModelError::NoSuchParameter { name: parameter.to_string(), dof });
         }
-        for (at, parameter) in parameters.iter().enumerate() {
-            if parameter.dof() != dof {
-                let name = parameter.to_string();
-                return Err(ModelError::NoSuchParameter { name, dof });
-            }
-            if parameters[..at].contains(parameter) {
-                return Err(ModelError::RepeatedParameter { parameter: *parameter });
-            }
-            let variance = covariance[(at, at)];
-            if variance < 0.0 || covariance.column(at).iter().any(|value| !value.is_finite()) {
-                return Err(ModelError::Covariance { parameter: *parameter, variance });
-            }
-        }
+        let names: Vec<String> = parameters.iter().map(Parameter::to_string).collect();
+        check_covariance(&names, &covariance)?;
         Ok(Self { system, parameters, covariance })
     }
 
@@ -96,6 +84,28 @@ impl UncertainSystem {
     }
 }
 
+/// Checks that a covariance belongs to parameters of these names.
+pub(crate) fn check_covariance(
+    names: &[String],
+    covariance: &DMatrix<f64>,
+) -> Result<(), ModelError> {
+    let (rows, columns) = covariance.shape();
+    if (rows, columns) != (names.len(), names.len()) {
+        let parameters = names.len();
+        return Err(ModelError::CovarianceShape { rows, columns, parameters });
+    }
+    for (at, name) in names.iter().enumerate() {
+        if names[..at].contains(name) {
+            return Err(ModelError::RepeatedParameter { parameter: name.clone() });
+        }
+        let variance = covariance[(at, at)];
+        if variance < 0.0 || covariance.column(at).iter().any(|value| !value.is_finite()) {
+            return Err(ModelError::Covariance { parameter: name.clone(), variance });
+        }
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use nalgebra::dmatrix;
@@ -116,12 +126,12 @@ mod tests {
             ModelError::CovarianceShape { rows: 2, columns: 2, parameters: 1 }
         );
         for variance in [-1.0, f64::INFINITY] {
-            let error = ModelError::Covariance { parameter: k, variance };
+            let error = ModelError::Covariance { parameter: k.to_string(), variance };
             assert_eq!(refused(&[k], dmatrix![variance]), error);
         }
         assert_eq!(
             refused(&[k, k], DMatrix::identity(2, 2)),
-            ModelError::RepeatedParameter { parameter: k }
+            ModelError::RepeatedParameter { parameter: k.to_string() }
         );
         let k22 = Parameter::named("k22", 2).unwrap();
         assert_eq!(

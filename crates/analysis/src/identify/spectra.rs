@@ -294,9 +294,11 @@ impl Fitted {
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
     pub fn model(&self) -> Result<Model, AnalysisError> {
-        Ok(match self.nonlinear_part()? {
+        Ok(match &self.nonlinear {
             None => Model::Linear(self.estimate.system()?),
-            Some(NonlinearPart { system, channels }) => Model::Nonlinear { system, channels },
+            Some(WithTerms { found, .. }) => {
+                Model::Nonlinear { system: found.system()?, channels: found.channels() }
+            }
         })
     }
 
@@ -306,7 +308,9 @@ impl Fitted {
     /// As [`Fitted::model`].
     pub(super) fn nonlinear_part(&self) -> Result<Option<NonlinearPart>, AnalysisError> {
         let Some(WithTerms { found, .. }) = &self.nonlinear else { return Ok(None) };
-        Ok(Some(NonlinearPart { system: found.system()?, channels: found.channels() }))
+        let (uncertain, channels) = (found.uncertain_system()?, found.channels());
+        let largest_displacement = found.ranges().iter().map(|range| range[0]).reduce(f64::max);
+        Ok(Some(NonlinearPart { uncertain, channels, largest_displacement }))
     }
 
     /// Residual of the equations over their right-hand sides, all degrees of freedom together.

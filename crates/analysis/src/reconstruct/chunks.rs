@@ -2,19 +2,22 @@
 
 use std::ops::Range;
 
+use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_force::{ForceError, IdentifiedForce, Measurement};
-use mechid_model::UncertainSystem;
 use mechid_signal::SignalError;
 
 use super::method::{Request, equation};
 use super::motion::{Recorded, complete};
 use super::options::Method;
 use crate::AnalysisError;
+use crate::machine::Machine;
 use crate::measurement::CHUNK_SAMPLES;
 
 /// Whether a method finds each sample of an open record from those beside it.
-pub fn are_enough_for(method: Method, request: &Request) -> bool {
-    !request.periodic && matches!(method, Method::Continuous | Method::Discretised)
+pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> bool {
+    // The phase that channels add is that of the whole record.
+    let phase = machine.nonlinear.as_ref().is_some_and(|p| p.channels != ChannelPhase::default());
+    !phase && !request.periodic && matches!(method, Method::Continuous | Method::Discretised)
 }
 
 /// Callback for a chunk, the force on it, and the range of its samples that count.
@@ -24,7 +27,7 @@ pub type Take<'a> =
 /// Finds the force by such a method, one chunk after the other.
 pub fn find(
     request: &Request,
-    machine: &UncertainSystem,
+    machine: &Machine,
     recorded: &Recorded,
     method: Method,
     take: &mut Take<'_>,

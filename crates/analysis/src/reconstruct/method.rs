@@ -4,16 +4,20 @@ use std::f64::consts::TAU;
 
 use mechid_force::{
     Channel, Filter, ForceError, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
-    OPEN_UNKNOWNS, Rule, Start, Tuning, Unexplained, continuous, continuous_with_noise,
-    discretised, discretised_with_noise, frequency_domain, inner_lines, kalman, regularised,
+    OPEN_UNKNOWNS, Rule, Start, Tuning, Unexplained, continuous, continuous_nonlinear,
+    continuous_nonlinear_with_noise, continuous_with_noise, discretised, discretised_with_noise,
+    frequency_domain, inner_lines, kalman, regularised, with_uncertain_nonlinear_system,
     with_uncertain_system,
 };
-use mechid_model::{Discretisation, ResponseQuantity, SecondOrderSystem, UncertainSystem};
-use mechid_signal::{Extent, Spectrum};
+use mechid_model::{
+    Discretisation, Response, ResponseQuantity, SecondOrderSystem, UncertainSystem,
+};
+use mechid_signal::{Extent, Record, Spectrum};
 
 use super::motion::{complete, response};
 use super::options::Method;
 use crate::AnalysisError;
+use crate::machine::{Machine, NonlinearPart};
 use crate::text::significant;
 
 /// Settings of a reconstruction, resolved for a record.
@@ -57,14 +61,26 @@ pub struct How {
 const SHORT: usize = OPEN_UNKNOWNS / 2;
 
 /// The method for a record of these channels and so many samples, and the reason for it.
+///
+/// # Errors
+/// [`AnalysisError::NonlinearMachine`] where the machine is not linear and the motion not complete, or
+/// another method was asked for than its equation of motion.
 pub fn choose(
     request: &Request,
+    machine: &Machine,
     channels: &[Channel],
     samples: usize,
-    dofs: usize,
-) -> (Method, String) {
+) -> Result<(Method, String), AnalysisError> {
+    let dofs = machine.system().dof();
+    if machine.nonlinear.is_some() {
+        let asked = matches!(request.method, Method::Auto | Method::Continuous);
+        if !asked || !complete(channels, dofs, true) || request.forced.len() != dofs {
+            return Err(machine.not_linear());
+        }
+        return Ok((Method::Continuous, "the machine has nonlinear terms".into()));
+    }
     if request.method != Method::Auto {
-        return (request.method, "it was asked for".into());
+        return Ok((request.method, "it was asked for".into()));
     }
     let unknowns = samples * request.forced.len();
     let (method, why) = if request.periodic && request.lines.is_some() {
@@ -81,30 +97,31 @@ pub fn choose(
     } else {
         (Method::Kalman, format!("an open record of {unknowns} unknowns, more than {SHORT}"))
     };
-    (method, why)
+    Ok((method, why))
 }
 
 /// Finds the force, with the uncertainty of the machine if that is known.
 pub fn find(
     request: &Request,
-    machine: &UncertainSystem,
+    machine: &Machine,
     motion: &Measurement,
 ) -> Result<Found, AnalysisError> {
     let samples = motion.sampling().len();
-    let (method, why) = choose(request, motion.channels(), samples, machine.system().dof());
+    let (method, why) = choose(request, machine, motion.channels(), samples)?;
+    let known = &machine.uncertain;
     match method {
         Method::Continuous | Method::Discretised => {
             let force = equation(request, machine, motion, method)?;
-            Ok(Found { force, how: How::of_equation(method, why, request) })
+            Ok(Found { force, how: How::of_equation(method, why, request, machine) })
         }
-        Method::FrequencyDomain => lines(request, machine, motion, why),
-        Method::Kalman => smoothed(request, machine, motion, why),
+        Method::FrequencyDomain => lines(request, known, motion, why),
+        Method::Kalman => smoothed(request, known, motion, why),
         Method::Auto | Method::Shrinkage => {
-            filtered(request, machine, motion, Filter::Shrinkage, why)
+            filtered(request, known, motion, Filter::Shrinkage, why)
         }
-        Method::Tikhonov => filtered(request, machine, motion, Filter::Tikhonov(request.rule), why),
+        Method::Tikhonov => filtered(request, known, motion, Filter::Tikhonov(request.rule), why),
         Method::TruncatedSvd => {
-            filtered(request, machine, motion, Filter::TruncatedSvd(request.rule), why)
+            filtered(request, known, motion, Filter::TruncatedSvd(request.rule), why)
         }
     }
 }
@@ -128,7 +145,7 @@ fn noise(request: &Request, unknown: Noise) -> Noise {
 /// The force by the equation of motion, sample by sample or from each to the next.
 pub fn equation(
     request: &Request,
-    machine: &UncertainSystem,
+    machine: &Machine,
     motion: &Measurement,
     method: Method,
 ) -> Result<IdentifiedForce, AnalysisError> {
@@ -138,12 +155,35 @@ pub fn equation(
     let ends = if request.periodic { Extent::WholePeriod } else { Extent::Open };
     let linear = Discretisation::FirstOrderHold;
     let noise = motion_noise(request, motion, machine.system().dof())?;
-    with_machine(machine, &|system| match (with_acceleration, &noise) {
+    if let Some(part) = &machine.nonlinear {
+        return with_terms(part, &response, noise.as_ref());
+    }
+    with_machine(&machine.uncertain, &|system| match (with_acceleration, &noise) {
         (true, None) => continuous(system, &response),
         (true, Some(noise)) => continuous_with_noise(system, &response, noise),
         (false, None) => discretised(system, &response, linear, ends),
         (false, Some(noise)) => discretised_with_noise(system, &response, linear, ends, noise),
     })
+}
+
+/// The force of a machine with nonlinear terms, of the motion before the phase of its channels.
+fn with_terms(
+    part: &NonlinearPart,
+    response: &Response,
+    noise: Option<&MotionNoise>,
+) -> Result<IdentifiedForce, AnalysisError> {
+    let before = |record: &Record| -> Result<Record, AnalysisError> {
+        Ok(part.channels.correct(record, record)?.1)
+    };
+    let response = Response::new(
+        before(response.displacement())?,
+        before(response.velocity())?,
+        before(response.acceleration())?,
+    )?;
+    Ok(with_uncertain_nonlinear_system(&part.uncertain, |system| match noise {
+        None => continuous_nonlinear(system, &response),
+        Some(noise) => continuous_nonlinear_with_noise(system, &response, noise),
+    })?)
 }
 
 /// The noise of each channel as that of a complete motion, if it is stated.
@@ -171,8 +211,10 @@ fn motion_noise(
 
 impl How {
     /// Describes the method of [`equation`].
-    pub fn of_equation(method: Method, why: String, request: &Request) -> Self {
-        let method = if method == Method::Continuous {
+    pub fn of_equation(method: Method, why: String, request: &Request, machine: &Machine) -> Self {
+        let method = if machine.nonlinear.is_some() {
+            "equation of motion with nonlinear terms, sample by sample"
+        } else if method == Method::Continuous {
             "equation of motion, sample by sample"
         } else {
             "equation of motion from sample to sample, the force linear between them"

@@ -26,7 +26,6 @@ use std::fmt;
 use std::ops::Range;
 
 use mechid_force::{IdentifiedForce, Start};
-use mechid_model::UncertainSystem;
 use mechid_signal::Sampling;
 use serde::{Serialize, Serializer};
 
@@ -180,16 +179,14 @@ impl Serialize for Reconstructed {
 struct Task {
     recorded: Recorded,
     request: Request,
-    known: UncertainSystem,
 }
 
 impl Task {
     fn new(run: &Measurement, machine: &Machine, how: &Reconstruct) -> Result<Self, AnalysisError> {
-        machine.require_linear()?;
         let periodic = run.window_settings().period.is_some() || how.lines.is_some();
         let recorded = Recorded::new(run, machine.system().dof(), periodic)?;
         let request = Request::new(how, &recorded, machine.system().dof(), periodic)?;
-        Ok(Self { recorded, request, known: machine.uncertain.clone() })
+        Ok(Self { recorded, request })
     }
 
     /// Finds the force, chunk by chunk where that will do and all of it is not asked for; only
@@ -201,21 +198,21 @@ impl Task {
         all_at_once: bool,
         take: &mut Take<'_>,
     ) -> Result<(ForceSummary, Option<IdentifiedForce>), AnalysisError> {
-        let Self { recorded, request, known } = self;
-        let (dofs, samples) = (known.system().dof(), recorded.sampling.len());
+        let Self { recorded, request } = self;
+        let (dofs, samples) = (machine.system().dof(), recorded.sampling.len());
         let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
-        let (method, why) = method::choose(request, &recorded.channels, samples, dofs);
+        let (method, why) = method::choose(request, machine, &recorded.channels, samples)?;
         let mut rates = KinematicConsistency::of(&recorded.channels);
-        let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request) {
-            chunks::find(request, known, recorded, method, &mut |chunk, force, kept| {
+        let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request, machine) {
+            chunks::find(request, machine, recorded, method, &mut |chunk, force, kept| {
                 rates.push(chunk);
                 tally.push(force, kept, !request.noise.is_empty())
             })?;
-            (How::of_equation(method, why, request), None)
+            (How::of_equation(method, why, request, machine), None)
         } else {
             let held = recorded.hold()?;
             rates.push(&held.motion);
-            let Found { force, mut how } = method::find(request, known, &held.motion)?;
+            let Found { force, mut how } = method::find(request, machine, &held.motion)?;
             tally.push_all(&force, how.counts_noise)?;
             how.remarks.extend(periods::remark(recorded, &held));
             periods::tell_noise(how.unexplained.as_mut(), recorded, &held);
@@ -232,22 +229,22 @@ impl Task {
         how: &How,
         tally: &Tally<'_>,
     ) -> ForceSummary {
-        let Self { recorded, request, known } = self;
+        let Self { recorded, request } = self;
         let mut remarks = recorded.unit_remarks().to_vec();
         remarks.extend(tally.remark());
         remarks.extend(how.remarks.iter().cloned());
         let unexplained = how.unexplained.as_deref();
         let channels = Measured::all(recorded, unexplained);
-        let dofs = known.system().dof();
+        let (dofs, uncertain) = (machine.system().dof(), !machine.is_exact());
         remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
-        if !known.parameters().is_empty() && !how.counts_noise {
+        if uncertain && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
                  record: state that with `noise`"
                     .to_owned(),
             );
         }
-        if known.parameters().is_empty() {
+        if !uncertain {
             remarks.push(
                 "the machine is taken as exactly known: its file has no covariance".to_owned(),
             );
@@ -260,7 +257,7 @@ impl Task {
             samples: recorded.sampling.len(),
             periods: request.periodic.then_some(recorded.periods),
             sample_rate_hz: recorded.sampling.rate_hz(),
-            machine_uncertainty: !known.parameters().is_empty(),
+            machine_uncertainty: uncertain,
             noise_uncertainty: how.counts_noise,
             chosen: how
                 .chosen

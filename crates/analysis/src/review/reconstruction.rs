@@ -37,7 +37,7 @@ impl Reconstruction {
         period: &Block,
         lines: Option<Vec<usize>>,
     ) -> Result<Self, AnalysisError> {
-        found.machine()?.require_linear()?;
+        let machine = found.machine()?;
         let force = &period.force;
         let forced: Vec<usize> =
             (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
@@ -51,7 +51,7 @@ impl Reconstruction {
             noise: Vec::new(),
             averaged: 1,
         };
-        let result = find(&request, &found.machine()?.uncertain, &motion(period)?)?;
+        let result = find(&request, &machine, &motion(period)?)?;
         let measured = match &lines {
             Some(lines) => on_lines(force, lines)?,
             None => force.clone(),

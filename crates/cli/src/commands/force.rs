@@ -20,7 +20,8 @@ use crate::outcome::{Files, Outcome};
 ///
 /// The window is one or more whole periods if --period or --lines is given (they are averaged), an
 /// open record otherwise. Where the machine comes from `mechid identify --json`, its uncertainty
-/// counts in the standard error of the force.
+/// counts in the standard error of the force. A machine with nonlinear terms needs displacement,
+/// velocity and acceleration of every degree of freedom.
 ///
 /// A long text is read a stretch at a time. The methods continuous and discretised hold no open
 /// record either; any other method, --spectrum and --plot hold all of it, of the columns used alone.

@@ -17,7 +17,8 @@ use crate::outcome::{Files, Outcome};
 /// stiffness gives it. Shapes are scaled so that their largest entry is 1. The picture shows the
 /// receptance of the machine around its natural frequencies: of one or two degrees of freedom for
 /// every pair of motion and force, of more where motion and force share their place, up to six of
-/// them.
+/// them. Of a machine whose nonlinear terms were identified the frequency of each mode over its
+/// amplitude is told and drawn instead, as far as the data reached.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json

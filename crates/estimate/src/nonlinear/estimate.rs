@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mechid_model::{Matrix, NonlinearSystem, Terms};
+use mechid_model::{Matrix, NonlinearParameter, NonlinearSystem, Terms, UncertainNonlinearSystem};
 use nalgebra::{DMatrix, DVector};
 
 use super::{ChannelPhase, Weighting};
@@ -59,6 +59,21 @@ impl NonlinearEstimate {
     pub fn system(&self) -> Result<NonlinearSystem, EstimateError> {
         let (linear, terms) = (self.linear.system()?, self.terms.clone());
         Ok(NonlinearSystem::new(linear, terms, self.coefficients.clone())?)
+    }
+
+    /// The identified system with the covariance of its parameters; delay and phase of the channels
+    /// are none of them.
+    ///
+    /// # Errors
+    /// [`EstimateError::Model`] if M̂ is singular, or the covariance is not finite.
+    pub fn uncertain_system(&self) -> Result<UncertainNonlinearSystem, EstimateError> {
+        let system = self.system()?;
+        let named = self.parameters.iter().enumerate();
+        let (places, parameters): (Vec<usize>, Vec<NonlinearParameter>) = named
+            .filter_map(|(at, p)| Some((at, NonlinearParameter::named(&p.name, &system).ok()?)))
+            .unzip();
+        let covariance = self.covariance.select_rows(&places).select_columns(&places);
+        Ok(UncertainNonlinearSystem::new(system, parameters, covariance)?)
     }
 
     /// The terms, with the constants found inside them.

@@ -148,7 +148,8 @@ impl Shape {
 /// The shape whose residual, the linear parameters fitted to each, is the least under given weights.
 ///
 /// # Errors
-/// [`EstimateError::NotConverged`].
+/// [`EstimateError::Undetermined`] if the search wanders because the data do not show a constant,
+/// [`EstimateError::NotConverged`] if it does so for another reason.
 pub(super) fn fit_shape(
     equations: &Equations<'_>,
     shape: Shape,
@@ -159,8 +160,37 @@ pub(super) fn fit_shape(
     let found = minimise(&mut projected, start)
         .ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
     let steps = found.steps;
-    let found = shape.with(found.theta.as_slice()).filter(|_| found.converged);
-    found.ok_or(EstimateError::NotConverged { searches: 1, steps })
+    if let Some(found) = shape.with(found.theta.as_slice()).filter(|_| found.converged) {
+        return Ok(found);
+    }
+    let unseen = unseen(&mut projected, &shape);
+    if unseen.is_empty() {
+        return Err(EstimateError::NotConverged { searches: 1, steps });
+    }
+    let parameters = unseen.join(", ");
+    let directions = format!("no value of {parameters} fits better than chance");
+    Err(EstimateError::Undetermined { parameters, directions })
+}
+
+/// Names of the constants with a standard error, at the start, beyond the scale on which they change
+/// anything: as of the phase of the channels where no term is there to show it.
+fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
+    let (rows, theta) =
+        (projected.residuals(), DVector::from_iterator(start.count(), start.values()));
+    let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, theta.len()));
+    if !projected.residual(&theta, &mut residual) {
+        return Vec::new();
+    }
+    projected.jacobian(&mut jacobian);
+    let deviation = residual.norm() / (rows as f64).sqrt();
+    let scales = start.steps(projected.equations.data.period().dt());
+    let of = |((name, column), step): ((String, f64), f64)| {
+        // With all other constants known: a lower bound.
+        (deviation > column * step / STEP).then_some(name)
+    };
+    let lengths = jacobian.column_iter().map(|column| column.norm());
+    let names = start.names().map(|(name, _)| name);
+    names.zip(lengths).zip(scales).filter_map(of).collect()
 }
 
 /// The weighted residual that the linear parameters leave, as a function of the shape constants.

@@ -1,13 +1,18 @@
 //! Systems with nonlinear springs and dampers.
 
+mod backbone;
 mod law;
 mod parse;
 mod term;
+mod uncertain;
 
+pub use backbone::BackbonePoint;
 pub use law::{Constant, Law, Power, QuadraticDamping, SaturatingDamping};
 pub use term::{Coordinate, Term, Terms};
+pub use uncertain::{NonlinearParameter, UncertainNonlinearSystem};
 
 use mechid_signal::Record;
+use nalgebra::DMatrix;
 
 use crate::{ModelError, Response, SecondOrderSystem};
 
@@ -105,6 +110,27 @@ impl NonlinearSystem {
         }
     }
 
+    /// ∂/∂x and ∂/∂ẋ of [`NonlinearSystem::restoring_force`]: K and C of small motions about a
+    /// displacement (m) and velocity (m/s), n × n, in N/m and N·s/m.
+    ///
+    /// # Panics
+    /// If one of the two has fewer than n entries.
+    pub fn tangents(&self, displacement: &[f64], velocity: &[f64]) -> [DMatrix<f64>; 2] {
+        let mut tangents = [self.linear.stiffness().clone(), self.linear.damping().clone()];
+        for (term, coefficient) in self.terms.iter().zip(&self.coefficients) {
+            let at = term.coordinate();
+            let slopes = term.law().slopes(at.of(displacement), at.of(velocity));
+            for (tangent, slope) in tangents.iter_mut().zip(slopes) {
+                for (row, sign) in at.signs() {
+                    for (column, other) in at.signs() {
+                        tangent[(row, column)] += sign * other * coefficient * slope;
+                    }
+                }
+            }
+        }
+        tangents
+    }
+
     /// The force (N, samples × degrees of freedom) under which the system responds so.
     ///
     /// # Errors
@@ -171,6 +197,32 @@ mod tests {
         two().restoring_force(&[0.3, -0.2], &[1.0, -2.0], &mut restoring);
         let expected = dmatrix![4.0 + restoring[0], 10.0 + restoring[1]; 1.0, -2.0];
         assert!((force.data() - expected).amax() < 1e-14);
+    }
+
+    #[test]
+    fn tangents_are_the_derivatives_of_the_restoring_force() {
+        let (system, x, v, h) = (two(), [0.3, -0.2], [1.0, -2.0], 1e-5);
+        let force = |x: &[f64], v: &[f64]| {
+            let mut force = [0.0; 2];
+            system.restoring_force(x, v, &mut force);
+            force
+        };
+        let [stiffness, damping] = system.tangents(&x, &v);
+        for column in 0..2 {
+            let moved = |of: [f64; 2], by: f64| {
+                let mut moved = of;
+                moved[column] += by;
+                moved
+            };
+            let by_x = [force(&moved(x, h), &v), force(&moved(x, -h), &v)];
+            let by_v = [force(&x, &moved(v, h)), force(&x, &moved(v, -h))];
+            for row in 0..2 {
+                // The error of a central difference: third derivatives times h²/6, and rounding.
+                let of = |[up, down]: [[f64; 2]; 2]| (up[row] - down[row]) / (2.0 * h);
+                assert!((of(by_x) - stiffness[(row, column)]).abs() < 1e-8);
+                assert!((of(by_v) - damping[(row, column)]).abs() < 1e-8);
+            }
+        }
     }
 
     #[test]

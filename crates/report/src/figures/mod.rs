@@ -1,5 +1,6 @@
 //! Figures of the results of an analysis.
 
+mod backbone;
 mod force;
 mod frf;
 pub mod modal;
@@ -66,8 +67,13 @@ impl ToFigure for Inspected {
 }
 
 impl ToFigure for Machine {
-    /// Draws the receptance around the natural frequencies.
+    /// Draws the receptance around the natural frequencies; of a machine whose nonlinear terms were
+    /// identified, to which no receptance belongs, the frequency of each mode over its amplitude.
     fn figure(&self) -> Result<Figure, ReportError> {
+        let backbone = self.backbone()?;
+        if !backbone.is_empty() {
+            return Ok(backbone::figure(&self.name, &backbone));
+        }
         let modes = self.modes()?;
         let resonances: Vec<modal::Resonance> = modes
             .iter()

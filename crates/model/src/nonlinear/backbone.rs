@@ -1,0 +1,387 @@
+//! Frequency of free vibration over its amplitude.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::{NonlinearSystem, UncertainNonlinearSystem};
+use crate::error::require;
+use crate::{ModelError, SecondOrderSystem};
+
+/// Harmonics of the motion beside its mean.
+const HARMONICS: usize = 9;
+
+/// Instants in a period: the ninth power of nine harmonics, times one of them, folds back on none.
+const INSTANTS: usize = 128;
+
+/// Newton steps to an amplitude, at most.
+const STEPS: usize = 30;
+
+/// Change, relative to amplitude and frequency, that counts as none.
+const SETTLED: f64 = 1e-11;
+
+/// Attempts on the way from one amplitude to the next, at most; each that fails halves the way.
+const ATTEMPTS: usize = 16;
+
+/// Part of a standard error by which a parameter is changed for a derivative.
+const STEP: f64 = 0.1;
+
+/// The real part of an undamped eigenvalue, over its modulus, that counts as zero.
+const UNDAMPED: f64 = 1e-6;
+
+/// One point of a backbone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BackbonePoint {
+    /// Amplitude of the fundamental where the mode moves most, in m.
+    pub amplitude: f64,
+    /// Frequency of the free vibration, in rad/s.
+    pub omega: f64,
+    /// Standard error of the frequency by the covariance of the parameters, in rad/s.
+    pub standard_error: f64,
+}
+
+impl UncertainNonlinearSystem {
+    /// The backbone of a mode: its frequency without damping at each amplitude (m, rising; of the
+    /// fundamental, at the degree of freedom where the mode of small amplitudes moves most), with the
+    /// standard error that the covariance gives it (delta method).
+    ///
+    /// Modes are counted from 0 by rising frequency, those of M and K alone. The motion is a Fourier
+    /// series of a mean and nine harmonics in balance with the forces; what the terms make of
+    /// velocities is left out with the damping. The list ends early where no such motion was found:
+    /// a spring that softens may have none.
+    ///
+    /// # Errors
+    /// [`ModelError::NoSuchMode`] if fewer modes oscillate without damping,
+    /// [`ModelError::Parameter`] for an amplitude that is not positive, and as
+    /// [`NonlinearSystem::changed`].
+    ///
+    /// # Source
+    /// Krack & Gross, *Harmonic Balance for Nonlinear Vibration Problems* (2019), chapters 2 and 4;
+    /// Kerschen, Peeters, Golinval & Vakakis (2009), Mechanical Systems and Signal Processing 23,
+    /// 170–194 (nonlinear normal modes).
+    ///
+    /// ```
+    /// use mechid_model::{NonlinearSystem, Sdof, UncertainNonlinearSystem};
+    ///
+    /// // A spring that hardens: ω² ≈ k + ¾ k₃ A² at 1 kg.
+    /// let linear = Sdof::new(1.0, 0.1, 4.0)?.system();
+    /// let system = NonlinearSystem::new(linear, "k3: x^3".parse()?, vec![0.1])?;
+    /// let points = UncertainNonlinearSystem::exact(system).backbone(0, &[0.1, 1.0])?;
+    /// assert!((points[0].omega - (4.0 + 0.075 * 0.01_f64).sqrt()).abs() < 1e-8);
+    /// assert!((points[1].omega - 4.075_f64.sqrt()).abs() < 1e-4);
+    /// # Ok::<(), mechid_model::ModelError>(())
+    /// ```
+    pub fn backbone(
+        &self,
+        mode: usize,
+        amplitudes: &[f64],
+    ) -> Result<Vec<BackbonePoint>, ModelError> {
+        let (mut motion, dof) = start(self.system(), mode)?;
+        let balance = Balance::new(self.system());
+        // The start is a mode of no amplitude in particular.
+        let (mut points, mut reached) = (Vec::new(), 0.0);
+        for &amplitude in amplitudes {
+            require("amplitude of a backbone", amplitude, "positive", amplitude > 0.0)?;
+            let Some(found) = balance.reach(&motion, dof, [reached, amplitude]) else { break };
+            (motion, reached) = (found, amplitude);
+            let Some(variance) = self.variance(&balance, &motion, dof)? else { break };
+            let (omega, standard_error) = (motion.omega, variance.max(0.0).sqrt());
+            points.push(BackbonePoint { amplitude, omega, standard_error });
+        }
+        Ok(points)
+    }
+
+    /// Variance of the frequency; `None` at a fold, where it has no derivative.
+    fn variance(
+        &self,
+        balance: &Balance<'_>,
+        motion: &Motion,
+        dof: usize,
+    ) -> Result<Option<f64>, ModelError> {
+        // ω changes by −(last row of J⁻¹) ∂R/∂θ: one solution with the transpose serves all.
+        let jacobian = balance.jacobian(motion, dof);
+        let mut last = DVector::zeros(jacobian.nrows());
+        last[jacobian.nrows() - 1] = 1.0;
+        let Some(row) = jacobian.transpose().lu().solve(&last) else { return Ok(None) };
+        let covariance = self.covariance();
+        let mut slopes = DVector::zeros(self.parameters().len());
+        for (at, parameter) in self.parameters().iter().enumerate() {
+            let step = STEP * covariance[(at, at)].sqrt();
+            if step > 0.0 {
+                let [above, below] = [
+                    self.system().changed(*parameter, step)?,
+                    self.system().changed(*parameter, -step)?,
+                ];
+                let change =
+                    Balance::new(&above).forces(motion) - Balance::new(&below).forces(motion);
+                slopes[at] = -row.rows(0, change.len()).dot(&change) / (2.0 * step);
+            }
+        }
+        Ok(Some(slopes.dot(&(covariance * &slopes))))
+    }
+}
+
+/// A motion x(t) = Σ a_h cos hωt.
+#[derive(Clone)]
+struct Motion {
+    /// Degrees of freedom × (harmonics + 1), in m.
+    cosines: DMatrix<f64>,
+    /// In rad/s.
+    omega: f64,
+}
+
+/// The mode of M and K as a motion of 1 m at the degree of freedom where it moves most.
+fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), ModelError> {
+    let linear = system.linear();
+    let none = DMatrix::zeros(linear.dof(), linear.dof());
+    let undamped = SecondOrderSystem::new(linear.mass().clone(), none, linear.stiffness().clone())?;
+    let modes = undamped.modes()?;
+    let oscillating: Vec<_> = modes
+        .iter()
+        .filter(|mode| mode.oscillates() && mode.damping_ratio().abs() < UNDAMPED)
+        .collect();
+    let found = oscillating
+        .get(mode)
+        .ok_or(ModelError::NoSuchMode { mode: mode + 1, modes: oscillating.len() })?;
+    let dof = found.shape().icamax();
+    let mut cosines = DMatrix::zeros(linear.dof(), HARMONICS + 1);
+    cosines.set_column(1, &found.shape().map(|entry| (entry / found.shape()[dof]).re));
+    Ok((Motion { cosines, omega: found.damped_frequency() }, dof))
+}
+
+/// Balance of the harmonics of a free motion without damping.
+struct Balance<'a> {
+    system: &'a NonlinearSystem,
+    /// cos hτ: instants × (harmonics + 1).
+    waves: DMatrix<f64>,
+}
+
+impl<'a> Balance<'a> {
+    fn new(system: &'a NonlinearSystem) -> Self {
+        let tau = TAU / INSTANTS as f64;
+        let wave = |s: usize, h: usize| (((s * h) % INSTANTS) as f64 * tau).cos();
+        Self { system, waves: DMatrix::from_fn(INSTANTS, HARMONICS + 1, wave) }
+    }
+
+    /// The motion of another amplitude that continues one of this; `None` if none is found.
+    fn reach(
+        &self,
+        from: &Motion,
+        dof: usize,
+        [mut reached, amplitude]: [f64; 2],
+    ) -> Option<Motion> {
+        let (mut at, mut next) = (from.clone(), amplitude);
+        for _ in 0..ATTEMPTS {
+            let mut guess = at.clone();
+            guess.cosines *= next / at.cosines[(dof, 1)];
+            match self.solve(guess, dof, next) {
+                Some(found) if next == amplitude => return Some(found),
+                Some(found) => (at, reached, next) = (found, next, amplitude),
+                None => next = 0.5 * (reached + next),
+            }
+        }
+        None
+    }
+
+    /// Newton's method from a guess.
+    fn solve(&self, mut motion: Motion, dof: usize, amplitude: f64) -> Option<Motion> {
+        for _ in 0..STEPS {
+            let forces = self.forces(&motion);
+            let residual = forces.push(motion.cosines[(dof, 1)] - amplitude);
+            let step = self.jacobian(&motion, dof).lu().solve(&residual)?;
+            let last = step.len() - 1;
+            let cosines = DMatrix::from_column_slice(
+                motion.cosines.nrows(),
+                motion.cosines.ncols(),
+                &step.as_slice()[..last],
+            );
+            motion.cosines -= &cosines;
+            motion.omega -= step[last];
+            if !(motion.omega > 0.0 && motion.omega.is_finite()) {
+                return None;
+            }
+            let small = cosines.amax() <= SETTLED * amplitude;
+            if small && step[last].abs() <= SETTLED * motion.omega {
+                return Some(motion);
+            }
+        }
+        None
+    }
+
+    /// (K − h²ω²M) a_h and the h-th harmonic of the terms, for every h, in N: all of which are to
+    /// vanish.
+    fn forces(&self, motion: &Motion) -> DVector<f64> {
+        let linear = self.system.linear();
+        let mut forces = linear.stiffness() * &motion.cosines;
+        let inertia = linear.mass() * &motion.cosines;
+        for (h, mut column) in forces.column_iter_mut().enumerate() {
+            column.axpy(-(h as f64 * motion.omega).powi(2), &inertia.column(h), 1.0);
+        }
+        let course = &self.waves * motion.cosines.transpose();
+        for (term, coefficient) in self.system.terms().iter().zip(self.system.coefficients()) {
+            let at = term.coordinate();
+            let force = DVector::from_fn(INSTANTS, |s, _| {
+                let q = at.of(&course.row(s).iter().copied().collect::<Vec<_>>());
+                coefficient * term.law().value(q, 0.0)
+            });
+            for (h, harmonic) in self.waves.tr_mul(&force).iter().enumerate() {
+                for (dof, sign) in at.signs() {
+                    forces[(dof, h)] += sign * share(h) * harmonic;
+                }
+            }
+        }
+        DVector::from_column_slice(forces.as_slice())
+    }
+
+    /// Derivatives of the forces and of the amplitude by the harmonics and the frequency.
+    fn jacobian(&self, motion: &Motion, dof: usize) -> DMatrix<f64> {
+        let (n, linear) = (self.system.dof(), self.system.linear());
+        let last = n * (HARMONICS + 1);
+        let mut jacobian = DMatrix::zeros(last + 1, last + 1);
+        let inertia = linear.mass() * &motion.cosines;
+        for h in 0..=HARMONICS {
+            let multiple = h as f64;
+            let own = linear.stiffness() - linear.mass() * (multiple * motion.omega).powi(2);
+            jacobian.view_mut((h * n, h * n), (n, n)).copy_from(&own);
+            let by_omega = inertia.column(h) * (-2.0 * multiple * multiple * motion.omega);
+            jacobian.view_mut((h * n, last), (n, 1)).copy_from(&by_omega);
+        }
+        let course = &self.waves * motion.cosines.transpose();
+        for (term, coefficient) in self.system.terms().iter().zip(self.system.coefficients()) {
+            let at = term.coordinate();
+            let mut bent = self.waves.clone();
+            for (s, mut row) in bent.row_iter_mut().enumerate() {
+                let q = at.of(&course.row(s).iter().copied().collect::<Vec<_>>());
+                row *= coefficient * term.law().slopes(q, 0.0)[0];
+            }
+            let harmonics = self.waves.tr_mul(&bent);
+            for ((h, l), slope) in
+                (0..=HARMONICS).flat_map(|l| (0..=HARMONICS).map(move |h| (h, l))).zip(&harmonics)
+            {
+                for (row, sign) in at.signs() {
+                    for (column, other) in at.signs() {
+                        jacobian[(h * n + row, l * n + column)] += sign * other * share(h) * slope;
+                    }
+                }
+            }
+        }
+        jacobian[(last, n + dof)] = 1.0;
+        jacobian
+    }
+}
+
+/// Factor of a sum over the instants in the harmonic.
+fn share(harmonic: usize) -> f64 {
+    if harmonic == 0 { 1.0 / INSTANTS as f64 } else { 2.0 / INSTANTS as f64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    use nalgebra::dmatrix;
+
+    use super::*;
+    use crate::{NonlinearParameter, Sdof};
+
+    /// Complete elliptic integral of the first kind by the arithmetic-geometric mean.
+    fn elliptic(parameter: f64) -> f64 {
+        let (mut a, mut b) = (1.0_f64, (1.0 - parameter).sqrt());
+        while (a - b).abs() > 1e-15 {
+            (a, b) = (0.5 * (a + b), (a * b).sqrt());
+        }
+        FRAC_PI_2 / a
+    }
+
+    /// Frequency, and amplitude of the fundamental, of ẍ + k x + k₃ x³ = 0 let go at `peak`:
+    /// x = peak cn(Ωt), Ω² = k + k₃ peak².
+    fn duffing(k: f64, cubic: f64, peak: f64) -> (f64, f64) {
+        let square = k + cubic * peak * peak;
+        let parameter = cubic * peak * peak / (2.0 * square);
+        let quarter = elliptic(parameter);
+        let nome = (-PI * elliptic(1.0 - parameter) / quarter).exp();
+        let fundamental = peak * TAU / (parameter.sqrt() * quarter) * nome.sqrt() / (1.0 + nome);
+        (PI * square.sqrt() / (2.0 * quarter), fundamental)
+    }
+
+    fn hardening() -> NonlinearSystem {
+        let linear = Sdof::new(1.0, 0.3, 4.0).unwrap().system();
+        // Dampers of any kind are left out.
+        let terms = "k3: x^3, c2: |v| v, cx: x^2 v".parse().unwrap();
+        NonlinearSystem::new(linear, terms, vec![0.8, 0.1, 0.1]).unwrap()
+    }
+
+    #[test]
+    fn the_backbone_of_a_cubic_spring_is_that_of_jacobi() {
+        let known = UncertainNonlinearSystem::exact(hardening());
+        let (omega, amplitudes): (Vec<f64>, Vec<f64>) =
+            [0.01, 0.5, 2.0, 6.0].map(|peak| duffing(4.0, 0.8, peak)).into_iter().unzip();
+        let points = known.backbone(0, &amplitudes).unwrap();
+        assert_eq!(points.len(), 4);
+        for (point, omega) in points.iter().zip(omega) {
+            assert!((point.omega / omega - 1.0).abs() < 1e-8, "{point:?}, {omega}");
+            assert_eq!(point.standard_error, 0.0);
+        }
+        // Straight to the largest, without the others on the way.
+        let alone = known.backbone(0, &amplitudes[3..]).unwrap();
+        assert!((alone[0].omega / points[3].omega - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn the_spring_between_two_equal_masses_bends_one_mode_alone() {
+        let linear = SecondOrderSystem::new(
+            DMatrix::identity(2, 2),
+            dmatrix![0.1, 0.0; 0.0, 0.2],
+            dmatrix![3.0, -1.0; -1.0, 3.0],
+        );
+        let terms = "kc: (x1-x2)^3".parse().unwrap();
+        let system = NonlinearSystem::new(linear.unwrap(), terms, vec![0.5]).unwrap();
+        let known = UncertainNonlinearSystem::exact(system);
+        let together = known.backbone(0, &[0.1, 1.0]).unwrap();
+        assert!(together.iter().all(|point| (point.omega - 2_f64.sqrt()).abs() < 1e-10));
+        // d = x₁ − x₂ obeys d̈ + 4 d + 2·0.5 d³ = 0.
+        let (omega, fundamental) = duffing(4.0, 1.0, 1.5);
+        let against = known.backbone(1, &[0.5 * fundamental]).unwrap();
+        assert!((against[0].omega / omega - 1.0).abs() < 1e-8, "{against:?}, {omega}");
+    }
+
+    #[test]
+    fn a_standard_error_is_that_of_the_changed_system() {
+        let (system, amplitude) = (hardening(), 1.2);
+        let at = |system: &NonlinearSystem| {
+            UncertainNonlinearSystem::exact(system.clone()).backbone(0, &[amplitude]).unwrap()[0]
+                .omega
+        };
+        let mut slopes = DVector::zeros(4);
+        let names = ["m", "c", "k", "k3"];
+        let parameters = names.map(|name| NonlinearParameter::named(name, &system).unwrap());
+        for (slope, parameter) in slopes.iter_mut().zip(parameters) {
+            let changed = |by| at(&system.changed(parameter, by).unwrap());
+            *slope = (changed(1e-4) - changed(-1e-4)) / 2e-4;
+        }
+        let root = DMatrix::from_fn(4, 4, |i, j| 0.01 * (1.0 + (3 * i + j) as f64).sin());
+        let covariance = &root * root.transpose();
+        let expected = slopes.dot(&(&covariance * &slopes)).sqrt();
+        let known = UncertainNonlinearSystem::new(system, parameters.to_vec(), covariance).unwrap();
+        let found = known.backbone(0, &[amplitude]).unwrap()[0].standard_error;
+        assert!((found / expected - 1.0).abs() < 1e-6, "{found}, {expected}");
+    }
+
+    #[test]
+    fn a_spring_that_softens_ends_where_it_gives_way() {
+        // x − x³: no vibration beyond the hilltops at ±1.
+        let linear = Sdof::new(1.0, 0.0, 1.0).unwrap().system();
+        let system = NonlinearSystem::new(linear, "k3: x^3".parse().unwrap(), vec![-1.0]).unwrap();
+        let known = UncertainNonlinearSystem::exact(system);
+        let points = known.backbone(0, &[0.2, 0.5, 0.8, 3.0]).unwrap();
+        assert_eq!(points.len(), 3, "{points:?}");
+        assert!(points.windows(2).all(|pair| pair[1].omega < pair[0].omega));
+    }
+
+    #[test]
+    fn modes_and_amplitudes_that_do_not_exist_are_refused() {
+        let known = UncertainNonlinearSystem::exact(hardening());
+        assert_eq!(known.backbone(1, &[1.0]), Err(ModelError::NoSuchMode { mode: 2, modes: 1 }));
+        assert!(known.backbone(0, &[-1.0]).unwrap_err().to_string().contains("amplitude"));
+    }
+}
