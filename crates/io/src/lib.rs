@@ -27,6 +27,7 @@ mod limits;
 mod line_spec;
 mod mat;
 mod output;
+mod responses;
 mod standard;
 mod system;
 mod table;
@@ -46,6 +47,7 @@ pub use line_spec::LineSpec;
 pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };
+pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -94,7 +94,7 @@ fn of_residual(residual: &Residual) -> Result<Vec<Finding>, AnalysisError> {
 }
 
 impl CheckRow {
-    fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
+    pub(super) fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
         Self {
             when,
             record,

@@ -305,17 +305,28 @@ impl Fitted {
             let mean = each.iter().map(|part| part * part).sum::<f64>() / each.len() as f64;
             return Ok(Some(mean.sqrt()));
         }
-        let Some((_, data)) = &self.frequency else { return Ok(None) };
-        let (mut left, mut all) = (0.0, 0.0);
-        for (row, omega) in data.omega().iter().enumerate() {
-            // In the quantity that was measured: a displacement weighs low lines most.
-            let factor = data.measured().per_displacement(*omega);
-            let measured = data.displacement().row(row).transpose() * factor;
-            let force = data.force().row(row).transpose();
-            let modelled = system.receptance(*omega)? * force * factor;
-            left += (&measured - modelled).norm_squared();
-            all += measured.norm_squared();
+        match &self.frequency {
+            Some((_, data)) => unexplained_motion(data, system),
+            None => Ok(None),
         }
-        Ok((all > 0.0).then(|| (left / all).sqrt()))
     }
+}
+
+/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data;
+/// `None` if nothing moves.
+pub(super) fn unexplained_motion(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+) -> Result<Option<f64>, AnalysisError> {
+    let (mut left, mut all) = (0.0, 0.0);
+    for (row, omega) in data.omega().iter().enumerate() {
+        // In the quantity that was measured: a displacement weighs low lines most.
+        let factor = data.measured().per_displacement(*omega);
+        let measured = data.displacement().row(row).transpose() * factor;
+        let force = data.force().row(row).transpose();
+        let modelled = system.receptance(*omega)? * force * factor;
+        left += (&measured - modelled).norm_squared();
+        all += measured.norm_squared();
+    }
+    Ok((all > 0.0).then(|| (left / all).sqrt()))
 }

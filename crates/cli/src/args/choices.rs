@@ -3,7 +3,7 @@
 use clap::ValueEnum;
 use mechid::analysis::{Detrend, frf, identify, reconstruct, sweep};
 use mechid::estimate::nonlinear;
-use mechid::model::Discretisation;
+use mechid::model::{Discretisation, ResponseQuantity};
 use mechid::signal::Extent;
 
 /// Defines a choice of the command line, which stands for an enum of the analysis with the same
@@ -30,6 +30,18 @@ choice! {
         None,
         /// The mean of the whole record
         Mean,
+    }
+}
+
+choice! {
+    /// Measured quantity of a frequency response.
+    QuantityChoice => ResponseQuantity {
+        /// Receptance, m/N
+        Displacement,
+        /// Mobility, m/(s·N)
+        Velocity,
+        /// Accelerance, m/(s²·N)
+        Acceleration,
     }
 }
 

@@ -9,7 +9,9 @@ mod record;
 mod sweep;
 pub mod trace;
 
-use mechid_analysis::{FrfTable, Identified, Inspected, Machine, Reconstructed, SweepSummary};
+use mechid_analysis::{
+    FrfTable, Identified, IdentifiedResponses, Inspected, Machine, Reconstructed, SweepSummary,
+};
 use mechid_plot::Figure;
 
 use crate::ReportError;
@@ -34,6 +36,14 @@ impl ToFigure for Identified {
             Some(data) => receptance::receptance(&title, data, &self.system()?),
             None => Ok(motion::motion(&title, &self.compared()?[0])),
         }
+    }
+}
+
+impl ToFigure for IdentifiedResponses {
+    /// Draws measured and identified receptance.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        let title = self.summary().files.join(", ");
+        receptance::receptance(&title, self.data(), &self.system()?)
     }
 }
 
