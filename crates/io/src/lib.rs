@@ -42,6 +42,7 @@ pub use experiment::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level, LoadBeyond,
     MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
+pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
 pub use output::{

@@ -156,13 +156,18 @@ impl BearingData {
                     0 => Pooling::PerLine,
                     wide => Pooling::Neighbours(wide),
                 };
-                (periods.mean_with_noise(pooling)?, Some("estimated from the periods"))
+                let noisy = periods.mean_with_noise(pooling)?;
+                match shows_noise(&noisy) {
+                    true => (noisy, Some("estimated from the periods")),
+                    false => (periods.mean()?, None),
+                }
             }
         };
         let mut remarks = held.unit_remarks.clone();
         if noise.is_none() {
             remarks.push(format!(
-                "{}: one period does not show its noise; it was taken as white on the displacement",
+                "{}: the periods show no noise ({count} of them); it was taken as white on the \
+                 displacement, of the level that the residual has",
                 held.file
             ));
         }
@@ -190,6 +195,17 @@ impl BearingData {
         self.left_out_hz = distinct(self.left_out_hz);
         Ok(self)
     }
+}
+
+/// Scatter of the periods over the displacement below which it is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether the scatter of the periods is more than rounding.
+fn shows_noise(data: &FrequencyData) -> bool {
+    let Some(noise) = data.noise() else { return false };
+    let variance = |row: usize| (0..2).map(|c| noise.covariance(row)[(c, c)].re).sum::<f64>();
+    let scatter: f64 = (0..data.len()).map(variance).sum();
+    scatter > ROUNDING * ROUNDING * data.displacement().norm_squared()
 }
 
 /// Sorted, each number once.

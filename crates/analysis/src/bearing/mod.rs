@@ -19,7 +19,7 @@
 //! | `film` | eight or twelve coefficients, with the baseline subtracted; the likelihood-ratio test |
 //! | `stiffness` | the dynamic stiffness line by line |
 //! | `summary` | the result: numbers, remarks |
-//! | `speeds` | results at several speeds and loads as one table |
+//! | `speeds` | tests at several speeds and loads, and their results as one table |
 //!
 //! # Source
 //! Childs and Hale (1994), Journal of Tribology 116, 337–344; Rouvas and Childs (1993), Journal of
@@ -39,7 +39,7 @@ use serde::{Serialize, Serializer};
 pub use self::data::BearingData;
 use self::film::Film;
 pub use self::settings::{BearingSize, Coefficients, IdentifyBearing};
-pub use self::speeds::BearingTable;
+pub use self::speeds::{BearingPlan, BearingPoint, BearingTable};
 pub use self::stiffness::StiffnessLine;
 pub use self::summary::{Amplitude, BearingSummary, CoefficientRow, Dimensionless, StabilityRow};
 use crate::AnalysisError;

@@ -1,7 +1,7 @@
 //! Words of the command line for the choices of the analysis.
 
 use clap::ValueEnum;
-use mechid::analysis::{Detrend, frf, identify, reconstruct, sweep};
+use mechid::analysis::{Detrend, bearing, frf, identify, reconstruct, sweep};
 use mechid::estimate::nonlinear;
 use mechid::model::{Discretisation, ResponseQuantity};
 use mechid::signal::Extent;
@@ -30,6 +30,18 @@ choice! {
         None,
         /// The mean of the whole record
         Mean,
+    }
+}
+
+choice! {
+    /// Coefficients of a film.
+    CoefficientsChoice => bearing::Coefficients {
+        /// Twelve if a likelihood-ratio test at 5 % finds inertia of the fluid, otherwise eight
+        Automatic,
+        /// Stiffness and damping
+        Eight,
+        /// Stiffness, damping and mass
+        Twelve,
     }
 }
 

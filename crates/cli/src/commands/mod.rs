@@ -5,6 +5,7 @@
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
 //! [`CliError`].
 
+mod bearing;
 mod completions;
 mod force;
 mod frf;
@@ -45,6 +46,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Bearing(bearing::BearingArgs),
     Completions(completions::CompletionsArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
@@ -63,6 +65,7 @@ impl Command {
     /// What the command found; nothing is printed or written yet.
     pub fn run(&self) -> Result<Outcome, CliError> {
         match self {
+            Command::Bearing(args) => args.run(),
             Command::Completions(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
@@ -81,6 +84,7 @@ impl Command {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         match self {
+            Command::Bearing(args) => args.files(),
             Command::Completions(_) => Files::default(),
             Command::Force(args) => args.files(),
             Command::Frf(args) => args.files(),
@@ -103,7 +107,7 @@ impl Command {
             _ if self.report().quiet => None,
             Command::Simulate(_) => Some("simulating"),
             Command::Force(_) => Some("looking for the force"),
-            Command::Identify(_) | Command::Report(_) => Some("identifying"),
+            Command::Bearing(_) | Command::Identify(_) | Command::Report(_) => Some("identifying"),
             _ => Some("working"),
         }
     }
@@ -111,6 +115,7 @@ impl Command {
     /// How the user wants to be told.
     pub fn report(&self) -> &ReportArgs {
         match self {
+            Command::Bearing(args) => &args.report,
             Command::Completions(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,

@@ -1,5 +1,6 @@
 //! Figures of the results of an analysis.
 
+mod bearing;
 mod force;
 mod frf;
 pub mod modal;
@@ -9,8 +10,10 @@ mod record;
 mod sweep;
 pub mod trace;
 
+use mechid_analysis::bearing::BearingTable;
 use mechid_analysis::{
-    FrfTable, Identified, IdentifiedResponses, Inspected, Machine, Reconstructed, SweepSummary,
+    FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
+    Reconstructed, SweepSummary,
 };
 use mechid_plot::Figure;
 
@@ -44,6 +47,20 @@ impl ToFigure for IdentifiedResponses {
     fn figure(&self) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
         receptance::receptance(&title, self.data(), &self.system()?)
+    }
+}
+
+impl ToFigure for IdentifiedBearing {
+    /// Draws the dynamic stiffness, measured line by line and fitted.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(bearing::dynamic_stiffness(self.summary()))
+    }
+}
+
+impl ToFigure for BearingTable {
+    /// Draws the coefficients over speed.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(bearing::over_speed(self))
     }
 }
 
