@@ -234,3 +234,24 @@ fn a_window_outside_the_record_says_what_there_is() {
         assert!(matches!(refused, Err(AnalysisError::Window { len: 256, .. })));
     }
 }
+
+/// A response that is the force itself leaves no residual at all.
+#[test]
+fn a_response_equal_to_the_force_is_no_panic() {
+    for periods in [1, 2, 4] {
+        let one = Multisine::flat(1..=9, 1.0, Phases::Schroeder)
+            .unwrap()
+            .sample(Sampling::new(0.01, 24).unwrap())
+            .unwrap();
+        let force = one.repeated(periods).unwrap();
+        for kind in [ResponseQuantity::Displacement, ResponseQuantity::Acceleration] {
+            let test = Measurement::from_records(&force, &[(kind, &force)]).unwrap();
+            for how in [Identify::default(), Identify::spectra(Method::LeastSquares)] {
+                // A machine or a reason why not.
+                if let Ok(found) = identify(&[test.clone().period(24).unwrap()], &how) {
+                    assert!(found.checks().iter().all(|check| !check.text.contains("NaN")));
+                }
+            }
+        }
+    }
+}

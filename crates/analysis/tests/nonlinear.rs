@@ -105,7 +105,8 @@ fn output_error_takes_noise_on_the_response() {
     let (force, x) = steady_state();
     let x = noise::add_white(&x, noise::NoiseLevel::FractionOfRms(0.01), 3).unwrap();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    let likely = Identify { fit: Fit::Spectra { method: Method::MaximumLikelihood }, ..how() };
+    let likely =
+        Identify { fit: Fit::Spectra { method: Some(Method::MaximumLikelihood) }, ..how() };
     let found = identify(&[test], &likely).unwrap();
     let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().found;
     assert!((cubic.value - 4e6).abs() < 4.0 * cubic.standard_error, "{cubic:?}");
@@ -134,7 +135,9 @@ fn a_force_alone_is_enough_for_a_prediction() {
 fn what_nonlinear_terms_cannot_be_fitted_to_is_refused() {
     let (force, x) = steady_state();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    for fit in [Fit::Samples(SampleFit::default()), Fit::Spectra { method: Method::Instrumental }] {
+    for fit in
+        [Fit::Samples(SampleFit::default()), Fit::Spectra { method: Some(Method::Instrumental) }]
+    {
         let error = identify(std::slice::from_ref(&test), &Identify { fit, ..how() }).unwrap_err();
         assert!(matches!(error, AnalysisError::Setting { setting: "nonlinear", .. }), "{error}");
     }

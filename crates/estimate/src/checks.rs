@@ -8,34 +8,38 @@ mod after;
 mod before;
 mod correlation;
 mod delay;
+mod family;
 mod finding;
 mod kinematics;
 mod linearity;
-mod misfit;
 mod period;
 mod power;
 mod range;
 mod regressors;
+mod response_residual;
 mod sentences;
 mod spectral;
+mod spectral_residual;
 pub mod thresholds;
 
 pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
 pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
 pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines};
+pub use family::adjust_p_values;
 pub use finding::{
     Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
-    Power, Quantity, Residual,
+    Power, Quantity, Reference, Residual,
 };
 pub use kinematics::kinematics;
 pub use linearity::linearity;
-pub use misfit::{after_response_fit, after_spectral_fit};
 pub use period::claimed_period;
 pub use power::power;
-pub use range::{clipped_channels, constant_channels};
+pub use range::{clipped_channels, constant_channels, quantised_channels, spiked_channels};
 pub use regressors::noise_on_response;
-pub use spectral::{before_response_fit, before_spectral_fit};
+pub use response_residual::after_response_fit;
+pub use spectral::{before_response_fit, before_spectral_fit, fitted_band};
+pub use spectral_residual::{AfterSpectralFit, SpectralResidual, after_spectral_fit};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.
 const MAX_SAMPLES: usize = 1 << 15;
@@ -61,7 +65,7 @@ pub enum Subject {
     Excitation,
     /// Conditioning of the regressors.
     Conditioning,
-    /// Channels that are clipped or constant.
+    /// Channels that are clipped, constant, coarsely quantised, or hold a spike.
     Range,
     /// Consistency of displacement, velocity and acceleration.
     Kinematics,
@@ -75,8 +79,8 @@ pub enum Subject {
     Coherence,
     /// Delay between force and response.
     Delay,
-    /// Noise on the response that biases the fit.
-    NoiseOnResponse,
+    /// Bias of the estimate by noise on the response.
+    Bias,
     /// Residual power against the noise.
     Misfit,
     /// Residual against powers of the displacement.

@@ -126,6 +126,17 @@ impl NoiseSpectrum {
         self
     }
 
+    /// The noise of data whose force is `delay` seconds later.
+    pub(crate) fn with_later_force(&self, delay: f64) -> Self {
+        let mut later = self.clone();
+        for (c, omega) in later.covariance.iter_mut().zip(&self.omega) {
+            let (n, turn) = (c.nrows() / 2, Complex::cis(-omega * delay));
+            c.rows_mut(n, n).apply(|v| *v *= turn);
+            c.columns_mut(n, n).apply(|v| *v *= turn.conj());
+        }
+        later
+    }
+
     /// Degrees of freedom n of the system; the matrices are 2n×2n.
     pub fn dof(&self) -> usize {
         self.covariance[0].nrows() / 2

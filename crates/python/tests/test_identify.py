@@ -117,7 +117,10 @@ def test_arrays_of_any_layout_and_number_type_are_the_file(columns: dict[str, np
 
 def test_least_squares_on_spectra_is_that_of_numpy(columns: dict[str, np.ndarray]) -> None:
     """Judge: the equation of motion on every driven line, stacked and solved by NumPy alone."""
-    found = mechid.identify(columns["force"], columns["displacement"], fs=128.0, period=256, lines="4:60")
+    found = mechid.identify(
+        columns["force"], columns["displacement"], fs=128.0, period=256, lines="4:60",
+        method="least-squares",
+    )
     lines = np.arange(4, 61)
     force, x = (
         np.fft.rfft(columns[name].reshape(2, 256).mean(axis=0))[lines]

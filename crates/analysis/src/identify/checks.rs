@@ -1,21 +1,16 @@
 //! Checks before and after the fit, record by record.
 
+use mechid_estimate::checks::thresholds::{LAGS, SAMPLES_PER_LAG};
 use mechid_estimate::checks::{
-    Finding, Quantity, Subject, Verdict, after_fit, clipped_channels, constant_channels,
-    kinematics, power,
+    Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
+    constant_channels, kinematics, power, quantised_channels, spiked_channels,
 };
 use mechid_model::ResponseQuantity;
 use serde::Serialize;
 
-use super::spectra::{Fitted, Residual};
+use super::spectra::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
 use crate::measurement::Block;
-
-/// Lags up to which a residual is correlated.
-pub const LAGS: usize = 25;
-
-/// Samples that a lag takes at least.
-pub const SAMPLES_PER_LAG: usize = 4;
 
 /// One finding, with the record it belongs to.
 #[derive(Debug, Serialize)]
@@ -47,24 +42,33 @@ pub enum When {
     After,
 }
 
-/// All findings before and after a fit.
+/// All findings before and after a fit, with one error rate for the statistical tests among them.
 pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>, AnalysisError> {
-    let mut rows = Vec::new();
-    let mut add = |when, at: usize, findings: &[Finding]| {
-        let name = (records.len() > 1).then(|| records[at].file.clone());
-        rows.extend(findings.iter().map(|finding| CheckRow::new(when, name.clone(), finding)));
+    let mut all: Vec<(When, Option<usize>, Finding)> = Vec::new();
+    let mut add = |when, at: Option<usize>, findings: &[Finding]| {
+        all.extend(findings.iter().map(|finding| (when, at, finding.clone())));
     };
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
-        add(When::Before, at, checks);
-        add(When::Before, at, &of_channels(record)?);
+        add(When::Before, Some(at), checks);
+        add(When::Before, Some(at), &of_channels(record)?);
     }
     for (at, checks) in fitted.after.iter().enumerate() {
-        add(When::After, at, checks);
+        add(When::After, Some(at), checks);
     }
+    add(When::After, None, &fitted.after_all);
     for (at, residual) in fitted.residuals.iter().enumerate() {
-        add(When::After, at, &of_residual(residual)?);
+        let checks = match residual {
+            Residual::Samples(residual) => of_samples(residual)?,
+            Residual::Lines(residual) => residual.findings(),
+        };
+        add(When::After, Some(at), &checks);
     }
-    Ok(rows)
+    adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
+    let name = |at: usize| (records.len() > 1).then(|| records[at].file.clone());
+    let row = |(when, at, finding): &(When, Option<usize>, Finding)| {
+        CheckRow::new(*when, at.and_then(name), finding)
+    };
+    Ok(all.iter().map(row).collect())
 }
 
 /// Faults of the channels themselves, whatever is fitted to them.
@@ -73,6 +77,8 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
     for (kind, motion) in measured.responses() {
         findings.extend(clipped_channels(Quantity::Response(kind), motion));
         findings.extend(constant_channels(Quantity::Response(kind), motion));
+        findings.extend(quantised_channels(Quantity::Response(kind), motion));
+        findings.extend(spiked_channels(Quantity::Response(kind), motion, &measured.force));
     }
     findings.extend(kinematics(&measured.responses())?);
     // A velocity gives the power without differentiation.
@@ -85,11 +91,18 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
 }
 
 /// Tests of a residual; none if it has too few samples.
-fn of_residual(residual: &Residual) -> Result<Vec<Finding>, AnalysisError> {
-    let Residual { left, fitted, force, noise_span } = residual;
-    match LAGS.min(left.len().saturating_sub(*noise_span) / SAMPLES_PER_LAG) {
+fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> {
+    let SampleResidual { left, fitted, force, noise_span } = residual;
+    match residual.lags() {
         0 => Ok(Vec::new()),
         lags => Ok(after_fit(left, fitted, force, lags, *noise_span)?),
+    }
+}
+
+impl SampleResidual {
+    /// Returns the number of lags at which it is correlated; 0 if it has too few samples.
+    pub fn lags(&self) -> usize {
+        LAGS.min(self.left.len().saturating_sub(self.noise_span) / SAMPLES_PER_LAG)
     }
 }
 

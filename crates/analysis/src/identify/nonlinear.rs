@@ -9,13 +9,13 @@ use mechid_estimate::nonlinear::{
     output_error,
 };
 use mechid_model::Terms;
-use mechid_signal::{Extent, driven_lines, lines};
+use mechid_signal::{Extent, Record, driven_lines, lines};
 use serde::{Deserialize, Serialize};
 
 use super::lines::{LineChoice, choose_lines};
 use super::options::Method;
 use super::prediction::{Model, Prediction};
-use super::spectra::{Fitted, one_motion_of, periods, steady_residuals};
+use super::spectra::{Fitted, Residual, SampleResidual, one_motion_of, periods};
 use super::summary::Uncertain;
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
@@ -112,7 +112,7 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     choice: &LineChoice,
-    method: Method,
+    method: Option<Method>,
     how: &Nonlinear,
 ) -> Result<Fitted, AnalysisError> {
     let first = &records[0].held;
@@ -125,7 +125,7 @@ pub(super) fn fit(
     }
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     let start = equation_error(&data, unknowns, &how.terms, &options)?;
-    let (estimator, found) = match method {
+    let (estimator, found) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
         }
@@ -170,6 +170,7 @@ pub(super) fn fit(
         frequency: spectra.map(|data| (band, data)),
         before,
         after: vec![Vec::new(); records.len()],
+        after_all: Vec::new(),
         residuals: steady_residuals(records, &model)?,
         prediction: Prediction::Steady,
         misfit: None,
@@ -192,6 +193,23 @@ fn all_lines(held: &Block, choice: &LineChoice) -> Result<Vec<usize>, AnalysisEr
             (1..=last).collect()
         }
     })
+}
+
+/// Returns, record by record, the part of the response that the steady state under the measured force
+/// leaves, means apart.
+fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>, AnalysisError> {
+    let mut residuals = Vec::new();
+    for Windowed { held, .. } in records {
+        let fitted = held.response().0.without_mean();
+        let predicted = Prediction::Steady.predict(model, held)?.swap_remove(0).predicted;
+        residuals.push(Residual::Samples(SampleResidual {
+            left: Record::new(fitted.sampling(), fitted.data() - predicted.data())?,
+            fitted,
+            force: held.force.clone(),
+            noise_span: 0,
+        }));
+    }
+    Ok(residuals)
 }
 
 fn mean_period(held: &Block) -> Result<SteppedRecord, AnalysisError> {

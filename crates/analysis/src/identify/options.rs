@@ -44,8 +44,10 @@ pub struct Identify {
 pub enum Fit {
     /// Spectral lines of whole periods.
     Spectra {
-        /// Estimator.
-        method: Method,
+        /// Estimator; `None`: maximum likelihood where two periods or more show the noise, otherwise
+        /// least squares.
+        #[serde(default)]
+        method: Option<Method>,
     },
     /// Frequency responses, averaged over segments.
     Responses(ResponseFit),
@@ -55,16 +57,15 @@ pub enum Fit {
 
 impl Default for Fit {
     fn default() -> Self {
-        Fit::Spectra { method: Method::default() }
+        Fit::Spectra { method: None }
     }
 }
 
 /// Estimator of the parameters from spectra.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Least squares on the equation of motion; biased by noise on the response.
-    #[default]
     LeastSquares,
     /// Instrumental variables, one half of the periods against the other; not biased.
     Instrumental,
@@ -213,7 +214,7 @@ impl fmt::Display for Derivatives {
 impl Identify {
     /// Fits spectral lines of whole periods.
     pub fn spectra(method: Method) -> Self {
-        Self { fit: Fit::Spectra { method }, ..Self::default() }
+        Self { fit: Fit::Spectra { method: Some(method) }, ..Self::default() }
     }
 
     /// Fits frequency responses averaged over segments.

@@ -10,8 +10,8 @@ use mechid_signal::Extent;
 
 use super::lines::LineChoice;
 use super::options::{Method, ResponseFit};
-use super::prediction::{Model, Prediction};
-use super::spectra::{Fitted, Misfit, one_motion_of, steady_residuals};
+use super::prediction::Prediction;
+use super::spectra::{Fitted, Misfit, one_motion_of};
 use super::summary::LinesUsed;
 use crate::AnalysisError;
 use crate::frf::Responses;
@@ -36,6 +36,8 @@ pub fn fit(
     let first = all.remove(0);
     let data = all.iter().try_fold(first, |data, own| data.and(own))?;
     let (name, found, misfit) = found(&data, unknowns, *method)?;
+    // Says what the data leave open, before anything is made of it.
+    found.system()?;
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
@@ -54,11 +56,8 @@ pub fn fit(
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,
-        residuals: if periodic {
-            steady_residuals(records, &Model::Linear(found.system()?))?
-        } else {
-            Vec::new()
-        },
+        after_all: Vec::new(),
+        residuals: Vec::new(),
         prediction: match periodic {
             true => Prediction::Steady,
             false => Prediction::Sampled {

@@ -13,7 +13,7 @@ use super::CONSPICUOUS;
 use super::derivatives::Prepared;
 use super::options::{Between, Derivatives, SampleFit};
 use super::prediction::Prediction;
-use super::spectra::{Fitted, Residual};
+use super::spectra::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
@@ -170,6 +170,7 @@ impl SampleFit {
             frequency: None,
             before,
             after,
+            after_all: Vec::new(),
             residuals: residuals.collect::<Result<_, _>>()?,
             prediction: self.prediction(Discretisation::FirstOrderHold),
             misfit: None,
@@ -221,7 +222,7 @@ impl SampleFit {
             let force = p.force.window(0, left.len())?;
             // An error of a measured state is in the interval before it and in the one after.
             let noise_span = self.noise_span() + 1;
-            Ok(Residual { left, fitted, force, noise_span })
+            Ok(Residual::Samples(SampleResidual { left, fitted, force, noise_span }))
         };
         let residuals = records.iter().zip(prepared).map(left).collect::<Result<_, _>>()?;
         let method = TimeDomain::new(discretisation, Extent::Open);
@@ -237,6 +238,7 @@ impl SampleFit {
             frequency: None,
             before,
             after: prepared.iter().map(late).collect(),
+            after_all: Vec::new(),
             residuals,
             prediction: self.prediction(discretisation),
             misfit: None,
@@ -311,7 +313,8 @@ fn left_of_equation(
     let record = |data| Record::new(a.sampling(), data);
     let residual = || {
         let (left, fitted) = (record(left)?, record(inertia)?);
-        Ok(Residual { left, fitted, force: p.force.clone(), noise_span })
+        let force = p.force.clone();
+        Ok(Residual::Samples(SampleResidual { left, fitted, force, noise_span }))
     };
     Some(residual())
 }

@@ -2,7 +2,10 @@
 
 use std::fmt;
 
-use mechid_estimate::checks::{Finding, after_spectral_fit, before_spectral_fit, delay_of_lines};
+use mechid_estimate::checks::{
+    AfterSpectralFit, Finding, SpectralResidual, Subject, Verdict, after_spectral_fit,
+    before_spectral_fit, delay_of_lines, fitted_band,
+};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
     output_error,
@@ -26,7 +29,7 @@ pub struct Fitted {
     pub domain: &'static str,
     /// Name of the estimator.
     pub estimator: &'static str,
-    /// Spectra were fitted by least squares, where another method allows for noise.
+    /// The checks after the fit see the bias of least squares, which another method does not have.
     pub least_squares: bool,
     /// Estimate with its uncertainty; with nonlinear terms, of the linear part.
     pub estimate: Estimate,
@@ -40,7 +43,9 @@ pub struct Fitted {
     pub before: Vec<Vec<Finding>>,
     /// Findings after the fit beside those on the residuals, record by record.
     pub after: Vec<Vec<Finding>>,
-    /// Residual of each record; empty where it is not a row of samples.
+    /// Findings after the fit on all records together.
+    pub after_all: Vec<Finding>,
+    /// Residual of each record; empty where it is not tested by itself.
     pub residuals: Vec<Residual>,
     /// Kind of prediction of the response to a measured force.
     pub prediction: Prediction,
@@ -66,9 +71,18 @@ impl fmt::Display for Misfit {
     }
 }
 
-/// Residual of a fit.
+/// Residual of a fit, as it is tested.
 #[derive(Debug)]
-pub struct Residual {
+pub enum Residual {
+    /// Samples.
+    Samples(SampleResidual),
+    /// Lines of a spectrum, weighted by their noise.
+    Lines(SpectralResidual),
+}
+
+/// Residual of a fit sample by sample.
+#[derive(Debug)]
+pub struct SampleResidual {
     /// Residual, samples × degrees of freedom.
     pub left: Record,
     /// The fitted signal, used to tell rounding from noise.
@@ -79,6 +93,10 @@ pub struct Residual {
     pub noise_span: usize,
 }
 
+/// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
+/// degrees of freedom, which take seconds.
+const LIKELIHOOD_PARAMETERS: usize = 1200;
+
 /// The periods of a record on the lines found in its force.
 type Spectra = (RepeatedPeriods, Lines);
 
@@ -88,7 +106,7 @@ pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     lines: &LineChoice,
-    method: Method,
+    method: Option<Method>,
 ) -> Result<Fitted, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
@@ -98,31 +116,46 @@ pub(super) fn fit(
         spectra.push((periods(recorded, &lines)?, lines));
     }
     let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, misfit, remark } = found(&spectra, &data, unknowns, method)?;
-    let (mut before, mut after) = (Vec::new(), Vec::new());
+    let Found { estimator, estimate, mut misfit, remark } =
+        found(&spectra, &data, unknowns, method)?;
+    // Says what the data leave open, before anything is made of it.
+    estimate.system()?;
+    let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
     for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
         let (motion, kind) = held.response();
-        before.push(before_spectral_fit(lines, &held.force, motion, kind, unknowns)?);
-        let own = lines.as_slice().len() as f64 / data.len() as f64;
-        let fitted = own * estimate.parameters().len() as f64;
-        let late = delay_of_lines(&weighted(periods)?, lines.sampling().dt(), unknowns);
-        after.push(late.into_iter().chain(of_noise(periods, &estimate, fitted)?).collect());
+        let checks = before_spectral_fit(lines, &held.force, motion, kind, unknowns)?;
+        // What differs between windows that are no periods is no noise.
+        let repeats = !checks.iter().any(no_period);
+        let data = if repeats { with_noise(periods)? } else { periods.mean()? };
+        misfit = misfit.filter(|_| repeats);
+        before.push(checks);
+        let band = fitted_band(&estimate, lines)?;
+        let late = delay_of_lines(&data, lines.sampling().dt(), unknowns);
+        after.push(band.into_iter().chain(late).collect());
+        weighted.push(data);
     }
+    let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&weighted, &estimate)?;
     Ok(Fitted {
         domain: "frequency",
         estimator,
-        least_squares: method == Method::LeastSquares,
+        least_squares: false,
         equations: 2 * data.len(),
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        residuals: steady_residuals(records, &Model::Linear(estimate.system()?))?,
+        after_all: Vec::from_iter(bias),
+        residuals: residuals.into_iter().map(Residual::Lines).collect(),
         prediction: Prediction::Steady,
         misfit,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
         estimate,
     })
+}
+
+/// Whether a finding says that the windows are no periods of the record.
+fn no_period(finding: &Finding) -> bool {
+    finding.subject() == Subject::Periodicity && finding.verdict() == Verdict::Bad
 }
 
 /// An estimate from spectra.
@@ -133,45 +166,62 @@ struct Found {
     remark: Option<String>,
 }
 
-/// Returns the estimate of a method from the spectra, of which `data` are the means.
+/// Returns the estimate of a method from the spectra, of which `data` are the means; without a method, of
+/// maximum likelihood if the periods show the noise and the search ends well, otherwise of least squares.
 fn found(
     spectra: &[Spectra],
     data: &FrequencyData,
     unknowns: &Unknowns,
-    method: Method,
+    method: Option<Method>,
 ) -> Result<Found, AnalysisError> {
-    let plain = |estimator, estimate| Found { estimator, estimate, misfit: None, remark: None };
-    Ok(match method {
-        Method::LeastSquares => plain(
-            "least squares on the equation of motion, in the frequency domain",
-            equation_error(data, unknowns)?,
-        ),
-        Method::Instrumental => {
+    let least_squares = |remark| -> Result<Found, AnalysisError> {
+        let estimator = "least squares on the equation of motion, in the frequency domain";
+        let estimate = equation_error(data, unknowns)?;
+        Ok(Found { estimator, estimate, misfit: None, remark })
+    };
+    let likelihood = |noisy: &FrequencyData| -> Result<Found, EstimateError> {
+        let (fit, noise) = (output_error(noisy, unknowns)?, "estimated from the periods");
+        let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
+        Ok(Found {
+            estimator: "maximum likelihood, in the frequency domain",
+            estimate: fit.estimate,
+            misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise }),
+            remark: of_pooling(fewest, noisy.noise().is_some()),
+        })
+    };
+    match method {
+        Some(Method::LeastSquares) => least_squares(None),
+        Some(Method::Instrumental) => {
             let first = together(spectra, &|periods| Ok(periods.halves()?.0))?;
             let second = together(spectra, &|periods| Ok(periods.halves()?.1))?;
-            plain(
-                "instrumental variables, half of the periods against the other",
-                instrumental_variables(&first, &second, unknowns)?,
-            )
+            Ok(Found {
+                estimator: "instrumental variables, half of the periods against the other",
+                estimate: instrumental_variables(&first, &second, unknowns)?,
+                misfit: None,
+                remark: None,
+            })
         }
-        Method::MaximumLikelihood => {
-            let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
-            let fit = match pooling(fewest) {
-                None => output_error(data, unknowns)?,
-                Some(pooling) => {
-                    let noisy = together(spectra, &|periods| periods.mean_with_noise(pooling))?;
-                    output_error(&noisy, unknowns)?
-                }
-            };
-            let noise = "estimated from the periods";
-            Found {
-                estimator: "maximum likelihood, in the frequency domain",
-                estimate: fit.estimate,
-                misfit: (fewest > 1).then_some(Misfit { ratio: fit.misfit_ratio, noise }),
-                remark: of_pooling(fewest),
+        Some(Method::MaximumLikelihood) => Ok(likelihood(&together(spectra, &with_noise)?)?),
+        None => {
+            let noisy = together(spectra, &with_noise)?;
+            if noisy.noise().is_none() {
+                return least_squares(None);
+            }
+            if unknowns.free().len() > LIKELIHOOD_PARAMETERS {
+                return least_squares(Some(format!(
+                    "least squares was used, for {} parameters: noise on the response biases it. \
+                     Maximum likelihood takes minutes; --method maximum-likelihood chooses it",
+                    unknowns.free().len()
+                )));
+            }
+            match likelihood(&noisy) {
+                Err(error @ EstimateError::NotConverged { .. }) => least_squares(Some(format!(
+                    "least squares was used, which noise on the response biases: {error}"
+                ))),
+                other => Ok(other?),
             }
         }
-    })
+    }
 }
 
 /// The rows of all records.
@@ -197,22 +247,11 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(all)
 }
 
-/// Returns the misfit against the noise of the periods, if there are several.
-fn of_noise(
-    periods: &RepeatedPeriods,
-    estimate: &Estimate,
-    fitted: f64,
-) -> Result<Option<Finding>, AnalysisError> {
-    let Some(pooling) = pooling(periods.count()) else { return Ok(None) };
-    Ok(after_spectral_fit(&periods.mean_with_noise(pooling)?, estimate, fitted))
-}
-
-/// The mean of the periods, with their noise if it shows.
-fn weighted(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
-    match pooling(periods.count()) {
-        Some(pooling) => periods.mean_with_noise(pooling),
-        None => periods.mean(),
-    }
+/// The mean of the periods, with their noise if they show more than rounding.
+fn with_noise(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
+    let Some(pooling) = pooling(periods.count()) else { return periods.mean() };
+    let noisy = periods.mean_with_noise(pooling)?;
+    if noisy.noise_above_rounding().is_some() { Ok(noisy) } else { periods.mean() }
 }
 
 /// Returns how the noise of `periods` periods is averaged over the lines; `None` for one period.
@@ -224,12 +263,17 @@ fn pooling(periods: usize) -> Option<Pooling> {
     }
 }
 
-/// Returns the remark on weights from `periods` periods.
-fn of_pooling(periods: usize) -> Option<String> {
+/// Returns the remark on weights from `periods` periods, whose noise shows or not.
+fn of_pooling(periods: usize, shows: bool) -> Option<String> {
     match periods {
         0 | 1 => Some(
             "one period does not show its noise: it was taken as white on the motion, of the level \
              the residual has"
+                .into(),
+        ),
+        _ if !shows => Some(
+            "the periods differ by rounding only: the noise was taken as white on the motion, of the \
+             level the residual has"
                 .into(),
         ),
         few @ 2..8 => Some(format!("{few} periods are few: one noise level for all lines")),
@@ -242,26 +286,6 @@ pub fn one_motion_of(measured: &Block) -> Vec<String> {
     let unused = measured.responses().len() > 1;
     let kind = measured.response().1;
     Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
-}
-
-/// The motion that is left of what is held when the machine's steady state under the measured force
-/// is taken away, means apart.
-pub fn steady_residuals(
-    records: &[Windowed],
-    model: &Model,
-) -> Result<Vec<Residual>, AnalysisError> {
-    let mut residuals = Vec::new();
-    for Windowed { held: measured, .. } in records {
-        let motion = measured.response().0.without_mean();
-        let predicted = Prediction::Steady.predict(model, measured)?.swap_remove(0).predicted;
-        residuals.push(Residual {
-            left: Record::new(motion.sampling(), motion.data() - predicted.data())?,
-            fitted: motion,
-            force: measured.force.clone(),
-            noise_span: 0,
-        });
-    }
-    Ok(residuals)
 }
 
 impl Fitted {
@@ -291,8 +315,14 @@ impl Fitted {
         (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
     }
 
-    /// RMS of measured minus modelled motion over RMS of the measured motion, on the lines used:
-    /// what no choice of these parameters' uncertainty accounts for.
+    /// Returns whether frequency responses were fitted, weighted by their noise.
+    pub fn is_weighted(&self) -> bool {
+        let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
+        noise_stated && !self.least_squares
+    }
+
+    /// RMS of measured minus modelled response over RMS of the measured response, on the lines used:
+    /// in the quantity measured or, where the fit was weighted by the noise, in units of the noise.
     ///
     /// # Errors
     /// If the model has no receptance at a line.
@@ -312,21 +342,28 @@ impl Fitted {
     }
 }
 
-/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data;
-/// `None` if nothing moves.
+/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data,
+/// weighted by the noise where it is known; `None` if nothing moves.
 pub(super) fn unexplained_motion(
     data: &FrequencyData,
     system: &SecondOrderSystem,
 ) -> Result<Option<f64>, AnalysisError> {
     let (mut left, mut all) = (0.0, 0.0);
     for (row, omega) in data.omega().iter().enumerate() {
-        // In the quantity that was measured: a displacement weighs low lines most.
-        let factor = data.measured().per_displacement(*omega);
-        let measured = data.displacement().row(row).transpose() * factor;
-        let force = data.force().row(row).transpose();
-        let modelled = system.receptance(*omega)? * force * factor;
-        left += (&measured - modelled).norm_squared();
-        all += measured.norm_squared();
+        let measured = data.displacement().row(row).transpose();
+        let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
+        // A displacement weighs low lines most, whatever their noise.
+        let quantity = data.measured().per_displacement(*omega).norm_sqr();
+        for channel in 0..data.dof() {
+            let weight = match data.noise() {
+                Some(noise) => noise.covariance(row)[(channel, channel)].re.recip(),
+                None => quantity,
+            };
+            if weight.is_finite() {
+                left += weight * (measured[channel] - modelled[channel]).norm_sqr();
+                all += weight * measured[channel].norm_sqr();
+            }
+        }
     }
     Ok((all > 0.0).then(|| (left / all).sqrt()))
 }

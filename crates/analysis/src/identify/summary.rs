@@ -3,6 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
+use mechid_estimate::checks::Subject;
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
@@ -194,7 +195,10 @@ impl IdentificationSummary {
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
             fit: FitRow {
-                nrmse: fitted.nrmse(),
+                nrmse: match fitted.is_weighted() {
+                    true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
+                    false => fitted.nrmse(),
+                },
                 unexplained_motion,
                 misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
                 condition_number: estimate.condition(),
@@ -229,7 +233,13 @@ impl IdentificationSummary {
     /// Returns what in the numbers themselves speaks against them.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
-        if let Some(part) = self.fit.unexplained_motion.filter(|part| *part > CONSPICUOUS) {
+        let mut misfits = self.checks.iter().filter(|check| check.subject == Subject::Misfit);
+        // Of a residual that is noise the checks tell.
+        let is_noise = misfits.next().is_some_and(|check| !check.is_conspicuous())
+            && misfits.all(|check| !check.is_conspicuous());
+        let unexplained =
+            self.fit.unexplained_motion.filter(|part| *part > CONSPICUOUS && !is_noise);
+        if let Some(part) = unexplained {
             let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
             doubts.push(format!(
                 "the {model} leaves {:.1} % of the motion unexplained: noise, a nonlinearity, a \

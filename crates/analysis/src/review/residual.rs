@@ -1,11 +1,10 @@
 //! Residual of the measured response after the identified system's prediction.
 
-use mechid_estimate::checks::{Correlation, cross_correlation, whiteness};
+use mechid_estimate::checks::{Correlation, SpectralResidual, cross_correlation, whiteness};
 use mechid_signal::{Record, measures};
 
 use crate::AnalysisError;
 use crate::identify::Identified;
-use crate::identify::checks::{LAGS, SAMPLES_PER_LAG};
 use crate::identify::prediction::Compared;
 use crate::identify::spectra;
 use crate::measurement::Block;
@@ -17,7 +16,7 @@ const ROUNDING: f64 = 1e-12;
 pub struct Residual {
     /// Every kind of motion measured.
     pub compared: Vec<Compared>,
-    /// Correlations of each residual channel; empty where the fit leaves no row of samples.
+    /// Correlations of each residual channel; empty where it is not tested by itself.
     pub correlations: Vec<Correlations>,
     /// The first kind of motion in the mean period, where there are several.
     pub mean: Option<Compared>,
@@ -25,12 +24,25 @@ pub struct Residual {
 
 /// Correlations of one channel of a residual.
 pub struct Correlations {
-    /// Autocorrelation.
-    pub own: Correlation,
-    /// Lags over which noise on the motion correlates it.
-    pub span: usize,
+    /// Correlation with itself; `None` if there are too few lines.
+    pub own: Option<OwnCorrelation>,
+    /// Time between two lags of the correlation with a force, in s.
+    pub lag: f64,
     /// Cross-correlation with each force that acts, by its degree of freedom counted from 0.
     pub forces: Vec<(usize, Correlation)>,
+}
+
+/// Correlation of a channel of a residual with itself.
+pub enum OwnCorrelation {
+    /// Correlation from sample to sample, at the lags 1, 2 …
+    Samples {
+        /// Autocorrelation.
+        correlation: Correlation,
+        /// Number of lags over which noise on the response correlates it.
+        span: usize,
+    },
+    /// Correlation from line to line: real and imaginary part at the distances 1, 2 …
+    Lines(Correlation),
 }
 
 impl Residual {
@@ -45,7 +57,8 @@ impl Residual {
         let mean = mean.map(|mean| prediction.predict(&model, mean)).transpose()?;
         let mean = mean.map(|mut motions| motions.swap_remove(0));
         let correlations = match found.fitted().residuals.get(at) {
-            Some(left) => correlations(left)?,
+            Some(spectra::Residual::Samples(residual)) => of_samples(residual)?,
+            Some(spectra::Residual::Lines(residual)) => of_lines(residual),
             None => Vec::new(),
         };
         Ok(Self { compared, correlations, mean })
@@ -62,22 +75,36 @@ pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     (size, if left > ROUNDING * size { left } else { 0.0 })
 }
 
-/// At the lags at which `mechid identify` judges the residual.
-fn correlations(residual: &spectra::Residual) -> Result<Vec<Correlations>, AnalysisError> {
-    let span = residual.noise_span;
-    let lags = LAGS.min(residual.left.len().saturating_sub(span) / SAMPLES_PER_LAG);
+/// At the lags at which the checks judge the residual.
+fn of_samples(residual: &spectra::SampleResidual) -> Result<Vec<Correlations>, AnalysisError> {
+    let (force, span, lags) = (&residual.force, residual.noise_span, residual.lags());
     if lags == 0 {
         return Ok(Vec::new());
     }
-    let force = &residual.force;
     let acting = || (0..force.channels()).filter(|c| varies(force, *c));
     let of = |channel: usize| {
         let own = residual.left.channel(channel);
         let with = |c: usize| Ok((c, cross_correlation(own, force.channel(c), lags)?));
         let forces = acting().map(with).collect::<Result<_, AnalysisError>>()?;
-        Ok(Correlations { own: whiteness(own, lags)?, span, forces })
+        let own = OwnCorrelation::Samples { correlation: whiteness(own, lags)?, span };
+        Ok(Correlations { own: Some(own), lag: force.sampling().dt(), forces })
     };
     (0..residual.left.channels()).map(of).collect()
+}
+
+fn of_lines(residual: &SpectralResidual) -> Vec<Correlations> {
+    let with_forces = |channel: usize| {
+        let with = |force: usize| Some((force, residual.with_force(channel, force)?));
+        (0..residual.dof()).filter_map(with).collect()
+    };
+    let of = |channel: usize| Correlations {
+        own: residual.line_to_line(channel).map(OwnCorrelation::Lines),
+        lag: residual.lag(),
+        forces: with_forces(channel),
+    };
+    let all: Vec<Correlations> = (0..residual.dof()).map(of).collect();
+    let any = all.iter().any(|channel| channel.own.is_some() || !channel.forces.is_empty());
+    if any { all } else { Vec::new() }
 }
 
 fn varies(force: &Record, channel: usize) -> bool {

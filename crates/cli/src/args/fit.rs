@@ -36,8 +36,8 @@ pub struct FitArgs {
     domain: Domain,
     #[command(flatten)]
     lines: LineArgs,
-    /// Estimator of the parameters from the spectra [default: least-squares, or maximum-likelihood
-    /// with --from-frf]
+    /// Estimator of the parameters from the spectra [default: maximum-likelihood where two periods or
+    /// more show the noise or with --from-frf, otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodChoice>,
     /// Assumption on the force between samples, in the time domain [default: the equation of motion
@@ -338,7 +338,7 @@ impl FitArgs {
                 segments: self.segments.segmentation(),
                 method,
             }),
-            (Domain::Frequency, None) => Fit::Spectra { method: method.unwrap_or_default() },
+            (Domain::Frequency, None) => Fit::Spectra { method },
         };
         Identify {
             fit,

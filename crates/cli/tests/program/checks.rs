@@ -260,7 +260,7 @@ fn noise_that_biases_least_squares_in_time_is_told() {
         let command = format!(
             "identify {name} --force f --displacement x --velocity v --acceleration a --domain time"
         );
-        let said = verdicts(place.path(), &command, "noise on response");
+        let said = verdicts(place.path(), &command, "bias");
         assert_eq!(said.len(), usize::from(share > 0.0), "{said:?}");
     }
     // Where the derivatives are the cause the way around them is told.

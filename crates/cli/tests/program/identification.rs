@@ -154,7 +154,9 @@ fn checks_tell_a_good_record_from_a_bad_one() {
     assert_eq!(verdict(&tight, "before", "excitation"), "doubtful");
     let good = json(folder, &format!("identify two.csv {columns}"));
     assert_eq!(verdict(&good, "before", "excitation"), "good");
-    assert_eq!(verdict(&good, "after", "whiteness"), "good");
+    // Four numbers less three parameters leave nothing to test.
+    let tested = |check: &Value| !check["finding"]["p_value"].is_null();
+    assert!(!good["checks"].as_array().unwrap().iter().any(tested), "{good}");
     // A wrong period: the record repeats every 400 samples.
     let wrong = json(folder, &format!("identify two.csv {columns} --period 190"));
     assert_eq!(verdict(&wrong, "before", "periodicity"), "bad");

@@ -112,7 +112,10 @@ fn warnings_stand_together() {
         text += &format!("{},{f},{x}\n", 0.01 * f64::from(k));
     }
     fs::write(folder.path().join("a.csv"), text).unwrap();
-    let told = mechid(folder.path(), "identify a.csv --force f --displacement x --period 128");
+    let told = mechid(
+        folder.path(),
+        "identify a.csv --force f --displacement x --period 120 --method least-squares",
+    );
     let lines: Vec<&str> = told.lines().collect();
     let of = |kind: &str| -> Vec<usize> {
         (0..lines.len()).filter(|at| lines[*at].starts_with(kind)).collect()

@@ -195,7 +195,7 @@ fn the_page_says_what_is_in_the_record() {
     assert_eq!(heading, "What speaks for the numbers");
 }
 
-/// Judge: white noise is white, and a mode that the model has not is not.
+/// Judge: white noise leaves the power of noise, and a mode that the model has not leaves more.
 #[test]
 fn a_missing_mode_shows_in_the_residual() {
     let likely = [&USUAL[..], &["--method", "maximum-likelihood"]].concat();
@@ -205,12 +205,12 @@ fn a_missing_mode_shows_in_the_residual() {
         let closed = closed(&page(folder.path()));
         let document = parse(&closed);
         let is_missing = second.is_finite();
-        assert_eq!(checks(&document).contains("good whiteness"), !is_missing);
+        assert_eq!(checks(&document).contains("good misfit"), !is_missing);
         let remarks = remarks(&document);
         // The power of the residual speaks for the fit or against it.
         for (heading, text) in &remarks {
             let bad = heading.starts_with("Before");
-            assert_eq!(text.contains("not white"), bad && is_missing, "{text}");
+            assert_eq!(text.contains("exceeds the noise"), bad && is_missing, "{text}");
             assert_eq!(text.contains("× the noise power"), bad == is_missing, "{text}");
         }
         assert_eq!(remarks.len(), if is_missing { 2 } else { 1 });

@@ -64,7 +64,9 @@ pub fn whiteness_beyond(
     let covariance = correlated(&all[..=span], &all[..=span], lags);
     let weight = |lag: usize| count * (count + 2.0) / (count - lag as f64);
     let squares = (span + 1..).zip(&coefficients).map(|(lag, c)| c * c * weight(lag));
-    Ok(Correlation::tested(squares.sum(), &covariance, coefficients, count))
+    // Squares at two lags share parallelograms of samples, even in white noise.
+    let shared = 2.0 * (lags * lags) as f64 / count * covariance[0] * covariance[0];
+    Ok(Correlation::tested(squares.sum(), &covariance, shared, coefficients, count))
 }
 
 /// Correlation of a residual with an input (one value per sample, any units) at the lags −`lags` …
@@ -107,41 +109,52 @@ pub(super) fn cross_correlation_of_coloured(
     let covariance = correlated(colour, &input, coefficients.len());
     let weight = |at: usize| count * count / (count - at.abs_diff(lags) as f64);
     let squares = coefficients.iter().enumerate().map(|(at, c)| c * c * weight(at));
-    Ok(Correlation::tested(squares.sum(), &covariance, coefficients, count))
+    // The input is given: the coefficients are normal numbers.
+    Ok(Correlation::tested(squares.sum(), &covariance, 0.0, coefficients, count))
 }
 
 impl Correlation {
     /// Test of a sum of squares of coefficients whose covariance, times the number of samples, depends
-    /// on the lag between them alone: `covariance` at the lags 0, 1 …
-    fn tested(sum: f64, covariance: &[f64], coefficients: Vec<f64>, count: f64) -> Self {
+    /// on the lag between them alone: `covariance` at the lags 0, 1 …; half of the variance of the sum is
+    /// `shared` more than that of normal numbers.
+    fn tested(
+        sum: f64,
+        covariance: &[f64],
+        shared: f64,
+        coefficients: Vec<f64>,
+        count: f64,
+    ) -> Self {
         // Coefficients hardly scatter where the spectra of input and residual hardly overlap.
         let variance = covariance[0].max(f64::EPSILON);
-        let p_value = share_above(sum, coefficients.len(), covariance);
+        let p_value = share_above(sum, coefficients.len(), covariance, shared);
         let bound = 1.96 * (variance / count).sqrt();
         Self { coefficients, bound, statistic: sum / variance, p_value }
     }
 }
 
 /// Probability that the sum of squares of `terms` normal numbers of mean zero is above `sum`, where
-/// the covariance of two depends on their distance alone: `covariance` at 0, 1 …, zero beyond.
+/// the covariance of two depends on their distance alone: `covariance` at 0, 1 …, zero beyond; `shared` as
+/// for [`Correlation::tested`].
 ///
 /// The sum has nearly the distribution of g χ²(h) with its own mean and variance.
-fn share_above(sum: f64, terms: usize, covariance: &[f64]) -> f64 {
+fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     let squares = covariance.iter().enumerate().take(terms).map(|(distance, c)| {
         let pairs = if distance == 0 { terms } else { 2 * (terms - distance) };
         pairs as f64 * c * c
     });
-    share_above_of(sum, terms as f64 * covariance[0], squares.sum())
+    share_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
 }
 
 /// Probability that a sum of squares of normal numbers is above `sum`, where their covariance has the
 /// trace `mean` and its square the trace `square`.
 pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
-    if mean <= 0.0 {
-        return if sum > 0.0 { 0.0 } else { 1.0 };
+    let unit = square.sqrt();
+    let ratio = mean / unit;
+    match ChiSquared::new(ratio * ratio) {
+        Ok(distribution) if sum.is_finite() => distribution.sf(sum / unit * ratio),
+        // Nothing scatters.
+        _ => f64::from(!(sum > 0.0 && mean <= 0.0)),
     }
-    let distribution = ChiSquared::new(mean * mean / square).expect("positive degrees of freedom");
-    distribution.sf(sum * mean / square)
 }
 
 /// Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two

@@ -8,12 +8,18 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::MAX_SAMPLES;
 use super::finding::Finding;
 use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
-use crate::frequency_domain::{FrequencyData, late_rows};
+use crate::frequency_domain::{FrequencyData, late_rows, output_error};
 use crate::time_domain::{TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// Maximum delay, in samples, to either side.
 const MAX_DELAY: isize = 16;
+
+/// The same where a response hardly follows the force: then a longer delay is likely.
+const MAX_LONG_DELAY: isize = 64;
+
+/// Residual power of the equations, over that of their right-hand sides, beyond which it hardly does.
+const HARDLY_FOLLOWS: f64 = 0.25;
 
 /// Steps of the search per sample, of spectra.
 const STEPS_PER_SAMPLE: isize = 2;
@@ -26,8 +32,9 @@ const PREFERRED: f64 = 0.99;
 
 /// Finds a delay with which the equation of motion fits the lines far better ([`Finding::Delay`]), by
 /// filters, a scanning converter or a trigger. `dt` is the sampling interval of the record in s; lines
-/// are weighted by the noise where `data` state it. `None` if no delay of up to 16 samples leaves less
-/// than a quarter of the residual power.
+/// are weighted by the noise where `data` state it. `None` if no delay of up to 16 samples (64 where the
+/// response hardly follows the force) leaves less than a quarter of the residual power, of least squares and, where the noise is stated, of maximum
+/// likelihood: noise on a resonance spoils least squares alone.
 ///
 /// # Source
 /// Ours: least squares on the equation of motion with the force turned by e^(−iωτ).
@@ -39,7 +46,8 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
     };
     let undelayed = power(0.0)?;
     let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
-    let step = best_step(undelayed, MAX_DELAY * STEPS_PER_SAMPLE, |step| power(samples(step)));
+    let longest = longest(undelayed, &driven) * STEPS_PER_SAMPLE;
+    let step = best_step(undelayed, longest, |step| power(samples(step)));
     let (mut low, mut high) = (samples(step - 1), samples(step + 1));
     for _ in 0..REDUCTIONS {
         let third = (high - low) / 3.0;
@@ -47,6 +55,18 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
     }
     let delay = 0.5 * (low + high);
     finding(delay, dt, [undelayed, power(delay)?], 2 * data.len(), unknowns)
+        .filter(|_| is_delayed(data, delay * dt, unknowns))
+}
+
+/// Whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.
+fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
+    let misfit = |data: &FrequencyData| Some(output_error(data, unknowns).ok()?.misfit_ratio);
+    let both = || Some([misfit(data)?, misfit(&data.with_later_force(delay))?]);
+    let [undelayed, delayed] = match data.noise() {
+        None => return true,
+        Some(_) => both().unwrap_or([f64::INFINITY, 0.0]),
+    };
+    delayed <= DELAY_REMAINING * undelayed
 }
 
 /// Finds a delay as [`delay_of_lines`] does, of a response fitted sample by sample to the equation of
@@ -93,17 +113,33 @@ fn delay_of_samples(
     unknowns: &Unknowns,
     fit: impl Fn(&Shifted<'_>, Record) -> Result<Estimate, EstimateError>,
 ) -> Option<Finding> {
-    let margin = MAX_DELAY as usize;
-    let len = force.len().min(MAX_SAMPLES).checked_sub(2 * margin)?;
     let driven = driven(force.data());
-    let power = |samples: isize| {
+    let power = |samples: isize, longest: isize| {
+        let margin = longest as usize;
+        let len = force.len().min(MAX_SAMPLES).checked_sub(2 * margin)?;
         let start = margin.checked_add_signed(samples)?;
         let shifted = |record: &Record| Ok(record.window(start, len)?);
         residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
     };
-    let undelayed = power(0)?;
-    let delay = best_step(undelayed, MAX_DELAY, power);
-    finding(delay as f64, force.sampling().dt(), [undelayed, power(delay)?], len, unknowns)
+    let longest = longest(power(0, MAX_DELAY)?, &driven);
+    // A record too short for a long delay may show a shorter one.
+    let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
+    let undelayed = power(0, longest)?;
+    let delay = best_step(undelayed, longest, |samples| power(samples, longest));
+    let rows = force.len().min(MAX_SAMPLES).checked_sub(2 * longest as usize)?;
+    finding(
+        delay as f64,
+        force.sampling().dt(),
+        [undelayed, power(delay, longest)?],
+        rows,
+        unknowns,
+    )
+}
+
+/// Maximum delay in samples, from the residual power without any.
+fn longest(undelayed: f64, driven: &[usize]) -> isize {
+    let hardly_follows = undelayed > HARDLY_FOLLOWS * driven.len() as f64;
+    if hardly_follows { MAX_LONG_DELAY } else { MAX_DELAY }
 }
 
 /// Degrees of freedom on which a force acts.

@@ -62,7 +62,7 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         fault: PeriodFault,
     },
-    /// Samples per period of the highest mode that least squares finds.
+    /// Samples per period of the highest mode.
     HighestMode {
         /// Natural frequency, in Hz.
         frequency_hz: f64,
@@ -106,6 +106,27 @@ pub enum Finding {
         /// Number of samples.
         samples: usize,
     },
+    /// A channel has a few equally spaced values only.
+    Quantisation {
+        /// The channel.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        channel: Channel,
+        /// Number of distinct values.
+        levels: usize,
+        /// Step between them, in the unit of the channel.
+        step: f64,
+    },
+    /// One sample of a channel stands far outside its neighbours.
+    Spike {
+        /// The channel.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        channel: Channel,
+        /// The sample, counted from 0 in the window.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        sample: usize,
+        /// Second difference at the sample over the largest of the others (pure number).
+        ratio: f64,
+    },
     /// Two measured response quantities of one degree of freedom are not derivatives of each other.
     Kinematics {
         /// Degree of freedom.
@@ -132,26 +153,29 @@ pub enum Finding {
         /// Fraction of the residual's power that is left when the delay is removed.
         remaining: f64,
     },
-    /// Noise on the response biases least squares sample by sample.
-    NoiseOnResponse {
-        /// Probability that noise on the force alone explains as much.
+    /// Difference of an estimate from another that noise on the response does not bias.
+    Bias {
+        /// Probability that noise alone makes them differ as much if neither is biased.
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
         /// The parameter that changes most, in standard errors.
         #[cfg_attr(feature = "serde", serde(serialize_with = "as_text"))]
         parameter: Parameter,
-        /// Value by least squares, in the unit of the parameter.
+        /// Value, in the unit of the parameter.
         estimate: f64,
-        /// Value with neighbouring samples as instruments (unit of the parameter).
-        instrumental: f64,
+        /// Value by the other estimator (unit of the parameter).
+        unbiased: f64,
         /// Standard error of `estimate` (unit of the parameter).
         standard_error: f64,
+        /// The other estimator.
+        reference: Reference,
     },
     /// Residual power against the power of the noise.
     Misfit {
         /// Residual power over its expectation for noise alone (pure number).
         ratio: f64,
-        /// Probability that noise alone leaves more.
+        /// Probability that noise alone deviates as much, to either side against periods, above
+        /// against coherence.
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
         /// Source of the noise power.
@@ -296,6 +320,16 @@ pub enum NoiseSource {
     Coherence,
 }
 
+/// Estimator that noise on the response does not bias.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+pub enum Reference {
+    /// Instrumental variables: the samples before and after.
+    NeighbouringSamples,
+    /// Maximum likelihood, one Gauss–Newton step from the estimate.
+    MaximumLikelihood,
+}
+
 /// Power of the displacement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
@@ -316,6 +350,12 @@ pub enum Power {
 pub enum Residual {
     /// Samples of a channel.
     Samples {
+        /// Channel of the residual.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        residual: usize,
+    },
+    /// Lines of a spectrum, weighted by the noise.
+    Lines {
         /// Channel of the residual.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
         residual: usize,
@@ -368,7 +408,7 @@ impl PValue {
         Self { raw, adjusted: raw }
     }
 
-    /// Returns whether noise alone hardly gives such a statistic.
+    /// Returns whether noise alone hardly gives such a statistic in any of the tests.
     pub fn is_significant(self) -> bool {
         self.adjusted < SIGNIFICANCE
     }
@@ -394,11 +434,14 @@ impl Finding {
             }
             Finding::HighestMode { .. } | Finding::NoLogarithm { .. } => Subject::Step,
             Finding::Coherence { .. } => Subject::Coherence,
-            Finding::Clipping { .. } | Finding::ConstantChannel { .. } => Subject::Range,
+            Finding::Clipping { .. }
+            | Finding::ConstantChannel { .. }
+            | Finding::Quantisation { .. }
+            | Finding::Spike { .. } => Subject::Range,
             Finding::Kinematics { .. } => Subject::Kinematics,
             Finding::PowerFlow { .. } => Subject::Power,
             Finding::Delay { .. } => Subject::Delay,
-            Finding::NoiseOnResponse { .. } => Subject::NoiseOnResponse,
+            Finding::Bias { .. } => Subject::Bias,
             Finding::Misfit { .. } => Subject::Misfit,
             Finding::Linearity { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
@@ -439,6 +482,8 @@ impl Finding {
             | Finding::NoLogarithm { .. }
             | Finding::Clipping { .. }
             | Finding::ConstantChannel { .. }
+            | Finding::Quantisation { .. }
+            | Finding::Spike { .. }
             | Finding::Kinematics { .. }
             | Finding::PowerFlow { .. }
             | Finding::Delay { .. } => Verdict::Bad,
@@ -466,13 +511,13 @@ impl Finding {
             Finding::Coherence { median, .. } => median,
             Finding::Clipping { samples, .. } => samples as f64,
             Finding::ConstantChannel { level, .. } => level,
+            Finding::Quantisation { levels, .. } => levels as f64,
+            Finding::Spike { ratio, .. } => ratio,
             Finding::Kinematics { gain, .. } => gain,
             Finding::Delay { samples, .. } => samples,
-            Finding::NoiseOnResponse { p_value, .. } | Finding::Linearity { p_value, .. } => {
-                p_value.raw
-            }
+            Finding::Bias { p_value, .. } | Finding::Linearity { p_value, .. } => p_value.adjusted,
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
-                test.p_value.raw
+                test.p_value.adjusted
             }
         }
     }
@@ -480,11 +525,24 @@ impl Finding {
     /// The p-value of a statistical test; `None` for other checks, and where only rounding is left.
     pub fn p_value(&self) -> Option<PValue> {
         match self {
-            Finding::NoiseOnResponse { p_value, .. }
+            Finding::Bias { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. } => Some(*p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 (!test.rounding).then_some(test.p_value)
+            }
+            _ => None,
+        }
+    }
+
+    /// The p-value of [`Finding::p_value`], to adjust it.
+    pub(super) fn p_value_mut(&mut self) -> Option<&mut PValue> {
+        match self {
+            Finding::Bias { p_value, .. }
+            | Finding::Misfit { p_value, .. }
+            | Finding::Linearity { p_value, .. } => Some(p_value),
+            Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
+                (!test.rounding).then_some(&mut test.p_value)
             }
             _ => None,
         }

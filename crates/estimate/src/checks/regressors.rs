@@ -7,19 +7,16 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::MAX_SAMPLES;
 use super::correlation::whiteness;
-use super::finding::{Finding, PValue};
-use super::thresholds::{ROUNDING, SIGNIFICANCE};
+use super::finding::{Finding, PValue, Reference};
+use super::thresholds::{LAGS, ROUNDING, SIGNIFICANCE};
 use crate::{Estimate, EstimateError, LeastSquares};
-
-/// Number of lags at which the residual must be white for the test to hold.
-const LAGS: usize = 25;
 
 /// Minimum number of samples per unknown.
 const SAMPLES_PER_UNKNOWN: usize = 4;
 
 /// Tests whether the response one sample before and after explains the residual of the equation of
 /// motion, fitted sample by sample to displacement, velocity, acceleration and force (N)
-/// ([`Finding::NoiseOnResponse`]): it does with white noise on the response, it does not with noise on
+/// ([`Finding::Bias`]): it does with white noise on the response, it does not with noise on
 /// the force. `None` if it does not, if no parameter changes by more than its standard error with those
 /// neighbours as instruments, if the residual is not white (then that is the finding), or if there is no
 /// noise. The first 32,768 samples of a long record are used.
@@ -62,12 +59,13 @@ pub fn noise_on_response(
     let significant = least.filter(|change| p_value(change) < SIGNIFICANCE);
     // A long record shows a smaller bias than that, but the interval still holds.
     let relevant = significant.filter(|change| change.standard_errors() > 1.0);
-    Ok(relevant.map(|change| Finding::NoiseOnResponse {
+    Ok(relevant.map(|change| Finding::Bias {
         p_value: PValue::of(p_value(&change)),
         parameter: change.parameter,
         estimate: change.estimate,
-        instrumental: change.instrumental,
+        unbiased: change.instrumental,
         standard_error: change.standard_error,
+        reference: Reference::NeighbouringSamples,
     }))
 }
 

@@ -6,7 +6,7 @@ use mechid_signal::{counted, told};
 
 use super::finding::{
     Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
-    Power, Quantity, Residual,
+    Power, Quantity, Reference, Residual,
 };
 use super::{Subject, Verdict};
 
@@ -53,8 +53,11 @@ impl Display for Finding {
                 )?;
                 f.write_str(match self.verdict() {
                     Verdict::Good => "",
-                    Verdict::Doubtful => ": noise, drift, or a transient that has not decayed",
-                    Verdict::Bad => ": hardly a steady response of this period",
+                    Verdict::Doubtful => {
+                        ": noise, drift, or a transient that has not decayed; leave out the beginning, or \
+                         average more periods"
+                    }
+                    Verdict::Bad => ": hardly a steady response of this period; check `period`",
                 })
             }
             Finding::WrongPeriod { claimed, fault } => fault.sentence(*claimed, f),
@@ -69,13 +72,20 @@ impl Display for Finding {
             Finding::NoLogarithm { eigenvalue } => write!(
                 f,
                 "the transition from sample to sample has the eigenvalue {eigenvalue:.3e}, zero or \
-                 negative: the sampling interval is too long for a mode, or the data hold mostly noise"
+                 negative: the sampling interval is too long for a mode, or the data hold mostly noise; \
+                 sample faster"
             ),
-            Finding::Coherence { median, minimum, averages } => write!(
-                f,
-                "median coherence {median:.4}, minimum {minimum:.4}, from {averages:.1} independent \
-                 averages"
-            ),
+            Finding::Coherence { median, minimum, averages } => {
+                write!(
+                    f,
+                    "median coherence {median:.4}, minimum {minimum:.4}, from {averages:.1} \
+                     independent averages"
+                )?;
+                f.write_str(match self.verdict() {
+                    Verdict::Good => "",
+                    _ => ": noise, leakage, or other forces; use longer segments, or more of them",
+                })
+            }
             Finding::Clipping { channel, level, samples } => write!(
                 f,
                 "{channel} is clipped at {}: {} at that level, three or more in a row; choose a wider \
@@ -85,8 +95,21 @@ impl Display for Finding {
             ),
             Finding::ConstantChannel { channel, level, samples } => write!(
                 f,
-                "{channel} is {} in all {samples} samples: no response there, or a dead channel",
+                "{channel} is {} in all {samples} samples: no response there, or a dead channel; check the sensor",
                 told(*level)
+            ),
+            Finding::Quantisation { channel, levels, step } => write!(
+                f,
+                "{channel} has {levels} values only, {} apart: the range of the converter is far too \
+                 wide, or its bits are too few; choose a narrower range and measure again",
+                six_digits(*step)
+            ),
+            Finding::Spike { channel, sample, ratio } => write!(
+                f,
+                "sample {} of {channel} is a spike, {} times as sharp as any other: an error of the \
+                 transmission; leave it out of the window",
+                sample + 1,
+                six_digits(*ratio)
             ),
             Finding::Kinematics { dof, quantity, derivative, gain } => {
                 let number = dof + 1;
@@ -107,22 +130,23 @@ impl Display for Finding {
             Finding::Delay { samples, seconds, remaining } => {
                 delay(f, *samples, *seconds, *remaining)
             }
-            Finding::NoiseOnResponse {
-                p_value,
-                parameter,
-                estimate,
-                instrumental,
-                standard_error,
-            } => {
-                write!(
-                    f,
-                    "noise on the response biases least squares ({p_value}): with neighbouring \
-                     samples as instruments, {parameter} is {} instead of {}, {:.1} standard errors \
-                     away",
-                    six_digits(*instrumental),
-                    six_digits(*estimate),
-                    (instrumental - estimate).abs() / standard_error
-                )
+            Finding::Bias { p_value, parameter, estimate, unbiased, standard_error, reference } => {
+                let [value, other] = [six_digits(*estimate), six_digits(*unbiased)];
+                let errors = (unbiased - estimate).abs() / standard_error;
+                if self.verdict() == Verdict::Good {
+                    write!(
+                        f,
+                        "the estimate agrees with {reference} ({p_value}): {parameter} is {other} \
+                         there, {value} here, {errors:.1} standard errors away"
+                    )
+                } else {
+                    write!(
+                        f,
+                        "noise on the response biases the estimate ({p_value}): by {reference} \
+                         {parameter} is {other} instead of {value}, {errors:.1} standard errors away; \
+                         prefer maximum likelihood on whole periods"
+                    )
+                }
             }
             Finding::Misfit { ratio, p_value, source } => {
                 misfit(f, *ratio, p_value, *source, self.verdict())
@@ -140,7 +164,7 @@ impl Display for Finding {
                     (_, false) => "; uncorrelated",
                     (_, true) => {
                         "; the residual is correlated with the force: the model misses part of the \
-                         response"
+                         response; try another degree of freedom, or another level of the force"
                     }
                 })
             }
@@ -178,7 +202,7 @@ fn conditioning(
         return write!(
             f,
             "{combinations} of displacements, velocities and forces {does} not vary in the data: some \
-             parameters stay undetermined"
+             parameters stay undetermined; excite more lines, or give a known mass"
         );
     }
     match condition_number {
@@ -240,10 +264,11 @@ impl ModeLimit {
             }
             (ModeLimit::BetweenSamples, Verdict::Good) => String::new(),
             (ModeLimit::BetweenSamples, Verdict::Doubtful) => {
-                ", so few that the force between samples matters".into()
+                ", so few that the force between samples matters: sample faster, or say what it does".into()
             }
             (ModeLimit::AtSamples | ModeLimit::BetweenSamples, _) => {
-                ", so few that it may be the alias of a mode above the Nyquist frequency".into()
+                ", so few that it may be the alias of a mode above the Nyquist frequency: sample faster"
+                    .into()
             }
             (ModeLimit::Euler { bias }, _) => {
                 format!("; the bias of Euler's rule is about {:.1} %", 100.0 * bias)
@@ -284,9 +309,13 @@ fn misfit(
     write!(f, "residual power is {times} × the noise power {source} ({p_value}): ")?;
     f.write_str(match verdict {
         Verdict::Good => "consistent with noise",
+        _ if ratio < 1.0 => {
+            "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \
+             the standard errors are too large; average frequency responses instead"
+        }
         _ => {
-            "exceeds the noise: biased estimate, wrong model (nonlinearity, missing degree of freedom, \
-             wrong known mass) or spectral leakage"
+            "exceeds the noise: wrong model (nonlinearity, missing degree of freedom, wrong known mass), \
+             spectral leakage, or a biased estimate; do not rely on the intervals"
         }
     })
 }
@@ -320,6 +349,7 @@ fn whiteness(
 ) -> fmt::Result {
     match residual {
         Residual::Samples { residual } => write!(f, "residual {}: ", residual + 1)?,
+        Residual::Lines { residual } => write!(f, "lines of residual {}: ", residual + 1)?,
         Residual::FrequencyResponse { response, force, distance } => {
             let (response, force) = (response + 1, force + 1);
             write!(
@@ -331,7 +361,8 @@ fn whiteness(
     if test.rounding {
         return write!(f, "{test}");
     }
-    if let Some(NoiseSpan { lags, first_coefficient, beyond }) = span {
+    let significant = span.filter(|_| test.is_significant());
+    if let Some(NoiseSpan { lags, first_coefficient, beyond }) = significant {
         return write!(
             f,
             "correlated up to lag {lags} ({first_coefficient:.2} at lag 1) and no further ({beyond}), \
@@ -342,8 +373,16 @@ fn whiteness(
     write!(f, "{test}; ")?;
     f.write_str(match (residual, test.is_significant()) {
         (Residual::Samples { .. }, false) => "white",
-        (Residual::Samples { .. }, true) => "not white: coloured noise, or an incomplete model",
-        (Residual::FrequencyResponse { .. }, false) => "uncorrelated from line to line",
+        (Residual::Samples { .. }, true) => {
+            "not white: coloured noise, or an incomplete model; do not rely on the intervals"
+        }
+        (Residual::Lines { .. } | Residual::FrequencyResponse { .. }, false) => {
+            "uncorrelated from line to line"
+        }
+        (Residual::Lines { .. }, true) => {
+            "correlated from line to line: a transient, leakage, or an error of the model; use later \
+             periods"
+        }
         (Residual::FrequencyResponse { .. }, true) => {
             "correlated from line to line: a missing mode, another error of the model, or segments too \
              short for the damping"
@@ -368,9 +407,14 @@ impl Display for PValue {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         // A distribution function does not resolve the rest.
         match self.raw {
-            p if p < 1e-15 => f.write_str("p < 1e-15"),
-            p if p < 1e-3 => write!(f, "p = {p:.1e}"),
-            p => write!(f, "p = {p:.3}"),
+            p if p < 1e-15 => return f.write_str("p < 1e-15"),
+            p if p < 1e-3 => write!(f, "p = {p:.1e}")?,
+            p => write!(f, "p = {p:.3}")?,
+        }
+        match self.adjusted {
+            p if p == self.raw => Ok(()),
+            p if p < 1e-3 => write!(f, ", {p:.1e} adjusted"),
+            p => write!(f, ", {p:.3} adjusted"),
         }
     }
 }
@@ -380,6 +424,15 @@ impl Display for NoiseSource {
         f.write_str(match self {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
+        })
+    }
+}
+
+impl Display for Reference {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Reference::NeighbouringSamples => "instrumental variables (neighbouring samples)",
+            Reference::MaximumLikelihood => "maximum likelihood (first step)",
         })
     }
 }
@@ -430,7 +483,7 @@ impl Display for Subject {
             Subject::Step => "step",
             Subject::Coherence => "coherence",
             Subject::Delay => "delay",
-            Subject::NoiseOnResponse => "noise on response",
+            Subject::Bias => "bias",
             Subject::Misfit => "misfit",
             Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",

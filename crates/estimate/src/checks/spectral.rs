@@ -10,8 +10,8 @@ use super::thresholds::EXCITED_LINE;
 use crate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods, equation_rows};
 use crate::{Estimate, EstimateError, Frf, Unknowns};
 
-/// Checks excitation, conditioning, periodicity (of the response, and by [`claimed_period`] of the
-/// force) and step before the spectra of whole periods of force (N) and response are fitted; `lines`
+/// Checks excitation, conditioning and periodicity (of the response, and by [`claimed_period`] of the
+/// force) before the spectra of whole periods of force (N) and response are fitted; `lines`
 /// belong to one period.
 ///
 /// # Errors
@@ -36,7 +36,6 @@ pub fn before_spectral_fit(
     let period = lines.sampling().len();
     let mut findings = vec![excitation, conditioning(&estimate), repetition(response, period)?];
     findings.extend(claimed_period(force, period));
-    findings.extend(band(&estimate, lines)?);
     Ok(findings)
 }
 
@@ -95,9 +94,15 @@ fn repetition(response: &Record, period: usize) -> Result<Finding, EstimateError
     Ok(Finding::PeriodScatter { fraction })
 }
 
-/// Highest mode that least squares finds, against the lines and the Nyquist frequency; `None` where
-/// the data do not determine a machine.
-fn band(estimate: &Estimate, lines: &Lines) -> Result<Option<Finding>, EstimateError> {
+/// Checks the highest mode of an estimate against the lines that were fitted and the Nyquist frequency
+/// ([`Finding::HighestMode`]); `None` where the data do not determine a machine.
+///
+/// # Errors
+/// [`EstimateError::Model`] if the modes cannot be found.
+///
+/// # Source
+/// Ours.
+pub fn fitted_band(estimate: &Estimate, lines: &Lines) -> Result<Option<Finding>, EstimateError> {
     let Ok(system) = estimate.system() else { return Ok(None) };
     let [frequency_hz, samples_per_period] = highest_mode(&system, lines.sampling().dt())?;
     let last = lines.as_slice().iter().copied().max().unwrap_or(0);

@@ -1,6 +1,7 @@
 //! Limits at which a finding becomes a warning. Those without a named source are ours.
 
-/// Probability below which a statistic is not attributed to noise.
+/// Probability below which a statistic is not attributed to noise: the error rate of a single test, and of
+/// all tests on a fit together once [`adjust_p_values`](super::adjust_p_values) has seen them.
 pub const SIGNIFICANCE: f64 = 0.01;
 
 /// Amplitude relative to that of the strongest line of a force, below which a line does not count as
@@ -63,5 +64,18 @@ pub const KINEMATIC_GAIN: f64 = 3.0;
 /// nor leakage.
 pub const POWER_TAKEN_OUT: f64 = 0.05;
 
+/// Number of distinct values of a quantised response, beyond which it is not counted as coarse.
+pub const QUANTISATION_LEVELS: usize = 16;
+
+/// Second difference of a sample over the largest of the others, beyond which it is a spike: no motion
+/// of a band below the Nyquist frequency bends so at one sample alone.
+pub const SPIKE: f64 = 20.0;
+
 /// Residual, relative to the signal fitted (RMS), below which it is rounding.
 pub const ROUNDING: f64 = 1e-9;
+
+/// Number of lags, to either side for a force, at which a residual is correlated.
+pub const LAGS: usize = 25;
+
+/// Minimum number of samples per lag.
+pub const SAMPLES_PER_LAG: usize = 4;

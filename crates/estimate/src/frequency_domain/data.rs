@@ -7,6 +7,9 @@ use nalgebra::{Complex, DMatrix};
 use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
 
+/// Noise relative to the signal (RMS), below which it is rounding.
+const SCATTER_ROUNDING: f64 = 1e-10;
+
 /// Complex amplitudes of forces and displacements, one row per frequency and experiment.
 ///
 /// Motion measured as velocity or acceleration is kept as displacement, X = V/(iω) = −A/ω²;
@@ -199,6 +202,17 @@ impl FrequencyData {
         })
     }
 
+    /// The same data with the force `delay` seconds later.
+    pub(crate) fn with_later_force(&self, delay: f64) -> Self {
+        let mut later = self.clone();
+        for (row, omega) in self.omega.iter().enumerate() {
+            let turn = Complex::cis(-omega * delay);
+            later.force.row_mut(row).apply(|f| *f *= turn);
+        }
+        later.noise = self.noise.as_ref().map(|noise| noise.with_later_force(delay));
+        later
+    }
+
     /// Degrees of freedom n.
     pub fn dof(&self) -> usize {
         self.force.ncols()
@@ -233,6 +247,21 @@ impl FrequencyData {
     /// Covariances of the noise: of displacement (m) and force (N) for every row.
     pub fn noise(&self) -> Option<&NoiseSpectrum> {
         self.noise.as_ref()
+    }
+
+    /// Covariances of the noise as [`FrequencyData::noise`]; `None` also where it is only rounding, below
+    /// 10⁻¹⁰ of both the displacement and the force (RMS over lines and channels).
+    pub fn noise_above_rounding(&self) -> Option<&NoiseSpectrum> {
+        let noise = self.noise()?;
+        let (n, mut scatter) = (self.dof(), [0.0; 2]);
+        for row in 0..self.len() {
+            let variance = noise.covariance(row).diagonal().map(|variance| variance.re);
+            scatter[0] += variance.rows(0, n).sum();
+            scatter[1] += variance.rows(n, n).sum();
+        }
+        let sizes = [self.displacement.norm_squared(), self.force.norm_squared()];
+        let rounding = SCATTER_ROUNDING * SCATTER_ROUNDING;
+        scatter.iter().zip(sizes).any(|(scatter, size)| *scatter > rounding * size).then_some(noise)
     }
 }
 

@@ -54,6 +54,7 @@ mod output_error;
 mod periods;
 mod search;
 mod starts;
+mod whitened;
 
 pub use data::FrequencyData;
 pub(crate) use equation_error::late_rows;
@@ -65,5 +66,6 @@ pub(crate) use lines::check_sampling;
 pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{OutputErrorFit, output_error, output_error_near};
 pub use periods::RepeatedPeriods;
+pub(crate) use whitened::Whitened;
 
 pub use crate::noise_spectrum::{NoiseSpectrum, Pooling};

@@ -3,6 +3,7 @@
 use mechid_estimate::checks::{
     Channel, Finding, Quantity, Subject, Verdict, clipped_channels, constant_channels,
     delay_at_samples, delay_between_samples, delay_of_lines, kinematics, noise_on_response, power,
+    quantised_channels, spiked_channels,
 };
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
@@ -101,9 +102,9 @@ fn instruments_rid_a_parameter_of_its_bias() {
         let response = noisy_response(&response, 0.1, seed);
         let found = equation_of_motion(&response, &force, &unknowns).unwrap();
         let finding = noise_on_response(&response, &force, &found).unwrap()?;
-        assert_eq!(finding.subject(), Subject::NoiseOnResponse);
+        assert_eq!(finding.subject(), Subject::Bias);
         assert_eq!(finding.verdict(), Verdict::Doubtful);
-        let Finding::NoiseOnResponse { parameter, estimate, instrumental, .. } = finding else {
+        let Finding::Bias { parameter, estimate, unbiased: instrumental, .. } = finding else {
             panic!("{finding:?}");
         };
         let truth = system.matrix(parameter.matrix())[(0, 0)];
@@ -126,7 +127,7 @@ fn of_lines(system: &SecondOrderSystem, force: &Record, motion: &Record) -> Opti
 #[test]
 fn a_delay_of_any_part_of_a_sample_is_found_from_lines() {
     for system in [oscillator(), bearing()] {
-        for (seed, delay) in (0..).zip([-7.4, -1.0, -0.3, 0.25, 0.5, 1.0, 3.0, 12.6]) {
+        for (seed, delay) in (0..).zip([-7.4, -1.0, -0.3, 0.25, 0.5, 1.0, 3.0, 12.6, 50.0]) {
             for share in [0.0, 0.003] {
                 let force = force(&system, seed);
                 let motion = exact_harmonic_periodic(&system, &force).unwrap();
@@ -146,7 +147,7 @@ fn a_delay_of_any_part_of_a_sample_is_found_from_lines() {
 fn a_delay_is_found_from_samples_to_whole_ones() {
     let system = oscillator();
     let unknowns = Unknowns::unknown_mass(1).unwrap();
-    for delay in [-16.0, -2.0, 1.0, 3.0, 9.0] {
+    for delay in [-16.0, -2.0, 1.0, 3.0, 9.0, 50.0] {
         let force = force(&system, 5);
         let response = exact_harmonic_periodic(&system, &force).unwrap();
         let late = noisy_response(&late_response(&response, delay), 0.001, 5);
@@ -157,6 +158,49 @@ fn a_delay_is_found_from_samples_to_whole_ones() {
         let between = delay_between_samples(method, x, v, &force, &unknowns).unwrap();
         assert_eq!(between.value(), delay, "{between}");
     }
+}
+
+const ACCELERATION: Quantity = Quantity::Response(ResponseQuantity::Acceleration);
+
+#[test]
+fn a_converter_of_few_bits_is_named() {
+    let system = oscillator();
+    for (seed, bits) in (0..).zip([2, 3]) {
+        let force = force(&system, seed);
+        let exact = exact_harmonic_periodic(&system, &force).unwrap();
+        let x = exact.acceleration();
+        let step = 2.1 * x.column(0).amax() / f64::from(1 << bits);
+        let quantised = Record::new(x.sampling(), x.data().map(|x| (x / step).round() * step));
+        let found = quantised_channels(ACCELERATION, &quantised.unwrap());
+        assert_eq!(found.len(), 1, "{bits} bits");
+        assert_eq!((found[0].subject(), found[0].verdict()), (Subject::Range, Verdict::Bad));
+    }
+}
+
+/// A blow that the force shows, and the jump after it, are no spikes of the response.
+#[test]
+fn a_spike_is_named_but_not_a_blow() {
+    let system = oscillator();
+    let force = force(&system, 1);
+    let exact = exact_harmonic_periodic(&system, &force).unwrap();
+    let spiked = |record: &Record, height: f64| {
+        let mut data = record.data().clone();
+        data[(100, 0)] += height;
+        Record::new(record.sampling(), data).unwrap()
+    };
+    let found = spiked_channels(ACCELERATION, &spiked(exact.acceleration(), 1e6), &force);
+    let [Finding::Spike { sample: 100, .. }] = found[..] else { panic!("{found:?}") };
+    assert_eq!(found[0].verdict(), Verdict::Bad);
+    let quiet = Record::new(force.sampling(), force.data() * 1e-6).unwrap();
+    let blow = spiked(&quiet, 1e3);
+    assert_eq!(spiked_channels(ACCELERATION, &spiked(exact.acceleration(), 1e6), &blow), []);
+    let jump = Record::from_channel(
+        force.sampling(),
+        (0..512)
+            .map(|k| if k < 100 { 1e-6 * f64::from(k % 3) } else { f64::from(k - 512) })
+            .collect(),
+    );
+    assert_eq!(spiked_channels(ACCELERATION, &jump.unwrap(), &force), []);
 }
 
 #[test]
@@ -180,6 +224,8 @@ fn nothing_is_said_of_channels_that_are_as_they_should_be() {
                 let quantity = Quantity::Response(ResponseQuantity::Displacement);
                 assert_eq!(clipped_channels(quantity, x), []);
                 assert_eq!(constant_channels(quantity, x), []);
+                assert_eq!(quantised_channels(quantity, x), []);
+                assert_eq!(spiked_channels(quantity, x, &force), []);
                 assert_eq!(kinematics(&motions(&response)).unwrap(), []);
                 let [x, _, a] = motions(&response);
                 assert_eq!(kinematics(&[x, a]).unwrap(), []);

@@ -643,7 +643,7 @@ def _fit(
             "segments": segments,
             "method": method,
         }
-    return {"domain": "spectra", "method": method or "least-squares"}
+    return {"domain": "spectra", "method": method}
 
 
 def _refuse(options: dict[str, Any], why: str) -> None:

@@ -6,7 +6,7 @@ use mechid_analysis::measurement::Block;
 use mechid_analysis::review::RecordReview;
 use mechid_analysis::review::receptance::Receptance;
 use mechid_analysis::review::reconstruction::Reconstruction;
-use mechid_analysis::review::residual::{Correlations, Residual};
+use mechid_analysis::review::residual::{Correlations, OwnCorrelation, Residual};
 use mechid_analysis::review::whole::Gathered;
 use mechid_model::ResponseQuantity;
 use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
@@ -238,35 +238,60 @@ pub fn residual_spectrum(
     )
 }
 
-/// Correlation of what the fit leaves with itself and with the forces.
+/// Correlation of the residual with itself and with the forces.
 pub fn correlations(part: &RecordReview<'_>, found: &[Correlations]) -> Result<Drawn, ReportError> {
     let dofs = found.len();
     let mut figure = Figure::new("");
+    let (mut widest, mut of_lines) = (0, false);
     for (c, channel) in found.iter().enumerate() {
-        let own = (1, "Autocorrelation".to_owned(), &channel.own);
-        let forces = channel.forces.iter().map(|(force, found)| {
-            let first = -((found.coefficients.len() / 2) as i32);
-            (first, numbered("With the force", *force, dofs), found)
-        });
-        for (first, name, found) in std::iter::once(own).chain(forces) {
-            let lags: Vec<f64> = (first..).take(found.coefficients.len()).map(f64::from).collect();
-            let label = numbered(&name, c, dofs);
-            let panel = Panel::new(Axis::linear("Lag", "samples"), Axis::linear(label, ""))
-                .curve(Curve::stems("", &lags, &found.coefficients).color(Color::BLUE))
-                .reference(Reference::horizontal("95 % of white noise", found.bound))
-                .reference(Reference::horizontal("", -found.bound))
-                .legend(Legend::Above);
-            figure = figure.panel(panel);
+        let panel = |x: Axis, name: &str, at: &[f64], coefficients: &[f64], bound: f64| {
+            Panel::new(x, Axis::linear(numbered(name, c, dofs), ""))
+                .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
+                .reference(Reference::horizontal("95 % of noise", bound))
+                .reference(Reference::horizontal("", -bound))
+                .legend(Legend::Above)
+        };
+        match &channel.own {
+            Some(OwnCorrelation::Samples { correlation, span }) => {
+                widest = widest.max(*span);
+                let (r, bound) = (&correlation.coefficients, correlation.bound);
+                let lags: Vec<f64> = (1..).take(r.len()).map(f64::from).collect();
+                let x = Axis::linear("Lag", "samples");
+                figure = figure.panel(panel(x, "Autocorrelation", &lags, r, bound));
+            }
+            Some(OwnCorrelation::Lines(correlation)) => {
+                of_lines = true;
+                // The imaginary part stands beside the real one.
+                let place = |at: usize| (at / 2 + 1) as f64 + 0.2 * (at % 2) as f64;
+                let (r, bound) = (&correlation.coefficients, correlation.bound);
+                let distances: Vec<f64> = (0..r.len()).map(place).collect();
+                let x = Axis::linear("Distance", "lines");
+                figure = figure.panel(panel(x, "From line to line", &distances, r, bound));
+            }
+            None => {}
+        }
+        for (force, correlation) in &channel.forces {
+            let (r, bound) = (&correlation.coefficients, correlation.bound);
+            let lag = |at: usize| (at as f64 - (r.len() / 2) as f64) * channel.lag;
+            let lags: Vec<f64> = (0..r.len()).map(lag).collect();
+            let name = numbered("With the force", *force, dofs);
+            figure = figure.panel(panel(Axis::linear("Lag", "s"), &name, &lags, r, bound));
         }
     }
-    let spanned = match found.iter().map(|channel| channel.span).max() {
-        None | Some(0) => String::new(),
-        Some(span) => format!(" Noise on the motion correlates it over {span} lags by itself."),
+    let what = match of_lines {
+        true => "Correlation of the residual, weighted by its noise, from line to line (real and \
+                 imaginary part) and with the force"
+            .into(),
+        false => {
+            part.of_held("Autocorrelation of the residual, and its correlation with the force")
+        }
     };
-    let caption = format!(
-        "{}; 95 % of the stems of white noise stay between the dashed lines.{spanned}",
-        part.of_held("Autocorrelation of what the fit leaves, and its correlation with the force")
-    );
+    let spanned = match widest {
+        0 => String::new(),
+        span => format!(" Noise on the response correlates it over {span} lags by itself."),
+    };
+    let caption =
+        format!("{what}; 95 % of the stems of noise stay between the dashed lines.{spanned}");
     drawn(part.id("correlations"), figure, caption)
 }
 

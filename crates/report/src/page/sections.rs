@@ -246,8 +246,8 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         (checks::list(contents, When::After))
         @if contents.review.found.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
-                "p is the share of experiments with nothing but noise left that look as bad. The test \
-                 against a force allows for a slow force. In white noise 5 % of the lags lie outside the bounds."
+                "p is the share of experiments with nothing but noise left that look as bad, adjusted for the \
+                 number of tests: below 0.01 it is a warning. In noise 5 % of the stems lie outside the bounds."
             }
         }
     })

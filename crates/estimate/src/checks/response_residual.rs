@@ -1,13 +1,13 @@
-//! Residuals of spectra and frequency responses against the noise that the measurement shows.
+//! Residuals of frequency responses against the noise that their coherence shows.
 
 use nalgebra::{Complex, DMatrix};
 
 use super::correlation::{Correlation, correlated, share_above_of};
 use super::finding::{Finding, NoiseSource, PValue, Residual};
-use crate::frequency_domain::{FrequencyData, in_units_of_noise};
+use crate::frequency_domain::in_units_of_noise;
 use crate::{Estimate, EstimateError, Frf};
 
-/// Scatter of periods over the response, and 1 − coherence, below which they are rounding.
+/// 1 − coherence, below which it is rounding.
 const ROUNDING: f64 = 1e-10;
 
 /// Maximum number of distances between lines at which residuals are correlated.
@@ -20,56 +20,11 @@ const LINES_PER_DISTANCE: usize = 8;
 /// Minimum number of pairs of lines at a distance.
 const PAIRS: usize = 8;
 
-/// Tests whether the residual of an estimate on the mean of several periods has the power of the noise
-/// that their scatter shows ([`Finding::Misfit`]); `data` carry that noise
-/// ([`RepeatedPeriods::mean_with_noise`]). `None` if they carry none.
-///
-/// `fitted` is the number of parameters (a pure number) fitted to these data: all, or of several records
-/// fitted together the share of this one.
-///
-/// [`RepeatedPeriods::mean_with_noise`]: crate::frequency_domain::RepeatedPeriods::mean_with_noise
-///
-/// # Source
-/// Hotelling's T² with a covariance sampled from complex numbers: Pintelon & Schoukens, *System
-/// Identification: A Frequency Domain Approach*, the chapter on the sample maximum likelihood.
-pub fn after_spectral_fit(
-    data: &FrequencyData,
-    estimate: &Estimate,
-    fitted: f64,
-) -> Option<Finding> {
-    let noise = data.noise()?;
-    let variance =
-        |row: usize| (0..data.dof()).map(|c| noise.covariance(row)[(c, c)].re).sum::<f64>();
-    let scatter: f64 = (0..data.len()).map(variance).sum();
-    if scatter < ROUNDING * ROUNDING * data.displacement().norm_squared() {
-        return None;
-    }
-    let residual = in_units_of_noise(data, estimate)?;
-    let (n, rows) = (data.dof() as f64, data.len() as f64);
-    let nu = noise.degrees_of_freedom();
-    // Rows with one covariance between them are one statistic.
-    let groups = noise.groups();
-    let each = rows / groups;
-    let spare = 1.0 - fitted / (2.0 * n * rows);
-    let (mean, variance) = if nu.is_infinite() {
-        (n * rows, n * rows)
-    } else {
-        if nu <= n + 1.0 {
-            return None;
-        }
-        let mean = n * each * nu / (nu - n);
-        let square = n * each * (n * each + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
-        (groups * mean, groups * (square - mean * mean))
-    };
-    let power = residual.map(|r| r.norm_sqr()).sum();
-    let expected = Expected { mean: mean * spare, variance: variance * spare };
-    Some(expected.misfit(power, NoiseSource::Periods))
-}
-
 /// Tests whether the residual of an estimate on frequency responses has the power that follows from
 /// their coherence ([`Finding::Misfit`]), and whether it is correlated from line to line beyond the
 /// correlation by the window ([`Finding::Whiteness`]). The forces act at the degrees of freedom
-/// `force_dof`, as for [`Frf::data`]; `fitted`, a pure number, as for [`after_spectral_fit`].
+/// `force_dof`, as for [`Frf::data`]. `fitted` is the number of parameters (a pure number) fitted to these
+/// data: all, or of several records fitted together the share of this one.
 ///
 /// Both allow for the correlation of lines by the window and the overlap of the segments; lines of
 /// responses measured elsewhere are taken as independent. The power is tested if there are more than

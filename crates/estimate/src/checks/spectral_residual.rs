@@ -1,0 +1,516 @@
+//! Residuals of spectra, weighted by their covariance, against noise.
+
+use std::f64::consts::PI;
+
+use mechid_model::linear_algebra::svd;
+use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use super::correlation::{Correlation, share_above_of};
+use super::finding::{Finding, NoiseSource, PValue, Reference, Residual};
+use super::thresholds::{LAGS, ROUNDING};
+use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
+use crate::triangular::TriangularFactor;
+use crate::{Estimate, EstimateError};
+
+/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
+/// combination of parameters has no effect.
+const RANK: f64 = 1e-12;
+
+/// Maximum distance of lines, counted in lines of the fit, at which residuals are correlated.
+const DISTANCES: usize = 12;
+
+/// Minimum number of lines per such distance, and per lag of the correlation with a force: more would
+/// leave no direction in which noise and an error of the model differ.
+const LINES_PER_CORRELATION: usize = 8;
+
+/// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
+const FREE_RESIDUALS: f64 = 8.0;
+
+/// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
+const STEPS: usize = 8;
+
+/// Residual power that another such step removes, over the variance of a residual, below which there is
+/// none.
+const SETTLED: f64 = 0.01;
+
+/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
+/// the estimate leaves it.
+const SENSITIVITIES: usize = 1 << 24;
+
+/// Result of the tests after a fit of spectra.
+#[derive(Debug, Clone)]
+pub struct AfterSpectralFit {
+    /// Residual of each record.
+    pub records: Vec<SpectralResidual>,
+    /// Test for a bias of the estimate ([`Finding::Bias`]); `None` where a record states no noise or the
+    /// standard errors of the estimate are not known.
+    pub bias: Option<Finding>,
+}
+
+/// Weights the residuals of a fit of spectra by their own covariance, and tests the estimate for a bias.
+///
+/// The covariance follows from the noise of force and response that the data state. Of the weighted
+/// residual, the part that other parameters explain is removed by a few Gauss–Newton steps of maximum
+/// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
+/// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
+/// parameters together and the one that changes most alone.
+/// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
+/// response.
+///
+/// # Errors
+/// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on maximum
+/// likelihood and on model validation; Hausman (1978), Econometrica 46, 1251–1271, for the bias, here
+/// with the covariance of the estimate, which is an upper bound of that of the difference.
+pub fn after_spectral_fit(
+    records: &[FrequencyData],
+    estimate: &Estimate,
+) -> Result<AfterSpectralFit, EstimateError> {
+    for data in records {
+        let what = "degrees of freedom of the data";
+        crate::least_squares::size(what, data.dof(), estimate.dof())?;
+    }
+    let Some(fit) = WeightedFit::of(records, estimate) else {
+        return Ok(AfterSpectralFit { records: Vec::new(), bias: None });
+    };
+    let noise_stated = fit.records.iter().all(|record| record.noise_stated);
+    let bias = if noise_stated { fit.bias(estimate) } else { None };
+    Ok(AfterSpectralFit { records: fit.records, bias })
+}
+
+/// Residuals of all records of a fit.
+struct WeightedFit {
+    records: Vec<SpectralResidual>,
+    /// Change of the parameters from the estimate to the most likely ones.
+    step: Option<DVector<f64>>,
+}
+
+/// Weighted residuals of all records, and their sensitivities in an orthonormal basis.
+struct Linearised {
+    weighted: Vec<Whitened>,
+    /// Combinations of parameters, one per column, that change the residuals by orthonormal columns.
+    basis: DMatrix<f64>,
+    /// Those columns.
+    explained: Vec<DMatrix<f64>>,
+    /// Scalar products of the residuals with those columns.
+    coefficients: DVector<f64>,
+}
+
+impl Linearised {
+    /// With an empty basis unless the problem is `small`.
+    fn of(weighted: Vec<Whitened>, small: bool) -> Option<Self> {
+        let basis = match small {
+            true => orthonormal_basis(&weighted)?,
+            false => DMatrix::zeros(weighted.first()?.sensitivity.ncols(), 0),
+        };
+        let explained: Vec<DMatrix<f64>> =
+            weighted.iter().map(|record| &record.sensitivity * &basis).collect();
+        let products = explained.iter().zip(&weighted).map(|(q, w)| q.tr_mul(&w.residual));
+        let coefficients =
+            products.fold(DVector::zeros(basis.ncols()), |sum, product| sum + product);
+        Some(Self { weighted, basis, explained, coefficients })
+    }
+
+    fn power(&self) -> f64 {
+        self.weighted.iter().map(|record| record.residual.norm_squared()).sum()
+    }
+
+    /// Gauss–Newton step of the parameters.
+    fn step(&self) -> DVector<f64> {
+        &self.basis * &self.coefficients
+    }
+}
+
+/// Residual of one record of a fit of spectra, in units of its noise.
+#[derive(Debug, Clone)]
+pub struct SpectralResidual {
+    data: FrequencyData,
+    /// Otherwise the weights are those of white noise of unknown level.
+    noise_stated: bool,
+    /// Weighted residual less the part that the step explains.
+    values: DVector<f64>,
+    /// Q of the covariance I − QQᵀ of the values.
+    explained: DMatrix<f64>,
+    rounding: bool,
+}
+
+impl WeightedFit {
+    fn of(records: &[FrequencyData], estimate: &Estimate) -> Option<Self> {
+        let noise: Option<Vec<&NoiseSpectrum>> =
+            records.iter().map(FrequencyData::noise_above_rounding).collect();
+        let levels = levels(records, estimate)?;
+        let weighted = |values: &DVector<f64>| -> Option<Vec<Whitened>> {
+            let one = |(at, data): (usize, &FrequencyData)| {
+                Whitened::of(data, estimate.unknowns(), values, |row| match &noise {
+                    Some(noise) => noise[at].covariance(row).clone(),
+                    None => white_covariance(data, row, &levels),
+                })
+            };
+            records.iter().enumerate().map(one).collect()
+        };
+        let start: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
+        let start = DVector::from_vec(start);
+        let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
+        let small = rows * start.len() <= SENSITIVITIES;
+        let mut values = start.clone();
+        let mut linear = Linearised::of(weighted(&values)?, small)?;
+        for _ in 0..STEPS {
+            let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
+            if linear.coefficients.norm_squared() <= SETTLED * unit {
+                break;
+            }
+            // Half a step where a whole one goes too far.
+            let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
+                let values = &values + linear.step() * *length;
+                let next = Linearised::of(weighted(&values)?, small)?;
+                (next.power() < linear.power()).then_some((values, next))
+            });
+            let Some(next) = next else { break };
+            (values, linear) = next;
+        }
+        let step = &values + linear.step() - start;
+        let Linearised { weighted, explained, coefficients, .. } = linear;
+        let residuals = records.iter().zip(weighted).zip(explained);
+        let residuals = residuals.map(|((data, weighted), explained)| SpectralResidual {
+            data: data.clone(),
+            noise_stated: noise.is_some(),
+            values: weighted.residual - &explained * &coefficients,
+            explained,
+            rounding: is_rounding(data, &levels),
+        });
+        Some(Self { records: residuals.collect(), step: small.then_some(step) })
+    }
+
+    fn bias(&self, estimate: &Estimate) -> Option<Finding> {
+        let errors: Vec<f64> = estimate.parameters().map(|p| p.standard_error).collect();
+        if errors.is_empty() || errors.iter().any(|error| !(*error > 0.0 && error.is_finite())) {
+            return None;
+        }
+        let (scale, change) = (DVector::from_vec(errors), self.step.as_ref()?);
+        let step = change.component_div(&scale);
+        let correlation = DMatrix::from_fn(scale.len(), scale.len(), |i, j| {
+            estimate.covariance()[(i, j)] / (scale[i] * scale[j])
+        });
+        let statistic = step.dot(&correlation.cholesky()?.solve(&step));
+        let count = scale.len() as f64;
+        let together = ChiSquared::new(count).expect("at least one parameter").sf(statistic);
+        let largest = step.iamax();
+        let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
+        let parameter = estimate.parameters().nth(largest)?;
+        Some(Finding::Bias {
+            p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
+            parameter: parameter.parameter,
+            estimate: parameter.value,
+            unbiased: parameter.value + change[largest],
+            standard_error: parameter.standard_error,
+            reference: Reference::MaximumLikelihood,
+        })
+    }
+}
+
+/// RMS residual of each channel in the quantity measured, over all records.
+fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
+    let system = estimate.system().ok()?;
+    let (mut power, mut rows) = (vec![0.0; system.dof()], 0);
+    for data in records {
+        for (row, omega) in data.omega().iter().enumerate() {
+            let modelled = system.receptance(*omega).ok()? * data.force().row(row).transpose();
+            let scale = data.measured().per_displacement(*omega).norm_sqr();
+            let residual = data.displacement().row(row).transpose() - modelled;
+            power.iter_mut().zip(residual.iter()).for_each(|(p, e)| *p += scale * e.norm_sqr());
+        }
+        rows += data.len();
+    }
+    Some(power.iter().map(|p| (p / rows as f64).sqrt()).collect())
+}
+
+/// Whether the residual of every channel is rounding.
+fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
+    let rms = |channel: usize| {
+        let lines = data.displacement().column(channel);
+        let power = lines
+            .iter()
+            .zip(data.omega())
+            .map(|(x, omega)| (x * data.measured().per_displacement(*omega)).norm_sqr());
+        (power.sum::<f64>() / data.len() as f64).sqrt()
+    };
+    levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
+}
+
+/// Covariance of displacement and force for white noise of these levels on the quantity measured.
+fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
+    let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
+    let scale = data.measured().per_displacement(data.omega()[row]).norm();
+    // A channel without any residual must not take all the weight.
+    let least = levels.iter().copied().fold(0.0, f64::max) * 1e-6;
+    for (channel, level) in levels.iter().enumerate().take(n) {
+        let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
+        covariance[(channel, channel)] = Complex::from(level * level);
+    }
+    covariance
+}
+
+/// B for which J B of the stacked sensitivities J has orthonormal columns that span those of J.
+fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
+    let parameters = records.first()?.sensitivity.ncols();
+    let mut factor = TriangularFactor::new(parameters);
+    for record in records {
+        factor.push(&[record.sensitivity.as_view()]).then_some(())?;
+    }
+    let mut r = factor.r().clone();
+    let mut scale = DVector::from_element(parameters, 1.0);
+    for (mut column, scale) in r.column_iter_mut().zip(scale.iter_mut()) {
+        let length = column.norm();
+        if length > 0.0 {
+            *scale = length;
+            column /= length;
+        }
+    }
+    let svd = svd(r).ok()?;
+    let (singular, v_t) = (&svd.singular_values, svd.v_t.as_ref()?);
+    let kept: Vec<usize> =
+        (0..parameters).filter(|at| singular[*at] > RANK * singular.max()).collect();
+    Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
+        v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
+    }))
+}
+
+impl SpectralResidual {
+    /// Tests the power of the residual against the noise, if it is stated ([`Finding::Misfit`]), and its
+    /// correlation from line to line ([`Finding::Whiteness`]) and with the forces
+    /// ([`Finding::CrossCorrelation`]). Residuals of rounding pass. Empty if the parameters leave too
+    /// few residuals free.
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
+    /// validation (whiteness of the residuals, Hotelling's T² with a covariance sampled from complex
+    /// numbers).
+    pub fn findings(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
+        let free = self.values.len() as f64 - self.explained.norm_squared();
+        if free < FREE_RESIDUALS {
+            return findings;
+        }
+        if self.noise_stated && !self.rounding {
+            findings.extend(self.data.noise().and_then(|noise| self.misfit(noise)));
+        }
+        for residual in 0..self.data.dof() {
+            if let Some(correlation) = self.line_to_line(residual) {
+                let test = correlation.test(self.rounding);
+                let residual = Residual::Lines { residual };
+                findings.push(Finding::Whiteness { residual, test, span: None });
+            }
+            for force in 0..self.data.dof() {
+                if let Some(correlation) = self.with_force(residual, force) {
+                    let test = correlation.test(self.rounding);
+                    findings.push(Finding::CrossCorrelation { residual, force, test });
+                }
+            }
+        }
+        findings
+    }
+
+    /// Number of degrees of freedom, each with a channel of the residual and one of the force.
+    pub fn dof(&self) -> usize {
+        self.data.dof()
+    }
+
+    /// Residual power against its expectation for noise of covariances sampled from few periods.
+    fn misfit(&self, noise: &NoiseSpectrum) -> Option<Finding> {
+        let (n, rows) = (self.data.dof() as f64, self.data.len() as f64);
+        let nu = noise.degrees_of_freedom();
+        // Rows with a common covariance make one statistic.
+        let groups = noise.groups();
+        let each = rows / groups;
+        let (mean, variance) = if nu.is_infinite() {
+            (n * rows, n * rows)
+        } else {
+            if nu <= n + 1.0 {
+                return None;
+            }
+            let mean = n * each * nu / (nu - n);
+            let square = n * each * (n * each + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
+            (groups * mean, groups * (square - mean * mean))
+        };
+        let gram = self.explained.tr_mul(&self.explained);
+        let all = self.values.len() as f64;
+        let free = (all - gram.trace()) / all;
+        let spread = (all - 2.0 * gram.trace() + gram.norm_squared()) / all;
+        // Real and imaginary parts have unit variance each.
+        let power = 0.5 * self.values.norm_squared();
+        let (mean, variance) = (mean * free, variance * spread);
+        // Too little is no noise, either: then the periods differ by more than noise.
+        let above = share_above_of(power, mean, 0.5 * variance);
+        let p_value = PValue::of(2.0 * above.min(1.0 - above));
+        Some(Finding::Misfit { ratio: power / mean, p_value, source: NoiseSource::Periods })
+    }
+
+    /// Places of the lines by rising frequency.
+    fn ascending(&self) -> Vec<usize> {
+        let mut rows: Vec<usize> = (0..self.data.len()).collect();
+        rows.sort_by(|a, b| self.data.omega()[*a].total_cmp(&self.data.omega()[*b]));
+        rows
+    }
+
+    /// Row of the real part of a line and channel; that of the imaginary part is the next.
+    fn row(&self, line: usize, channel: usize) -> usize {
+        2 * (self.data.dof() * line + channel)
+    }
+
+    /// Correlation of the residual of a channel from line to line: real and imaginary part of
+    /// Σ r̄(l) r(l + d), less their expectation, at the distances d = 1, 2 … in lines of the fit. `None` if
+    /// there are too few lines or the residual is zero.
+    ///
+    /// For given |r| the phases of independent lines are random, whatever the colour of the noise: that
+    /// gives the variances of the products and the covariances of their squares.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on model
+    /// validation; White (1980), Econometrica 48, 817–838, for the variance.
+    pub fn line_to_line(&self, channel: usize) -> Option<Correlation> {
+        let rows: Vec<usize> =
+            self.ascending().into_iter().map(|line| self.row(line, channel)).collect();
+        let last = DISTANCES.min(rows.len() / LINES_PER_CORRELATION);
+        if last == 0 {
+            return None;
+        }
+        let complex = |values: &[f64]| -> Vec<Complex<f64>> {
+            rows.iter().map(|row| Complex::new(values[*row], values[row + 1])).collect()
+        };
+        let product = |r: &[Complex<f64>], distance: usize| -> Complex<f64> {
+            r.iter().zip(&r[distance..]).map(|(a, b)| a.conj() * b).sum()
+        };
+        let residual = complex(self.values.as_slice());
+        let explained: Vec<Vec<Complex<f64>>> =
+            self.explained.column_iter().map(|q| complex(q.as_slice())).collect();
+        let powers: Vec<f64> = residual.iter().map(|r| r.norm_sqr()).collect();
+        let power: f64 = powers.iter().sum();
+        if power == 0.0 {
+            return None;
+        }
+        let explained_power: f64 = explained.iter().flatten().map(|q| q.norm_sqr()).sum();
+        // Variance of a real or imaginary part that the parameters do not reduce.
+        let unit = power / (2.0 * rows.len() as f64 - explained_power);
+        let variance = |distance: usize| -> f64 {
+            powers.iter().zip(&powers[distance..]).map(|(a, b)| a * b).sum()
+        };
+        let (mut coefficients, mut statistic) = (Vec::new(), 0.0);
+        for distance in 1..=last {
+            let expected: Complex<f64> = explained.iter().map(|q| product(q, distance)).sum();
+            let deviation = product(&residual, distance) + expected * unit;
+            coefficients.extend([deviation.re / power, deviation.im / power]);
+            statistic += deviation.norm_sqr() / variance(distance);
+        }
+        let mut square = 0.0;
+        for a in 1..=last {
+            for b in 1..=last {
+                square += covariance_of_squares(&powers, a, b) / (variance(a) * variance(b));
+            }
+        }
+        Some(Correlation {
+            coefficients,
+            bound: 1.96 * (0.5 / rows.len() as f64).sqrt(),
+            statistic,
+            // A square of a complex number is half a sum of two.
+            p_value: share_above_of(statistic, last as f64, 0.5 * square),
+        })
+    }
+
+    /// Correlation of the residual of a channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of
+    /// lags τ, multiples of [`SpectralResidual::lag`] around 0: up to 51, fewer where there are few lines.
+    /// `None` if the force is zero.
+    ///
+    /// # Panics
+    /// If there is no such channel or force.
+    ///
+    /// # Source
+    /// White (1980), Econometrica 48, 817–838, for the covariance of the correlations; Box (1954),
+    /// Annals of Mathematical Statistics 25, 290–302, for their sum of squares.
+    pub fn with_force(&self, channel: usize, force: usize) -> Option<Correlation> {
+        let lines = self.data.len();
+        let forces = self.data.force().column(force);
+        let rows: Vec<usize> = (0..lines).map(|line| self.row(line, channel)).collect();
+        let lags = LAGS.min(lines / LINES_PER_CORRELATION);
+        let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
+        for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
+            for at in 0..weights.nrows() {
+                let lag = (at as f64 - lags as f64) * self.lag();
+                let weight = f.conj() * Complex::cis(omega * lag);
+                // Re(w r) = Re w Re r − Im w Im r.
+                weights[(at, 2 * line)] = weight.re;
+                weights[(at, 2 * line + 1)] = -weight.im;
+            }
+        }
+        let own: Vec<usize> = rows.iter().flat_map(|row| [*row, row + 1]).collect();
+        let residual = DVector::from_iterator(own.len(), own.iter().map(|row| self.values[*row]));
+        let products = &weights * &residual;
+        let covariance = self.covariance(&weights, &own)?;
+        let size = residual.norm() * forces.norm();
+        let mean = covariance.trace();
+        Some(Correlation {
+            coefficients: products.iter().map(|product| product / size).collect(),
+            bound: 1.96 * (mean / weights.nrows() as f64).sqrt() / size,
+            statistic: products.norm_squared() / mean * weights.nrows() as f64,
+            p_value: share_above_of(products.norm_squared(), mean, covariance.norm_squared()),
+        })
+    }
+
+    /// Lag at which the correlation with a force is computed, in s: half a period of the highest line.
+    pub fn lag(&self) -> f64 {
+        PI / self.data.omega().iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Covariance A P Σ P Aᵀ of weighted sums A over the `own` rows, with P = I − QQᵀ and the variances
+    /// Σ that the residuals show themselves.
+    fn covariance(&self, weights: &DMatrix<f64>, own: &[usize]) -> Option<DMatrix<f64>> {
+        let deviations = self.deviations();
+        let scaled = |mut matrix: DMatrix<f64>, rows: &[usize]| {
+            for (mut column, row) in matrix.column_iter_mut().zip(rows) {
+                column *= deviations[*row];
+            }
+            matrix
+        };
+        let explained = &self.explained;
+        let all: Vec<usize> = (0..self.values.len()).collect();
+        let own_explained = explained.select_rows(own);
+        let loads = weights * &own_explained;
+        let white = scaled(weights.clone(), own);
+        let spread = scaled(explained.transpose(), &all);
+        let cross = &white * scaled(own_explained.transpose(), own).transpose() * loads.transpose();
+        let inner = &loads * (&spread * spread.transpose()) * loads.transpose();
+        let covariance = &white * white.transpose() - &cross - cross.transpose() + inner;
+        (covariance.trace() > 0.0).then_some(covariance)
+    }
+
+    /// Standard deviation of every residual before the parameters were fitted, from its own size.
+    fn deviations(&self) -> DVector<f64> {
+        let leverage = |row: usize| self.explained.row(row).norm_squared();
+        let mut deviations = DVector::zeros(self.values.len());
+        for row in (0..self.values.len()).step_by(2) {
+            let power = self.values[row].powi(2) + self.values[row + 1].powi(2);
+            let free = (2.0 - leverage(row) - leverage(row + 1)).max(0.5);
+            deviations[row] = (power / free).sqrt();
+            deviations[row + 1] = deviations[row];
+        }
+        deviations
+    }
+}
+
+/// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the
+/// given squares |r|².
+fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
+    let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
+        .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])
+        .sum();
+    let own = || -> f64 {
+        let pairs = || powers.iter().zip(&powers[a..]).map(|(x, y)| x * y);
+        pairs().sum::<f64>().powi(2) - pairs().map(|pair| pair * pair).sum::<f64>()
+    };
+    2.0 * parallelograms + if a == b { own() } else { 0.0 }
+}

@@ -1,0 +1,110 @@
+//! Residuals and sensitivities in units of the noise.
+
+use mechid_model::{Parameter, SecondOrderSystem};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::FrequencyData;
+use crate::Unknowns;
+
+type ComplexMatrix = DMatrix<Complex<f64>>;
+
+/// Residual of a machine on spectra, with its sensitivity to the free parameters, both weighted by
+/// the covariance L Lᴴ of the residual that follows from the noise on displacement and force.
+///
+/// Real and imaginary parts are separate: row 2(n·line + channel) is the real part of a line and
+/// channel, the next one its imaginary part.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
+/// likelihood in errors-in-variables.
+pub(crate) struct Whitened {
+    /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
+    pub residual: DVector<f64>,
+    /// Derivative of −`residual` with respect to the free parameters, at the most likely force.
+    pub sensitivity: DMatrix<f64>,
+}
+
+impl Whitened {
+    /// `covariance` is that of displacement and force (2n×2n) at each row of the data. `None` if the
+    /// covariance of a residual is singular, or if there is no receptance at a line.
+    pub fn of(
+        data: &FrequencyData,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+        covariance: impl Fn(usize) -> ComplexMatrix,
+    ) -> Option<Self> {
+        let (n, free) = (data.dof(), unknowns.free());
+        let [mass, damping, stiffness] = unknowns.assemble(values.as_slice());
+        let system = SecondOrderSystem::new(mass, damping, stiffness).ok()?;
+        let mut residual = DVector::zeros(2 * n * data.len());
+        let mut sensitivity = DMatrix::zeros(residual.len(), free.len());
+        for (row, &omega) in data.omega().iter().enumerate() {
+            let line = Line::of(&system, data, row, &covariance(row))?;
+            let at = 2 * n * row..2 * n * (row + 1);
+            write_real(&line.residual, &mut residual.as_mut_slice()[at.clone()]);
+            for (parameter, mut column) in free.iter().zip(sensitivity.column_iter_mut()) {
+                let derivative = line.derivative(parameter, omega);
+                write_real(&derivative, &mut column.as_mut_slice()[at.clone()]);
+            }
+        }
+        let finite = residual.iter().chain(sensitivity.iter()).all(|value| value.is_finite());
+        finite.then_some(Self { residual, sensitivity })
+    }
+}
+
+/// One line.
+struct Line {
+    /// L⁻¹(X − G F).
+    residual: DVector<Complex<f64>>,
+    /// L⁻¹G.
+    receptance: ComplexMatrix,
+    /// G F̂ with the force F̂ that, within its noise, agrees best with the displacement.
+    likely_displacement: DVector<Complex<f64>>,
+}
+
+impl Line {
+    fn of(
+        system: &SecondOrderSystem,
+        data: &FrequencyData,
+        row: usize,
+        covariance: &ComplexMatrix,
+    ) -> Option<Self> {
+        let n = data.dof();
+        let mut receptance = system.receptance(data.omega()[row]).ok()?;
+        let block = |i: usize, j: usize| covariance.view((i * n, j * n), (n, n));
+        let adjoint = receptance.adjoint();
+        let cross = block(1, 0) - block(1, 1) * &adjoint;
+        let total = block(0, 0) - block(0, 1) * &adjoint - &receptance * &cross;
+        let lower = cholesky(total)?;
+        let force = data.force().row(row).transpose();
+        let mut residual = data.displacement().row(row).transpose() - &receptance * &force;
+        lower.solve_lower_triangular_mut(&mut residual).then_some(())?;
+        let mut twice = residual.clone();
+        lower.ad_solve_lower_triangular_mut(&mut twice).then_some(())?;
+        let likely_displacement = &receptance * (force - cross * twice);
+        lower.solve_lower_triangular_mut(&mut receptance).then_some(())?;
+        Some(Self { residual, receptance, likely_displacement })
+    }
+
+    /// Derivative of −L⁻¹(X − G F̂): −L⁻¹G E_ij X̂ (iω)^p.
+    fn derivative(&self, parameter: &Parameter, omega: f64) -> DVector<Complex<f64>> {
+        let power = -Complex::new(0.0, omega).powu(2 - parameter.matrix() as u32);
+        let factor = power * self.likely_displacement[parameter.column()];
+        self.receptance.column(parameter.row()) * factor
+    }
+}
+
+/// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
+fn cholesky(matrix: ComplexMatrix) -> Option<ComplexMatrix> {
+    // nalgebra takes complex roots of negative pivots.
+    let lower = matrix.cholesky()?.unpack();
+    let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
+    lower.diagonal().iter().all(positive).then_some(lower)
+}
+
+fn write_real(white: &DVector<Complex<f64>>, part: &mut [f64]) {
+    for (z, pair) in white.iter().zip(part.chunks_exact_mut(2)) {
+        pair[0] = std::f64::consts::SQRT_2 * z.re;
+        pair[1] = std::f64::consts::SQRT_2 * z.im;
+    }
+}
