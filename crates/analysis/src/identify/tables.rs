@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use mechid_estimate::checks::{after_response_fit, before_response_fit};
+use mechid_estimate::checks::{Finding, adjust_p_values, after_response_fit, before_response_fit};
 use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid_estimate::{Estimate, Frf, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, ResponseFunction, SystemMatrices};
@@ -66,11 +66,18 @@ pub fn identify_responses(
     }
     let unknowns = how.mass.unknowns(data.dof())?;
     let fit = Fit::of(&data, &unknowns, &measured, how.method)?;
-    let mut checks = Vec::new();
+    let mut findings = Vec::new();
     for (table, measured) in tables.iter().zip(&measured) {
         let name = (tables.len() > 1).then(|| table.file.clone());
-        checks.extend(measured.checks(name, &unknowns, &fit.estimate, data.len())?);
+        for (when, finding) in measured.findings(&unknowns, &fit.estimate, data.len())? {
+            findings.push((when, name.clone(), finding));
+        }
     }
+    adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
+    let row = |(when, name, finding): (When, Option<String>, Finding)| {
+        CheckRow::new(when, name, &finding)
+    };
+    let checks = findings.into_iter().map(row).collect();
     let estimate = &fit.estimate;
     let system = estimate.system()?;
     let each = estimate.residual_nrmse();
@@ -377,23 +384,22 @@ impl Tabulated {
     }
 
     /// Returns the findings before and after the fit; `all` is the number of rows of all tables.
-    fn checks(
+    fn findings(
         &self,
-        name: Option<String>,
         unknowns: &Unknowns,
         estimate: &Estimate,
         all: usize,
-    ) -> Result<Vec<CheckRow>, AnalysisError> {
-        let mut rows = Vec::new();
+    ) -> Result<Vec<(When, Finding)>, AnalysisError> {
+        let mut findings = Vec::new();
         for (frf, driven) in &self.coherent {
             let own = (driven.len() * frf.omega().len()) as f64 / all as f64;
             let fitted = own * estimate.parameters().len() as f64;
             let before = before_response_fit(frf, driven, unknowns)?;
             let after = after_response_fit(frf, driven, estimate, fitted)?;
-            rows.extend(before.iter().map(|f| CheckRow::new(When::Before, name.clone(), f)));
-            rows.extend(after.iter().map(|f| CheckRow::new(When::After, name.clone(), f)));
+            findings.extend(before.into_iter().map(|finding| (When::Before, finding)));
+            findings.extend(after.into_iter().map(|finding| (When::After, finding)));
         }
-        Ok(rows)
+        Ok(findings)
     }
 }
 
