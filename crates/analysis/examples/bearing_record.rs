@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let sampling = Sampling::from_rate_hz(1024.0, LENGTH[0])?;
     // 20 to 252 Hz in steps of 4 Hz, the shakers by turns.
     let lines: Vec<usize> = (5..=63).collect();
-    let amplitude = if is_dry { 4.0 } else { 25.0 };
+    let amplitude = if is_dry { 4.0 } else { 14.0 };
     let period = rig.period(sampling, &lines, amplitude, Shakers::Interleaved, seed)?;
     let test = rig.measured(&period, LENGTH[1], seed)?;
     println!("time,fx [N],fy [N],ax [m/s^2],ay [m/s^2],dx [um],dy [um]");

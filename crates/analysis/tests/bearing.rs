@@ -203,7 +203,7 @@ fn intervals_hold_with_the_baseline_subtracted_and_not_without() {
             without += share(&bare, &rig.film) / runs as f64;
         }
         assert!((0.915..=0.985).contains(&with), "{coefficients:?}: {with}");
-        assert!(without < 0.6, "{coefficients:?}: {without}");
+        assert!(without < 0.7, "{coefficients:?}: {without}");
         let false_alarms = rejected as f64 / runs as f64;
         match coefficients {
             // Four standard errors of 80 tests are 10 %.
