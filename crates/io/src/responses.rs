@@ -41,7 +41,7 @@ pub struct FrequencyResponses {
     pub functions: Vec<ResponseFunction>,
     /// Coherences, in the order of the file.
     pub coherence: Vec<CoherenceFunction>,
-    /// What was left out or converted.
+    /// Remarks on what was left out or converted.
     pub remarks: Vec<String>,
 }
 

@@ -26,7 +26,7 @@ pub struct BearingRig {
     pub crosstalk: f64,
     /// Speed of rotation, in Hz.
     pub rotation_hz: f64,
-    /// Run-out at the rotation and its multiples, amplitudes in m.
+    /// Amplitudes of the run-out, in m, one for the rotation and each of its multiples.
     pub run_out: Vec<f64>,
     /// Standard deviation of white noise on a force sensor, in N.
     pub force_noise: f64,
@@ -39,9 +39,9 @@ pub struct BearingRig {
 /// Shakers that work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shakers {
-    /// That in x.
+    /// Shaker in x.
     X,
-    /// That in y.
+    /// Shaker in y.
     Y,
     /// Both, on alternate lines.
     Interleaved,
@@ -80,13 +80,20 @@ impl BearingRig {
         Self { film: [Matrix2::zeros(); 3], run_out: Vec::new(), ..self.clone() }
     }
 
-    /// H of film and baseline, 2×2, in N/m, at `omega` (rad/s).
+    /// Returns H of film and baseline, 2×2, in N/m, at `omega` (rad/s).
+    ///
+    /// # Source
+    /// Childs and Hale (1994), Journal of Tribology 116, 337–344.
     pub fn dynamic_stiffness(&self, omega: f64) -> Matrix2<Complex<f64>> {
         let [k, c, m] = std::array::from_fn(|at| self.film[at] + self.baseline[at]);
         k.zip_zip_map(&c, &m, |k, c, m| Complex::new(k - omega * omega * m, omega * c))
     }
 
-    /// One period without noise: `amplitude` (N) at each of the lines, with phases drawn from `seed`.
+    /// Returns one period without noise: `amplitude` (N) at each of the lines, with phases drawn from
+    /// `seed`.
+    ///
+    /// # Source
+    /// That of [`BearingRig::dynamic_stiffness`].
     ///
     /// # Errors
     /// [`ProblemError::Signal`] for a line beyond the Nyquist frequency.
@@ -139,7 +146,7 @@ impl BearingRig {
         })
     }
 
-    /// So many periods of a test, with noise on every sensor.
+    /// Returns some periods of a test, with noise on every sensor.
     ///
     /// # Errors
     /// [`ProblemError::Signal`] if the record gets too long.

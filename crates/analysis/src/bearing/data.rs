@@ -1,4 +1,4 @@
-//! What acts on the film and how it moves, from records or from tables of frequency responses.
+//! Forces on the film and its motion, from records or from tables of frequency responses.
 
 use std::f64::consts::TAU;
 

@@ -90,8 +90,8 @@ impl IdentifiedBearing {
         self.film.matrix(2)
     }
 
-    /// Returns the covariance of the coefficients, 12×12 or 8×8, in products of their units: kxx, kxy,
-    /// kyx, kyy, then c and m likewise.
+    /// Returns the covariance of the coefficients, one row per coefficient, in products of their units:
+    /// kxx, kxy, kyx, kyy, then c and m likewise.
     pub fn covariance(&self) -> &DMatrix<f64> {
         self.film.covariance()
     }

@@ -59,7 +59,7 @@ pub struct BearingSummary {
     pub condition_number: f64,
     /// Number of spectral lines, summed over the tests.
     pub lines: usize,
-    /// Frequencies that were left out because the shaft rotates there, in Hz.
+    /// Frequencies that were left out, in Hz, one per line at which the shaft rotates.
     pub left_out_hz: Vec<f64>,
     /// Dynamic stiffness of the film line by line.
     pub dynamic_stiffness: Vec<StiffnessLine>,

@@ -104,6 +104,9 @@ impl FrequencyData {
     /// # Errors
     /// [`EstimateError::Size`] if the shapes differ or a degree of freedom does not exist, and what
     /// [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`] refuse.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (frequency responses as amplitudes per unit force).
     pub fn from_responses(
         omega: &[f64],
         response: &[DMatrix<Complex<f64>>],
