@@ -78,21 +78,17 @@ impl Film {
             return Ok(film);
         }
         let eight = 2 * EACH;
-        let difference = |reduced: &OutputErrorFit, base: Option<&OutputErrorFit>| {
-            let of = |fit: &OutputErrorFit| in_order(fit, &common).0.rows(0, eight).into_owned();
-            base.map_or_else(|| of(reduced), |base| of(reduced) - of(base))
-        };
-        film.values = difference(&reduced, reduced_base.as_ref());
+        let without = |fit: &OutputErrorFit| in_order(fit, &common).0.rows(0, eight).into_owned();
+        film.values = without(&reduced);
+        if let Some(base) = &reduced_base {
+            film.values -= without(base);
+        }
         film.covariance = match &base {
             None => in_order(&reduced, &common).1.view((0, 0), (eight, eight)).into_owned(),
             // The mass that both tests have in common is uncertain, too.
             Some(_) => without_mass(&with_mass.1)?,
         };
-        film.rig = {
-            let mut rig = in_order(&reduced, &common).0;
-            rig.rows_mut(eight, EACH).copy_from_slice(&row_by_row(&common));
-            rig
-        };
+        film.rig = in_order(&reduced, &common).0;
         if let (Some(base), Some((values, _))) = (&reduced_base, &mut film.baseline) {
             *values = in_order(base, &common).0;
         }

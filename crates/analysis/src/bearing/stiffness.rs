@@ -45,11 +45,11 @@ pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLin
         next += 1;
         if group.len() > 1 {
             lines.extend(line(tests, film, group));
-        } else if let Some(other) = groups.get(next).filter(|other| other.len() == 1) {
-            if let Some(found) = line(tests, film, &[group[0], other[0]]) {
-                lines.push(found);
-                next += 1;
-            }
+        } else if let Some(other) = groups.get(next).filter(|other| other.len() == 1)
+            && let Some(found) = line(tests, film, &[group[0], other[0]])
+        {
+            lines.push(found);
+            next += 1;
         }
     }
     Ok(lines)
@@ -76,7 +76,7 @@ fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLin
     if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
         return None;
     }
-    let inverse = power.try_inverse()?;
+    let inverse = power.lu().solve(&Complex2::identity())?;
     let mut h = forces * inverse;
     let mut variance = data.noise().map(|noise| {
         let mut variance = [[0.0; 4]; 2];

@@ -163,14 +163,14 @@ impl BearingSummary {
             Some(hz) => summary.whirl(film, TAU * hz, &uncertain)?,
             None => None,
         };
-        if let Some(ratio) = amplitude.and_then(|a| a.over_clearance) {
-            if ratio > LARGEST_AMPLITUDE {
-                summary.remarks.push(format!(
-                    "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film \
-                     is not linear, and the coefficients depend on the amplitude; excite less",
-                    significant(ratio, 2)
-                ));
-            }
+        if let Some(ratio) = amplitude.and_then(|a| a.over_clearance)
+            && ratio > LARGEST_AMPLITUDE
+        {
+            summary.remarks.push(format!(
+                "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
+                 not linear, and the coefficients depend on the amplitude; excite less",
+                significant(ratio, 2)
+            ));
         }
         Ok(summary)
     }

@@ -366,8 +366,7 @@ impl Tabulated {
             let data = own(&omega, &response, Some(&variance), measured, &driven)?;
             return Ok(Self { points, driven, noise: Noise::Stated, data, coherent: Vec::new() });
         }
-        let Some(coherent) = coherent(table, how, &points, &forces, (&rows, &omega, &response))?
-        else {
+        let Some(coherent) = coherent(table, how, &points, &forces, &rows, &response)? else {
             let data = own(&omega, &response, None, measured, &driven)?;
             return Ok(Self { points, driven, noise: Noise::Unknown, data, coherent: Vec::new() });
         };
@@ -462,9 +461,11 @@ fn coherent(
     how: &IdentifyResponses,
     points: &[String],
     forces: &[String],
-    (rows, omega, response): (&[usize], &[f64], &[DMatrix<Complex<f64>>]),
+    rows: &[usize],
+    response: &[DMatrix<Complex<f64>>],
 ) -> Result<Option<Coherent>, AnalysisError> {
     let measured = quantity(table, how)?;
+    let omega: Vec<f64> = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
     let of = |point: &String, force: Option<&String>| {
         let fits = |c: &&mechid_io::CoherenceFunction| {
             c.response == *point && c.reference.as_ref() == force
@@ -490,7 +491,7 @@ fn coherent(
     let dof = |force: &String| points.iter().position(|point| point == force);
     let driven: Vec<usize> = forces.iter().filter_map(dof).collect();
     let frf = |response: Vec<DMatrix<Complex<f64>>>, coherence: DMatrix<f64>| {
-        Frf::new(omega.to_vec(), response, coherence, averages, measured)
+        Frf::new(omega.clone(), response, coherence, averages, measured)
     };
     if let Some(apart) = apart {
         let each = apart.into_iter().enumerate().map(|(force, coherence)| {

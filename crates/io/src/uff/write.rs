@@ -180,7 +180,7 @@ mod tests {
         assert_eq!(point("3-RX"), Ok((3, -4)));
         assert_eq!(point("7"), Ok((7, 0)));
         assert!(["x", "1+Q", "+X", "1-"].iter().all(|label| point(label).is_err()));
-        for number in [0.0, 1.0, -0.390625, 78.125, 0.59604644775390625, -1.0e-300, 1.5e300] {
+        for number in [0.0, 1.0, -0.390625, 78.125, 0.596_046_447_753_906_2, -1.0e-300, 1.5e300] {
             let text = narrow(number);
             assert_eq!(text.len(), 13, "{text}");
             let back: f64 = text.trim().parse().unwrap();
