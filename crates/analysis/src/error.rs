@@ -66,6 +66,19 @@ pub enum AnalysisError {
     /// No record was given.
     #[error("no record: an identification needs one at least")]
     NoRecord,
+    /// A table of frequency responses has not all that its forces and points need.
+    #[error(
+        "{file} has no response at {response} to a force at {force}: every point needs one to every \
+         force, and every force one at its own point (choose `points`)"
+    )]
+    NoResponse {
+        /// The table.
+        file: String,
+        /// Point of the response.
+        response: String,
+        /// Point of the force.
+        force: String,
+    },
     /// No force column is named.
     #[error("the force is missing: name its columns with `force`")]
     NoForce,
@@ -169,6 +182,9 @@ pub enum AnalysisError {
     /// The Kalman smoother has no periods.
     #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
     KalmanIsOpen,
+    /// A bearing cannot be as described.
+    #[error(transparent)]
+    Bearing(#[from] mechid_bearing::BearingError),
     /// The reconstruction failed.
     #[error(transparent)]
     Force(#[from] mechid_force::ForceError),

@@ -29,15 +29,18 @@
 //! | What is in this record? | [`inspect()`] | [`InspectSettings`] | [`Inspected`] |
 //! | What is the response per unit force? | [`frf()`] | [`FrfSettings`] | [`FrfTable`] |
 //! | What machine is this? | [`identify()`] | [`Identify`] | [`Identified`] |
+//! | What machine has these frequency responses? | [`identify_responses()`] | [`IdentifyResponses`] | [`IdentifiedResponses`] |
 //! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
 //! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
+//! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
 //! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
 //!
 //! Settings are plain structs with defaults, which `serde` saves and reads back; every result carries
 //! those it was made with, and prints itself with [`Display`](std::fmt::Display).
 
+pub mod bearing;
 mod error;
 mod extremes;
 pub mod frf;
@@ -53,9 +56,12 @@ pub mod review;
 pub mod sweep;
 pub mod text;
 
+pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
 pub use error::AnalysisError;
 pub use frf::{FrfSettings, FrfTable, Segmentation, frf};
-pub use identify::{Identified, Identify, identify};
+pub use identify::{
+    Identified, IdentifiedResponses, Identify, IdentifyResponses, identify, identify_responses,
+};
 pub use inspect::{InspectSettings, Inspected, inspect};
 pub use machine::{Machine, NonlinearPart};
 pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Window};

@@ -78,6 +78,30 @@ fn missing_column_lists_those_there_are() {
 }
 
 #[test]
+fn tables_of_frequency_responses() {
+    refused(&good(), "identify a.csv --frf-table", &["a.csv has no frequency response: name col"]);
+    let table = "f,real,imag,coherence\n1,1e-3,-2e-3,0.9\n2,1e-3,-3e-3,0.9\n";
+    refused(table, "identify a.csv --frf-table", &["--quantity", "does not say what was measured"]);
+    let told = "identify a.csv --frf-table --quantity velocity";
+    refused(table, told, &["from how many independent averages?"]);
+    refused(table, &format!("{told} --averages 8 --band-hz 5:9"), &["5 and 9 Hz"]);
+    refused(table, &format!("{told} --averages 8 --force 1"), &["cannot be used with"]);
+}
+
+#[test]
+fn bearing_tests_need_two_directions() {
+    let common = "bearing a.csv --force force --stator-mass";
+    refused(&good(), &format!("{common} 2 --displacement x"), &["needs two columns, in x and y"]);
+    refused(
+        &good(),
+        &format!("{common} 0 --displacement x"),
+        &["--stator-mass: a positive number"],
+    );
+    refused(&good(), "bearing a.csv --force force --displacement x", &["--stator-mass <KG>"]);
+    refused("{\"points\": 3}", "bearing a.csv --campaign", &["a.csv: points: "]);
+}
+
+#[test]
 fn duplicate_column_lists_those_there_are() {
     let twice = good().replacen("time,force,x", "time,x,x", 1);
     let arguments = "identify a.csv --force 2 --displacement x";

@@ -6,13 +6,13 @@ mod segments;
 
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix};
 
 pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
 pub use self::segments::{Segments, Window};
 use crate::EstimateError;
-use crate::frequency_domain::{FrequencyData, Lines, NoiseSpectrum};
+use crate::frequency_domain::{FrequencyData, Lines};
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
@@ -187,39 +187,19 @@ impl Frf {
     /// [`EstimateError::Size`] if there is not one degree of freedom per force or one of
     /// them does not exist.
     pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, EstimateError> {
-        let (n, lines) = (self.coherence.ncols(), self.omega.len());
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         if force_dof.len() != inputs {
             let (expected, got) = (inputs, force_dof.len());
             return Err(EstimateError::Size { what: "driven degrees of freedom", expected, got });
         }
-        if let Some(&got) = force_dof.iter().find(|dof| **dof >= n) {
-            let what = "driven degree of freedom, at most";
-            return Err(EstimateError::Size { what, expected: n.saturating_sub(1), got });
-        }
-        let mut all: Option<FrequencyData> = None;
-        for (input, &dof) in force_dof.iter().enumerate() {
-            let mut force = DMatrix::zeros(lines, n);
-            force.column_mut(dof).fill(Complex::new(1.0, 0.0));
-            let motion = DMatrix::from_fn(lines, n, |l, o| self.response[l][(o, input)]);
-            let covariance = (0..lines).map(|l| {
-                let mut diagonal = DVector::zeros(2 * n);
-                for o in 0..n {
-                    let scale = self.measured.per_displacement(self.omega[l]).norm_sqr();
-                    diagonal[o] = Complex::new(self.variance[l][(o, input)] / scale, 0.0);
-                }
-                DMatrix::from_diagonal(&diagonal)
-            });
-            let noise = NoiseSpectrum::new(self.omega.clone(), covariance.collect())?;
-            let one =
-                FrequencyData::from_amplitudes(self.omega.clone(), force, motion, self.measured)?
-                    .with_noise(noise)?;
-            all = Some(match all {
-                None => one,
-                Some(before) => before.and(&one)?,
-            });
-        }
-        all.ok_or(EstimateError::NoExcitedLine)
+        let variance = Some(self.variance.as_slice());
+        FrequencyData::from_responses(
+            &self.omega,
+            &self.response,
+            variance,
+            self.measured,
+            force_dof,
+        )
     }
 
     /// The same responses at some of the frequencies only, by their places, counted from 0.

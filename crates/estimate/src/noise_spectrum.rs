@@ -16,7 +16,8 @@ use crate::EstimateError;
 pub enum Pooling {
     /// Every line has its own covariance: from about 8 periods on.
     PerLine,
-    /// Every line takes the mean of the covariances of this many chosen lines to either side.
+    /// Every line takes the mean of the covariances of this many chosen lines to either side; at the
+    /// ends of the band, of as many lines altogether.
     Neighbours(usize),
     /// One covariance for all lines: white noise in the quantity measured.
     AllLines,
@@ -199,7 +200,7 @@ impl NoiseSpectrum {
     }
 }
 
-/// Mean covariances, and how many lines the least averaged of them is made of.
+/// Mean covariances, and how many lines each of them is made of.
 fn pool(
     covariance: Vec<DMatrix<Complex<f64>>>,
     pooling: Pooling,
@@ -210,17 +211,22 @@ fn pool(
         Pooling::Neighbours(half_width) => half_width.min(len),
         Pooling::AllLines => len,
     };
-    let window = |row: usize| row.saturating_sub(half_width)..(row + half_width + 1).min(len);
+    // All of one width, so that one number of degrees of freedom holds for all.
+    let width = (2 * half_width + 1).min(len);
+    let window = |row: usize| {
+        let first = row.saturating_sub(half_width).min(len - width);
+        first..first + width
+    };
     let mean = |range: std::ops::Range<usize>| {
         let count = range.len() as f64;
         let mut sum = covariance[range.start].clone();
         covariance[range.start + 1..range.end].iter().for_each(|c| sum += c);
         sum.unscale(count)
     };
-    if half_width == len {
+    if width == len {
         return (vec![mean(0..len); len], len);
     }
-    ((0..len).map(|row| mean(window(row))).collect(), window(0).len())
+    ((0..len).map(|row| mean(window(row))).collect(), width)
 }
 
 /// Turns covariances of the quantity measured into covariances of displacement.

@@ -371,6 +371,22 @@ pub enum IoError {
         /// Text of the choice.
         lines: String,
     },
+    /// The columns of a text are not those of frequency responses.
+    #[error("{}", Message(format_args!("{file} has no frequency response: name columns h_1_1_real and h_1_1_imaginary, or \
+         h_1_1_magnitude and h_1_1_phase_deg (response, then force); its columns are {available}")))]
+    Responses {
+        /// The file.
+        file: String,
+        /// Numbers and names of the columns there are.
+        available: String,
+    },
+    /// A point is not written as universal files number them.
+    #[error("{}", Message(format_args!("\"{point}\" is no point of a universal file: write a node and a direction such as 12+Z \
+         (X, Y, Z, RX, RY or RZ)")))]
+    Point {
+        /// The point.
+        point: String,
+    },
     /// A spectral line does not exist in a period.
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
          frequency of a period of {}", counted(*len, "sample"))))]

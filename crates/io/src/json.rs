@@ -10,6 +10,14 @@ use serde::de::{DeserializeOwned, Deserializer, Error, Visitor};
 
 use crate::{IoError, standard};
 
+/// Reads a value from a JSON file, or from standard input as `-`: the saved settings of an analysis.
+///
+/// # Errors
+/// [`IoError::Read`], [`IoError::NotJson`], and [`IoError::Json`] with the field that is wrong.
+pub fn read_json<T: DeserializeOwned>(path: impl AsRef<Path>) -> Result<T, IoError> {
+    Ok(read(path.as_ref())?.1)
+}
+
 /// Reads a value from a JSON file, or from standard input as `-`; returns its name in messages, too.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoError> {
     let file = standard::input_name(path);

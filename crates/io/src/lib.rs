@@ -27,6 +27,7 @@ mod limits;
 mod line_spec;
 mod mat;
 mod output;
+mod responses;
 mod standard;
 mod system;
 mod table;
@@ -41,11 +42,13 @@ pub use experiment::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level, LoadBeyond,
     MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
+pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
 pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };
+pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -59,9 +59,10 @@ pub use mechid_analysis as analysis;
 pub use mechid_analysis::identify::LineChoice;
 pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, MaximumLikelihood};
 pub use mechid_analysis::{
-    Channels, Detrend, FrfSettings, Identified, Identify, InspectSettings, Machine, Measurement,
-    Predict, Predicted, Reading, Reconstruct, Reconstructed, Segmentation, Window, frf, identify,
-    inspect, predict, reconstruct,
+    BearingData, Channels, Detrend, FrfSettings, Identified, IdentifiedBearing,
+    IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses, InspectSettings, Machine,
+    Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed, Segmentation, Window,
+    frf, identify, identify_bearing, identify_responses, inspect, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -21,6 +21,7 @@ pub mod exact;
 pub mod machines;
 mod named;
 mod random;
+pub mod rig;
 mod transition;
 
 pub use error::ProblemError;

@@ -5,10 +5,13 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
 use mechid_estimate::{Segments, Window};
+use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid_signal::counted;
+use nalgebra::Complex;
 use serde::Serialize;
 
 use super::{FrfSettings, Responses};
+use crate::AnalysisError;
 use crate::measurement::Block;
 use crate::text::{compact, paragraph, significant, text_table};
 
@@ -164,6 +167,50 @@ impl FrfTable {
         }
         text += &text_table(&rows);
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    /// Returns the responses as they are written into files of other programs; `points` names the place
+    /// and direction of each degree of freedom, such as `12+Z`. Empty: node and degree of freedom have
+    /// the same number, and the direction is +X.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom.
+    pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
+        let dofs = self.coherence.len();
+        if !points.is_empty() && points.len() != dofs {
+            let given = counted(points.len(), "point");
+            let why = format!("{given} for {}", counted(dofs, "degree of freedom"));
+            return Err(AnalysisError::Setting { setting: "points", why });
+        }
+        let point = |dof: usize| points.get(dof - 1).cloned().unwrap_or_else(|| format!("{dof}+X"));
+        let functions = self.responses.iter().map(|r| ResponseFunction {
+            response: point(r.motion),
+            reference: point(r.force),
+            quantity: self.quantity.parse().ok(),
+            values: r
+                .real
+                .iter()
+                .zip(&r.imaginary)
+                .map(|(re, im)| Complex::new(*re, *im))
+                .collect(),
+            standard_error: Some(r.standard_error.clone()),
+        });
+        let coherence = self.coherence.iter().map(|c| CoherenceFunction {
+            response: point(c.motion),
+            // With one force the multiple coherence is the ordinary one.
+            reference: match self.responses.len() == dofs {
+                true => self.responses.first().map(|r| point(r.force)),
+                false => None,
+            },
+            values: c.values.clone(),
+        });
+        Ok(FrequencyResponses {
+            file: self.file.clone(),
+            frequency_hz: self.frequency_hz.clone(),
+            functions: functions.collect(),
+            coherence: coherence.collect(),
+            remarks: Vec::new(),
+        })
     }
 
     /// One row per frequency.

@@ -107,7 +107,7 @@ impl SampleResidual {
 }
 
 impl CheckRow {
-    fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
+    pub(super) fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
         Self {
             when,
             record,

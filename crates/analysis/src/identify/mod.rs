@@ -5,6 +5,7 @@
 //! | `options` | settings, as values |
 //! | `lines`, `mass` | spectral lines to use; known masses |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
+//! | `tables` | frequency responses that were measured elsewhere |
 //! | `nonlinear` | whole periods with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
@@ -23,6 +24,7 @@ mod responses;
 mod samples;
 pub(crate) mod spectra;
 pub mod summary;
+pub mod tables;
 pub mod validation;
 
 use std::fmt;
@@ -42,6 +44,7 @@ pub use self::options::{
 use self::prediction::{Compared, Model, Prediction};
 use self::spectra::Fitted;
 use self::summary::IdentificationSummary;
+pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
 use crate::machine::Machine;

@@ -339,24 +339,35 @@ impl Fitted {
             let mean = each.iter().map(|part| part * part).sum::<f64>() / each.len() as f64;
             return Ok(Some(mean.sqrt()));
         }
-        let Some((_, data)) = &self.frequency else { return Ok(None) };
-        let (mut left, mut all) = (0.0, 0.0);
-        for (row, omega) in data.omega().iter().enumerate() {
-            let measured = data.displacement().row(row).transpose();
-            let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
-            // A displacement weighs low lines most, whatever their noise.
-            let quantity = data.measured().per_displacement(*omega).norm_sqr();
-            for channel in 0..data.dof() {
-                let weight = match data.noise() {
-                    Some(noise) => noise.covariance(row)[(channel, channel)].re.recip(),
-                    None => quantity,
-                };
-                if weight.is_finite() {
-                    left += weight * (measured[channel] - modelled[channel]).norm_sqr();
-                    all += weight * measured[channel].norm_sqr();
-                }
+        match &self.frequency {
+            Some((_, data)) => unexplained_motion(data, system),
+            None => Ok(None),
+        }
+    }
+}
+
+/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data,
+/// weighted by the noise where it is known; `None` if nothing moves.
+pub(super) fn unexplained_motion(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+) -> Result<Option<f64>, AnalysisError> {
+    let (mut left, mut all) = (0.0, 0.0);
+    for (row, omega) in data.omega().iter().enumerate() {
+        let measured = data.displacement().row(row).transpose();
+        let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
+        // A displacement weighs low lines most, whatever their noise.
+        let quantity = data.measured().per_displacement(*omega).norm_sqr();
+        for channel in 0..data.dof() {
+            let weight = match data.noise() {
+                Some(noise) => noise.covariance(row)[(channel, channel)].re.recip(),
+                None => quantity,
+            };
+            if weight.is_finite() {
+                left += weight * (measured[channel] - modelled[channel]).norm_sqr();
+                all += weight * measured[channel].norm_sqr();
             }
         }
-        Ok((all > 0.0).then(|| (left / all).sqrt()))
     }
+    Ok((all > 0.0).then(|| (left / all).sqrt()))
 }

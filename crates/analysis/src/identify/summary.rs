@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_estimate::checks::Subject;
-use mechid_estimate::{self as estimate, IdentifiedMode, Unknowns, frequency_domain};
+use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
 use mechid_signal::counted;
@@ -191,7 +191,7 @@ impl IdentificationSummary {
             repeats: fitted.prediction == Prediction::Steady,
             lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
             confidence: CONFIDENCE,
-            parameters: parameters(fitted)?,
+            parameters: parameters(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
             fit: FitRow {
@@ -270,23 +270,8 @@ impl IdentificationSummary {
             text += &format!("\n{}", validation.text());
         }
         text.push('\n');
-        text += &self.verdict();
+        text += &verdict(&self.checks);
         text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
-    }
-
-    /// Returns how many checks passed, and each warning with its sentence.
-    fn verdict(&self) -> String {
-        let all = self.checks.len();
-        let warnings: Vec<&CheckRow> =
-            self.checks.iter().filter(|check| check.is_conspicuous()).collect();
-        let mut text = match warnings.len() {
-            0 => format!("{all} of {} passed\n", counted(all, "check")),
-            some => format!("{some} of {}: warning\n", counted(all, "check")),
-        };
-        for check in warnings {
-            text += &format!("  {}: {}\n", check.subject, check.sentence());
-        }
-        text
     }
 
     /// Returns every check with its verdict, in the order in which they were made.
@@ -335,13 +320,8 @@ impl IdentificationSummary {
     }
 
     fn parameter_table(&self) -> String {
-        let mut rows = vec![self.header("parameter")];
-        for p in &self.parameters {
-            let mut row = vec![p.name.clone()];
-            row.extend(p.estimate.cells());
-            row.push(p.unit.into());
-            rows.push(row);
-        }
+        let mut rows = vec![header("parameter")];
+        rows.extend(self.parameters.iter().map(ParameterRow::cells));
         for p in self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters) {
             let mut row = vec![p.name.clone()];
             row.extend(p.estimate.cells());
@@ -353,35 +333,71 @@ impl IdentificationSummary {
 
     fn mode_table(&self) -> String {
         let small = self.nonlinear.is_some();
-        let mut rows = vec![self.header(if small { "mode of small amplitude" } else { "mode" })];
-        for (number, mode) in (1..).zip(&self.modes) {
-            let mut add = |name: String, value: &Uncertain, unit: &str| {
-                let mut row = vec![name];
-                row.extend(value.cells());
-                row.push(unit.into());
-                rows.push(row);
-            };
-            add(format!("{number} natural frequency"), &mode.natural_frequency_hz, "Hz");
-            add(format!("{number} damping ratio"), &mode.damping_ratio, "–");
-        }
-        text_table(&rows)
-    }
-
-    fn header(&self, what: &str) -> Vec<String> {
-        let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
-        [what, "value", "standard error", &interval, "unit"].map(String::from).to_vec()
+        let what = if small { "mode of small amplitude" } else { "mode" };
+        mode_table(what, &self.modes)
     }
 
     fn fit_lines(&self) -> String {
-        let fit = &self.fit;
+        self.fit.lines(if self.nonlinear.is_some() { "model" } else { "linear model" })
+    }
+}
+
+/// Returns how many checks passed, and each warning with its sentence.
+pub(super) fn verdict(checks: &[CheckRow]) -> String {
+    let all = checks.len();
+    let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
+    let mut text = match warnings.len() {
+        0 => format!("{all} of {} passed\n", counted(all, "check")),
+        some => format!("{some} of {}: warning\n", counted(all, "check")),
+    };
+    for check in warnings {
+        text += &format!("  {}: {}\n", check.subject, check.sentence());
+    }
+    text
+}
+
+/// Returns the header of a table of estimates.
+pub(crate) fn header(what: &str) -> Vec<String> {
+    let interval = format!("{} % interval", compact(100.0 * CONFIDENCE, 3));
+    [what, "value", "standard error", &interval, "unit"].map(String::from).to_vec()
+}
+
+/// Returns natural frequency and damping ratio of every mode as a table.
+pub(super) fn mode_table(what: &str, modes: &[ModeRow]) -> String {
+    let mut rows = vec![header(what)];
+    for (number, mode) in (1..).zip(modes) {
+        let mut add = |name: String, value: &Uncertain, unit: &str| {
+            let mut row = vec![name];
+            row.extend(value.cells());
+            row.push(unit.into());
+            rows.push(row);
+        };
+        add(format!("{number} natural frequency"), &mode.natural_frequency_hz, "Hz");
+        add(format!("{number} damping ratio"), &mode.damping_ratio, "–");
+    }
+    text_table(&rows)
+}
+
+impl ParameterRow {
+    /// Name, value, standard error, interval and unit.
+    pub(super) fn cells(&self) -> Vec<String> {
+        let mut row = vec![self.name.clone()];
+        row.extend(self.estimate.cells());
+        row.push(self.unit.into());
+        row
+    }
+}
+
+impl FitRow {
+    /// Returns the quality of the fit as a table; `model` says what explains the motion.
+    pub(super) fn lines(&self, model: &str) -> String {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
         let mut rows = vec![
-            vec!["residual of the fit (NRMSE)".into(), percent(fit.nrmse)],
-            vec!["condition number".into(), significant(fit.condition_number, 3)],
-            vec!["equations / unknowns".into(), format!("{} / {}", fit.equations, fit.unknowns)],
+            vec!["residual of the fit (NRMSE)".into(), percent(self.nrmse)],
+            vec!["condition number".into(), significant(self.condition_number, 3)],
+            vec!["equations / unknowns".into(), format!("{} / {}", self.equations, self.unknowns)],
         ];
-        if let Some(unexplained) = fit.unexplained_motion {
-            let model = if self.nonlinear.is_some() { "model" } else { "linear model" };
+        if let Some(unexplained) = self.unexplained_motion {
             let name = format!("motion the {model} leaves unexplained");
             rows.insert(1, vec![name, percent(unexplained)]);
         }
@@ -479,8 +495,8 @@ pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> 
     })
 }
 
-fn parameters(fitted: &Fitted) -> Result<Vec<ParameterRow>, AnalysisError> {
-    let (estimate, mut rows) = (&fitted.estimate, Vec::new());
+pub(super) fn parameters(estimate: &Estimate) -> Result<Vec<ParameterRow>, AnalysisError> {
+    let mut rows = Vec::new();
     let found = |parameter: Parameter| {
         let at = estimate.parameters().position(|p| p.parameter == parameter);
         at.and_then(|at| estimate.parameters().nth(at))

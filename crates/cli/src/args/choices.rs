@@ -1,9 +1,9 @@
 //! Words of the command line for the choices of the analysis.
 
 use clap::ValueEnum;
-use mechid::analysis::{Detrend, frf, identify, reconstruct, sweep};
+use mechid::analysis::{Detrend, bearing, frf, identify, reconstruct, sweep};
 use mechid::estimate::nonlinear;
-use mechid::model::Discretisation;
+use mechid::model::{Discretisation, ResponseQuantity};
 use mechid::signal::Extent;
 
 /// Defines a choice of the command line, which stands for an enum of the analysis with the same
@@ -30,6 +30,30 @@ choice! {
         None,
         /// The mean of the whole record
         Mean,
+    }
+}
+
+choice! {
+    /// Coefficients of a film.
+    CoefficientsChoice => bearing::Coefficients {
+        /// Twelve if a likelihood-ratio test at 5 % finds inertia of the fluid, otherwise eight
+        Automatic,
+        /// Stiffness and damping
+        Eight,
+        /// Stiffness, damping and mass
+        Twelve,
+    }
+}
+
+choice! {
+    /// Measured quantity of a frequency response.
+    QuantityChoice => ResponseQuantity {
+        /// Receptance, m/N
+        Displacement,
+        /// Mobility, m/(s·N)
+        Velocity,
+        /// Accelerance, m/(s²·N)
+        Acceleration,
     }
 }
 

@@ -5,17 +5,17 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use mechid::analysis::identify::{
-    Band, Derivatives, Fit, Identified, Identify, KnownMass, LineChoice, Method, Nonlinear,
-    Refinement, ResponseFit, SampleFit, ValidationWindow,
+    Band, Derivatives, Fit, Identified, IdentifiedResponses, Identify, IdentifyResponses,
+    KnownMass, LineChoice, Method, Nonlinear, Refinement, ResponseFit, SampleFit, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
 use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
-use mechid::io::LineSpec;
+use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
 
 use super::choices::{
     BetweenSamplesChoice, EstimatorChoice, ExtentChoice, InterpolationChoice, MethodChoice,
-    SearchChoice, WeightChoice, WeightingChoice,
+    QuantityChoice, SearchChoice, WeightChoice, WeightingChoice,
 };
 use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
@@ -161,6 +161,29 @@ pub struct SegmentArgs {
     segment_overlap: Option<f64>,
 }
 
+/// Frequency responses that were measured elsewhere.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Tables of frequency responses")]
+pub struct TableArgs {
+    /// The files are tables of frequency responses: text with columns h_1_1_real, h_1_1_imaginary …
+    /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
+    #[arg(long, conflicts_with_all = ["force", "displacement", "velocity", "acceleration",
+          "sample_rate", "time", "period", "detrend", "lines", "from_frf", "segment", "nonlinear",
+          "between_samples", "extent", "derivatives", "refine", "validate", "validate_start",
+          "validate_samples", "skip_lines"])]
+    frf_table: bool,
+    /// Measured quantity of the responses, where the table does not state it
+    #[arg(long, value_name = "QUANTITY", value_enum, requires = "frf_table")]
+    quantity: Option<QuantityChoice>,
+    /// Number of independent averages behind the coherence, from which standard errors follow; not
+    /// needed where the table has standard errors
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
+    averages: Option<usize>,
+    /// Points to use, one per degree of freedom, as the table names them [default: all]
+    #[arg(long, value_name = "POINT,…", value_delimiter = ',', requires = "frf_table")]
+    points: Vec<String>,
+}
+
 /// A record to predict.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Validation")]
@@ -250,6 +273,33 @@ impl FitArgs {
         let other = found.validation_window(other, &ValidationWindow { start, samples })?;
         found.add_validation(&other)?;
         Ok(found)
+    }
+
+    /// Identifies the machine from tables of frequency responses, if the files are such.
+    pub fn identify_tables(
+        &self,
+        table: &TableArgs,
+    ) -> Result<Option<IdentifiedResponses>, CliError> {
+        if !table.frf_table {
+            return Ok(None);
+        }
+        if let Domain::Time = self.domain {
+            let (option, why) = ("--frf-table", "belongs to --domain frequency");
+            return Err(CliError::MisplacedOption { option, why });
+        }
+        let files = std::iter::once(self.input.record.as_path())
+            .chain(self.more.iter().map(PathBuf::as_path));
+        let tables: Vec<FrequencyResponses> =
+            files.map(FrequencyResponses::read).collect::<Result<_, _>>()?;
+        let how = IdentifyResponses {
+            quantity: table.quantity.map(Into::into),
+            averages: table.averages.map(|count| count as f64),
+            points: table.points.clone(),
+            band: self.lines.band_hz,
+            mass: self.mass.clone(),
+            method: self.method.map(Method::from),
+        };
+        Ok(Some(mechid::identify_responses(&tables, &how)?))
     }
 
     /// Returns the records that are read.

@@ -35,10 +35,19 @@ pub struct FrfArgs {
     lines: LineArgs,
     #[command(flatten)]
     segments: SegmentArgs,
-    /// Write the responses into this file (-: to standard output), as a table with one row per
-    /// frequency
-    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    /// Write the responses into this file (-: to standard output): a table with one row per
+    /// frequency, or a universal file (.unv, .uff) of datasets 151, 164 and 58
+    #[arg(long, value_name = "FILE.csv|FILE.unv", help_heading = "Output")]
     output: Option<PathBuf>,
+    /// Place and direction of each degree of freedom in a universal file [default: 1+X,2+X,…]
+    #[arg(
+        long,
+        value_name = "POINT,…",
+        value_delimiter = ',',
+        requires = "output",
+        help_heading = "Output"
+    )]
+    points: Vec<String>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -65,7 +74,14 @@ impl FrfArgs {
         let mut outcome = Outcome::new(found.to_string(), &found)?
             .with_plot(&self.plot, || Ok(found.figure()?))?;
         if let Some(path) = &self.output {
-            outcome = outcome.with_file(path, found.csv());
+            let universal = path.extension().is_some_and(|ending| {
+                ["unv", "uff"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+            });
+            let content = match universal {
+                true => found.to_responses(&self.points)?.to_universal_file()?,
+                false => found.csv(),
+            };
+            outcome = outcome.with_file(path, content);
         }
         Ok(outcome)
     }

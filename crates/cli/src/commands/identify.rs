@@ -3,7 +3,7 @@
 use clap::Args;
 use mechid::report::ToFigure as _;
 
-use crate::args::fit::FitArgs;
+use crate::args::fit::{FitArgs, TableArgs};
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
@@ -15,6 +15,8 @@ use crate::outcome::{Files, Outcome};
 /// cut into segments with --from-frf. In the time domain any record will do: displacement, velocity
 /// and acceleration for the equation of motion itself, or displacement and velocity with an
 /// assumption on the force between the samples; what was not measured, --derivatives finds.
+///
+/// With --frf-table the files are frequency responses measured elsewhere.
 ///
 /// A long text is read period by period, or a stretch at a time, and not held: the fit takes all of
 /// it, the checks and a plot in the time domain look at the first 262144 samples at most. Held whole
@@ -29,12 +31,15 @@ use crate::outcome::{Files, Outcome};
   mechid identify a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
       --validate c.csv
   mechid identify random.csv --force f --acceleration a --from-frf h1 --segment 1024
+  mechid identify modal.unv --frf-table --averages 32 --band-hz 20:400
   mechid identify t.csv --force f --displacement x --velocity v --domain time \\
       --between-samples euler --extent period --refine 8 --interpolation band-limited --plot t.svg
   mechid identify t.csv --force f --acceleration a --domain time --derivatives savitzky-golay:11:4")]
 pub struct IdentifyArgs {
     #[command(flatten)]
     fit: FitArgs,
+    #[command(flatten)]
+    table: TableArgs,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -49,6 +54,10 @@ impl IdentifyArgs {
 
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
+        if let Some(found) = self.fit.identify_tables(&self.table)? {
+            return Outcome::new(found.to_string(), &found)?
+                .with_plot(&self.plot, || Ok(found.figure()?));
+        }
         let found = self.fit.identify()?;
         Outcome::new(self.fit.text(&found), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
     }

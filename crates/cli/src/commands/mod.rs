@@ -5,6 +5,7 @@
 //! [`Command`] and its two arms below. Errors of a library crate get a variant of
 //! [`CliError`].
 
+mod bearing;
 mod completions;
 mod force;
 mod frf;
@@ -47,6 +48,7 @@ pub struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    Bearing(bearing::BearingArgs),
     Completions(completions::CompletionsArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
@@ -66,6 +68,7 @@ impl Command {
     /// it, for a report that tells how it is made again.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match self {
+            Command::Bearing(args) => args.run(),
             Command::Completions(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
@@ -84,6 +87,7 @@ impl Command {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         match self {
+            Command::Bearing(args) => args.files(),
             Command::Completions(_) => Files::default(),
             Command::Force(args) => args.files(),
             Command::Frf(args) => args.files(),
@@ -106,7 +110,7 @@ impl Command {
             _ if self.report().quiet => None,
             Command::Simulate(_) => Some("simulating"),
             Command::Force(_) => Some("looking for the force"),
-            Command::Identify(_) | Command::Report(_) => Some("identifying"),
+            Command::Bearing(_) | Command::Identify(_) | Command::Report(_) => Some("identifying"),
             _ => Some("working"),
         }
     }
@@ -114,6 +118,7 @@ impl Command {
     /// How the user wants to be told.
     pub fn report(&self) -> &ReportArgs {
         match self {
+            Command::Bearing(args) => &args.report,
             Command::Completions(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,

@@ -24,7 +24,7 @@ impl Session {
         let home = tempfile::tempdir().unwrap();
         let folder = home.path().to_owned();
         fs::create_dir(folder.join("examples")).unwrap();
-        for file in ["machine.json", "machine.csv"] {
+        for file in ["machine.json", "machine.csv", "bearing-rig.csv", "bearing-dry.csv"] {
             let name = Path::new("examples").join(file);
             fs::copy(root.join(&name), folder.join(&name)).unwrap();
         }

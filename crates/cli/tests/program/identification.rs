@@ -367,6 +367,17 @@ fn frequency_responses_are_estimated_and_fitted() {
         let tolerance = if estimator == "hv" { 1e-6 } else { 1e-9 };
         assert!(error(&found) < tolerance, "{estimator}: {found}");
         assert_eq!(verdict(&found, "before", "coherence"), "good");
+        let table = "identify frf.csv --frf-table --quantity displacement --plot fitted.svg";
+        let found = json(folder, table);
+        assert!(error(&found) < tolerance, "{estimator}: {found}");
+        json(folder, &format!("frf p.csv {common} --estimator {estimator} --output frf.unv"));
+        let found = json(folder, "identify frf.unv --frf-table --averages 4");
+        assert_eq!(
+            (&found["quantity"], &found["points"][0]),
+            (&"displacement".into(), &"1+X".into())
+        );
+        // The numbers of a universal file have 13 digits, its frequencies nine.
+        assert!(error(&found) < 1e-5, "{estimator}: {found}");
     }
     let (_, text, _) = run(folder, &format!("frf p.csv {common}"));
     assert!(text.contains("H1 from periods of 256 samples, worth 4 averages; 20 lines"), "{text}");

@@ -56,7 +56,7 @@ fn is_named(section: &str, path: &str) -> bool {
 fn every_field_of_every_report_is_in_the_reference() {
     let folder = tempfile::tempdir().unwrap();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    for file in ["machine.csv", "machine.json"] {
+    for file in ["machine.csv", "machine.json", "bearing-rig.csv", "bearing-dry.csv"] {
         fs::copy(examples.join(file), folder.path().join(file)).unwrap();
     }
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../io/tests/data/plain.mat");
@@ -66,6 +66,8 @@ fn every_field_of_every_report_is_in_the_reference() {
     let nonlinear = format!("{identify} --period 256 --nonlinear k3:x1^3 --search delay");
     let found = mechid(folder.path(), &format!("{nonlinear} --json"));
     fs::write(folder.path().join("nonlinear.json"), found).unwrap();
+    let measured = "--force force --displacement displacement --period 256";
+    mechid(folder.path(), &format!("frf machine.csv {measured} --output frf.csv"));
     let time = "--velocity velocity --acceleration acceleration --domain time";
     for arguments in [
         format!("{identify} --period 256"),
@@ -75,6 +77,11 @@ fn every_field_of_every_report_is_in_the_reference() {
         "force machine.csv --system found.json --displacement displacement --period 256".into(),
         "force machine.csv --system machine.json --displacement displacement".into(),
         "frf machine.csv --force force --displacement displacement --period 256".into(),
+        "identify frf.csv --frf-table --quantity displacement --band-hz 1:60".into(),
+        "bearing bearing-rig.csv --baseline bearing-dry.csv --force fx,fy --acceleration ax,ay \
+         --displacement dx,dy --stator-mass 20 --rotation-hz 50 --period 256 --load 2500 --clearance \
+         100e-6 --diameter 0.1 --length 0.05 --viscosity 0.02"
+            .into(),
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
         "modal found.json".into(),

@@ -96,6 +96,59 @@ impl FrequencyData {
         Ok(Self { omega, force, displacement: motion, measured, noise: None })
     }
 
+    /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
+    /// for each of `omega` (rad/s): every force in turn is an experiment with unit force at its
+    /// degree of freedom (`force_dof`, one per column, counted from 0). `variance` is E|ΔH|² of every
+    /// entry, in the square of its unit, if it is known; errors of two entries are independent.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if the shapes differ or a degree of freedom does not exist, and what
+    /// [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`] refuse.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), chapter 2 (frequency responses as amplitudes per unit force).
+    pub fn from_responses(
+        omega: &[f64],
+        response: &[DMatrix<Complex<f64>>],
+        variance: Option<&[DMatrix<f64>]>,
+        measured: ResponseQuantity,
+        force_dof: &[usize],
+    ) -> Result<Self, EstimateError> {
+        let size = crate::least_squares::size;
+        let (lines, n) = (omega.len(), response.first().map_or(0, |h| h.nrows()));
+        size("frequency response matrices", lines, response.len())?;
+        size("variances of frequency responses", lines, variance.map_or(lines, <[_]>::len))?;
+        let shapes = response.iter().map(|h| h.shape());
+        for shape in shapes.chain(variance.iter().flat_map(|v| v.iter().map(|v| v.shape()))) {
+            size("rows of a frequency response matrix", n, shape.0)?;
+            size("columns of a frequency response matrix", force_dof.len(), shape.1)?;
+        }
+        if let Some(&got) = force_dof.iter().find(|dof| **dof >= n) {
+            let what = "driven degree of freedom, at most";
+            return Err(EstimateError::Size { what, expected: n.saturating_sub(1), got });
+        }
+        let mut all: Option<Self> = None;
+        for (input, &dof) in force_dof.iter().enumerate() {
+            let mut force = DMatrix::zeros(lines, n);
+            force.column_mut(dof).fill(Complex::new(1.0, 0.0));
+            let motion = DMatrix::from_fn(lines, n, |l, o| response[l][(o, input)]);
+            let mut one = Self::from_amplitudes(omega.to_vec(), force, motion, measured)?;
+            if let Some(variance) = variance {
+                let covariance = variance.iter().zip(omega).map(|(variance, omega)| {
+                    let scale = measured.per_displacement(*omega).norm_sqr();
+                    let entries = variance.column(input).map(|v| Complex::from(v / scale));
+                    DMatrix::from_diagonal(&entries.resize_vertically(2 * n, Complex::default()))
+                });
+                one = one.with_noise(NoiseSpectrum::new(omega.to_vec(), covariance.collect())?)?;
+            }
+            all = Some(match all {
+                None => one,
+                Some(before) => before.and(&one)?,
+            });
+        }
+        all.ok_or(EstimateError::NoExcitedLine)
+    }
+
     /// The same data with what is known of their noise.
     ///
     /// # Errors

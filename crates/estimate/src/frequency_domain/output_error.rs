@@ -22,6 +22,12 @@ pub struct OutputErrorFit {
     /// what the model says (nonlinear, more degrees of freedom). 1 by construction where the
     /// noise is estimated from the residual.
     pub misfit_ratio: f64,
+    /// Twice the negative logarithm of the likelihood, up to a constant and allowing for sampled
+    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits of
+    /// the same data differ by is a [`likelihood_ratio`].
+    ///
+    /// [`likelihood_ratio`]: super::likelihood_ratio()
+    pub deviance: Option<f64>,
     /// Gauss–Newton steps from the best start to the minimum.
     pub steps: usize,
     /// Number of searches, each from another start.
@@ -114,6 +120,7 @@ fn with_known_noise(
         variance: inflation,
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: found.minimum.cost / expected,
+        deviance: Some(found.minimum.cost / inflation),
     };
     finish(data, unknowns, &mut misfit, &found, scale)
 }
@@ -151,6 +158,7 @@ fn with_white_noise(
                 variance: fit.minimum.cost / spare.max(1) as f64,
                 degrees_of_freedom: spare,
                 misfit_ratio: 1.0,
+                deviance: None,
             };
             return finish(data, unknowns, &mut misfit, &fit, scale);
         }
@@ -174,6 +182,7 @@ struct Scale {
     variance: f64,
     degrees_of_freedom: usize,
     misfit_ratio: f64,
+    deviance: Option<f64>,
 }
 
 fn finish(
@@ -204,6 +213,7 @@ fn finish(
     Ok(OutputErrorFit {
         estimate,
         misfit_ratio: scale.misfit_ratio,
+        deviance: scale.deviance,
         steps: found.minimum.steps,
         searches: found.searches,
         agreeing: found.agreeing,

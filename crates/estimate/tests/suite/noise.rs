@@ -68,7 +68,7 @@ fn the_scatter_of_the_periods_is_the_noise_that_was_added() {
     .unwrap();
     for (pooling, averages) in [
         (Pooling::PerLine, 399.0),
-        (Pooling::Neighbours(4), 5.0 * 399.0),
+        (Pooling::Neighbours(4), 9.0 * 399.0),
         (Pooling::AllLines, 40.0 * 399.0),
     ] {
         let found = periods.noise(pooling).unwrap();

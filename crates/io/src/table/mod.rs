@@ -10,7 +10,7 @@ mod preamble;
 mod printed;
 mod record_file;
 mod rows;
-mod source;
+pub(crate) mod source;
 mod text;
 mod time_axis;
 mod time_unit;
@@ -89,7 +89,7 @@ impl Table {
     /// As [`Table::read`], and [`IoError::NothingToSkip`] for lines to be skipped in a file that is
     /// no text.
     pub fn read_with(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Self, IoError> {
-        Ok(Self::first_rows(Source::open(path.as_ref())?, options, usize::MAX)?.table)
+        Self::of_source(Source::open(path.as_ref())?, options)
     }
 
     /// Reads the table in the bytes of a file; `file` is its name in messages.
@@ -113,7 +113,12 @@ impl Table {
         bytes: &[u8],
         options: &ReadOptions,
     ) -> Result<Self, IoError> {
-        Ok(Self::first_rows(Source::new(file.into(), bytes)?, options, usize::MAX)?.table)
+        Self::of_source(Source::new(file.into(), bytes)?, options)
+    }
+
+    /// Reads the table of a source.
+    pub(crate) fn of_source(source: Source<'_>, options: &ReadOptions) -> Result<Self, IoError> {
+        Ok(Self::first_rows(source, options, usize::MAX)?.table)
     }
 
     /// Reads a table, of a text at most the first `limit` rows and one more.

@@ -10,12 +10,23 @@ use crate::limits::Budget;
 const NOT_TIME: [u32; 3] = [18, 19, 20];
 
 /// Adds the columns of the dataset whose number stands on `id`: one or, for uneven instants, two.
-pub(crate) fn read(
+pub(super) fn read(
     lines: &mut Lines<'_>,
     id: &Line<'_>,
     columns: &mut Vec<Column>,
     budget: &mut Budget,
 ) -> Result<(), Fault> {
+    let (header, values) = dataset(lines, id, budget)?;
+    add(header, values, columns);
+    Ok(())
+}
+
+/// Reads the dataset whose number stands on `id`: its description and its numbers.
+pub(super) fn dataset(
+    lines: &mut Lines<'_>,
+    id: &Line<'_>,
+    budget: &mut Budget,
+) -> Result<(Header, Vec<f64>), Fault> {
     let binary = Binary::of(id)?;
     let header = Header::read(lines)?;
     if header.count == 0 {
@@ -30,8 +41,7 @@ pub(crate) fn read(
         None => printed(&header, lines)?,
         Some(binary) => binary.read(&header, lines)?,
     };
-    add(header, values, columns);
-    Ok(())
+    Ok((header, values))
 }
 
 fn add(header: Header, values: Vec<f64>, columns: &mut Vec<Column>) {

@@ -26,6 +26,8 @@ pub(crate) struct Header {
     pub abscissa: u32,
     /// Quantity, for people; empty if the file does not state it.
     pub quantity: String,
+    /// Data types of the ordinate and of what it is divided by: 8, 11 and 12 are a response, 13 a force.
+    pub ordinate: [u32; 2],
     /// The line with the numbers, for messages.
     pub form_at: usize,
 }
@@ -39,9 +41,8 @@ impl Header {
             next()?;
         }
         let (what, form, abscissa, ordinate) = (next()?, next()?, next()?, next()?);
-        for _ in 10..=11 {
-            next()?;
-        }
+        let denominator = next()?;
+        next()?;
         let point = |from: usize| -> Result<(i64, i64), Fault> {
             Ok((whole(&what, from, 10)?, whole(&what, from + 10, 4)?))
         };
@@ -70,6 +71,7 @@ impl Header {
             step: if is_even { real(&form, 43)? } else { 0.0 },
             abscissa: whole(&abscissa, 0, 10)?,
             quantity: quantity(&ordinate)?,
+            ordinate: [whole(&ordinate, 0, 10)?, whole(&denominator, 0, 10)?],
             form_at: form.at,
         })
     }

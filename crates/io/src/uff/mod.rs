@@ -1,13 +1,15 @@
-//! Universal files: functions of time in datasets 58 and 58b.
+//! Universal files: functions of time, and frequency responses, in datasets 58 and 58b.
 //!
 //! # Source
 //! University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets 58,
-//! 58b and 164.
+//! 58b, 151 and 164.
 
 mod function;
 mod header;
 mod lines;
+mod responses;
 mod values;
+mod write;
 
 use std::collections::BTreeMap;
 
@@ -15,6 +17,9 @@ use self::lines::{Line, Lines, is_mark, number};
 use crate::IoError;
 use crate::contents::{Contents, Fault, Place};
 use crate::limits::{Budget, Limits};
+
+pub(crate) use self::responses::read as read_responses;
+pub(crate) use self::write::write_responses;
 
 /// Reads the functions of a file as columns.
 pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents, IoError> {
@@ -45,18 +50,22 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
         let dataset = dataset_number(&id)?;
         match dataset {
             58 => function::read(lines, &id, &mut contents.columns, &mut budget)?,
-            164 => contents.remarks.push(units(lines)?),
+            164 => contents.remarks.push(units(lines)?.remark()),
             _ => *skipped.entry(dataset).or_default() += 1,
         }
-        while !is_mark(lines.required("dataset has no end: the file is cut short")?.text) {
-            // The rest of a dataset is left out.
-        }
+        skip_to_end(lines)?;
     }
     if !skipped.is_empty() {
         let told: Vec<String> = skipped.iter().map(|(n, count)| format!("{n} ({count})")).collect();
         contents.remarks.push(format!("left out: datasets {}", told.join(", ")));
     }
     Ok(contents)
+}
+
+/// Leaves out the rest of a dataset.
+fn skip_to_end(lines: &mut Lines<'_>) -> Result<(), Fault> {
+    while !is_mark(lines.required("dataset has no end: the file is cut short")?.text) {}
+    Ok(())
 }
 
 /// The number of a dataset, in columns 1 to 6 of its first line.
@@ -72,8 +81,17 @@ fn dataset_number(id: &Line<'_>) -> Result<u32, Fault> {
     })
 }
 
+/// Units that dataset 164 describes.
+struct Units {
+    code: u32,
+    name: String,
+    /// Factors by which lengths and forces in SI units are multiplied in the file.
+    length: f64,
+    force: f64,
+}
+
 /// The units that dataset 164 describes.
-fn units(lines: &mut Lines<'_>) -> Result<String, Fault> {
+fn units(lines: &mut Lines<'_>) -> Result<Units, Fault> {
     let first = lines.required("the units are cut short")?;
     let code: u32 = number(first.text.get(..10).unwrap_or(first.text))
         .ok_or_else(|| first.fault("the units code is missing in columns 1 to 10"))?;
@@ -84,9 +102,15 @@ fn units(lines: &mut Lines<'_>) -> Result<String, Fault> {
         number(part.get(..25).unwrap_or(part))
             .ok_or_else(|| factors.fault("the factor of a unit is no number"))
     };
-    let (length, force) = (factor(0)?, factor(1)?);
-    Ok(format!(
-        "units: code {code} {}; to get SI units, divide lengths by {length} and forces by {force}",
-        name.trim()
-    ))
+    Ok(Units { code, name: name.trim().into(), length: factor(0)?, force: factor(1)? })
+}
+
+impl Units {
+    fn remark(&self) -> String {
+        let Self { code, name, length, force } = self;
+        format!(
+            "units: code {code} {name}; to get SI units, divide lengths by {length} and forces by \
+             {force}"
+        )
+    }
 }

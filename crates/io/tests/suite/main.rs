@@ -4,4 +4,5 @@ mod covariance;
 mod experiment;
 mod limits;
 mod output;
+mod responses;
 mod table;

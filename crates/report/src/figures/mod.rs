@@ -1,6 +1,7 @@
 //! Figures of the results of an analysis.
 
 mod backbone;
+mod bearing;
 mod force;
 mod frf;
 pub mod modal;
@@ -10,7 +11,11 @@ mod record;
 mod sweep;
 pub mod trace;
 
-use mechid_analysis::{FrfTable, Identified, Inspected, Machine, Reconstructed, SweepSummary};
+use mechid_analysis::bearing::BearingTable;
+use mechid_analysis::{
+    FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
+    Reconstructed, SweepSummary,
+};
 use mechid_plot::Figure;
 
 use crate::ReportError;
@@ -35,6 +40,28 @@ impl ToFigure for Identified {
             Some(data) => receptance::receptance(&title, data, &self.system()?),
             None => Ok(motion::motion(&title, &self.compared()?[0])),
         }
+    }
+}
+
+impl ToFigure for IdentifiedResponses {
+    /// Draws measured and identified receptance.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        let title = self.summary().files.join(", ");
+        receptance::receptance(&title, self.data(), &self.system()?)
+    }
+}
+
+impl ToFigure for IdentifiedBearing {
+    /// Draws the dynamic stiffness, measured line by line and fitted.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(bearing::dynamic_stiffness(self.summary()))
+    }
+}
+
+impl ToFigure for BearingTable {
+    /// Draws the coefficients over speed.
+    fn figure(&self) -> Result<Figure, ReportError> {
+        Ok(bearing::over_speed(self))
     }
 }
 

@@ -1,0 +1,273 @@
+//! Forces on the film and its motion, from records or from tables of frequency responses.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::frequency_domain::{
+    FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods,
+};
+use mechid_io::FrequencyResponses;
+use mechid_model::ResponseQuantity;
+use mechid_signal::Record;
+use nalgebra::{Complex, DMatrix};
+
+use super::IdentifyBearing;
+use crate::AnalysisError;
+use crate::identify::lines::choose_lines;
+use crate::identify::tables::{IdentifyResponses, response_data};
+use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Measurement, Windowed};
+
+/// Degrees of freedom from which the noise of a line is known well enough to weight with it: the loss
+/// of information is then below 3 %.
+const WELL_KNOWN: usize = 40;
+
+/// Spectra of f − M_s a and d, of all tests of one condition.
+#[derive(Debug, Clone)]
+pub struct BearingData {
+    /// Names of the tests.
+    pub(super) names: Vec<String>,
+    /// Rows of all tests, with their noise where it is known.
+    pub(super) data: FrequencyData,
+    /// Source of the noise, in words; `None` where it is not known.
+    pub(super) noise: Option<&'static str>,
+    /// Largest distance of the housing from its mean place, relative to the shaft, in m; `None` of
+    /// frequency responses.
+    pub(super) largest_displacement: Option<f64>,
+    /// Frequencies with rotation that were left out, in Hz.
+    pub(super) left_out_hz: Vec<f64>,
+    pub(super) remarks: Vec<String>,
+}
+
+impl BearingData {
+    /// Takes records of whole periods: `force` the two shaker forces, `acceleration` of the housing and
+    /// `displacement` of the housing relative to the shaft, x before y in each.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoRecord`], [`AnalysisError::Setting`] if a record has no displacement or
+    /// acceleration in two directions, or no line is left, what
+    /// [`choose_lines`](crate::identify::lines::choose_lines) refuses, and if a file cannot be read
+    /// again.
+    pub fn of_records(tests: &[Measurement], how: &IdentifyBearing) -> Result<Self, AnalysisError> {
+        how.check()?;
+        let each = tests.iter().map(|test| Self::of_record(test, how));
+        let all = each.collect::<Result<Vec<_>, _>>()?.into_iter();
+        all.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+    }
+
+    /// Takes the displacement relative to the shaft and the acceleration of the housing per shaker
+    /// force, two points and two forces each, at the same frequencies. `tables` says what the tables do
+    /// not: points, averages, band.
+    ///
+    /// # Errors
+    /// As [`identify_responses`](crate::identify_responses()), and [`AnalysisError::Setting`] if the
+    /// tables do not belong together.
+    ///
+    /// # Source
+    /// Rouvas and Childs (1993).
+    pub fn of_responses(
+        displacement: &FrequencyResponses,
+        acceleration: &FrequencyResponses,
+        tables: &IdentifyResponses,
+        how: &IdentifyBearing,
+    ) -> Result<Self, AnalysisError> {
+        how.check()?;
+        let of = |table: &FrequencyResponses, quantity| {
+            let how = IdentifyResponses { quantity: Some(quantity), ..tables.clone() };
+            response_data(table, &how)
+        };
+        let (d, noise) = of(displacement, ResponseQuantity::Displacement)?;
+        let (a, noise_of_a) = of(acceleration, ResponseQuantity::Acceleration)?;
+        let apart = |why: &str| AnalysisError::Setting { setting: "tables", why: why.into() };
+        if (d.dof(), a.dof()) != (2, 2) {
+            return Err(apart("a bearing has two directions: choose two `points`"));
+        }
+        if d.omega() != a.omega() || d.force() != a.force() {
+            return Err(apart(
+                "displacement and acceleration need the same frequencies and forces",
+            ));
+        }
+        let mass = how.stator_mass;
+        let keep: Vec<usize> = (0..d.len())
+            .filter(|row| !rotates(d.omega()[*row] / TAU, how.rotation_hz, spacing(d.omega())))
+            .collect();
+        let omega: Vec<f64> = keep.iter().map(|row| d.omega()[*row]).collect();
+        let motion = d.displacement().select_rows(&keep);
+        let mut force = d.force().select_rows(&keep);
+        for (to, row) in keep.iter().enumerate() {
+            // The table holds accelerations as displacements.
+            let factor = ResponseQuantity::Acceleration.per_displacement(d.omega()[*row]) * mass;
+            for direction in 0..2 {
+                force[(to, direction)] -= a.displacement()[(*row, direction)] * factor;
+            }
+        }
+        let mut data = FrequencyData::from_amplitudes(
+            omega.clone(),
+            force,
+            motion,
+            ResponseQuantity::Displacement,
+        )?;
+        let noise = noise.zip(noise_of_a).map(|(noise, _)| noise);
+        if let (Some(_), Some(of_d), Some(of_a)) = (noise, d.noise(), a.noise()) {
+            let covariance = keep.iter().map(|row| {
+                let factor = (mass * d.omega()[*row].powi(2)).powi(2);
+                let mut both = of_d.covariance(*row).clone();
+                let of_force = of_a.covariance(*row).view((0, 0), (2, 2)) * Complex::from(factor);
+                both.view_mut((2, 2), (2, 2)).copy_from(&of_force);
+                both
+            });
+            data = data.with_noise(NoiseSpectrum::new(omega, covariance.collect())?)?;
+        }
+        let all = d.omega().iter().map(|omega| omega / TAU);
+        let left_out =
+            all.enumerate().filter(|(row, _)| !keep.contains(row)).map(|(_, hz)| hz).collect();
+        let remarks = displacement.remarks.iter().chain(&acceleration.remarks).cloned().collect();
+        Ok(Self {
+            names: vec![displacement.file.clone(), acceleration.file.clone()],
+            data,
+            noise,
+            largest_displacement: None,
+            left_out_hz: distinct(left_out),
+            remarks,
+        })
+    }
+
+    fn of_record(test: &Measurement, how: &IdentifyBearing) -> Result<Self, AnalysisError> {
+        let recorded = test.hold(Hold::Periods)?;
+        let held = &recorded.held;
+        let (_, d) = of_film(held, how.stator_mass)?;
+        let period = held.force.sampling().with_len(held.period)?;
+        let spacing_hz = period.line_spacing_hz();
+        let chosen = choose_lines(&held.force, held.period, &how.lines)?;
+        let (rotating, kept): (Vec<usize>, Vec<usize>) = chosen
+            .into_iter()
+            .partition(|line| rotates(*line as f64 * spacing_hz, how.rotation_hz, spacing_hz));
+        if kept.is_empty() {
+            let why = "every line lies on a multiple of the rotation: excite lines between them";
+            return Err(AnalysisError::Setting { setting: "lines", why: why.into() });
+        }
+        let lines = Lines::new(period, kept)?;
+        let periods = film_periods(&recorded, &lines, how.stator_mass)?;
+        let count = periods.count();
+        let (data, noise) = match count {
+            0 | 1 => (periods.mean()?, None),
+            // A few periods, and as many neighbouring lines as make the noise well known.
+            _ => {
+                let half_width = WELL_KNOWN.div_ceil(count - 1) / 2;
+                let pooling = match half_width {
+                    0 => Pooling::PerLine,
+                    wide => Pooling::Neighbours(wide),
+                };
+                let noisy = periods.mean_with_noise(pooling)?;
+                match shows_noise(&noisy) {
+                    true => (noisy, Some("estimated from the periods")),
+                    false => (periods.mean()?, None),
+                }
+            }
+        };
+        let mut remarks = held.unit_remarks.clone();
+        if noise.is_none() {
+            remarks.push(format!(
+                "{}: the periods show no noise ({count} of them); it was taken as white on the \
+                 displacement, of the level that the residual has",
+                held.file
+            ));
+        }
+        Ok(Self {
+            names: vec![held.file.clone()],
+            data,
+            noise,
+            largest_displacement: Some(largest_orbit(&d)),
+            left_out_hz: rotating.into_iter().map(|line| line as f64 * spacing_hz).collect(),
+            remarks,
+        })
+    }
+
+    /// The rows of both.
+    fn and(mut self, other: Self) -> Result<Self, AnalysisError> {
+        self.data = self.data.and(&other.data)?;
+        self.noise = self.noise.and(other.noise);
+        self.largest_displacement = match (self.largest_displacement, other.largest_displacement) {
+            (Some(a), Some(b)) => Some(a.max(b)),
+            (a, b) => a.or(b),
+        };
+        self.names.extend(other.names);
+        self.remarks.extend(other.remarks);
+        self.left_out_hz.extend(other.left_out_hz);
+        self.left_out_hz = distinct(self.left_out_hz);
+        Ok(self)
+    }
+}
+
+/// Scatter of the periods over the displacement below which it is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether the scatter of the periods is more than rounding.
+fn shows_noise(data: &FrequencyData) -> bool {
+    let Some(noise) = data.noise() else { return false };
+    let variance = |row: usize| (0..2).map(|c| noise.covariance(row)[(c, c)].re).sum::<f64>();
+    let scatter: f64 = (0..data.len()).map(variance).sum();
+    scatter > ROUNDING * ROUNDING * data.displacement().norm_squared()
+}
+
+/// Sorted, each number once.
+fn distinct(mut numbers: Vec<f64>) -> Vec<f64> {
+    numbers.sort_by(f64::total_cmp);
+    numbers.dedup();
+    numbers
+}
+
+/// Smallest distance between different frequencies, in Hz; 0 of a single one.
+fn spacing(omega: &[f64]) -> f64 {
+    let sorted = distinct(omega.to_vec());
+    let smallest = sorted.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+    if smallest.is_finite() { smallest / TAU } else { 0.0 }
+}
+
+/// Whether a frequency lies within half a line of the rotation or a multiple of it.
+fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
+    let Some(rotation_hz) = rotation_hz else { return false };
+    let nearest = (hz / rotation_hz).round().max(1.0) * rotation_hz;
+    // Of a rotation between two lines both show it.
+    (hz - nearest).abs() < spacing_hz * (1.0 - 1e-6)
+}
+
+/// f − M_s a and d of consecutive samples.
+fn of_film(block: &Block, mass: f64) -> Result<(Record, Record), AnalysisError> {
+    let missing = |setting| AnalysisError::Setting {
+        setting,
+        why: format!(
+            "{}: a bearing test needs two columns, in x and y: the forces of the shakers, the \
+             acceleration of the housing and its displacement relative to the shaft",
+            block.file
+        ),
+    };
+    let a = block.acceleration.as_ref().ok_or_else(|| missing("acceleration"))?;
+    let d = block.displacement.as_ref().ok_or_else(|| missing("displacement"))?;
+    if block.force.channels() != 2 {
+        return Err(missing("force"));
+    }
+    let force = Record::new(block.force.sampling(), block.force.data() - a.data() * mass)?;
+    Ok((force, d.clone()))
+}
+
+/// All periods of a test, read chunk by chunk.
+fn film_periods(
+    recorded: &Windowed,
+    lines: &Lines,
+    mass: f64,
+) -> Result<RepeatedPeriods, AnalysisError> {
+    let Block { period, periods, .. } = &recorded.held;
+    let kind = ResponseQuantity::Displacement;
+    let mut all = RepeatedPeriods::expecting(lines, 2, kind, *periods);
+    let samples = period * (CHUNK_SAMPLES / period).max(1);
+    recorded.chunks(samples, samples, &mut |chunk| {
+        let (force, d) = of_film(chunk, mass)?;
+        Ok(all.push(&force, &d)?)
+    })?;
+    Ok(all)
+}
+
+/// Largest distance from the mean place, in m.
+fn largest_orbit(d: &Record) -> f64 {
+    let d: DMatrix<f64> = d.without_mean().into_data();
+    d.row_iter().map(|row| row.norm()).fold(0.0, f64::max)
+}

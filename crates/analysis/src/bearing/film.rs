@@ -1,0 +1,216 @@
+//! Eight or twelve coefficients of a film, less those of the baseline.
+
+use mechid_estimate::frequency_domain::{
+    LikelihoodRatio, OutputErrorFit, likelihood_ratio, output_error,
+};
+use mechid_estimate::{EstimateError, Unknowns};
+use mechid_model::{Matrix, Parameter};
+use nalgebra::{DMatrix, DVector, Matrix2};
+
+use super::{BearingData, Coefficients};
+use crate::AnalysisError;
+
+/// Level of the test on the inertia of the fluid.
+const SIGNIFICANCE: f64 = 0.05;
+
+/// Coefficients of each kind.
+const EACH: usize = 4;
+
+/// Coefficients of a film with their covariance: kxx, kxy, kyx, kyy, then c and m likewise.
+#[derive(Debug, Clone)]
+pub(super) struct Film {
+    /// 12 or 8.
+    values: DVector<f64>,
+    covariance: DMatrix<f64>,
+    /// Test whether M = 0.
+    pub inertia: Option<LikelihoodRatio>,
+    /// All twelve coefficients of the rig, and of the baseline, which the line-by-line stiffness and
+    /// its bridging take.
+    pub rig: DVector<f64>,
+    pub baseline: Option<(DVector<f64>, DMatrix<f64>)>,
+    /// Fit of the tests, by which the result is judged.
+    pub fit: OutputErrorFit,
+    pub degrees_of_freedom: usize,
+}
+
+impl Film {
+    pub fn of(
+        tests: &BearingData,
+        baseline: Option<&BearingData>,
+        coefficients: Coefficients,
+    ) -> Result<Self, AnalysisError> {
+        let rig = Fitted::of(tests)?;
+        let base = baseline.map(Fitted::of).transpose()?;
+        let with_mass = rig.less(base.as_ref());
+        let (values, covariance) = (with_mass.0.clone(), with_mass.1.clone());
+        let degrees_of_freedom = [Some(&rig), base.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(|fitted| fitted.full.estimate.degrees_of_freedom())
+            .min()
+            .unwrap_or(0);
+        let mut film = Self {
+            values,
+            covariance,
+            inertia: None,
+            rig: rig.values.clone(),
+            baseline: base.as_ref().map(|base| (base.values.clone(), base.covariance.clone())),
+            fit: rig.full.clone(),
+            degrees_of_freedom,
+        };
+        let common = rig.common_mass(base.as_ref())?;
+        let reduced = rig.with_mass(tests, &common)?;
+        let reduced_base = match (baseline, &base) {
+            (Some(data), Some(base)) => Some(base.with_mass(data, &common)?),
+            _ => None,
+        };
+        let mut pairs = vec![(&rig.full, &reduced)];
+        if let (Some(base), Some(reduced)) = (&base, &reduced_base) {
+            pairs.push((&base.full, reduced));
+        }
+        film.inertia = likelihood_ratio(&pairs, EACH);
+        let eight = match coefficients {
+            Coefficients::Eight => true,
+            Coefficients::Twelve => false,
+            Coefficients::Automatic => film.inertia.is_some_and(|t| t.p_value >= SIGNIFICANCE),
+        };
+        if !eight {
+            return Ok(film);
+        }
+        let eight = 2 * EACH;
+        let without = |fit: &OutputErrorFit| in_order(fit, &common).0.rows(0, eight).into_owned();
+        film.values = without(&reduced);
+        if let Some(base) = &reduced_base {
+            film.values -= without(base);
+        }
+        film.covariance = match &base {
+            None => in_order(&reduced, &common).1.view((0, 0), (eight, eight)).into_owned(),
+            // The mass that both tests have in common is uncertain, too.
+            Some(_) => without_mass(&with_mass.1)?,
+        };
+        film.rig = in_order(&reduced, &common).0;
+        if let (Some(base), Some((values, _))) = (&reduced_base, &mut film.baseline) {
+            *values = in_order(base, &common).0;
+        }
+        film.fit = reduced;
+        Ok(film)
+    }
+
+    /// Returns K, C or M, 2×2; M is zero where it was not identified.
+    pub fn matrix(&self, kind: usize) -> Matrix2<f64> {
+        let at = kind * EACH;
+        match self.values.len() > at {
+            true => Matrix2::from_row_slice(&self.values.as_slice()[at..at + EACH]),
+            false => Matrix2::zeros(),
+        }
+    }
+
+    pub fn covariance(&self) -> &DMatrix<f64> {
+        &self.covariance
+    }
+
+    pub fn values(&self) -> &[f64] {
+        self.values.as_slice()
+    }
+}
+
+/// Twelve coefficients of one condition of the rig.
+struct Fitted {
+    full: OutputErrorFit,
+    values: DVector<f64>,
+    covariance: DMatrix<f64>,
+}
+
+impl Fitted {
+    fn of(data: &BearingData) -> Result<Self, AnalysisError> {
+        let full = output_error(&data.data, &Unknowns::unknown_mass(2)?)?;
+        let (values, covariance) = in_order(&full, &Matrix2::zeros());
+        Ok(Self { full, values, covariance })
+    }
+
+    /// The fit with M given.
+    fn with_mass(
+        &self,
+        data: &BearingData,
+        mass: &Matrix2<f64>,
+    ) -> Result<OutputErrorFit, AnalysisError> {
+        let mass = DMatrix::from_column_slice(2, 2, mass.as_slice());
+        Ok(output_error(&data.data, &Unknowns::known_mass(&mass)?)?)
+    }
+
+    /// Coefficients less those of a baseline, with the sum of the covariances.
+    fn less(&self, base: Option<&Self>) -> (DVector<f64>, DMatrix<f64>) {
+        match base {
+            None => (self.values.clone(), self.covariance.clone()),
+            Some(base) => (&self.values - &base.values, &self.covariance + &base.covariance),
+        }
+    }
+
+    /// M if the film has no inertia: that of the baseline, estimated from both; zero without one.
+    fn common_mass(&self, base: Option<&Self>) -> Result<Matrix2<f64>, AnalysisError> {
+        let Some(base) = base else { return Ok(Matrix2::zeros()) };
+        let of = |fitted: &Self| {
+            let at = 2 * EACH;
+            let covariance = fitted.covariance.view((at, at), (EACH, EACH)).into_owned();
+            (fitted.values.rows(at, EACH).into_owned(), covariance)
+        };
+        let ((rig, of_rig), (base, of_base)) = (of(self), of(base));
+        let total = solve(
+            &(&of_rig + of_base),
+            &DMatrix::from_column_slice(EACH, 1, (&rig - base).as_slice()),
+        )?;
+        let mean = rig - of_rig * total.column(0);
+        Ok(Matrix2::from_row_slice(mean.as_slice()))
+    }
+}
+
+/// Covariance of eight coefficients once the last four are known to be zero.
+///
+/// # Source
+/// The conditional normal distribution: Anderson, *An Introduction to Multivariate Statistical
+/// Analysis*, 3rd ed. (2003), section 2.5.
+fn without_mass(all: &DMatrix<f64>) -> Result<DMatrix<f64>, AnalysisError> {
+    let eight = 2 * EACH;
+    let cross = all.view((eight, 0), (EACH, eight)).into_owned();
+    let mass = all.view((eight, eight), (EACH, EACH)).into_owned();
+    let explained = cross.transpose() * solve(&mass, &cross)?;
+    Ok(all.view((0, 0), (eight, eight)) - explained)
+}
+
+/// A⁻¹B of a covariance A, whose entries may be of different units.
+fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, AnalysisError> {
+    let scale = a.diagonal().map(|v| if v > 0.0 { v.sqrt().recip() } else { 1.0 });
+    let scaling = DMatrix::from_diagonal(&scale);
+    let solution = (&scaling * a * &scaling).lu().solve(&(&scaling * b));
+    Ok(&scaling * solution.ok_or(AnalysisError::Estimate(EstimateError::Overflow))?)
+}
+
+fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {
+    [matrix[(0, 0)], matrix[(0, 1)], matrix[(1, 0)], matrix[(1, 1)]]
+}
+
+/// Coefficients of a fit as kxx, kxy, kyx, kyy, c and m likewise, with their covariance; `mass` where
+/// it was given, without covariance.
+fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix<f64>) {
+    let estimate = &fit.estimate;
+    let free: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();
+    let place = |p: &Parameter| {
+        let kind = match p.matrix() {
+            Matrix::Stiffness => 0,
+            Matrix::Damping => 1,
+            Matrix::Mass => 2,
+        };
+        EACH * kind + 2 * p.row() + p.column()
+    };
+    let places: Vec<usize> = free.iter().map(place).collect();
+    let mut values = DVector::zeros(3 * EACH);
+    values.rows_mut(2 * EACH, EACH).copy_from_slice(&row_by_row(mass));
+    let mut covariance = DMatrix::zeros(3 * EACH, 3 * EACH);
+    for (from, (p, to)) in estimate.parameters().zip(&places).enumerate() {
+        values[*to] = p.value;
+        for (other, column) in places.iter().enumerate() {
+            covariance[(*to, *column)] = estimate.covariance()[(from, other)];
+        }
+    }
+    (values, covariance)
+}

@@ -1,0 +1,156 @@
+//! Coefficients at several speeds and loads as one table.
+
+use std::f64::consts::TAU;
+use std::fmt::{self, Write as _};
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use super::{
+    BearingData, BearingSummary, CoefficientRow, IdentifiedBearing, IdentifyBearing,
+    identify_bearing,
+};
+use crate::AnalysisError;
+use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
+use crate::text::{compact, paged_table, significant};
+
+/// Tests at several speeds and loads, all with the same columns: the saved form of a test campaign.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BearingPlan {
+    /// Columns of force, acceleration and displacement.
+    pub channels: Channels,
+    /// Settings for reading the files.
+    pub reading: Reading,
+    /// Samples to use.
+    pub window: Window,
+    /// Settings; each point replaces speed and load.
+    pub settings: IdentifyBearing,
+    /// Baseline tests for every point that has none of its own.
+    pub baseline: Vec<PathBuf>,
+    /// Speeds and loads.
+    pub points: Vec<BearingPoint>,
+}
+
+/// Tests at one speed and load.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BearingPoint {
+    /// Records of the tests.
+    pub tests: Vec<PathBuf>,
+    /// Records of the baseline tests.
+    pub baseline: Vec<PathBuf>,
+    /// Speed of rotation, in Hz; `None`: as in the settings.
+    pub rotation_hz: Option<f64>,
+    /// Static load, in N; `None`: as in the settings.
+    pub load: Option<f64>,
+}
+
+impl BearingPlan {
+    /// Identifies the bearing at every point.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoRecord`] for a point without tests, and those of
+    /// [`BearingData::of_records`] and [`identify_bearing`](super::identify_bearing()).
+    pub fn run(&self) -> Result<BearingTable, AnalysisError> {
+        let found = self.points.iter().map(|point| self.at(point));
+        Ok(BearingTable::new(found.collect::<Result<Vec<_>, _>>()?))
+    }
+
+    fn at(&self, point: &BearingPoint) -> Result<IdentifiedBearing, AnalysisError> {
+        let how = IdentifyBearing {
+            rotation_hz: point.rotation_hz.or(self.settings.rotation_hz),
+            load: point.load.or(self.settings.load),
+            ..self.settings.clone()
+        };
+        let data = |paths: &[PathBuf]| {
+            let open = |path: &PathBuf| {
+                let (path, channels) = (path.clone(), self.channels.clone());
+                let (reading, window) = (self.reading.clone(), self.window.clone());
+                RecordPlan { path, channels, reading, window }.open()
+            };
+            let tests: Vec<Measurement> = paths.iter().map(open).collect::<Result<_, _>>()?;
+            BearingData::of_records(&tests, &how)
+        };
+        let tests = data(&point.tests)?;
+        let own = if point.baseline.is_empty() { &self.baseline } else { &point.baseline };
+        let baseline = if own.is_empty() { None } else { Some(data(own)?) };
+        identify_bearing(&tests, baseline.as_ref(), &how)
+    }
+}
+
+/// Coefficients of a bearing, one row per speed and load.
+#[derive(Debug, Serialize)]
+pub struct BearingTable {
+    /// Results by rising speed, then load.
+    pub rows: Vec<BearingSummary>,
+}
+
+impl BearingTable {
+    /// Sorts results by speed and load.
+    pub fn new(found: impl IntoIterator<Item = IdentifiedBearing>) -> Self {
+        let mut rows: Vec<BearingSummary> = found.into_iter().map(|one| one.summary).collect();
+        let key = |row: &BearingSummary| [row.rotation_hz, row.load].map(|x| x.unwrap_or(0.0));
+        rows.sort_by(|a, b| {
+            let [a, b] = [key(a), key(b)];
+            a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1]))
+        });
+        Self { rows }
+    }
+
+    /// Returns the table as text: `speed` in rad/s, `load` in N, the coefficients kxx … myy (zero where
+    /// they were not identified) in SI units, and each with its standard error. The columns without
+    /// the load and the errors are the arguments of a bearing element in rotor-dynamics programs.
+    pub fn csv(&self) -> String {
+        let names =
+            ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
+        let mut text = String::from("speed,load");
+        for name in names {
+            let _ = write!(text, ",{name}");
+        }
+        for name in names {
+            let _ = write!(text, ",{name}_standard_error");
+        }
+        for row in &self.rows {
+            let speed = row.rotation_hz.unwrap_or(0.0) * TAU;
+            let load = row.load.map_or(String::new(), |load| format!("{load:?}"));
+            let _ = write!(text, "\n{speed:?},{load}");
+            let of =
+                |name: &str| row.coefficients.iter().find(|c: &&CoefficientRow| c.name == name);
+            for name in names {
+                let _ = write!(text, ",{:?}", of(name).map_or(0.0, |c| c.estimate.value));
+            }
+            for name in names {
+                let error = of(name).and_then(|c| c.estimate.standard_error);
+                let _ = write!(text, ",{:?}", error.unwrap_or(0.0));
+            }
+        }
+        text + "\n"
+    }
+}
+
+impl fmt::Display for BearingTable {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = self.rows.iter().map(|row| &row.coefficients).max_by_key(|rows| rows.len());
+        let mut table = vec![vec!["rotation, Hz".to_owned(), "load, N".to_owned()]];
+        for row in names.into_iter().flatten() {
+            table[0].push(format!("{}, {}", row.name, row.unit));
+        }
+        for row in &self.rows {
+            let cell = |value: Option<f64>| value.map_or(String::new(), |value| compact(value, 6));
+            let mut cells = vec![cell(row.rotation_hz), cell(row.load)];
+            cells.extend(row.coefficients.iter().map(|c| {
+                let error = c.estimate.standard_error.unwrap_or(0.0);
+                format!("{} ± {}", significant(c.estimate.value, 4), significant(error, 2))
+            }));
+            table.push(cells);
+        }
+        f.write_str(&paged_table(&table, 6))?;
+        for row in &self.rows {
+            for remark in &row.remarks {
+                writeln!(f, "note: {}: {remark}", row.tests.join(", "))?;
+            }
+        }
+        Ok(())
+    }
+}

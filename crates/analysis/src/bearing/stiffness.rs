@@ -1,0 +1,129 @@
+//! The dynamic stiffness line by line, which no model has smoothed.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{Complex, DVector, Matrix2, Vector2};
+use serde::Serialize;
+
+use super::BearingData;
+use super::film::Film;
+use crate::AnalysisError;
+
+/// Dynamic stiffness H of a film at one frequency; entries xx, xy, yx, yy.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct StiffnessLine {
+    /// Frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Re H = K − ω² M, in N/m.
+    pub real: [f64; 4],
+    /// Im H = ω C, in N/m.
+    pub imaginary: [f64; 4],
+    /// Standard errors of the real parts, in N/m; `None` where the noise is not known.
+    pub standard_error_real: Option<[f64; 4]>,
+    /// Standard errors of the imaginary parts, in N/m; `None` where the noise is not known.
+    pub standard_error_imaginary: Option<[f64; 4]>,
+}
+
+type Complex2 = Matrix2<Complex<f64>>;
+
+/// Sine of the angle between two displacements below which they do not tell two directions apart.
+const INDEPENDENT: f64 = 0.1;
+
+/// Frequencies that differ by less than this part of themselves are one.
+const SAME: f64 = 1e-9;
+
+/// Solves G = H D at every frequency with two tests, or on pairs of neighbouring lines with one each,
+/// which the fitted film takes to their middle; the baseline is subtracted as it was fitted.
+pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLine>, AnalysisError> {
+    let omega = tests.data.omega();
+    let mut rows: Vec<usize> = (0..omega.len()).collect();
+    rows.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
+    let same = |a: &usize, b: &usize| omega[*b] - omega[*a] <= SAME * omega[*b];
+    let groups: Vec<&[usize]> = rows.chunk_by(same).collect();
+    let (mut lines, mut next) = (Vec::new(), 0);
+    while let Some(group) = groups.get(next) {
+        next += 1;
+        if group.len() > 1 {
+            lines.extend(line(tests, film, group));
+        } else if let Some(other) = groups.get(next).filter(|other| other.len() == 1)
+            && let Some(found) = line(tests, film, &[group[0], other[0]])
+        {
+            lines.push(found);
+            next += 1;
+        }
+    }
+    Ok(lines)
+}
+
+/// H from some rows at about one frequency; `None` if they move in one direction only.
+fn line(tests: &BearingData, film: &Film, rows: &[usize]) -> Option<StiffnessLine> {
+    let data = &tests.data;
+    let middle = rows.iter().map(|row| data.omega()[*row]).sum::<f64>() / rows.len() as f64;
+    let two = |matrix: &nalgebra::DMatrix<Complex<f64>>, row: usize| {
+        Vector2::new(matrix[(row, 0)], matrix[(row, 1)])
+    };
+    let at_middle = modelled(&film.rig, middle);
+    let (mut forces, mut power) = (Complex2::zeros(), Complex2::zeros());
+    for row in rows {
+        let d = two(data.displacement(), *row);
+        let bridge = at_middle - modelled(&film.rig, data.omega()[*row]);
+        let force = two(data.force(), *row) + bridge * d;
+        forces += force * d.adjoint();
+        power += d * d.adjoint();
+    }
+    // |det| of two displacements over their lengths is the sine of the angle between them.
+    let lengths = power[(0, 0)].re + power[(1, 1)].re;
+    if power.determinant().norm().sqrt() < INDEPENDENT * 0.5 * lengths {
+        return None;
+    }
+    let inverse = power.lu().solve(&Complex2::identity())?;
+    let mut h = forces * inverse;
+    let mut variance = data.noise().map(|noise| {
+        let mut variance = [[0.0; 4]; 2];
+        for row in rows {
+            let weight = (two(data.displacement(), *row).adjoint() * inverse).transpose();
+            let covariance = noise.covariance(*row);
+            let block = |i: usize, j: usize| -> Complex2 {
+                covariance.fixed_view::<2, 2>(2 * i, 2 * j).into_owned()
+            };
+            // Of ΔG − H ΔD.
+            let error = block(1, 1) - h * block(0, 1) - block(1, 0) * h.adjoint()
+                + h * block(0, 0) * h.adjoint();
+            for (at, (a, b)) in [(0, 0), (0, 1), (1, 0), (1, 1)].into_iter().enumerate() {
+                let each = 0.5 * error[(a, a)].re.max(0.0) * weight[b].norm_sqr();
+                variance[0][at] += each;
+                variance[1][at] += each;
+            }
+        }
+        variance
+    });
+    if let Some((baseline, covariance)) = &film.baseline {
+        h -= modelled(baseline, middle);
+        let square = middle * middle;
+        for (at, (real, imaginary)) in
+            variance.iter_mut().flat_map(|[re, im]| re.iter_mut().zip(im)).enumerate()
+        {
+            *real += covariance[(at, at)] + square * square * covariance[(8 + at, 8 + at)]
+                - 2.0 * square * covariance[(at, 8 + at)];
+            *imaginary += square * covariance[(4 + at, 4 + at)];
+        }
+    }
+    let entries = [h[(0, 0)], h[(0, 1)], h[(1, 0)], h[(1, 1)]];
+    let root = |variance: [f64; 4]| variance.map(|v| v.max(0.0).sqrt());
+    Some(StiffnessLine {
+        frequency_hz: middle / TAU,
+        real: entries.map(|z| z.re),
+        imaginary: entries.map(|z| z.im),
+        standard_error_real: variance.map(|[real, _]| root(real)),
+        standard_error_imaginary: variance.map(|[_, imaginary]| root(imaginary)),
+    })
+}
+
+/// K − ω² M + iω C of twelve coefficients.
+pub(super) fn modelled(coefficients: &DVector<f64>, omega: f64) -> Complex2 {
+    let entry = |at: usize| {
+        let (k, c, m) = (coefficients[at], coefficients[4 + at], coefficients[8 + at]);
+        Complex::new(k - omega * omega * m, omega * c)
+    };
+    Complex2::new(entry(0), entry(1), entry(2), entry(3))
+}

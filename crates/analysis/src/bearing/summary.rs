@@ -1,0 +1,328 @@
+//! The result of a bearing test.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use mechid_bearing::{Conditions, Threshold};
+use mechid_estimate as estimate;
+use mechid_estimate::frequency_domain::LikelihoodRatio;
+use mechid_io::ParameterCovariance;
+use mechid_model::OilFilm;
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use super::film::Film;
+use super::{BearingData, IdentifyBearing, StiffnessLine};
+use crate::AnalysisError;
+use crate::identify::summary::{CONFIDENCE, Uncertain, header};
+use crate::text::{compact, paragraph, significant, text_table};
+
+/// Amplitude over clearance above which the linearised film is biased.
+pub const LARGEST_AMPLITUDE: f64 = 0.05;
+
+/// Names of the coefficients, in the order of every covariance.
+const NAMES: [&str; 12] =
+    ["kxx", "kxy", "kyx", "kyy", "cxx", "cxy", "cyx", "cyy", "mxx", "mxy", "myx", "myy"];
+
+/// Units of k, c and m.
+const UNITS: [&str; 3] = ["N/m", "N·s/m", "kg"];
+
+/// Result of a bearing test: numbers and remarks.
+#[derive(Debug, Serialize)]
+pub struct BearingSummary {
+    /// The tests.
+    pub tests: Vec<String>,
+    /// The baseline tests; empty without them.
+    pub baseline: Vec<String>,
+    /// Speed of rotation, in Hz; `None` of a shaft that stands still.
+    pub rotation_hz: Option<f64>,
+    /// Static load, in N, if it was given.
+    pub load: Option<f64>,
+    /// Level of the confidence intervals, a pure number such as 0.95.
+    pub confidence: f64,
+    /// Coefficients of the film, eight or twelve.
+    pub coefficients: Vec<CoefficientRow>,
+    /// Covariance of the coefficients.
+    pub covariance: ParameterCovariance,
+    /// Likelihood-ratio test whether the inertia of the fluid can be left out; `None` where the noise is
+    /// not known.
+    pub inertia_test: Option<LikelihoodRatio>,
+    /// Dimensionless coefficients, if load and clearance are known.
+    pub dimensionless: Option<Dimensionless>,
+    /// Whirl and threshold of instability of a rigid rotor; `None` without rotation.
+    pub stability: Option<StabilityRow>,
+    /// Amplitude of the tests; `None` of frequency responses.
+    pub amplitude: Option<Amplitude>,
+    /// Residual power over noise power, a ratio; 1 where the noise is not known.
+    pub misfit_ratio: f64,
+    /// Condition number of the column-scaled regressor, a ratio.
+    pub condition_number: f64,
+    /// Number of spectral lines, summed over the tests.
+    pub lines: usize,
+    /// Frequencies that were left out, in Hz, one per line at which the shaft rotates.
+    pub left_out_hz: Vec<f64>,
+    /// Dynamic stiffness of the film line by line.
+    pub dynamic_stiffness: Vec<StiffnessLine>,
+    /// Remarks to read before using the numbers.
+    pub remarks: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: IdentifyBearing,
+}
+
+/// One coefficient of a film.
+#[derive(Debug, Clone, Serialize)]
+pub struct CoefficientRow {
+    /// Name: the first index is the direction of the force, the second that of the motion.
+    pub name: &'static str,
+    /// SI unit.
+    pub unit: &'static str,
+    #[serde(flatten)]
+    /// Estimate with its uncertainty.
+    pub estimate: Uncertain,
+}
+
+/// Dimensionless coefficients: k c/W, c c Ω/W, m c Ω²/W with the clearance c and the load W.
+#[derive(Debug, Clone, Serialize)]
+pub struct Dimensionless {
+    /// Coefficients, a ratio each; without rotation of stiffness alone.
+    pub coefficients: Vec<CoefficientRow>,
+    /// Sommerfeld number μ N L D (R/c)²/W, dimensionless; `None` if size or viscosity are not known.
+    pub sommerfeld_number: Option<f64>,
+}
+
+/// Whirl of a rigid rotor on this film.
+#[derive(Debug, Clone, Serialize)]
+pub struct StabilityRow {
+    /// Whirl frequency over the speed of rotation at the threshold, a ratio; `None` if no rotor becomes
+    /// unstable.
+    pub whirl_frequency_ratio: Option<Uncertain>,
+    /// Mass per bearing above which a rigid rotor is unstable at this speed and load, in kg; `None` if
+    /// there is no such mass.
+    pub critical_mass: Option<Uncertain>,
+}
+
+/// Amplitude of the housing relative to the shaft.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct Amplitude {
+    /// Largest distance from the mean place, in m.
+    pub largest_displacement: f64,
+    /// The same over the clearance, a ratio; `None` if that is not known.
+    pub over_clearance: Option<f64>,
+}
+
+impl BearingSummary {
+    pub(super) fn new(
+        tests: &BearingData,
+        baseline: Option<&BearingData>,
+        film: &Film,
+        lines: Vec<StiffnessLine>,
+        how: &IdentifyBearing,
+    ) -> Result<Self, AnalysisError> {
+        let uncertain = |value: f64, variance: f64| {
+            let standard_error = variance.max(0.0).sqrt();
+            let degrees_of_freedom = film.degrees_of_freedom;
+            let found = estimate::Uncertain { value, standard_error, degrees_of_freedom };
+            Uncertain::of(&found)
+        };
+        let count = film.values().len();
+        let rows = (0..count).map(|at| {
+            let estimate = uncertain(film.values()[at], film.covariance()[(at, at)])?;
+            Ok(CoefficientRow { name: NAMES[at], unit: UNITS[at / 4], estimate })
+        });
+        let amplitude = tests.largest_displacement.map(|largest_displacement| Amplitude {
+            largest_displacement,
+            over_clearance: how.size.clearance.map(|c| largest_displacement / c),
+        });
+        let mut summary = Self {
+            tests: tests.names.clone(),
+            baseline: baseline.map(|b| b.names.clone()).unwrap_or_default(),
+            rotation_hz: how.rotation_hz,
+            load: how.load,
+            confidence: CONFIDENCE,
+            coefficients: rows.collect::<Result<_, AnalysisError>>()?,
+            covariance: ParameterCovariance::new(
+                NAMES[..count].iter().map(|name| (*name).to_owned()).collect(),
+                film.covariance(),
+                film.degrees_of_freedom,
+            ),
+            inertia_test: film.inertia,
+            dimensionless: None,
+            stability: None,
+            amplitude,
+            misfit_ratio: film.fit.misfit_ratio,
+            condition_number: film.fit.estimate.condition(),
+            lines: tests.data.len(),
+            left_out_hz: tests.left_out_hz.clone(),
+            dynamic_stiffness: lines,
+            remarks: tests.remarks.clone(),
+            analysis: how.clone(),
+        };
+        summary.remarks.extend(baseline.iter().flat_map(|b| b.remarks.iter().cloned()));
+        summary.dimensionless = summary.scaled()?;
+        summary.stability = match how.rotation_hz {
+            Some(hz) => summary.whirl(film, TAU * hz, &uncertain)?,
+            None => None,
+        };
+        if let Some(ratio) = amplitude.and_then(|a| a.over_clearance)
+            && ratio > LARGEST_AMPLITUDE
+        {
+            summary.remarks.push(format!(
+                "the housing moves by up to {} of the clearance: above {LARGEST_AMPLITUDE} the film is \
+                 not linear, and the coefficients depend on the amplitude; excite less",
+                significant(ratio, 2)
+            ));
+        }
+        Ok(summary)
+    }
+
+    fn scaled(&self) -> Result<Option<Dimensionless>, AnalysisError> {
+        let size = &self.analysis.size;
+        let (Some(load), Some(clearance)) = (self.load, size.clearance) else { return Ok(None) };
+        let omega = self.rotation_hz.map(|hz| TAU * hz);
+        let unit = |kind: usize| match (kind, omega) {
+            (0, _) => Some(load / clearance),
+            (kind, Some(omega)) => Some(load / clearance / omega.powi(kind as i32)),
+            (_, None) => None,
+        };
+        let rows = self.coefficients.iter().enumerate().filter_map(|(at, row)| {
+            let unit = unit(at / 4)?;
+            let Uncertain { value, standard_error, interval } = row.estimate;
+            let estimate = Uncertain {
+                value: value / unit,
+                standard_error: standard_error.map(|error| error / unit),
+                interval: interval.map(|interval| interval.map(|end| end / unit)),
+            };
+            Some(CoefficientRow { name: row.name, unit: "–", estimate })
+        });
+        let coefficients = rows.collect();
+        let sommerfeld_number = match (size.diameter, size.length, size.viscosity, omega) {
+            (Some(diameter), Some(length), Some(viscosity), Some(omega)) => {
+                let all = Conditions { diameter, length, clearance, viscosity, omega };
+                Some(all.sommerfeld_number(load)?)
+            }
+            _ => None,
+        };
+        Ok(Some(Dimensionless { coefficients, sommerfeld_number }))
+    }
+
+    /// The threshold of instability; a remark where the coefficients allow none.
+    fn whirl(
+        &mut self,
+        film: &Film,
+        omega: f64,
+        uncertain: &dyn Fn(f64, f64) -> Result<Uncertain, AnalysisError>,
+    ) -> Result<Option<StabilityRow>, AnalysisError> {
+        let [kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy] = std::array::from_fn(|at| film.values()[at]);
+        let film_at = OilFilm { kxx, kxy, kyx, kyy, cxx, cxy, cyx, cyy };
+        let threshold = match Threshold::new(&film_at, omega) {
+            Ok(threshold) => threshold,
+            Err(error) => {
+                self.remarks.push(format!("no threshold of instability: {error}"));
+                return Ok(None);
+            }
+        };
+        let covariance: DMatrix<f64> = film.covariance().view((0, 0), (8, 8)).into_owned();
+        let errors = threshold.standard_errors(&covariance)?;
+        let of = |value: Option<f64>, error: Option<f64>| {
+            value.zip(error).map(|(value, error)| uncertain(value, error * error)).transpose()
+        };
+        Ok(Some(StabilityRow {
+            whirl_frequency_ratio: of(
+                threshold.whirl_frequency_ratio(),
+                errors.whirl_frequency_ratio,
+            )?,
+            critical_mass: of(threshold.critical_mass(), errors.critical_mass)?,
+        }))
+    }
+
+    fn text(&self) -> String {
+        let mut text = self.tests.join(", ");
+        if let Some(hz) = self.rotation_hz {
+            text += &format!(": {} Hz rotation", compact(hz, 6));
+        }
+        if let Some(load) = self.load {
+            text += &format!(", {} N load", compact(load, 6));
+        }
+        if !self.baseline.is_empty() {
+            text += &format!("\nless the baseline {}", self.baseline.join(", "));
+        }
+        text += &format!(
+            "\nmaximum likelihood on f − M a = H d, M = {} kg; {} lines{}\n\n",
+            compact(self.analysis.stator_mass, 6),
+            self.lines,
+            match self.left_out_hz.len() {
+                0 => String::new(),
+                count => format!(", {count} with rotation left out"),
+            }
+        );
+        let table = |what: &str, rows: &[CoefficientRow]| {
+            let mut all = vec![header(what)];
+            all.extend(rows.iter().map(|row| {
+                let mut cells = vec![row.name.to_owned()];
+                cells.extend(row.estimate.cells());
+                cells.push(row.unit.into());
+                cells
+            }));
+            text_table(&all)
+        };
+        text += &table("coefficient", &self.coefficients);
+        if let Some(scaled) = &self.dimensionless {
+            text.push('\n');
+            text += &table("dimensionless", &scaled.coefficients);
+            if let Some(number) = scaled.sommerfeld_number {
+                text += &format!("Sommerfeld number  {}\n", significant(number, 4));
+            }
+        }
+        if let Some(stability) = &self.stability {
+            let mut rows = vec![header("rigid rotor")];
+            for (name, value, unit) in [
+                ("whirl frequency ratio", &stability.whirl_frequency_ratio, "–"),
+                ("critical mass per bearing", &stability.critical_mass, "kg"),
+            ] {
+                let mut row = vec![name.to_owned()];
+                match value {
+                    Some(value) => row.extend(value.cells()),
+                    None => row.push("none: stable".into()),
+                }
+                row.resize(4, String::new());
+                row.push(unit.into());
+                rows.push(row);
+            }
+            text.push('\n');
+            text += &text_table(&rows);
+        }
+        text.push('\n');
+        text += &self.fit_lines();
+        text + &paragraph(self.remarks.iter().map(|remark| format!("note: {remark}")))
+    }
+
+    fn fit_lines(&self) -> String {
+        let mut rows = vec![
+            vec!["residual power / noise power".into(), significant(self.misfit_ratio, 3)],
+            vec!["condition number".into(), significant(self.condition_number, 3)],
+        ];
+        if let Some(test) = &self.inertia_test {
+            let LikelihoodRatio { statistic, restrictions, p_value } = test;
+            let cell = format!(
+                "{} with {restrictions} coefficients, p = {}",
+                significant(*statistic, 3),
+                significant(*p_value, 2)
+            );
+            rows.push(vec!["likelihood ratio of the inertia".into(), cell]);
+        }
+        if let Some(amplitude) = &self.amplitude {
+            let part = amplitude.over_clearance.map_or(String::new(), |part| {
+                format!(" ({} of the clearance)", significant(part, 2))
+            });
+            let cell = format!("{} m{part}", significant(amplitude.largest_displacement, 3));
+            rows.push(vec!["largest relative displacement".into(), cell]);
+        }
+        text_table(&rows)
+    }
+}
+
+impl fmt::Display for BearingSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}

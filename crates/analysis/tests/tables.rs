@@ -1,0 +1,219 @@
+//! Identification from tables of frequency responses, judged by closed-form receptances and by the
+//! records that the tables were made from.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::identify::{Band, Method};
+use mechid_analysis::{
+    AnalysisError, FrfSettings, Identify, IdentifyResponses, Measurement, ResponseQuantity, frf,
+    identify, identify_responses,
+};
+use mechid_estimate::Estimate;
+use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid_model::{Sdof, SecondOrderSystem};
+use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::{Multisine, NoiseLevel, Phases, Sampling, lines, noise};
+use nalgebra::{Complex, dmatrix};
+
+fn oscillator() -> SecondOrderSystem {
+    Sdof::new(25.0, 188.0, 142_000.0).unwrap().system()
+}
+
+/// Two degrees of freedom with C and K as of an oil film, not symmetric.
+fn coupled() -> SecondOrderSystem {
+    let (c, k) = (dmatrix![900.0, 300.0; 200.0, 1500.0], dmatrix![3e5, 2e5; -1e5, 5e5]);
+    SecondOrderSystem::new(dmatrix![20.0, 0.5; -0.3, 21.0], c, k).unwrap()
+}
+
+/// Exact responses at 5, 7 … 83 Hz, the forces one after another.
+fn exact(system: &SecondOrderSystem, quantity: ResponseQuantity) -> FrequencyResponses {
+    let frequency_hz: Vec<f64> = (0..40).map(|k| 5.0 + 2.0 * f64::from(k)).collect();
+    let at = |hz: &f64| {
+        let omega = TAU * hz;
+        system.receptance(omega).unwrap() * quantity.per_displacement(omega)
+    };
+    let all: Vec<_> = frequency_hz.iter().map(at).collect();
+    let n = system.dof();
+    let pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let functions = pairs.map(|(i, j)| ResponseFunction {
+        response: format!("{}", i + 1),
+        reference: format!("{}", j + 1),
+        quantity: Some(quantity),
+        values: all.iter().map(|h| h[(i, j)]).collect(),
+        standard_error: None,
+    });
+    let file = "table".into();
+    let functions = functions.collect();
+    FrequencyResponses { file, frequency_hz, functions, ..FrequencyResponses::default() }
+}
+
+fn entries(system: &SecondOrderSystem) -> Vec<f64> {
+    let all = [system.mass(), system.damping(), system.stiffness()];
+    all.iter().flat_map(|m| m.transpose().iter().copied().collect::<Vec<_>>()).collect()
+}
+
+#[test]
+fn exact_tables_give_the_machine_whatever_was_measured() {
+    for system in [oscillator(), coupled()] {
+        for quantity in ResponseQuantity::ALL {
+            for method in [Method::LeastSquares, Method::MaximumLikelihood] {
+                let how =
+                    IdentifyResponses { method: Some(method), ..IdentifyResponses::default() };
+                let found = identify_responses(&[exact(&system, quantity)], &how).unwrap();
+                for (p, exact) in found.estimate().parameters().zip(entries(&system)) {
+                    assert!((p.value - exact).abs() < 1e-9 * exact.abs().max(1.0), "{p} {exact}");
+                }
+            }
+        }
+    }
+}
+
+/// Frequency responses in a text and in a universal file, from sixteen noisy periods: the fit of the
+/// periods themselves, of the text and of the universal file agree.
+#[test]
+fn a_record_and_its_table_agree() {
+    let period = Sampling::from_rate_hz(128.0, 128).unwrap();
+    let force = Multisine::flat(lines::band(period, 3.0, 40.0), 2.0, Phases::Schroeder).unwrap();
+    let force = force.sample(period).unwrap();
+    let exact = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    let (force, x) = (force.repeated(16).unwrap(), exact.displacement().repeated(16).unwrap());
+    let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.05), 7).unwrap();
+    let responses = [(ResponseQuantity::Displacement, &x)];
+    let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
+    let of_record =
+        identify(&[test.clone()], &Identify::spectra(Method::MaximumLikelihood)).unwrap();
+    let table = frf(&test, &FrfSettings::default()).unwrap();
+
+    let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
+    let quantity = Some(ResponseQuantity::Displacement);
+    let how = IdentifyResponses { quantity, ..IdentifyResponses::default() };
+    let of_text = identify_responses(&[text], &how).unwrap();
+
+    let universal = table.to_responses(&["7+Z".into()]).unwrap().to_universal_file().unwrap();
+    let universal = FrequencyResponses::parse("a.unv", universal.as_bytes()).unwrap();
+    let how = IdentifyResponses { averages: Some(16.0), ..IdentifyResponses::default() };
+    let of_universal = identify_responses(&[universal], &how).unwrap();
+    assert_eq!(of_universal.summary().points, ["7+Z"]);
+
+    for found in [of_text.estimate(), of_universal.estimate()] {
+        for (a, b) in of_record.estimate().parameters().zip(found.parameters()) {
+            let apart = (a.value - b.value).abs() / a.standard_error;
+            assert!(apart < 0.1, "{a} against {b}");
+            // Those of the record allow for weights from sixteen periods, by 7 %.
+            let ratio = a.standard_error / b.standard_error;
+            assert!((1.0..1.1).contains(&ratio), "{ratio}");
+        }
+    }
+    let checks = &of_universal.summary().checks;
+    assert!(!checks.is_empty() && checks.iter().all(|check| !check.is_conspicuous()));
+}
+
+/// Numbers of a complex normal distribution with E|z|² = 1.
+fn normal(count: usize, seed: u64) -> Vec<Complex<f64>> {
+    let both = noise::white(Sampling::new(1.0, count).unwrap(), 2, 0.5_f64.sqrt(), seed).unwrap();
+    (0..count).map(|k| Complex::new(both.channel(0)[k], both.channel(1)[k])).collect()
+}
+
+/// Share of 95 % intervals that hold the true value, all parameters together.
+fn coverage(
+    system: &SecondOrderSystem,
+    runs: u64,
+    how: &IdentifyResponses,
+    measure: &dyn Fn(FrequencyResponses, u64) -> FrequencyResponses,
+) -> f64 {
+    let truth = entries(system);
+    let inside = |estimate: &Estimate| {
+        let holds = |(p, exact): (mechid_estimate::Estimated, &f64)| {
+            let [low, high] = p.interval(0.95).unwrap();
+            usize::from((low..=high).contains(exact))
+        };
+        estimate.parameters().zip(&truth).map(holds).sum::<usize>()
+    };
+    let all = (0..runs).map(|seed| {
+        let table = measure(exact(system, ResponseQuantity::Acceleration), seed);
+        inside(identify_responses(&[table], how).unwrap().estimate())
+    });
+    all.sum::<usize>() as f64 / (runs as usize * truth.len()) as f64
+}
+
+/// 500 runs of 12 parameters scatter by about 0.4 %.
+#[test]
+fn intervals_from_standard_errors_hold() {
+    let measure = |mut table: FrequencyResponses, seed: u64| {
+        let count = table.frequency_hz.len();
+        for (at, function) in table.functions.iter_mut().enumerate() {
+            // Larger at one end, as of an accelerometer below its range.
+            let size = |row: usize| 1e-4 * (1.0 + 20.0 / (1.0 + row as f64));
+            for (row, z) in normal(count, 10 * seed + at as u64).into_iter().enumerate() {
+                function.values[row] += z * size(row);
+            }
+            let errors = (0..count).map(|row| size(row) / 2_f64.sqrt()).collect();
+            function.standard_error = Some(errors);
+        }
+        table
+    };
+    let share = coverage(&coupled(), 500, &IdentifyResponses::default(), &measure);
+    assert!((0.935..=0.965).contains(&share), "{share}");
+}
+
+/// Sixty-four averages with noise on the response alone, and the coherence that they have.
+#[test]
+fn intervals_from_coherence_hold() {
+    let measure = |mut table: FrequencyResponses, seed: u64| {
+        let (averages, level) = (64_usize, 4e-3);
+        let count = table.frequency_hz.len();
+        let draws = normal(count * averages, seed);
+        let function = &mut table.functions[0];
+        let mut coherence = Vec::new();
+        for row in 0..count {
+            let h = function.values[row];
+            let each: Vec<_> =
+                (0..averages).map(|k| h + draws[row * averages + k] * level).collect();
+            let mean = each.iter().sum::<Complex<f64>>() / averages as f64;
+            let power = each.iter().map(|z| z.norm_sqr()).sum::<f64>() / averages as f64;
+            function.values[row] = mean;
+            coherence.push(mean.norm_sqr() / power);
+        }
+        let (response, reference) = ("1".to_owned(), Some("1".to_owned()));
+        table.coherence.push(CoherenceFunction { response, reference, values: coherence });
+        table
+    };
+    let how = IdentifyResponses { averages: Some(64.0), ..IdentifyResponses::default() };
+    let share = coverage(&oscillator(), 1000, &how, &measure);
+    assert!((0.935..=0.965).contains(&share), "{share}");
+}
+
+#[test]
+fn what_a_table_lacks_is_told() {
+    let table = exact(&coupled(), ResponseQuantity::Velocity);
+    let refused = |table: &FrequencyResponses, how: &IdentifyResponses| {
+        identify_responses(std::slice::from_ref(table), how).unwrap_err().to_string()
+    };
+    let usual = IdentifyResponses::default();
+    let mut nameless = table.clone();
+    nameless.functions.iter_mut().for_each(|f| f.quantity = None);
+    assert!(refused(&nameless, &usual).contains("does not say what was measured"));
+    let other = Some(ResponseQuantity::Acceleration);
+    let told = refused(&table, &IdentifyResponses { quantity: other, ..usual.clone() });
+    assert!(told.contains("table states velocity, not acceleration"), "{told}");
+    let mut gap = table.clone();
+    gap.functions.remove(2);
+    assert_eq!(
+        refused(&gap, &usual),
+        "table has no response at 2 to a force at 1: every point needs one to every force, and every \
+         force one at its own point (choose `points`)"
+    );
+    // One point alone is another machine, but its table is whole.
+    let alone = IdentifyResponses { points: vec!["2".into()], ..usual.clone() };
+    assert_eq!(identify_responses(&[gap], &alone).unwrap().estimate().dof(), 1);
+    let mut coherent = table.clone();
+    for response in ["1", "2"] {
+        let (response, values) = (response.to_owned(), vec![0.9; 40]);
+        coherent.coherence.push(CoherenceFunction { response, reference: None, values });
+    }
+    assert!(refused(&coherent, &usual).contains("from how many independent averages?"));
+    let band = Some(Band { low_hz: 100.0, high_hz: 200.0 });
+    let how = IdentifyResponses { band, ..usual.clone() };
+    assert!(matches!(identify_responses(&[table], &how), Err(AnalysisError::EmptyBand { .. })));
+    assert!(matches!(identify_responses(&[], &usual), Err(AnalysisError::NoRecord)));
+}

@@ -1,0 +1,150 @@
+//! `mechid bearing`: the coefficients of a journal bearing on a test rig.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable};
+use mechid::analysis::{IdentifyBearing, Measurement};
+use mechid::report::ToFigure as _;
+use mechid::{BearingData, identify_bearing};
+
+use crate::args::choices::CoefficientsChoice;
+use crate::args::fit::LineArgs;
+use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests
+///
+/// The housing floats on the film of a rotating shaft in rigid supports; shakers in x and y excite it
+/// in one test each, or on alternate lines of one. --force names the forces of the shakers,
+/// --acceleration the housing's, --displacement that of the housing relative to the shaft, x before
+/// y. Of the window, which must hold whole periods, lines at multiples of --rotation-hz are left out.
+/// Baseline tests (no film, shaft at rest) are subtracted with their uncertainty.
+///
+/// A campaign at several speeds and loads is described by a JSON file with `points`, each with
+/// `tests`, `baseline`, `rotation_hz` and `load`, beside `channels`, `window` and `settings` as --json
+/// prints them: --campaign.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid bearing x.csv y.csv --force fx,fy --acceleration ax,ay --displacement dx,dy \\
+      --stator-mass 20 --rotation-hz 50 --period 1024 --plot stiffness.svg
+  mechid bearing x.csv y.csv --baseline dry-x.csv --baseline dry-y.csv --force fx,fy \\
+      --acceleration ax,ay --displacement dx,dy --stator-mass 20 --rotation-hz 50 --load 2500 \\
+      --clearance 100e-6 --period 1024 --output coefficients.csv
+  mechid bearing campaign.json --campaign --output coefficients.csv --plot speeds.svg")]
+pub struct BearingArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    /// Further records of the same speed and load, with the same columns and window
+    #[arg(value_name = "RECORD")]
+    more: Vec<PathBuf>,
+    /// Baseline record, with the same columns and window; repeat the option for further ones
+    #[arg(long, value_name = "RECORD")]
+    baseline: Vec<PathBuf>,
+    /// The file describes tests at several speeds and loads
+    #[arg(long, conflicts_with_all = ["more", "baseline", "force", "displacement", "acceleration",
+          "velocity", "stator_mass", "rotation_hz", "load", "period", "sample_rate", "time",
+          "detrend", "lines", "band_hz", "clearance", "diameter", "length", "viscosity"])]
+    campaign: bool,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    /// Mass of the housing with all that moves with it, in kg
+    #[arg(long, value_name = "KG", required_unless_present = "campaign")]
+    stator_mass: Option<f64>,
+    /// Speed of rotation, in Hz; its lines and multiples are left out [default: the shaft is at rest]
+    #[arg(long, value_name = "HZ")]
+    rotation_hz: Option<f64>,
+    /// Static load, in N, for dimensionless coefficients
+    #[arg(long, value_name = "N")]
+    load: Option<f64>,
+    #[command(flatten)]
+    size: SizeArgs,
+    /// Coefficients to identify
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = CoefficientsChoice::Automatic)]
+    coefficients: CoefficientsChoice,
+    #[command(flatten)]
+    lines: LineArgs,
+    /// Write the coefficients into this file (-: to standard output): speed in rad/s, load, kxx …
+    /// myy, and their standard errors, one row per speed and load
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    output: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+/// Size of the bearing.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Size")]
+struct SizeArgs {
+    /// Radial clearance, in m
+    #[arg(long, value_name = "METRES")]
+    clearance: Option<f64>,
+    /// Diameter of the journal, in m, for the Sommerfeld number
+    #[arg(long, value_name = "METRES")]
+    diameter: Option<f64>,
+    /// Length of the bearing, in m, for the Sommerfeld number
+    #[arg(long, value_name = "METRES")]
+    length: Option<f64>,
+    /// Dynamic viscosity of the oil, in Pa·s, for the Sommerfeld number
+    #[arg(long, value_name = "PA·S")]
+    viscosity: Option<f64>,
+}
+
+impl BearingArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        let outputs = [&self.output, &self.plot.plot].into_iter().flatten();
+        let inputs = [&self.input.record].into_iter().chain(&self.more).chain(&self.baseline);
+        Files::default().reads(inputs).writes(outputs)
+    }
+
+    /// Reads, identifies, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        if self.campaign {
+            let plan: BearingPlan = mechid::io::read_json(&self.input.record)?;
+            let found = plan.run()?;
+            let outcome = Outcome::new(found.to_string(), &found)?
+                .with_plot(&self.plot, || Ok(found.figure()?))?;
+            return Ok(self.with_table(outcome, &found));
+        }
+        let channels = self.channels.channels();
+        channels.check_pairs()?;
+        let how = self.settings();
+        let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {
+            let open = |path: &PathBuf| self.input.open_other(path, &channels, self.input.window());
+            let tests: Vec<Measurement> = paths.map(open).collect::<Result<_, _>>()?;
+            Ok(BearingData::of_records(&tests, &how)?)
+        };
+        let tests = data(&mut [&self.input.record].into_iter().chain(&self.more))?;
+        let baseline = match self.baseline.is_empty() {
+            true => None,
+            false => Some(data(&mut self.baseline.iter())?),
+        };
+        let found = identify_bearing(&tests, baseline.as_ref(), &how)?;
+        let outcome = Outcome::new(found.to_string(), &found)?
+            .with_plot(&self.plot, || Ok(found.figure()?))?;
+        Ok(self.with_table(outcome, &BearingTable::new([found])))
+    }
+
+    fn settings(&self) -> IdentifyBearing {
+        let SizeArgs { clearance, diameter, length, viscosity } = self.size;
+        IdentifyBearing {
+            stator_mass: self.stator_mass.unwrap_or_default(),
+            rotation_hz: self.rotation_hz,
+            load: self.load,
+            size: BearingSize { clearance, diameter, length, viscosity },
+            coefficients: self.coefficients.into(),
+            lines: self.lines.choice(),
+        }
+    }
+
+    fn with_table(&self, outcome: Outcome, table: &BearingTable) -> Outcome {
+        match &self.output {
+            Some(path) => outcome.with_file(path, table.csv()),
+            None => outcome,
+        }
+    }
+}

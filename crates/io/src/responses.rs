@@ -1,0 +1,181 @@
+//! Frequency responses that were measured elsewhere, in and out of files.
+
+use std::path::Path;
+
+use mechid_model::ResponseQuantity;
+use nalgebra::Complex;
+
+use crate::limits::ReadOptions;
+use crate::table::source::{Kind, Source};
+use crate::{IoError, Table, uff};
+
+/// Frequency responses of a file, at common frequencies and in SI units.
+///
+/// A text has one row per frequency and a column `frequency_hz` (or `frequency`, `freq`, `f`; otherwise
+/// the first column). The response of point i to a force at point j is `h_i_j_real` with
+/// `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`; beside it may
+/// stand `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to all forces) or
+/// `coherence_i_j`. A text with one response may leave `h_i_j_` and `_i` out. This is what
+/// `mechid frf --output` writes.
+///
+/// A universal file has a dataset 58 or 58b per response (function type 4) and coherence (6); its
+/// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 become SI units.
+///
+/// ```
+/// use mechid_io::FrequencyResponses;
+///
+/// let text = "frequency_hz,magnitude,phase_deg,coherence\n1,2e-3,-90,0.99\n2,1e-3,-120,0.98\n";
+/// let found = FrequencyResponses::parse("a.csv", text.as_bytes())?;
+/// assert_eq!(found.frequency_hz, [1.0, 2.0]);
+/// assert!((found.functions[0].values[0].im + 2e-3).abs() < 1e-18);
+/// assert_eq!(found.coherence[0].values, [0.99, 0.98]);
+/// # Ok::<(), mechid_io::IoError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FrequencyResponses {
+    /// Name of the file for messages.
+    pub file: String,
+    /// Frequencies in Hz, one per value of every function.
+    pub frequency_hz: Vec<f64>,
+    /// Frequency responses, in the order of the file.
+    pub functions: Vec<ResponseFunction>,
+    /// Coherences, in the order of the file.
+    pub coherence: Vec<CoherenceFunction>,
+    /// Remarks on what was left out or converted.
+    pub remarks: Vec<String>,
+}
+
+/// Response at one point per unit force at another, frequency by frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResponseFunction {
+    /// Point and direction of the response.
+    pub response: String,
+    /// Point and direction of the force.
+    pub reference: String,
+    /// Measured quantity; `None` if the file does not state it.
+    pub quantity: Option<ResponseQuantity>,
+    /// Values, one per frequency, in m/N, m/(s·N) or m/(s²·N).
+    pub values: Vec<Complex<f64>>,
+    /// Standard error of the real and of the imaginary part alike, one per frequency, in the unit of
+    /// the values; `None` if the file has none.
+    pub standard_error: Option<Vec<f64>>,
+}
+
+/// Fraction of the power of a response that is linear in the force.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoherenceFunction {
+    /// Point and direction of the response.
+    pub response: String,
+    /// Point and direction of the force; `None` for the multiple coherence with all forces.
+    pub reference: Option<String>,
+    /// Values, one per frequency, a ratio from 0 to 1 each.
+    pub values: Vec<f64>,
+}
+
+impl FrequencyResponses {
+    /// Reads the frequency responses in a file, or on standard input as `-`.
+    ///
+    /// # Errors
+    /// As [`FrequencyResponses::parse`], and [`IoError::Read`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
+        Self::of_source(Source::open(path.as_ref())?)
+    }
+
+    /// Reads the frequency responses in the bytes of a file; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`IoError::Responses`] if the columns of a text are none of frequency responses,
+    /// [`IoError::Empty`] for a universal file without any, and those of [`Table::parse`] and
+    /// [`Table::column`].
+    pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
+        Self::of_source(Source::new(file.into(), bytes)?)
+    }
+
+    fn of_source(mut source: Source<'_>) -> Result<Self, IoError> {
+        let options = ReadOptions::default();
+        let file = source.file.clone();
+        match source.kind() {
+            Kind::Uff => {
+                uff::read_responses(&file, &source.bytes(&options.limits)?, &options.limits)
+            }
+            _ => Self::of_table(&Table::of_source(source, &options)?),
+        }
+    }
+
+    fn of_table(table: &Table) -> Result<Self, IoError> {
+        let mut found = Self { file: table.file().into(), ..Self::default() };
+        let frequency = FREQUENCY.iter().find(|name| table.find(name).is_ok()).unwrap_or(&"1");
+        found.frequency_hz = table.column(frequency)?.to_vec();
+        for name in table.names() {
+            let name = name.trim();
+            if let Some(prefix) = ["real", "magnitude"].iter().find_map(|end| before(name, end)) {
+                found.functions.push(Self::function(table, name, prefix)?);
+            } else if let Some(points) = name.strip_prefix("coherence") {
+                let mut points = points.split('_').skip(1).map(str::to_owned);
+                let response = points.next().unwrap_or_else(|| ALONE.into());
+                let (reference, values) = (points.next(), table.column(name)?.to_vec());
+                found.coherence.push(CoherenceFunction { response, reference, values });
+            }
+        }
+        if found.functions.is_empty() {
+            let (file, available) = (found.file, table.available());
+            return Err(IoError::Responses { file, available });
+        }
+        Ok(found)
+    }
+
+    /// Returns the response whose first column is called `name`, and the others `prefix` and a word.
+    fn function(table: &Table, name: &str, prefix: &str) -> Result<ResponseFunction, IoError> {
+        let column = |word: &str| table.column(&format!("{prefix}{word}"));
+        let has = |word: &str| table.find(&format!("{prefix}{word}")).is_ok();
+        let first = table.column(name)?;
+        let values = if name.ends_with("real") {
+            let second = column(if has("imag") { "imag" } else { "imaginary" })?;
+            first.iter().zip(second).map(|(re, im)| Complex::new(*re, *im)).collect()
+        } else {
+            let (second, unit) = match has("phase_rad") {
+                true => (column("phase_rad")?, 1.0),
+                false => (column("phase_deg")?, 1_f64.to_radians()),
+            };
+            let polar = |(r, phase): (&f64, &f64)| Complex::from_polar(*r, phase * unit);
+            first.iter().zip(second).map(polar).collect()
+        };
+        let standard_error = match has("standard_error") {
+            true => Some(column("standard_error")?.to_vec()),
+            false => None,
+        };
+        let mut points = prefix.split('_').skip(1).filter(|point| !point.is_empty());
+        let mut point = || points.next().unwrap_or(ALONE).to_owned();
+        let (response, reference) = (point(), point());
+        Ok(ResponseFunction { response, reference, quantity: None, values, standard_error })
+    }
+
+    /// Returns the text of a universal file: datasets 151 and 164, and a dataset 58 for each response
+    /// and coherence. Points need a node and a direction (`12+Z`), or a node alone.
+    ///
+    /// # Errors
+    /// [`IoError::Point`] for a point that is not written so, [`IoError::Responses`] if there are no
+    /// frequencies.
+    ///
+    /// # Source
+    /// University of Cincinnati, SDRL, *Universal File Formats for Modal Analysis Testing*, datasets
+    /// 58, 151 and 164.
+    pub fn to_universal_file(&self) -> Result<String, IoError> {
+        if self.frequency_hz.is_empty() {
+            let file = self.file.clone();
+            return Err(IoError::Responses { file, available: "none".into() });
+        }
+        uff::write_responses(self).map_err(|point| IoError::Point { point })
+    }
+}
+
+/// Names of the column with the frequencies.
+const FREQUENCY: [&str; 4] = ["frequency_hz", "frequency", "freq", "f"];
+
+/// Point of a table with a single response.
+const ALONE: &str = "1";
+
+/// What stands before a word at the end of a name: nothing, or something that ends with `_`.
+fn before<'a>(name: &'a str, word: &str) -> Option<&'a str> {
+    name.strip_suffix(word).filter(|prefix| prefix.is_empty() || prefix.ends_with('_'))
+}

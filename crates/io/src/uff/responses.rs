@@ -1,0 +1,185 @@
+//! Frequency responses and coherences in datasets 58 and 58b.
+
+use mechid_model::ResponseQuantity;
+use nalgebra::Complex;
+
+use super::function::dataset;
+use super::header::Header;
+use super::lines::{Line, Lines, is_mark};
+use super::{Units, dataset_number, skip_to_end, units};
+use crate::IoError;
+use crate::contents::{Fault, Place};
+use crate::limits::{Budget, Limits};
+use crate::responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+
+/// Abscissa type of a frequency.
+const FREQUENCY: u32 = 18;
+
+/// Data type of an excitation force.
+const EXCITATION_FORCE: u32 = 13;
+
+/// Relative difference of two frequencies, in printed single precision.
+const SAME_FREQUENCY: f64 = 2e-5;
+
+/// Reads the frequency responses of a file, in SI units.
+pub(crate) fn read(
+    file: &str,
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<FrequencyResponses, IoError> {
+    let mut lines = Lines::new(bytes);
+    match functions(file, &mut lines, Budget::new(limits)) {
+        Ok(found) if found.functions.is_empty() => Err(IoError::Empty {
+            file: file.into(),
+            found: "it has no dataset 58 with a frequency response function",
+        }),
+        Ok(found) => Ok(found),
+        Err(fault) => {
+            let at = Place::Line(lines.number_at(fault.at));
+            Err(fault.error(file, at))
+        }
+    }
+}
+
+fn functions(
+    file: &str,
+    lines: &mut Lines<'_>,
+    mut budget: Budget,
+) -> Result<FrequencyResponses, Fault> {
+    let mut found = FrequencyResponses { file: file.into(), ..FrequencyResponses::default() };
+    let (mut stated, mut others) = (None, 0_usize);
+    while let Some(mark) = lines.next() {
+        if mark.text.trim_ascii().is_empty() {
+            continue;
+        }
+        if !is_mark(mark.text) {
+            return Err(mark.fault("a dataset begins with -1 in columns 5 and 6"));
+        }
+        let id = lines.required("a dataset begins here and has no number")?;
+        match dataset_number(&id)? {
+            58 => {
+                let (header, values) = dataset(lines, &id, &mut budget)?;
+                match header.function {
+                    4 | 6 => add(&mut found, &id, &header, &values)?,
+                    _ => others += 1,
+                }
+            }
+            164 => stated = Some(units(lines)?),
+            _ => {}
+        }
+        skip_to_end(lines)?;
+    }
+    if others > 0 {
+        found.remarks.push(format!(
+            "left out: datasets 58 that are neither a frequency response nor a coherence ({others})"
+        ));
+    }
+    if let Some(units) = stated {
+        to_si(&mut found, &units);
+    }
+    Ok(found)
+}
+
+/// Adds a frequency response or a coherence.
+fn add(
+    found: &mut FrequencyResponses,
+    id: &Line<'_>,
+    header: &Header,
+    values: &[f64],
+) -> Result<(), Fault> {
+    if header.abscissa != FREQUENCY {
+        let abscissa = header.abscissa;
+        return Err(id.fault(format!(
+            "{} over an abscissa of type {abscissa}, not over a frequency (18)",
+            header.kind()
+        )));
+    }
+    let each = 1 + usize::from(header.is_complex) + usize::from(!header.is_even);
+    let rows = values.chunks_exact(each);
+    let frequency_hz: Vec<f64> = match header.is_even {
+        true => (0..header.count).map(|k| header.start + k as f64 * header.step).collect(),
+        false => rows.clone().map(|row| row[0]).collect(),
+    };
+    let numbers = rows.map(|row| match header.is_complex {
+        true => Complex::new(row[each - 2], row[each - 1]),
+        false => Complex::from(row[each - 1]),
+    });
+    let numbers: Vec<Complex<f64>> = numbers.collect();
+    if let Some(at) = numbers.iter().position(|z| !z.is_finite()) {
+        return Err(id.fault(format!("value {} of the function is not finite", at + 1)));
+    }
+    same_frequencies(found, id, frequency_hz)?;
+    let response = header.response.clone();
+    if header.function == 6 {
+        let values = numbers.iter().map(|z| z.re).collect();
+        let reference = header.reference.clone();
+        found.coherence.push(CoherenceFunction { response, reference, values });
+        return Ok(());
+    }
+    if !header.is_complex {
+        return Err(id.fault("a frequency response function of real numbers"));
+    }
+    let Some(reference) = header.reference.clone() else {
+        return Err(id.fault("a frequency response function without a reference"));
+    };
+    let [ordinate, denominator] = header.ordinate;
+    if ![0, EXCITATION_FORCE].contains(&denominator) {
+        return Err(id.fault(format!(
+            "a response per quantity of type {denominator}, not per excitation force (13)"
+        )));
+    }
+    let quantity = match ordinate {
+        8 => Some(ResponseQuantity::Displacement),
+        11 => Some(ResponseQuantity::Velocity),
+        12 => Some(ResponseQuantity::Acceleration),
+        _ => None,
+    };
+    let (values, standard_error) = (numbers, None);
+    found.functions.push(ResponseFunction {
+        response,
+        reference,
+        quantity,
+        values,
+        standard_error,
+    });
+    Ok(())
+}
+
+/// Takes the frequencies of the first function, and asks the others for the same.
+fn same_frequencies(
+    found: &mut FrequencyResponses,
+    id: &Line<'_>,
+    frequency_hz: Vec<f64>,
+) -> Result<(), Fault> {
+    if found.frequency_hz.is_empty() {
+        found.frequency_hz = frequency_hz;
+        return Ok(());
+    }
+    let (len, got) = (found.frequency_hz.len(), frequency_hz.len());
+    if len != got {
+        return Err(id.fault(format!("{got} frequencies where the first function has {len}")));
+    }
+    let pairs = found.frequency_hz.iter().zip(&frequency_hz);
+    match pairs.into_iter().find(|(a, b)| (*a - *b).abs() > SAME_FREQUENCY * a.abs().max(b.abs())) {
+        None => Ok(()),
+        Some((first, other)) => {
+            Err(id.fault(format!("{other} Hz where the first function has {first} Hz")))
+        }
+    }
+}
+
+/// Divides lengths and multiplies forces by the factors of the file.
+fn to_si(found: &mut FrequencyResponses, units: &Units) {
+    let factor = units.force / units.length;
+    if !(factor.is_finite() && factor > 0.0) || factor == 1.0 {
+        return;
+    }
+    for function in &mut found.functions {
+        function.values.iter_mut().for_each(|z| *z *= factor);
+    }
+    let Units { code, name, .. } = units;
+    found.remarks.push(format!(
+        "the file states its units (code {code} {name}): responses were multiplied by {factor} to \
+         get SI units"
+    ));
+}

@@ -1,0 +1,156 @@
+//! Frequency responses in and out of files. Judge of universal files: pyuff wrote `printed.unv` and
+//! `binary.unv` (`data/make.py`).
+
+use mechid_io::{CoherenceFunction, FrequencyResponses, IoError, ResponseFunction};
+use mechid_model::ResponseQuantity;
+use nalgebra::Complex;
+
+const PRINTED: &[u8] = include_bytes!("../data/printed.unv");
+const BINARY: &[u8] = include_bytes!("../data/binary.unv");
+
+fn parse(text: &str) -> Result<FrequencyResponses, IoError> {
+    FrequencyResponses::parse("a.csv", text.as_bytes())
+}
+
+#[test]
+fn universal_files_of_another_program_are_read() {
+    for bytes in [PRINTED, BINARY] {
+        let found = FrequencyResponses::parse("a.unv", bytes).unwrap();
+        assert_eq!(found.functions.len(), 1);
+        let function = &found.functions[0];
+        assert_eq!((function.response.as_str(), function.reference.as_str()), ("12+Z", "1-X"));
+        assert_eq!(function.quantity, Some(ResponseQuantity::Acceleration));
+        let expected: Vec<_> = (0..8).map(|k| Complex::new(0.5_f64.powi(k), 1.0)).collect();
+        assert_eq!(function.values, expected);
+        let hz: Vec<f64> = (0..8).map(|k| 1.0 + 0.25 * f64::from(k)).collect();
+        assert_eq!(found.frequency_hz, hz);
+        assert!(found.remarks[0].contains("neither a frequency response nor a coherence (4)"));
+    }
+}
+
+fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
+    let function = |response: &str, of: f64| ResponseFunction {
+        response: response.into(),
+        reference: "1+X".into(),
+        quantity: Some(ResponseQuantity::Velocity),
+        values: frequency_hz.iter().map(|f| Complex::new(of / f, -of * f * 1e-7)).collect(),
+        standard_error: None,
+    };
+    let coherence = |response: &str, of: f64| CoherenceFunction {
+        response: response.into(),
+        reference: Some("1+X".into()),
+        values: frequency_hz.iter().map(|f| 1.0 - of / (100.0 + f)).collect(),
+    };
+    FrequencyResponses {
+        file: "rig\n    -1".into(),
+        functions: vec![function("1+X", 1.0), function("2-RY", -3e-12)],
+        coherence: vec![coherence("1+X", 0.3), coherence("2-RY", 0.5)],
+        frequency_hz,
+        remarks: Vec::new(),
+    }
+}
+
+/// Numbers are written with 13 digits, frequencies with as many as fit into 13 columns.
+#[test]
+fn universal_files_are_read_back() {
+    let even: Vec<f64> = (0..101).map(|k| 78.125 + 0.59604644775 * f64::from(k)).collect();
+    let uneven: Vec<f64> = (0..10).map(|k| 10.0 * 1.25_f64.powi(k)).collect();
+    for frequency_hz in [even, uneven, vec![31.25]] {
+        let written = two_by_one(frequency_hz);
+        let text = written.to_universal_file().unwrap();
+        assert!(text.lines().all(|line| line.len() <= 80), "{text}");
+        let numbers: Vec<&str> = text
+            .lines()
+            .zip(text.lines().skip(1))
+            .filter_map(|(mark, id)| (mark == "    -1" && id != "    -1").then_some(id))
+            .collect();
+        assert_eq!(numbers, ["   151", "   164", "    58", "    58", "    58", "    58"]);
+        let read = FrequencyResponses::parse("b.unv", text.as_bytes()).unwrap();
+        assert!(read.remarks.is_empty(), "{:?}", read.remarks);
+        let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * a.abs();
+        let pairs = written.frequency_hz.iter().zip(&read.frequency_hz);
+        assert!(pairs.into_iter().all(|(a, b)| near(*a, *b, 1e-7)), "{:?}", read.frequency_hz);
+        assert_eq!(written.functions.len(), read.functions.len());
+        for (a, b) in written.functions.iter().zip(&read.functions) {
+            assert_eq!(
+                (&a.response, &a.reference, a.quantity),
+                (&b.response, &b.reference, b.quantity)
+            );
+            let pairs = a.values.iter().zip(&b.values);
+            assert!(pairs.into_iter().all(|(a, b)| (a - b).norm() <= 1e-12 * a.norm()));
+        }
+        for (a, b) in written.coherence.iter().zip(&read.coherence) {
+            assert_eq!((&a.response, &a.reference), (&b.response, &b.reference));
+            assert!(a.values.iter().zip(&b.values).all(|(a, b)| near(*a, *b, 1e-12)));
+        }
+    }
+}
+
+#[test]
+fn stated_units_become_si_units() {
+    // Responses in mm/s per mN: a factor of 1000 each for length and force.
+    let text = two_by_one(vec![1.0, 2.0]).to_universal_file().unwrap();
+    let one = "  1.00000000000000000D+00";
+    let milli = "  1.00000000000000000D+03";
+    let inch = "  3.93700787401574800D+01";
+    let of = |length: &str, force: &str| {
+        let factors = format!("{length}{force}{one}");
+        FrequencyResponses::parse("b.unv", text.replace(&one.repeat(3), &factors).as_bytes())
+            .unwrap()
+    };
+    assert_eq!(of(milli, milli).functions[0].values[0].re, 1.0);
+    let found = of(inch, one);
+    assert!((found.functions[0].values[0].re - 0.0254).abs() < 1e-15);
+    assert!(found.remarks[0].contains("multiplied by 0.0254"), "{:?}", found.remarks);
+}
+
+#[test]
+fn tables_in_every_form() {
+    let polar = parse("f;h_2_1_magnitude;h_2_1_phase_deg\n1,5;2,0;90\n2,5;1,0;-90\n").unwrap();
+    assert_eq!(polar.frequency_hz, [1.5, 2.5]);
+    let function = &polar.functions[0];
+    assert_eq!((function.response.as_str(), function.reference.as_str()), ("2", "1"));
+    assert!((function.values[0] - Complex::new(0.0, 2.0)).norm() < 1e-15);
+    let radians = parse("freq,magnitude,phase_rad\n1,2,1.5707963267948966\n2,1,0\n").unwrap();
+    assert!((radians.functions[0].values[0] - Complex::new(0.0, 2.0)).norm() < 1e-15);
+    let whole = "frequency_hz,h_1_1_real,h_1_1_imaginary,h_1_1_standard_error,h_2_1_real,\
+                 h_2_1_imaginary,coherence_1,coherence_2_1\n5,1,2,0.1,3,4,0.9,0.8\n";
+    let whole = parse(whole).unwrap();
+    assert_eq!(whole.functions[0].standard_error.as_deref(), Some(&[0.1][..]));
+    assert_eq!(whole.functions[1].values, [Complex::new(3.0, 4.0)]);
+    assert_eq!(whole.coherence[0].reference, None);
+    assert_eq!(whole.coherence[1].reference.as_deref(), Some("1"));
+}
+
+#[test]
+fn broken_tables_are_refused() {
+    for (text, message) in [
+        ("frequency_hz,x\n1,2\n", "a.csv has no frequency response: name columns h_1_1_real and"),
+        ("frequency_hz,real\n1,2\n", "a.csv has no column \"imaginary\""),
+        ("frequency_hz,real,imag\n1,2,\n", "a.csv, line 2, column 3 \"imag\": the field is empty"),
+        ("    -1\n   164\n         1\n    -1\n", "a.csv, line 4: the units"),
+    ] {
+        let e = parse(text).unwrap_err().to_string();
+        assert!(e.contains(message.split(':').next().unwrap()), "{e}");
+    }
+    let mut nameless = two_by_one(vec![1.0]);
+    nameless.functions[0].response = "drive end".into();
+    let e = nameless.to_universal_file().unwrap_err().to_string();
+    assert!(e.starts_with("\"drive end\" is no point of a universal file"), "{e}");
+    let text = two_by_one(vec![1.0, 2.0, 3.0]).to_universal_file().unwrap();
+    for (what, by, message) in [
+        ("        18    0", "        17    0", "not over a frequency"),
+        ("        13    0", "        12    0", "not per excitation force"),
+    ] {
+        assert!(text.contains(what));
+        let e = FrequencyResponses::parse("b.unv", text.replace(what, by).as_bytes()).unwrap_err();
+        assert!(e.to_string().contains(message), "{e}");
+    }
+    for end in 40..text.len() - 8 {
+        match FrequencyResponses::parse("b.unv", &text.as_bytes()[..end]) {
+            Ok(found) => assert!(found.functions.len() + found.coherence.len() < 4, "{end}"),
+            Err(IoError::Malformed { .. } | IoError::Empty { .. }) => {}
+            Err(e) => panic!("cut at {end}: {e}"),
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Dynamic stiffness of a bearing, and its coefficients over speed.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::bearing::{BearingSummary, BearingTable};
+use mechid_plot::{Axis, Curve, Figure, Panel, Reference};
+
+/// Standard errors of a 95 % interval.
+const NORMAL: f64 = 1.96;
+
+/// N/m in a MN/m.
+const MEGA: f64 = 1e6;
+
+/// Names of the entries of a 2×2 matrix.
+const ENTRIES: [&str; 4] = ["xx", "xy", "yx", "yy"];
+
+/// Re H over ω² and Im H over ω, direct and cross-coupled: measured line by line with 95 % intervals,
+/// and as fitted.
+pub fn dynamic_stiffness(found: &BearingSummary) -> Figure {
+    let omega: Vec<f64> =
+        found.dynamic_stiffness.iter().map(|line| TAU * line.frequency_hz).collect();
+    let coefficient = |kind: usize, entry: usize| {
+        found.coefficients.get(4 * kind + entry).map_or(0.0, |row| row.estimate.value)
+    };
+    let mut panels = Vec::new();
+    for (is_real, x_name, x_unit, y_name) in
+        [(true, "ω²", "10⁶ rad²/s²", "Re H"), (false, "ω", "rad/s", "Im H")]
+    {
+        let x: Vec<f64> = omega.iter().map(|w| if is_real { w * w / 1e6 } else { *w }).collect();
+        for (title, entries) in [("direct", [0, 3]), ("cross-coupled", [1, 2])] {
+            let mut panel =
+                Panel::new(Axis::linear(x_name, x_unit), Axis::linear(y_name, "MN/m")).title(title);
+            for (slot, entry) in entries.into_iter().enumerate() {
+                let lines = || found.dynamic_stiffness.iter();
+                let y: Vec<f64> = lines()
+                    .map(|line| if is_real { line.real[entry] } else { line.imaginary[entry] } / MEGA)
+                    .collect();
+                let errors: Option<Vec<f64>> = lines()
+                    .map(|line| {
+                        let of = match is_real {
+                            true => line.standard_error_real,
+                            false => line.standard_error_imaginary,
+                        };
+                        of.map(|errors| NORMAL * errors[entry] / MEGA)
+                    })
+                    .collect();
+                if let Some(errors) = errors {
+                    let edge = |sign: f64| -> Vec<f64> {
+                        y.iter().zip(&errors).map(|(y, error)| y + sign * error).collect()
+                    };
+                    panel = panel.curve(Curve::band("", &x, &edge(-1.0), &edge(1.0)).slot(slot));
+                }
+                let fit: Vec<f64> = omega
+                    .iter()
+                    .map(|w| {
+                        let value = match is_real {
+                            true => coefficient(0, entry) - w * w * coefficient(2, entry),
+                            false => w * coefficient(1, entry),
+                        };
+                        value / MEGA
+                    })
+                    .collect();
+                let name = ENTRIES[entry];
+                panel = panel
+                    .curve(Curve::points(format!("{name} measured"), &x, &y).slot(slot))
+                    .curve(Curve::line(format!("{name} fitted"), &x, &fit).slot(slot));
+            }
+            panels.push(panel);
+        }
+    }
+    let title = format!("Dynamic stiffness: {}", found.tests.join(", "));
+    panels.into_iter().fold(Figure::new(title).columns(2), Figure::panel)
+}
+
+/// Stiffness, damping and, where it was identified, mass over the speed of rotation, with 95 %
+/// intervals.
+pub fn over_speed(table: &BearingTable) -> Figure {
+    let speed = |row: &BearingSummary| row.rotation_hz.unwrap_or(0.0);
+    let kinds = [("Stiffness", "MN/m", MEGA), ("Damping", "kN·s/m", 1e3), ("Mass", "kg", 1.0)];
+    let mut figure = Figure::new("Bearing coefficients over speed");
+    for (kind, (name, unit, scale)) in kinds.into_iter().enumerate() {
+        let mut panel = Panel::new(Axis::linear("Rotation", "Hz"), Axis::linear(name, unit));
+        let mut is_empty = true;
+        for entry in 0..4 {
+            let of = table
+                .rows
+                .iter()
+                .filter_map(|row| Some((speed(row), row.coefficients.get(4 * kind + entry)?)));
+            let (x, rows): (Vec<f64>, Vec<_>) = of.unzip();
+            let Some(first) = rows.first() else { continue };
+            is_empty = false;
+            let label = first.name;
+            let y: Vec<f64> = rows.iter().map(|row| row.estimate.value / scale).collect();
+            let ends: Option<Vec<[f64; 2]>> =
+                rows.iter().map(|row| row.estimate.interval).collect();
+            if let Some(ends) = ends {
+                let edge = |at: usize| -> Vec<f64> { ends.iter().map(|e| e[at] / scale).collect() };
+                panel = panel.curve(Curve::band("", &x, &edge(0), &edge(1)).slot(entry));
+            }
+            panel = panel.curve(Curve::marked_line(label, &x, &y).slot(entry));
+        }
+        if !is_empty {
+            figure = figure.panel(panel.reference(Reference::horizontal("", 0.0)));
+        }
+    }
+    figure.share_x()
+}
