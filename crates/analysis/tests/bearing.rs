@@ -135,7 +135,7 @@ fn tables(rig: &BearingRig) -> [FrequencyResponses; 2] {
             let omega = TAU * hz;
             let inertia = Complex::from(-omega * omega * rig.stator_mass);
             let h = rig.dynamic_stiffness(omega) + Matrix2::from_diagonal_element(inertia);
-            h.try_inverse().unwrap() * quantity.per_displacement(omega)
+            h.lu().solve(&Matrix2::identity()).unwrap() * quantity.per_displacement(omega)
         };
         let all: Vec<_> = frequency_hz.iter().map(at).collect();
         let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];

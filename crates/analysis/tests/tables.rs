@@ -81,7 +81,8 @@ fn a_record_and_its_table_agree() {
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
     let of_record =
-        identify(&[test.clone()], &Identify::spectra(Method::MaximumLikelihood)).unwrap();
+        identify(std::slice::from_ref(&test), &Identify::spectra(Method::MaximumLikelihood))
+            .unwrap();
     let table = frf(&test, &FrfSettings::default()).unwrap();
 
     let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
