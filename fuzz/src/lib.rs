@@ -2,7 +2,8 @@
 //!
 //! A [`Target`] takes bytes and returns an error where a promise is broken; a panic, a hang and
 //! memory beyond a cap are errors, too. [`run`] gives it the files of its corpus (a folder of
-//! `corpus` in this package) and mutations of them, each of which follows from its seed and its number alone.
+//! `corpus` in this package) and then mutations of them, or random bytes from which it draws the
+//! arguments of public functions; each follows from its seed and its number alone.
 //!
 //! - `cargo test -p mechid-fuzz` runs some thousand cases of each target.
 //! - `cargo run --release -p mechid-fuzz -- --cases 10000000` runs many, of one target with
@@ -38,12 +39,21 @@ pub struct Target {
     pub name: &'static str,
     /// Folder of its corpus.
     pub corpus: &'static str,
-    /// Texts that its input is made of, such as the words of a format.
-    pub words: &'static [&'static str],
+    /// What its input is made of.
+    pub input: Input,
     /// Bytes of memory that a case may take, and as many more for each byte of its input.
     pub memory: [usize; 2],
     /// Runs a case; an error says which promise is broken.
     pub run: fn(&[u8]) -> Result<(), String>,
+}
+
+/// What the input of a target is made of.
+#[derive(Debug, Clone, Copy)]
+pub enum Input {
+    /// Files of its corpus with changes, some of which put in texts such as the words of a format.
+    Mutations(&'static [&'static str]),
+    /// Random bytes, from which a target draws arguments.
+    Bytes,
 }
 
 /// Which cases to run.
@@ -172,7 +182,10 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
         }
         let mut random = ChaCha8Rng::seed_from_u64(cases.seed);
         random.set_stream(case);
-        let input = mutation::mutated(&inputs, target.words, &mut random);
+        let input = match target.input {
+            Input::Mutations(words) => mutation::mutated(&inputs, words, &mut random),
+            Input::Bytes => mutation::bytes(&mut random),
+        };
         one(case.to_string(), input)?;
     }
     Ok(summary)

@@ -40,6 +40,16 @@ const NUMBERS: [&str; 24] = [
 /// Bytes that mean something to some format.
 const BYTES: &[u8] = b"\0\t\n\r\x1b \"#'+,-.:;[]{}\x7f\x80\xff";
 
+/// Longest input of random bytes.
+const MOST_BYTES: usize = 1 << 10;
+
+/// Random bytes.
+pub fn bytes(random: &mut impl Rng) -> Vec<u8> {
+    let mut input = vec![0; random.random_range(0..=MOST_BYTES)];
+    random.fill_bytes(&mut input);
+    input
+}
+
 /// An input that follows from others and from random numbers.
 pub fn mutated(corpus: &[Vec<u8>], words: &[&str], random: &mut impl Rng) -> Vec<u8> {
     let mut input = corpus[random.random_range(0..corpus.len())].clone();

@@ -4,7 +4,7 @@
 /// pixels.
 const CELLS: usize = 4096;
 
-/// The least and the largest sample of every cell of so many.
+/// Smallest and largest sample of each cell of a window, in the unit of its channel.
 #[derive(Debug, Clone)]
 pub struct Extremes {
     cell: usize,
@@ -14,13 +14,13 @@ pub struct Extremes {
 }
 
 impl Extremes {
-    /// None yet of a window of so many samples.
-    pub fn of(window: usize) -> Self {
+    /// Creates the extremes, without a sample yet, of a window of `window` samples.
+    pub(crate) fn of(window: usize) -> Self {
         Self { cell: window.div_ceil(CELLS).max(1), samples: 0, found: Vec::new() }
     }
 
-    /// The next samples.
-    pub fn push(&mut self, values: &[f64]) {
+    /// Takes the next samples.
+    pub(crate) fn push(&mut self, values: &[f64]) {
         for point in (self.samples..).zip(values.iter().copied()) {
             match self.found.get_mut(point.0 / self.cell) {
                 None => self.found.push([point; 2]),
@@ -32,7 +32,7 @@ impl Extremes {
         self.samples += values.len();
     }
 
-    /// In the order of time.
+    /// Returns the numbers of samples, counted from 0, and their values, in the order of time.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
         self.found.iter().flat_map(|cell| {
             let mut cell = *cell;

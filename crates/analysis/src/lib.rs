@@ -42,11 +42,10 @@
 
 pub mod bearing;
 mod error;
-mod extremes;
+pub mod extremes;
 pub mod frf;
 pub mod identify;
 pub mod inspect;
-mod levels;
 mod machine;
 pub mod measurement;
 pub mod modal;

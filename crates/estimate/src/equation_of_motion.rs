@@ -1,8 +1,10 @@
 //! M ẍ + C ẋ + K x = F fitted row by row: the common core of the linear estimators.
 
 use mechid_model::{Matrix, Parameter};
+use mechid_signal::message;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
+use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, finite, size, solve_compressed};
 use crate::triangular::TriangularFactor;
@@ -48,7 +50,7 @@ struct Group {
 impl EquationOfMotion {
     /// No rows yet, `dof` degrees of freedom.
     pub fn new(dof: usize) -> Self {
-        Self { dof, factor: TriangularFactor::new(4 * dof) }
+        Self { dof, factor: TriangularFactor::new(dof.saturating_mul(4)) }
     }
 
     /// Rows seen so far.
@@ -123,6 +125,9 @@ impl EquationOfMotion {
         let free = unknowns.free();
         if free.is_empty() {
             return Err(EstimateError::NothingUnknown);
+        }
+        if self.rows() == 0 {
+            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() });
         }
         if let Some((at, norm)) = self.factor.too_small() {
             let what = ["acceleration", "velocity", "displacement", "force"][at / self.dof];
@@ -283,6 +288,6 @@ impl Group {
 
 pub(crate) fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
     let own = unknowns.free().into_iter().filter(|p| p.row() == equation);
-    let parameters: Vec<String> = own.map(|p| p.to_string()).collect();
-    EstimateError::OnlyRatios { dof: equation + 1, parameters: parameters.join(", ") }
+    let parameters = message::list(own, ", ", NAMED_PARAMETERS);
+    EstimateError::OnlyRatios { dof: equation + 1, parameters }
 }

@@ -1,7 +1,13 @@
 //! Errors of an identification.
 
 use mechid_model::Matrix;
-use mechid_signal::counted;
+use mechid_signal::message;
+
+/// Maximum number of parameters that an error names.
+pub(crate) const NAMED_PARAMETERS: usize = 12;
+
+/// Maximum number of undetermined combinations that an error names.
+pub(crate) const NAMED_DIRECTIONS: usize = 3;
 
 /// An identification that cannot be done; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,9 +50,9 @@ pub enum EstimateError {
     /// Fewer equations than unknowns.
     #[error(
         "{} {} not determine {}: use a longer record or fewer unknowns",
-        counted(*rows, "equation"),
+        message::count(*rows, "equation"),
         if *rows == 1 { "does" } else { "do" },
-        counted(*unknowns, "unknown")
+        message::count(*unknowns, "unknown")
     )]
     TooFewRows {
         /// Equations (rows) given.
@@ -83,7 +89,7 @@ pub enum EstimateError {
     #[error(
         "all values of the {what} {} are so small that their squares vanish (their root sum of \
          squares is about {norm:.0e}): use other units",
-        column + 1
+        column.saturating_add(1)
     )]
     Underflow {
         /// Name of the data.
@@ -122,7 +128,7 @@ pub enum EstimateError {
         parameter: String,
     },
     /// Segments that do not move on, or leave samples out.
-    #[error("segments of {} cannot start {} apart: from 1 to {len}", counted(*len, "sample"), counted(*hop, "sample"))]
+    #[error("segments of {} cannot start {} apart: from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
     Hop {
         /// Samples of a segment.
         len: usize,
@@ -140,7 +146,7 @@ pub enum EstimateError {
     /// A sliding polynomial cannot be fitted, or has no such derivative.
     #[error(
         "a polynomial of order {order} through {}: the window must have more samples \
-         than the order, and the order must be at least that of the derivative", counted(*samples, "sample")
+         than the order, and the order must be at least that of the derivative", message::count(*samples, "sample")
     )]
     Window {
         /// Samples of the window.
@@ -162,7 +168,7 @@ pub enum EstimateError {
         order: usize,
     },
     /// A record is too short for what is asked of it.
-    #[error("the record has {} where at least {needed} are needed", counted(*samples, "sample"))]
+    #[error("the record has {} where at least {needed} are needed", message::count(*samples, "sample"))]
     TooShort {
         /// Samples of the record.
         samples: usize,
@@ -192,7 +198,7 @@ pub enum EstimateError {
     #[error(
         "the response of the nonlinear system grows beyond all bounds within {}: its spring or damper \
          turns negative at that amplitude",
-        counted(*len, "sample")
+        message::count(*len, "sample")
     )]
     Diverged {
         /// Samples of the record.

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_signal::message;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::{EstimateError, Unknowns};
 
 /// M̂, Ĉ, K̂ with the covariance of what was estimated.
@@ -180,12 +182,9 @@ impl Estimate {
     pub(crate) fn check_determined(&self) -> Result<(), EstimateError> {
         if !self.undetermined.is_empty() {
             let open = self.parameters().filter(|p| p.value.is_nan());
-            let names: Vec<String> = open.map(|p| p.parameter.to_string()).collect();
-            let directions: Vec<String> =
-                self.undetermined.iter().map(Undetermined::to_string).collect();
             return Err(EstimateError::Undetermined {
-                parameters: names.join(", "),
-                directions: directions.join("; "),
+                parameters: message::list(open.map(|p| p.parameter), ", ", NAMED_PARAMETERS),
+                directions: message::list(&self.undetermined, "; ", NAMED_DIRECTIONS),
             });
         }
         Ok(())

@@ -79,7 +79,7 @@ pub struct Direction {
 impl LeastSquares {
     /// No rows yet; `unknowns` columns of A and `targets` columns of B.
     pub fn new(unknowns: usize, targets: usize) -> Self {
-        Self { unknowns, targets, factor: TriangularFactor::new(unknowns + targets) }
+        Self { unknowns, targets, factor: TriangularFactor::new(unknowns.saturating_add(targets)) }
     }
 
     /// Rows seen so far.
@@ -145,6 +145,12 @@ impl LeastSquares {
             return Err(EstimateError::Underflow { what, column, norm });
         }
         let r = self.factor.r();
+        if r.is_empty() {
+            return match self.unknowns {
+                0 => Err(EstimateError::NothingUnknown),
+                unknowns => Err(EstimateError::TooFewRows { rows: 0, unknowns }),
+            };
+        }
         let regressors = r.columns(0, self.unknowns);
         let targets = r.columns(self.unknowns, self.targets);
         solve_compressed(regressors, targets, self.rows())

@@ -38,9 +38,16 @@ const LEAST_NORM: f64 = 1e-140;
 
 impl TriangularFactor {
     pub(crate) fn new(columns: usize) -> Self {
-        let r = DMatrix::zeros(columns, columns);
-        let block = vec![0.0; BLOCK_ROWS * columns];
-        Self { columns, rows: 0, r, block, vanished: vec![false; columns] }
+        Self { columns, rows: 0, r: DMatrix::zeros(0, 0), block: Vec::new(), vanished: Vec::new() }
+    }
+
+    /// Makes room at the first rows, which are known to have this many columns.
+    fn allocate(&mut self) {
+        if self.r.ncols() != self.columns {
+            self.r = DMatrix::zeros(self.columns, self.columns);
+            self.block = vec![0.0; BLOCK_ROWS * self.columns];
+            self.vanished = vec![false; self.columns];
+        }
     }
 
     /// Rows seen so far.
@@ -48,7 +55,7 @@ impl TriangularFactor {
         self.rows
     }
 
-    /// R: columns × columns, upper triangular.
+    /// R: columns × columns, upper triangular; 0 × 0 before the first rows.
     pub(crate) fn r(&self) -> &DMatrix<f64> {
         &self.r
     }
@@ -74,6 +81,7 @@ impl TriangularFactor {
     }
 
     fn push_range(&mut self, parts: &[DMatrixView<'_, f64>], rows: Range<usize>) -> bool {
+        self.allocate();
         let before = self.r.clone();
         for start in rows.clone().step_by(BLOCK_ROWS) {
             let len = BLOCK_ROWS.min(rows.end - start);
@@ -101,6 +109,9 @@ impl TriangularFactor {
     /// Takes everything another factor has seen; false, and nothing taken, if a square overflows.
     #[must_use]
     pub(crate) fn merge(&mut self, other: &Self) -> bool {
+        if other.r.is_empty() {
+            return true;
+        }
         let rows = self.rows + other.rows;
         let finite = self.push_range(&[other.r.as_view()], 0..other.columns);
         if finite {
@@ -289,6 +300,8 @@ mod tests {
         let mut factors = [TriangularFactor::new(5), TriangularFactor::new(5)];
         for len in [BLOCK_ROWS, 77] {
             let [chosen, plain] = &mut factors;
+            chosen.allocate();
+            plain.allocate();
             chosen.block.copy_from_slice(&block);
             plain.block.copy_from_slice(&block);
             chosen.absorb(len);

@@ -30,7 +30,7 @@ impl Parameter {
     /// [`ModelError::NoSuchEntry`] if it lies outside the matrix.
     pub fn new(matrix: Matrix, row: usize, column: usize, dof: usize) -> Result<Self, ModelError> {
         if row >= dof || column >= dof {
-            let (row, column) = (row + 1, column + 1);
+            let (row, column) = (row.saturating_add(1), column.saturating_add(1));
             return Err(ModelError::NoSuchEntry { matrix, row, column, dof });
         }
         Ok(Self { matrix, row, column, dof })
@@ -50,9 +50,22 @@ impl Parameter {
     /// # Errors
     /// [`ModelError::NoSuchParameter`] if the name is none of theirs.
     pub fn named(name: &str, dof: usize) -> Result<Self, ModelError> {
-        Self::all(dof)
-            .find(|parameter| parameter.to_string() == name)
+        Self::read(name, dof)
+            .filter(|parameter| parameter.to_string() == name)
             .ok_or_else(|| ModelError::NoSuchParameter { name: name.to_owned(), dof })
+    }
+
+    /// Entry that a name stands for, however its numbers are written.
+    fn read(name: &str, dof: usize) -> Option<Self> {
+        let matrix = Matrix::ALL.into_iter().find(|matrix| name.starts_with(matrix.letter()))?;
+        let place = &name[matrix.letter().len_utf8()..];
+        let (row, column) = match dof {
+            1 => ("1", "1"),
+            2..=9 => place.split_at_checked(1)?,
+            _ => place.split_once(',')?,
+        };
+        let index = |text: &str| text.parse::<usize>().ok()?.checked_sub(1);
+        Self::new(matrix, index(row)?, index(column)?, dof).ok()
     }
 
     /// The matrix it is an entry of.
@@ -101,6 +114,17 @@ mod tests {
             assert_eq!(Parameter::named(name, dof), Ok(parameter));
         }
         assert_eq!(Parameter::all(3).count(), 27);
+    }
+
+    #[test]
+    fn names_of_large_systems_are_read_without_a_search() {
+        let dof = 1 << 40;
+        let last = Parameter::new(Matrix::Stiffness, 0, dof - 1, dof).unwrap();
+        assert_eq!(Parameter::named(&last.to_string(), dof), Ok(last));
+        for name in ["k1", "k01,2", "k+1,2", "k0,1", "k1,2,3", "x1,2", "κ1,2", ""] {
+            let error = Parameter::named(name, dof).unwrap_err().to_string();
+            assert!(error.ends_with("m1,1 … k1099511627776,1099511627776"), "{error}");
+        }
     }
 
     #[test]

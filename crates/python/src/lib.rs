@@ -6,6 +6,8 @@
 //! a pool of threads of this process (`work`); failures and panics become `MechidError`
 //! (`failure`).
 
+#![allow(unnameable_types, reason = "the classes are named from Python")]
+
 mod answer;
 mod arrays;
 mod failure;

@@ -1,6 +1,6 @@
 //! Errors of signals.
 
-use crate::{Sampling, counted, told};
+use crate::{Sampling, message};
 
 /// A signal that cannot be made or used; every variant carries the offending numbers.
 ///
@@ -9,7 +9,7 @@ use crate::{Sampling, counted, told};
 #[non_exhaustive]
 pub enum SignalError {
     /// The time step is not a positive finite number of seconds.
-    #[error("time step must be positive and finite, got {dt} s", dt = told(*dt))]
+    #[error("time step must be positive and finite, got {dt} s", dt = message::number(*dt))]
     TimeStep {
         /// The step given, in seconds.
         dt: f64,
@@ -18,7 +18,7 @@ pub enum SignalError {
     #[error("a record needs at least one sample")]
     Empty,
     /// The data do not have as many samples as the sampling says.
-    #[error("channel {} has {} where the sampling has {expected}", channel + 1, counted(*got, "sample"))]
+    #[error("channel {} has {} where the sampling has {expected}", channel.saturating_add(1), message::count(*got, "sample"))]
     Length {
         /// Channel, counted from 0.
         channel: usize,
@@ -30,8 +30,8 @@ pub enum SignalError {
     /// A sample is NaN or infinite.
     #[error(
         "sample {} of channel {} is {value}, not a finite number",
-        sample + 1, channel + 1,
-        value = told(*value)
+        sample.saturating_add(1), channel.saturating_add(1),
+        value = message::number(*value)
     )]
     NotFinite {
         /// Sample, counted from 0.
@@ -42,7 +42,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A record does not fit in memory.
-    #[error("{} of {} do not fit in memory", counted(*channels, "channel"), counted(*samples, "sample"))]
+    #[error("{} of {} do not fit in memory", message::count(*channels, "channel"), message::count(*samples, "sample"))]
     Memory {
         /// Samples of a channel.
         samples: usize,
@@ -50,7 +50,7 @@ pub enum SignalError {
         channels: usize,
     },
     /// Channel that the record does not have.
-    #[error("channel {} was asked for, there {} {channels}", channel + 1, if *channels == 1 { "is" } else { "are" })]
+    #[error("channel {} was asked for, there {} {channels}", channel.saturating_add(1), if *channels == 1 { "is" } else { "are" })]
     NoSuchChannel {
         /// Channel, counted from 0.
         channel: usize,
@@ -58,7 +58,7 @@ pub enum SignalError {
         channels: usize,
     },
     /// The lines of a spectrum do not belong to its sampling.
-    #[error("{} where the sampling has {expected}", counted(*got, "line"))]
+    #[error("{} where the sampling has {expected}", message::count(*got, "line"))]
     SpectrumLength {
         /// Lines given.
         got: usize,
@@ -66,7 +66,7 @@ pub enum SignalError {
         expected: usize,
     },
     /// A complex amplitude is NaN or infinite.
-    #[error("line {line} of channel {} is not a finite number", channel + 1)]
+    #[error("line {line} of channel {} is not a finite number", channel.saturating_add(1))]
     LineNotFinite {
         /// The line, counted from 0 (DC).
         line: usize,
@@ -74,7 +74,7 @@ pub enum SignalError {
         channel: usize,
     },
     /// A window does not lie inside the record.
-    #[error("samples {} to {end} were requested, but the record has {len}", start + 1)]
+    #[error("samples {} to {end} were requested, but the record has {len}", start.saturating_add(1))]
     Window {
         /// First sample asked for, counted from 0.
         start: usize,
@@ -85,8 +85,8 @@ pub enum SignalError {
     },
     /// Two records that must share a time axis do not.
     #[error(
-        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", counted(*left_len, "sample"),
-        left_dt = told(*left_dt), right_dt = told(*right_dt)
+        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", message::count(*left_len, "sample"),
+        left_dt = message::number(*left_dt), right_dt = message::number(*right_dt)
     )]
     SamplingMismatch {
         /// Number of samples of the first record.
@@ -118,7 +118,7 @@ pub enum SignalError {
         line: usize,
     },
     /// A list that must have one entry per line has another length.
-    #[error("{} but {got} {what}", counted(*lines, "line"))]
+    #[error("{} but {got} {what}", message::count(*lines, "line"))]
     PerLine {
         /// Name of the entries.
         what: &'static str,
@@ -136,7 +136,7 @@ pub enum SignalError {
         len: usize,
     },
     /// A quantity that must be finite and not negative is not.
-    #[error("{what} must be finite and not negative, got {value}", value = told(*value))]
+    #[error("{what} must be finite and not negative, got {value}", value = message::number(*value))]
     Negative {
         /// The quantity.
         what: &'static str,
@@ -144,7 +144,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite is not.
-    #[error("{what} must be finite, got {value}", value = told(*value))]
+    #[error("{what} must be finite, got {value}", value = message::number(*value))]
     Infinite {
         /// The quantity.
         what: &'static str,
@@ -152,7 +152,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite and greater than zero is not.
-    #[error("{what} must be finite and positive, got {value}", value = told(*value))]
+    #[error("{what} must be finite and positive, got {value}", value = message::number(*value))]
     NotPositive {
         /// The quantity.
         what: &'static str,
@@ -162,7 +162,7 @@ pub enum SignalError {
     /// A frequency at or above half the sampling rate cannot be sampled.
     #[error(
         "{frequency_hz} Hz is not below half the sampling rate, {nyquist_hz} Hz",
-        frequency_hz = told(*frequency_hz), nyquist_hz = told(*nyquist_hz)
+        frequency_hz = message::number(*frequency_hz), nyquist_hz = message::number(*nyquist_hz)
     )]
     AboveNyquist {
         /// The frequency, in Hz.
@@ -174,7 +174,7 @@ pub enum SignalError {
     #[error(
         "the band from {low_hz} Hz to {high_hz} Hz is empty: its lower end must be at least 0 and below \
          its upper end",
-        low_hz = told(*low_hz), high_hz = told(*high_hz)
+        low_hz = message::number(*low_hz), high_hz = message::number(*high_hz)
     )]
     Band {
         /// Lower end, in Hz.
@@ -185,7 +185,7 @@ pub enum SignalError {
     /// No spectral line lies in the band.
     #[error(
         "no spectral line lies between {low_hz} Hz and {high_hz} Hz: the lines are {spacing_hz} Hz apart",
-        low_hz = told(*low_hz), high_hz = told(*high_hz), spacing_hz = told(*spacing_hz)
+        low_hz = message::number(*low_hz), high_hz = message::number(*high_hz), spacing_hz = message::number(*spacing_hz)
     )]
     EmptyBand {
         /// Lower end, in Hz.
@@ -198,7 +198,7 @@ pub enum SignalError {
     /// A quantity lies outside the range it may have.
     #[error(
         "{what} must be between {low} and {high}, got {value}",
-        value = told(*value), low = told(*low), high = told(*high)
+        value = message::number(*value), low = message::number(*low), high = message::number(*high)
     )]
     Range {
         /// The quantity.
@@ -221,7 +221,7 @@ pub enum SignalError {
         got: usize,
     },
     /// Several inputs must excite the same lines.
-    #[error("input {} excites other lines than input 1: all inputs must excite the same lines", input + 1)]
+    #[error("input {} excites other lines than input 1: all inputs must excite the same lines", input.saturating_add(1))]
     DifferentLines {
         /// The input, counted from 0.
         input: usize,
@@ -235,7 +235,7 @@ pub enum SignalError {
         order: usize,
     },
     /// A signal that is zero throughout has no crest factor, no signal-to-noise ratio, no band.
-    #[error("channel {} is zero throughout", channel + 1)]
+    #[error("channel {} is zero throughout", channel.saturating_add(1))]
     Silent {
         /// Channel, counted from 0.
         channel: usize,
@@ -299,7 +299,11 @@ pub(crate) fn finite(what: &'static str, value: f64) -> Result<f64, SignalError>
 /// An error if `channels` channels of `samples` samples cannot be allocated.
 pub(crate) fn fits_in_memory(samples: usize, channels: usize) -> Result<(), SignalError> {
     let reserve = |len: usize| Vec::<f64>::new().try_reserve_exact(len).ok();
-    samples.checked_mul(channels).and_then(reserve).ok_or(SignalError::Memory { samples, channels })
+    // Time alone must be countable where there is no channel.
+    samples
+        .checked_mul(channels.max(1))
+        .and_then(reserve)
+        .ok_or(SignalError::Memory { samples, channels })
 }
 
 /// An error unless `channel` is one of `channels`.

@@ -38,6 +38,7 @@
 //! | the level at which a channel is clipped | [`clipping()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
+//! | numbers and counts in sentences | [`message`] |
 
 mod clipping;
 pub mod crest;
@@ -47,6 +48,7 @@ pub mod excitation;
 mod extent;
 pub mod lines;
 pub mod measures;
+pub mod message;
 pub mod multi_input;
 mod multisine;
 pub mod noise;
@@ -57,7 +59,6 @@ pub mod resample;
 mod sampling;
 pub mod spectrum;
 mod statistics;
-mod told;
 
 pub use clipping::{Clipping, clipping};
 pub use crest::CrestSearch;
@@ -73,4 +74,3 @@ pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
 pub use statistics::RunningStatistics;
-pub use told::{counted, ordinal, told, told_to};

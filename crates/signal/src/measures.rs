@@ -82,7 +82,7 @@ pub fn relative_peak_factor(record: &Record, channel: usize) -> Result<f64, Sign
 }
 
 /// α_k = (1/N) Σ x_n x_{n+k}, indices modulo N, for each of the lags k = 0 … N − 1, in the squared
-/// unit of the samples.
+/// unit of the samples; not finite where these squares leave the range of numbers.
 ///
 /// # Source
 /// Dissertation eq. (4.3.1) with cyclic indices.
@@ -91,7 +91,7 @@ pub fn circular_autocorrelation(x: &[f64]) -> Vec<f64> {
 }
 
 /// α_k = (1/N) Σ_{n ≤ N−k} x_n x_{n+k}, for each of the lags k = 0 … N − 1, in the squared unit of
-/// the samples.
+/// the samples; not finite where these squares leave the range of numbers.
 ///
 /// # Source
 /// Dissertation eq. (4.3.1), the sum ending with the sequence.
@@ -105,8 +105,10 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     let Ok(sampling) = Sampling::new(1.0, period) else {
         return Vec::new();
     };
+    // Squares of large or small samples leave the range of numbers; scaling is exact.
+    let unit = power_of_two(peak(x));
     let mut padded = DMatrix::zeros(period, 1);
-    padded.as_mut_slice()[..x.len()].copy_from_slice(x);
+    padded.iter_mut().zip(x).for_each(|(padded, x)| *padded = x / unit);
     let Ok(record) = Record::new(sampling, padded) else {
         // Samples that are not finite have no finite correlation.
         return vec![f64::NAN; x.len()];
@@ -119,9 +121,15 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
         *line = Complex::from(half * line.norm_sqr());
     }
     let correlation = Spectrum::from_lines(sampling, lines).map(|spectrum| spectrum.samples());
-    let correlation = correlation.expect("squares of what a record may hold are finite");
+    let correlation = correlation.expect("squares of scaled samples are finite");
     let scale = period as f64 / x.len() as f64;
-    correlation.as_slice()[..x.len()].iter().map(|a| scale * a).collect()
+    correlation.as_slice()[..x.len()].iter().map(|a| scale * a * unit * unit).collect()
+}
+
+/// Largest power of two that is not above a level, or the smallest normal number.
+pub(crate) fn power_of_two(level: f64) -> f64 {
+    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
+    f64::from_bits(level.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
 }
 
 /// Geometric over arithmetic mean of the power of some lines, a pure number: 1 if all are equal, 0

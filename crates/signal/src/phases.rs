@@ -74,7 +74,7 @@ pub fn schroeder(lines: &[usize], amplitudes: &[f64]) -> Vec<f64> {
     for (&line, a) in lines.iter().zip(amplitudes) {
         if let Some(previous) = previous {
             // Every step adds the power passed so far once more to Σ (n − l) p_l.
-            phase += ((line - previous) / step) as f64 * share;
+            phase += (line.abs_diff(previous) / step) as f64 * share;
         }
         phases.push(0.0 - TAU * phase.fract());
         share += if total > 0.0 { power(a) / total } else { 0.0 };
@@ -98,8 +98,8 @@ pub fn schroeder_binary(lines: &[usize], harmonics: usize) -> Vec<f64> {
     let (first, step) = first_and_step(lines);
     let n2 = 2 * harmonics.max(1) as u128;
     let sign_changes = |line: &usize| {
-        let n = ((line - first) / step + 1) as u128;
-        n * n / n2
+        let n = (line.abs_diff(first) / step) as u128 + 1;
+        n.saturating_mul(n) / n2
     };
     lines.iter().map(|line| if sign_changes(line) % 2 == 0 { 0.0 } else { PI }).collect()
 }
@@ -107,7 +107,7 @@ pub fn schroeder_binary(lines: &[usize], harmonics: usize) -> Vec<f64> {
 /// The first line and the greatest common divisor of the spacings (1 for a single line).
 fn first_and_step(lines: &[usize]) -> (usize, usize) {
     let first = lines.first().copied().unwrap_or(1);
-    let step = lines.windows(2).fold(0, |d, w| gcd(d, w[1] - w[0]));
+    let step = lines.windows(2).fold(0, |d, w| gcd(d, w[1].abs_diff(w[0])));
     (first, step.max(1))
 }
 

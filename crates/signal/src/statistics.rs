@@ -1,5 +1,6 @@
 //! Mean, level and extremes of samples that come a block at a time.
 
+use crate::measures::power_of_two;
 use crate::{SignalError, measures};
 
 /// Count, mean, RMS value, standard deviation and extremes of a channel whose samples come a block at
@@ -29,7 +30,7 @@ pub struct RunningStatistics {
     sum: f64,
     /// Σ (x / peak)²: squares of large or small values leave the range of numbers.
     squares: f64,
-    /// Σ (x − mean)² over the square of [`unit`] of the peak, a power of two: scaling is exact.
+    /// Σ (x − mean)² over the square of [`power_of_two`] of the peak, a power of two: scaling is exact.
     centred_squares: f64,
     peak: f64,
     minimum: f64,
@@ -86,7 +87,7 @@ impl RunningStatistics {
             let before = self.squares * (self.peak / peak).powi(2);
             self.squares = samples.iter().fold(before, |sum, x| sum + (x / peak).powi(2));
         }
-        let (unit, count) = (unit(peak), samples.len());
+        let (unit, count) = (power_of_two(peak), samples.len());
         let mean = samples.iter().sum::<f64>() / count as f64;
         let squares = samples.iter().map(|x| ((x - mean) / unit).powi(2)).sum();
         self.centred_squares = self.combined(squares, mean, count, unit);
@@ -114,7 +115,7 @@ impl RunningStatistics {
         let peak = self.peak.max(later.peak);
         let rescaled = |part: &Self| part.squares * (part.peak / peak).powi(2);
         self.squares = if peak > 0.0 { rescaled(self) + rescaled(later) } else { 0.0 };
-        let (unit, mean) = (unit(peak), later.sum / later.count as f64);
+        let (unit, mean) = (power_of_two(peak), later.sum / later.count as f64);
         let squares = later.centred_squares_over(unit);
         self.centred_squares = self.combined(squares, mean, later.count, unit);
         self.sum = sum;
@@ -147,12 +148,12 @@ impl RunningStatistics {
 
     /// Root mean square about the mean, in the unit of the samples; 0 for no samples.
     pub fn standard_deviation(&self) -> f64 {
-        unit(self.peak) * (self.centred_squares / self.count.max(1) as f64).sqrt()
+        power_of_two(self.peak) * (self.centred_squares / self.count.max(1) as f64).sqrt()
     }
 
     /// Sum of the squares about the mean, in the squared unit of the samples.
     pub fn centred_sum_of_squares(&self) -> f64 {
-        let unit = unit(self.peak);
+        let unit = power_of_two(self.peak);
         self.centred_squares * unit * unit
     }
 
@@ -189,14 +190,8 @@ impl RunningStatistics {
     }
 
     fn centred_squares_over(&self, new_unit: f64) -> f64 {
-        self.centred_squares * (unit(self.peak) / new_unit).powi(2)
+        self.centred_squares * (power_of_two(self.peak) / new_unit).powi(2)
     }
-}
-
-/// Largest power of two that is not above a level, or the smallest normal number.
-fn unit(level: f64) -> f64 {
-    const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
-    f64::from_bits(level.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
 }
 
 #[cfg(test)]

@@ -1,10 +1,17 @@
 //! What is tried.
 
+mod calls;
+mod draw;
+mod estimate;
+mod force;
+mod integrate;
+mod model;
 mod readers;
+mod signal;
 
 use crate::Target;
 
 /// All targets.
 pub fn all() -> Vec<Target> {
-    readers::TARGETS.to_vec()
+    [readers::TARGETS, calls::TARGETS].concat()
 }

@@ -9,7 +9,7 @@ use mechid_io::{
 };
 use mechid_signal::Sampling;
 
-use crate::Target;
+use crate::{Input, Target};
 
 /// Words of delimited text.
 const TEXT: &[&str] = &[
@@ -84,20 +84,38 @@ const JSON: &[&str] = &[
 ];
 
 pub const TARGETS: [Target; 5] = [
-    Target { name: "text", corpus: "text", words: TEXT, memory: [4 << 20, 100], run: record },
-    Target { name: "binary", corpus: "binary", words: BINARY, memory: [8 << 20, 100], run: record },
-    Target { name: "chunks", corpus: "text", words: TEXT, memory: [8 << 20, 200], run: chunks },
+    Target {
+        name: "text",
+        corpus: "text",
+        input: Input::Mutations(TEXT),
+        memory: [4 << 20, 100],
+        run: record,
+    },
+    Target {
+        name: "binary",
+        corpus: "binary",
+        input: Input::Mutations(BINARY),
+        memory: [8 << 20, 100],
+        run: record,
+    },
+    Target {
+        name: "chunks",
+        corpus: "text",
+        input: Input::Mutations(TEXT),
+        memory: [8 << 20, 200],
+        run: chunks,
+    },
     Target {
         name: "json",
         corpus: "json",
-        words: JSON,
+        input: Input::Mutations(JSON),
         memory: [4 << 20, 1000],
         run: descriptions,
     },
     Target {
         name: "lines",
         corpus: "lines",
-        words: &["odd", "even", "all", ":", ","],
+        input: Input::Mutations(&["odd", "even", "all", ":", ","]),
         memory: [1 << 20, 1000],
         run: lines,
     },

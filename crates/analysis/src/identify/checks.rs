@@ -101,7 +101,7 @@ fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> 
 
 impl SampleResidual {
     /// Returns the number of lags at which it is correlated; 0 if it has too few samples.
-    pub fn lags(&self) -> usize {
+    pub(crate) fn lags(&self) -> usize {
         LAGS.min(self.left.len().saturating_sub(self.noise_span) / SAMPLES_PER_LAG)
     }
 }

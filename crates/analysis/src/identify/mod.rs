@@ -42,7 +42,7 @@ pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
-use self::spectra::Fitted;
+pub use self::spectra::{Fitted, Misfit, Residual, SampleResidual};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::validation::{Validation, ValidationWindow};

@@ -153,7 +153,7 @@ fn periodic_start(motion: &Record, kind: ResponseQuantity) -> Result<InitialStat
 }
 
 /// Returns the reason why there is no prediction.
-pub fn failed(reason: EstimateError, model: &Model, measured: &Block) -> AnalysisError {
+pub(crate) fn failed(reason: EstimateError, model: &Model, measured: &Block) -> AnalysisError {
     match growth(model.linear()) {
         Some(rate) => AnalysisError::Diverges { file: measured.file.clone(), rate },
         None => reason.into(),
@@ -167,7 +167,7 @@ fn growth(system: &SecondOrderSystem) -> Option<f64> {
 }
 
 /// Returns one quantity of a response.
-pub fn channels(response: &Response, kind: ResponseQuantity) -> &Record {
+pub(crate) fn channels(response: &Response, kind: ResponseQuantity) -> &Record {
     match kind {
         ResponseQuantity::Displacement => response.displacement(),
         ResponseQuantity::Velocity => response.velocity(),

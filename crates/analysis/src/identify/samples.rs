@@ -7,7 +7,7 @@ use mechid_estimate::checks::{
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
 use mechid_model::Discretisation;
-use mechid_signal::{Extent, Interpolation, Record, counted};
+use mechid_signal::{Extent, Interpolation, Record, message};
 
 use super::CONSPICUOUS;
 use super::derivatives::Prepared;
@@ -19,7 +19,7 @@ use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
 impl SampleFit {
     /// Returns how much of a record must be held: all of it where every sample needs all others.
-    pub fn hold(&self) -> Hold {
+    pub(crate) fn hold(&self) -> Hold {
         match (self.derivatives, self.refine.map(|refine| refine.interpolation)) {
             (Some(Derivatives::Spectral), _) => Hold::Whole,
             (_, Some(Between::Spline | Between::BandLimited)) => Hold::Whole,
@@ -267,7 +267,7 @@ impl SampleFit {
             let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
             remarks.push(format!(
                 "{} in every interval; the standard errors count measured samples only{}",
-                counted(factor, "step"),
+                message::count(factor, "step"),
                 if open { ", and the interpolation takes the window as open" } else { "" }
             ));
         }

@@ -314,13 +314,13 @@ impl Fitted {
     }
 
     /// Residual of the equations over their right-hand sides, all degrees of freedom together.
-    pub fn nrmse(&self) -> f64 {
+    pub(crate) fn nrmse(&self) -> f64 {
         let each = self.estimate.residual_nrmse();
         (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
     }
 
     /// Returns whether frequency responses were fitted, weighted by their noise.
-    pub fn is_weighted(&self) -> bool {
+    pub(crate) fn is_weighted(&self) -> bool {
         let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
         noise_stated && !self.least_squares
     }
@@ -330,7 +330,7 @@ impl Fitted {
     ///
     /// # Errors
     /// If the model has no receptance at a line.
-    pub fn unexplained_motion(
+    pub(crate) fn unexplained_motion(
         &self,
         system: &SecondOrderSystem,
     ) -> Result<Option<f64>, AnalysisError> {

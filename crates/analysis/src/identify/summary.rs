@@ -7,7 +7,7 @@ use mechid_estimate::checks::Subject;
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::CONSPICUOUS;
@@ -300,7 +300,7 @@ impl IdentificationSummary {
             let rate = compact(window.sample_rate_hz, 8);
             let periods = match (self.repeats, window.periods) {
                 (false, _) => String::new(),
-                (_, n) => format!(", {} of {}", counted(n, "period"), window.period_samples),
+                (_, n) => format!(", {} of {}", message::count(n, "period"), window.period_samples),
             };
             let (first, last) = (window.first_sample, window.last_sample);
             text += &format!("{file}: samples {first} to {last}{periods}, {rate} Hz\n");
@@ -347,8 +347,8 @@ pub(super) fn verdict(checks: &[CheckRow]) -> String {
     let all = checks.len();
     let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
     let mut text = match warnings.len() {
-        0 => format!("{all} of {} passed\n", counted(all, "check")),
-        some => format!("{some} of {}: warning\n", counted(all, "check")),
+        0 => format!("{all} of {} passed\n", message::count(all, "check")),
+        some => format!("{some} of {}: warning\n", message::count(all, "check")),
     };
     for check in warnings {
         text += &format!("  {}: {}\n", check.subject, check.sentence());
@@ -413,7 +413,7 @@ impl fmt::Display for IdentificationSummary {
 
 impl WindowRow {
     /// The samples of a measurement.
-    pub fn of(measured: &Block) -> Self {
+    pub(crate) fn of(measured: &Block) -> Self {
         Self {
             first_sample: measured.first_sample,
             last_sample: measured.last_sample(),
@@ -484,7 +484,7 @@ fn digits(value: f64, error: f64) -> usize {
 }
 
 /// Returns the remark on a residual of least squares that is not noise.
-pub fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
+pub(crate) fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<String> {
     let warned = |when| checks.iter().any(|row| row.when == when && row.is_conspicuous());
     let explained = checks.iter().any(CheckRow::is_bad);
     (fitted.least_squares && warned(When::After) && !warned(When::Before) && !explained).then(|| {

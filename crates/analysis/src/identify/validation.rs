@@ -4,7 +4,7 @@ use mechid_estimate::{StartFit, fit_percent, predict};
 use mechid_model::Discretisation;
 use mechid_model::ResponseQuantity;
 use mechid_model::{InitialState, SecondOrderSystem};
-use mechid_signal::Extent;
+use mechid_signal::{Extent, RunningStatistics, SignalError};
 use serde::{Deserialize, Serialize};
 
 use super::prediction::{Model, Prediction, channels, failed};
@@ -160,7 +160,7 @@ fn in_stretches(
         for ((kind, levels), (_, measured)) in levels.iter_mut().zip(chunk.responses()) {
             for (c, level) in levels.iter_mut().enumerate() {
                 let predicted = channels(&response, *kind).channel(c);
-                level.add(&measured.channel(c)[seen..], &predicted[seen..]);
+                level.add(&measured.channel(c)[seen..], &predicted[seen..])?;
             }
         }
         let row = |kind| channels(&response, kind).data().row(chunk.force.len() - 1).transpose();
@@ -177,34 +177,18 @@ fn in_stretches(
 /// A channel measured, and what a prediction leaves of it.
 #[derive(Debug, Clone, Default)]
 struct Level {
-    count: f64,
-    mean: f64,
-    /// Sum of the squares about the mean.
-    squares: f64,
+    measured: RunningStatistics,
     /// Sum of the squares of what is left.
     left: f64,
 }
 
 impl Level {
-    /// # Source
-    /// Chan, Golub & LeVeque (1983), The American Statistician 37, 242–247: sums of squares about
-    /// the mean, put together from parts.
-    fn add(&mut self, measured: &[f64], predicted: &[f64]) {
-        let count = measured.len() as f64;
-        if measured.is_empty() {
-            return;
-        }
-        let mean = measured.iter().sum::<f64>() / count;
-        let squares: f64 = measured.iter().map(|x| (x - mean).powi(2)).sum();
-        let apart = mean - self.mean;
-        let all = self.count + count;
-        self.squares += squares + apart * apart * self.count * count / all;
-        self.mean += apart * count / all;
-        self.count = all;
+    fn add(&mut self, measured: &[f64], predicted: &[f64]) -> Result<(), SignalError> {
         self.left += measured.iter().zip(predicted).map(|(x, p)| (x - p).powi(2)).sum::<f64>();
+        self.measured.push(measured)
     }
 
     fn fit_percent(&self) -> f64 {
-        100.0 * (1.0 - self.left.sqrt() / self.squares.sqrt())
+        100.0 * (1.0 - self.left.sqrt() / self.measured.centred_sum_of_squares().sqrt())
     }
 }

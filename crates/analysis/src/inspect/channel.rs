@@ -2,11 +2,12 @@
 
 use std::f64::consts::TAU;
 
-use mechid_signal::{Clipping, Record, Sampling, SignalError, Spectrum, clipping, repetition};
+use mechid_signal::{
+    Clipping, Record, RunningStatistics, Sampling, SignalError, Spectrum, clipping, repetition,
+};
 use serde::Serialize;
 
 use crate::extremes::Extremes;
-use crate::levels::Levels;
 
 /// Spectral lines told of a channel.
 const STRONGEST: usize = 3;
@@ -80,7 +81,7 @@ pub struct Period {
 /// Statistics of a channel, gathered block by block.
 #[derive(Debug, Default)]
 pub struct Gathered {
-    levels: Levels,
+    levels: RunningStatistics,
     /// The first samples, which are looked at together; none where nothing is looked for.
     held: Vec<f64>,
     mean_of_held: f64,
@@ -133,17 +134,16 @@ impl Measured {
         let (spectral, repeats, cut) = (!held.is_empty(), repetition(&held), clipping(&held));
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
         let lines = AmplitudeSpectrum::of(held, mean_of_held, period)?;
-        let Levels { peak, minimum, maximum, .. } = levels;
         let channel = Channel {
             column,
             name,
             about,
             mean: levels.mean(),
             rms: levels.rms(),
-            peak,
-            crest_factor: (peak > 0.0).then(|| peak / levels.rms()),
-            minimum,
-            maximum,
+            peak: levels.peak(),
+            crest_factor: levels.crest_factor(),
+            minimum: levels.minimum(),
+            maximum: levels.maximum(),
             clipping: cut.map(|Clipping { level, samples }| Cut { level, samples }),
             spectrum_peaks: lines.strongest(dt),
             period: repeats.map(|r| Period {

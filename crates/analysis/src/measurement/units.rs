@@ -94,7 +94,11 @@ const LONG_S: f64 = 1000.0;
 
 /// Returns a remark if a time column without a unit gives a record so slow and long that it may be in
 /// milliseconds.
-pub fn doubtful_time(table: &Table, time: &TimeAxis<'_>, sampling: Sampling) -> Option<String> {
+pub(crate) fn doubtful_time(
+    table: &Table,
+    time: &TimeAxis<'_>,
+    sampling: Sampling,
+) -> Option<String> {
     let TimeAxis::Column(name) = time else { return None };
     let column = table.find(name).ok()?;
     let (rate_hz, long_s) = (1.0 / sampling.dt(), sampling.len() as f64 * sampling.dt());

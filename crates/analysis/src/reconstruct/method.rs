@@ -381,13 +381,3 @@ fn smoothed(
     let remarks = Vec::new();
     Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
 }
-
-/// A chosen parameter as a person reads it.
-pub fn told(value: f64, unit: &str) -> String {
-    let number = if value.fract() == 0.0 && value.abs() < 1e6 {
-        format!("{value}")
-    } else {
-        significant(value, 4)
-    };
-    format!("{number} {unit}").trim_end().into()
-}

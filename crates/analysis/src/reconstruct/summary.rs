@@ -2,10 +2,9 @@
 
 use std::fmt::{self, Write as _};
 
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
-use super::method::told;
 use super::options::Reconstruct;
 use super::unexplained::Measured;
 use crate::text::{compact, significant, text_table};
@@ -86,12 +85,15 @@ impl ForceSummary {
             Some(1) => "one period".into(),
             Some(n) => format!("mean of {n} periods"),
         };
-        let mut text =
-            format!("{}: {} at {rate} Hz, {extent}\n", self.file, counted(self.samples, "sample"));
+        let mut text = format!(
+            "{}: {} at {rate} Hz, {extent}\n",
+            self.file,
+            message::count(self.samples, "sample")
+        );
         let _ = writeln!(text, "machine: {}", self.machine);
         let _ = writeln!(text, "method: {}\n  because: {}", self.method, self.why);
         for Chosen { name, value, unit } in &self.chosen {
-            let _ = writeln!(text, "  {name}: {}", told(*value, unit));
+            let _ = writeln!(text, "  {name}: {}", with_unit(*value, unit));
         }
         for channel in self.channels.iter().filter_map(Measured::text) {
             let _ = writeln!(text, "  {channel}");
@@ -133,4 +135,14 @@ impl fmt::Display for ForceSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.text())
     }
+}
+
+/// Returns a value with its unit, to four significant digits unless it is a whole number.
+fn with_unit(value: f64, unit: &str) -> String {
+    let number = if value.fract() == 0.0 && value.abs() < 1e6 {
+        format!("{value}")
+    } else {
+        significant(value, 4)
+    };
+    format!("{number} {unit}").trim_end().into()
 }

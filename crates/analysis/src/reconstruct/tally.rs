@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use mechid_force::IdentifiedForce;
-use mechid_signal::Sampling;
+use mechid_signal::{RunningStatistics, Sampling};
 
 use super::ForceChunk;
 use super::peak_line::PeakLine;
@@ -22,13 +22,12 @@ pub struct Tally<'a> {
 /// Callback for some samples of the force.
 pub type Take<'a> = dyn FnMut(&ForceChunk<'_>) -> Result<(), AnalysisError> + 'a;
 
-/// Sums over one channel.
+/// Levels of one channel.
 #[derive(Default)]
 struct Level {
-    squares: f64,
-    peak: f64,
-    /// Squared standard errors; nothing where they are not known.
-    errors: Option<f64>,
+    force: RunningStatistics,
+    /// Standard errors; `None` where they are not known.
+    error: Option<RunningStatistics>,
 }
 
 impl<'a> Tally<'a> {
@@ -79,13 +78,9 @@ impl<'a> Tally<'a> {
     ) -> Result<(), AnalysisError> {
         let (record, error) = (force.record(), force.standard_error());
         for (dof, level) in self.levels.iter_mut().enumerate() {
-            let values = record.column(dof);
-            let values = values.rows_range(kept.clone());
-            level.squares += values.norm_squared();
-            level.peak = level.peak.max(values.amax());
+            level.force.push(&record.channel(dof)[kept.clone()])?;
             if let Some(error) = error {
-                let squares = error.column(dof).rows_range(kept.clone()).norm_squared();
-                *level.errors.get_or_insert(0.0) += squares;
+                level.error.get_or_insert_default().push(&error.channel(dof)[kept.clone()])?;
             }
         }
         (self.take)(&ForceChunk { sampling: self.sampling, force, samples: kept, counts_noise })
@@ -93,18 +88,18 @@ impl<'a> Tally<'a> {
 
     /// Returns the levels on each degree of freedom; `forced` are those where a force was sought.
     pub fn forces(&self, forced: &[usize]) -> Vec<ForceRow> {
-        let size = (self.sampling.len() as f64).sqrt();
-        let levels = self.levels.iter().enumerate();
-        levels
+        self.levels
+            .iter()
+            .enumerate()
             .map(|(dof, level)| {
                 let (strongest_hz, strongest_amplitude) = self.strongest.line(dof);
                 ForceRow {
                     dof: dof + 1,
                     // The equations of motion give a force everywhere, asked for or not.
-                    sought: level.peak > 0.0 || forced.contains(&dof),
-                    rms: level.squares.sqrt() / size,
-                    peak: level.peak,
-                    standard_error: level.errors.map(|squares| squares.sqrt() / size),
+                    sought: level.force.peak() > 0.0 || forced.contains(&dof),
+                    rms: level.force.rms(),
+                    peak: level.force.peak(),
+                    standard_error: level.error.map(|error| error.rms()),
                     strongest_hz,
                     strongest_amplitude,
                 }

@@ -34,7 +34,7 @@ const SELDOM_NOISE: f64 = 0.1;
 
 impl Measured {
     /// Every channel measured.
-    pub fn all(recorded: &Recorded, unexplained: Option<&[Unexplained]>) -> Vec<Self> {
+    pub(crate) fn all(recorded: &Recorded, unexplained: Option<&[Unexplained]>) -> Vec<Self> {
         let columns = recorded.columns().iter().enumerate();
         columns
             .map(|(at, column)| {

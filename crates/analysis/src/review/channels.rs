@@ -51,7 +51,7 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
         let varying = period.without_mean();
         for (at, column) in columns.iter().enumerate() {
             let levels = &all.levels[at];
-            let (mean, rms, peak) = (levels.mean(), levels.rms(), levels.peak);
+            let (mean, rms, peak) = (levels.mean(), levels.rms(), levels.peak());
             found.push(Channel {
                 column: column.clone(),
                 quantity,
@@ -60,7 +60,7 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
                 mean: if mean.abs() > ROUNDING * peak { mean } else { 0.0 },
                 rms,
                 peak,
-                crest_factor: (peak > 0.0).then(|| peak / rms),
+                crest_factor: levels.crest_factor(),
                 scatter: scatter(all, at, measures::rms(varying.channel(at))),
             });
         }

@@ -1,11 +1,10 @@
 //! Levels, histories and mean period of all samples of a window, gathered in one pass.
 
-use mechid_signal::{Record, Sampling};
+use mechid_signal::{Record, RunningStatistics, Sampling};
 use nalgebra::DMatrix;
 
 use crate::AnalysisError;
 use crate::extremes::Extremes;
-use crate::levels::Levels;
 use crate::measurement::{Block, CHUNK_SAMPLES, Windowed};
 
 /// Statistics of all samples of a window.
@@ -22,7 +21,7 @@ pub struct Whole {
 #[derive(Debug)]
 pub struct Gathered {
     /// Levels of each channel.
-    pub levels: Vec<Levels>,
+    pub levels: Vec<RunningStatistics>,
     periods: Option<Periods>,
     /// Extreme values of each channel, where not all samples are held.
     extremes: Vec<Extremes>,
@@ -89,7 +88,7 @@ impl Gathered {
             None => Vec::new(),
         };
         let periods = (held.periods > 1).then(|| Periods::new(held.period, record));
-        Self { levels: vec![Levels::default(); channels], periods, extremes }
+        Self { levels: vec![RunningStatistics::default(); channels], periods, extremes }
     }
 
     /// The next samples.

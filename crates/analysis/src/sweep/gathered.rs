@@ -45,7 +45,7 @@ impl Estimator {
     }
 
     /// Returns whether it takes whole periods.
-    pub fn is_of_spectra(self) -> bool {
+    pub(crate) fn is_of_spectra(self) -> bool {
         matches!(self, Estimator::LeastSquares | Estimator::MaximumLikelihood)
     }
 
@@ -55,7 +55,7 @@ impl Estimator {
     }
 
     /// Samples of a record to take at a time.
-    pub fn chunk(self, period: usize) -> usize {
+    pub(crate) fn chunk(self, period: usize) -> usize {
         if self.is_of_spectra() { period * (CHUNK_SAMPLES / period).max(1) } else { CHUNK_SAMPLES }
     }
 }

@@ -32,7 +32,7 @@ impl Kind {
 }
 
 /// Returns the whole number, one or more, that a setting (a pure number, to rounding) means.
-pub fn whole(value: f64) -> Option<usize> {
+pub(crate) fn whole(value: f64) -> Option<usize> {
     let nearest = value.round();
     // Rates read from files differ by rounding.
     let is_whole = nearest >= 1.0 && (value - nearest).abs() <= 1e-6 * nearest;

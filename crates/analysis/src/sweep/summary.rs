@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mechid_estimate::{Estimate, SweepPoint};
 use mechid_model::SecondOrderSystem;
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::SweepSettings;
@@ -82,7 +82,7 @@ pub struct SweptParameter {
 pub type Failure = Arc<AnalysisError>;
 
 /// Returns the reason why a setting (a pure number, or Hz) gave no estimate.
-pub fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
+pub(crate) fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
     match &point.outcome {
         Ok(found) => found.system().err().map(|reason| reason.to_string()),
         Err(reason) => Some(reason.to_string()),
@@ -143,7 +143,7 @@ impl SweepSummary {
             "{}: {}, {} in a period",
             self.file,
             self.estimator,
-            counted(self.samples_per_period, "sample")
+            message::count(self.samples_per_period, "sample")
         );
         if let Some(hz) = self.natural_frequency_hz {
             text += &format!(", natural frequency {} Hz", significant(hz, 6));

@@ -12,7 +12,7 @@ macro_rules! choice {
     ($(#[$about:meta])* $name:ident => $domain:path { $($(#[$help:meta])* $variant:ident,)+ }) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-        pub enum $name { $($(#[$help])* $variant,)+ }
+        pub(crate) enum $name { $($(#[$help])* $variant,)+ }
 
         impl From<$name> for $domain {
             fn from(choice: $name) -> Self {
@@ -97,7 +97,7 @@ pub enum SearchChoice {
 
 /// Assumption on the force between samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BetweenSamplesChoice {
+pub(crate) enum BetweenSamplesChoice {
     /// Euler's rule, the dissertation's; biased in proportion to the step
     Euler,
     /// The force is held, as a digital converter drives a shaker; then exact
@@ -118,7 +118,7 @@ impl From<BetweenSamplesChoice> for Discretisation {
 
 /// Extent of a window in the time domain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ExtentChoice {
+pub(crate) enum ExtentChoice {
     /// Any part of a response
     Open,
     /// Whole periods: the first sample follows the last again

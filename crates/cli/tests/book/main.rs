@@ -245,6 +245,26 @@ fn the_tutorial_says_what_its_blocks_show() {
     assert!(looked_at > 30, "{looked_at} numbers");
 }
 
+/// Rows of tables, whose cells two blanks or more keep apart, fit on a screen of 100 columns.
+#[test]
+fn tables_fit_on_a_screen() {
+    let mut rows = 0;
+    for page in documents() {
+        let text = read(&page);
+        for block in Page::parse(&text).blocks.iter().filter(|block| block.language() == "console")
+        {
+            for line in text[block.range.clone()].lines() {
+                let cells = line.trim().split("  ").filter(|cell| !cell.is_empty()).count();
+                if cells > 2 {
+                    assert!(line.chars().count() <= 100, "{}: {line}", page.display());
+                    rows += 1;
+                }
+            }
+        }
+    }
+    assert!(rows > 100, "{rows} rows");
+}
+
 /// Every line for a shell, in blocks and in running text, with the page that has it. Folders are
 /// made and entered where the pages are followed.
 fn shell_lines(wrong: &mut Vec<String>) -> Vec<(PathBuf, String)> {

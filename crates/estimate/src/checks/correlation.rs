@@ -174,7 +174,7 @@ pub(super) fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
 }
 
 pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, EstimateError> {
-    let needed = lags.max(1) + span + 2;
+    let needed = lags.max(1).saturating_add(span).saturating_add(2);
     if lags == 0 || values.len() < needed {
         return Err(EstimateError::TooShort { samples: values.len(), needed });
     }

@@ -22,7 +22,9 @@ const POWERS: [Power; 2] = [Power::Square, Power::Cube];
 /// machine; a Gaussian force keeps errors of the linear model out, too.
 ///
 /// # Errors
-/// As [`predict_periodic`], and [`EstimateError::Undetermined`] if the estimate is no machine.
+/// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is no machine,
+/// [`EstimateError::Size`] for another number of responses and [`EstimateError::NoExcitedLine`] if no
+/// line lies in the band.
 ///
 /// # Source
 /// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers less their linear
@@ -38,12 +40,19 @@ pub fn linearity(
     force.check_same_sampling(response)?;
     let system = estimate.system()?;
     let (n, predicted) = (system.dof(), predict_periodic(&system, force)?);
+    if response.channels() != n {
+        let what = "channels of the response";
+        return Err(EstimateError::Size { what, expected: n, got: response.channels() });
+    }
     let spectra = [force, response].map(Spectrum::of);
     let inside = |line: &usize| {
         let hz = *line as f64 * force.sampling().line_spacing_hz();
         band_hz[0] <= hz && hz <= band_hz[1] && 2 * line < force.len()
     };
     let lines: Vec<usize> = (1..spectra[0].len()).filter(inside).collect();
+    if lines.is_empty() {
+        return Err(EstimateError::NoExcitedLine);
+    }
     let mut receptances = Vec::with_capacity(lines.len());
     let mut residual = DMatrix::zeros(n, lines.len());
     for (at, line) in lines.iter().enumerate() {

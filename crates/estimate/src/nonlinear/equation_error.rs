@@ -1,6 +1,7 @@
 //! Least squares on the equation of motion with nonlinear columns.
 
 use mechid_model::{Term, Terms};
+use mechid_signal::message;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::SteadyExperiments;
@@ -11,6 +12,7 @@ use super::experiments::Columns;
 use super::grid::Grid;
 use super::shape::{Shape, ShapeConstants, fit_shape};
 use super::weighting::{Weighting, Weights};
+use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::estimate::Findings;
 use crate::{Direction, Estimate, EstimateError, LeastSquares, Uncertain, Unknowns};
 
@@ -129,13 +131,13 @@ fn check_determined(names: &[String], open: &[Direction]) -> Result<(), Estimate
     }
     let of = |involved: &dyn Fn(usize) -> bool| {
         let names = names.iter().enumerate().filter(|(at, _)| involved(*at));
-        names.map(|(_, name)| name.as_str()).collect::<Vec<_>>().join(", ")
+        message::list(names.map(|(_, name)| name), ", ", NAMED_PARAMETERS)
     };
     let direction =
         |d: &Direction| format!("only a combination of {} shows", of(&|at| d.involved[at]));
     Err(EstimateError::Undetermined {
         parameters: of(&|at| open.iter().any(|direction| direction.involved[at])),
-        directions: open.iter().map(direction).collect::<Vec<_>>().join("; "),
+        directions: message::list(open.iter().map(direction), "; ", NAMED_DIRECTIONS),
     })
 }
 

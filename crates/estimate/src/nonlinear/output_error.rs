@@ -1,7 +1,7 @@
 //! The simulated response fitted to the measured one.
 
 use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
-use mechid_signal::{Extent, Record};
+use mechid_signal::{Extent, Record, message};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
@@ -11,6 +11,7 @@ use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 use super::levenberg_marquardt::{SumOfSquares, minimise};
 use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
+use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
 use crate::least_squares::size;
 use crate::triangular::TriangularFactor;
@@ -329,15 +330,9 @@ impl<'a> Problem<'a> {
         let solution = rows.solve()?;
         if !solution.undetermined.is_empty() {
             let at = |at: usize| solution.undetermined.iter().any(|d| d.involved[at]);
-            let open: Vec<String> = self
-                .free
-                .iter()
-                .enumerate()
-                .filter(|(i, _)| at(*i))
-                .map(|(_, p)| p.to_string())
-                .collect();
+            let open = self.free.iter().enumerate().filter(|(i, _)| at(*i)).map(|(_, p)| p);
             return Err(EstimateError::Undetermined {
-                parameters: open.join(", "),
+                parameters: message::list(open, ", ", NAMED_PARAMETERS),
                 directions: "they change the simulated response in the same way".to_owned(),
             });
         }

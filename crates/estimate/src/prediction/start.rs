@@ -128,14 +128,17 @@ impl StartFit {
     /// [`EstimateError::TooFewRows`] if there was none.
     pub fn start(&self) -> Result<InitialState, EstimateError> {
         let n = self.system.dof();
-        if self.channels.is_empty() {
+        if self.channels.iter().all(|factor| factor.rows() == 0) {
             return Err(EstimateError::TooFewRows { rows: 0, unknowns: 2 * n });
         }
         let width = 2 * n + 1;
         let mut rows = DMatrix::zeros(self.channels.len() * width, width);
         for (at, (factor, size)) in self.channels.iter().zip(&self.sizes).enumerate() {
-            let scale = if *size > 0.0 { size.sqrt() } else { 1.0 };
-            rows.rows_mut(at * width, width).copy_from(&factor.r().unscale(scale));
+            // A stretch that was refused leaves channels without rows.
+            if factor.rows() > 0 {
+                let scale = if *size > 0.0 { size.sqrt() } else { 1.0 };
+                rows.rows_mut(at * width, width).copy_from(&factor.r().unscale(scale));
+            }
         }
         let gap = rows.column(2 * n).into_owned();
         let mut free = rows.remove_column(2 * n);

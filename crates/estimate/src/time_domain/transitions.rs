@@ -40,7 +40,7 @@ impl Transitions {
             return Err(EstimateError::NoDof);
         }
         let dt = Sampling::new(dt, 1)?.dt();
-        Ok(Self { dof, dt, factor: TriangularFactor::new(6 * dof) })
+        Ok(Self { dof, dt, factor: TriangularFactor::new(dof.saturating_mul(6)) })
     }
 
     /// Degrees of freedom.
@@ -204,6 +204,9 @@ impl Transitions {
 
     /// An error if the squares of a quantity are too small to be told from 0.
     pub(super) fn check_size(&self) -> Result<(), EstimateError> {
+        if self.rows() == 0 {
+            return Err(EstimateError::TooFewRows { rows: 0, unknowns: 3 * self.dof });
+        }
         match self.factor.too_small() {
             Some((at, norm)) if at < 3 * self.dof => {
                 let what = ["displacement", "velocity", "force"][at / self.dof];

@@ -80,3 +80,15 @@ fn windows_of_absurd_size_are_refused_before_they_are_built() {
         assert_eq!(refused, Err(EstimateError::WindowTooLarge { half_width, order }));
     }
 }
+
+#[test]
+fn sizes_that_no_memory_holds_are_refused_where_rows_come() {
+    let mut rows = LeastSquares::new(usize::MAX, 2);
+    let error = rows.push_rows(DMatrix::zeros(3, 2).as_view(), DMatrix::zeros(3, 2).as_view());
+    assert!(matches!(error, Err(EstimateError::Size { expected: usize::MAX, got: 2, .. })));
+    let needed = EstimateError::TooFewRows { rows: 0, unknowns: usize::MAX };
+    assert_eq!(rows.solve().unwrap_err(), needed);
+    assert_eq!(LeastSquares::new(0, 1).solve().unwrap_err(), EstimateError::NothingUnknown);
+    let nothing = EquationOfMotion::new(1).solve(&Unknowns::unknown_mass(1).unwrap());
+    assert_eq!(nothing.unwrap_err(), EstimateError::TooFewRows { rows: 0, unknowns: 3 });
+}

@@ -24,7 +24,7 @@ const WIDTH: f64 = 480.0;
 const PANEL: f64 = 210.0;
 
 /// A picture with its words.
-pub struct Drawn {
+pub(crate) struct Drawn {
     pub id: String,
     pub svg: String,
     pub caption: String,

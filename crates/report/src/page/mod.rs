@@ -153,7 +153,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
 }
 
 /// A picture with its caption.
-pub fn figure(drawn: &Drawn) -> Markup {
+pub(crate) fn figure(drawn: &Drawn) -> Markup {
     html! {
         figure id={ "figure-" (drawn.id) } {
             // Made by `mechid-plot`, which escapes the words in it.

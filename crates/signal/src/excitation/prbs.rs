@@ -85,9 +85,14 @@ impl Prbs {
 
     /// The levels of one period, in N, one per chip.
     pub fn chips(&self) -> Vec<f64> {
+        self.first_chips(usize::MAX)
+    }
+
+    /// The levels of one period, or of its first `most` chips.
+    fn first_chips(&self, most: usize) -> Vec<f64> {
         let taps = TAPS[self.order as usize - 2];
         let mut register = (1u32 << self.order) - 1;
-        (0..(1usize << self.order) - 1)
+        (0..most.min((1usize << self.order) - 1))
             .map(|_| {
                 let out = register >> (self.order - 1) & 1;
                 let feedback = (register & taps).count_ones() & 1;
@@ -106,7 +111,7 @@ impl Prbs {
     /// None for a sequence that exists; the signature is that of all excitations.
     pub fn sample(&self, sampling: Sampling) -> Result<Record, SignalError> {
         fits_in_memory(sampling.len(), 1)?;
-        let chips = self.chips();
+        let chips = self.first_chips(sampling.len().div_ceil(self.hold));
         let level = |k: usize| chips[k / self.hold % chips.len()];
         Record::from_channel(sampling, (0..sampling.len()).map(level).collect())
     }

@@ -3,7 +3,7 @@
 mod appendices;
 pub mod claims;
 mod counts;
-mod evidence;
+pub mod evidence;
 pub mod markdown;
 pub mod misprints;
 mod rerun;
