@@ -130,10 +130,11 @@ fn spectra(d: &mut Draw) -> Result<(), String> {
         passed(Lines::new(force.sampling(), chosen))?
     };
     let (Some(lines), Some(unknowns)) = (lines, unknowns(d, dof)?) else { return Ok(()) };
-    passed(checks::before_spectral_fit(&lines, &force, &response, quantity, &unknowns))?;
+    passed(checks::steady_periods(&force, &response, d.size()))?;
     let Some(data) = passed(FrequencyData::read(&lines, &force, &response, quantity))? else {
         return Ok(());
     };
+    passed(checks::before_spectral_fit(&data, &unknowns))?;
     passed(equation_rows(&data))?;
     let estimate = equation_error(&data, &unknowns);
     let estimate = found(d, estimate)?;
@@ -195,7 +196,7 @@ fn responses(d: &mut Draw) -> Result<(), String> {
     let Some(frf) = passed(frf)? else { return Ok(()) };
     let places: Vec<usize> = (0..frf.omega().len()).collect();
     let Some(unknowns) = unknowns(d, dof)? else { return Ok(()) };
-    passed(checks::before_response_fit(&frf, &places, &unknowns))?;
+    let _ = checks::coherence(&frf);
     if let Some(data) = passed(frf.data(&places))? {
         let estimate = output_error(&data, &unknowns).map(|fit| fit.estimate);
         if let Some(estimate) = found(d, estimate)? {
@@ -240,14 +241,14 @@ fn steps(d: &mut Draw) -> Result<(), String> {
     };
     let Some(unknowns) = unknowns(d, dof)? else { return Ok(()) };
     let (x, v, extent) = (motion.displacement(), motion.velocity(), d.extent());
-    passed(checks::before_equation_of_motion(&motion, &force, &unknowns, extent))?;
+    passed(checks::before_equation_of_motion(&[(&motion, &force)], &unknowns))?;
     let estimate = equation_of_motion(&motion, &force, &unknowns);
     if let Some(estimate) = found(d, estimate)? {
         passed(checks::noise_on_response(&motion, &force, &estimate))?;
     }
     let _ = checks::delay_at_samples(&motion, &force, &unknowns);
     let domain = TimeDomain::new(hold(d), extent);
-    passed(checks::before_fit(domain, x, v, &force))?;
+    passed(checks::before_fit(domain, &[[x, v, &force]]))?;
     let _ = checks::delay_between_samples(domain, x, v, &force, &unknowns);
     let fit = domain.fit(x, v, &force, &unknowns);
     if let Some(fit) = passed(fit)? {

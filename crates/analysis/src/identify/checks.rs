@@ -48,6 +48,7 @@ pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>,
     let mut add = |when, at: Option<usize>, findings: &[Finding]| {
         all.extend(findings.iter().map(|finding| (when, at, finding.clone())));
     };
+    add(When::Before, None, &fitted.before_all);
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
         add(When::Before, Some(at), checks);
         add(When::Before, Some(at), &of_channels(record)?);

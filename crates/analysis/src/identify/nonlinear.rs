@@ -1,7 +1,7 @@
 //! Fits of whole periods with nonlinear terms beside M, C and K.
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::checks::before_spectral_fit;
+use mechid_estimate::checks::{before_spectral_fit, steady_periods};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::nonlinear::{
     ChannelPhase, Distortion, EquationErrorOptions, Level, NonlinearEstimate, ShapeConstants,
@@ -147,13 +147,17 @@ pub(super) fn fit(
         let held = &recorded.held;
         let chosen = choose_lines(&held.force, held.period, &LineChoice::Driven)?;
         let driven = Lines::new(band.sampling(), chosen)?;
-        before.push(before_spectral_fit(&driven, &held.force, held.response().0, kind, unknowns)?);
+        before.push(steady_periods(&held.force, held.response().0, held.period)?);
         let own = periods(recorded, &driven)?.mean()?;
         spectra = Some(match spectra {
             None => own,
             Some(all) => all.and(&own)?,
         });
     }
+    let before_all = match &spectra {
+        Some(data) => before_spectral_fit(data, unknowns)?,
+        None => Vec::new(),
+    };
     let mut remarks = one_motion_of(first);
     if found.standard_errors() == StandardErrors::White {
         remarks.push(
@@ -168,6 +172,7 @@ pub(super) fn fit(
         least_squares: false,
         equations: found.equations() / dofs,
         frequency: spectra.map(|data| (band, data)),
+        before_all,
         before,
         after: vec![Vec::new(); records.len()],
         after_all: Vec::new(),

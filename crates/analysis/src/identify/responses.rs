@@ -1,7 +1,8 @@
 //! Fits frequency responses.
 
 use mechid_estimate::checks::{
-    Finding, after_response_fit, before_response_fit, claimed_period, delay_of_lines, linearity,
+    Finding, after_response_fit, before_spectral_fit, claimed_period, coherence, delay_of_lines,
+    linearity,
 };
 use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -41,7 +42,7 @@ pub fn fit(
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
-        let mut checks = before_response_fit(&r.frf, &r.driven, unknowns)?;
+        let mut checks = vec![coherence(&r.frf)];
         if periodic {
             checks.extend(claimed_period(&held.force, held.period));
         }
@@ -53,6 +54,7 @@ pub fn fit(
         estimator: name,
         least_squares: *method == Some(Method::LeastSquares),
         equations: 2 * data.len(),
+        before_all: before_spectral_fit(&data, unknowns)?,
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
         after,

@@ -1,8 +1,8 @@
 //! Fits sample by sample.
 
 use mechid_estimate::checks::{
-    Finding, Subject, before_equation_of_motion, before_fit, delay_at_samples,
-    delay_between_samples, noise_on_response, periodicity_across,
+    Finding, before_equation_of_motion, before_fit, claimed_period, delay_at_samples,
+    delay_between_samples, noise_on_response, periodicity, periodicity_across,
 };
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
@@ -76,21 +76,19 @@ impl SampleFit {
         if held.held_to().is_some() { Extent::Open } else { self.extent() }
     }
 
-    /// Adds to the findings before the fit whether a period that is not held whole is one, by its last
-    /// samples.
-    fn with_seam(
-        &self,
-        mut seen: Vec<Finding>,
-        recorded: &Windowed,
-        p: &Prepared,
-        end: Option<Record>,
-    ) -> Vec<Finding> {
-        let long = self.extent() == Extent::WholePeriod && recorded.held.held_to().is_some();
-        if let Some(end) = end.filter(|_| long) {
-            let step = seen.iter().position(|check| check.subject() == Subject::Step);
-            seen.insert(step.unwrap_or(seen.len()), periodicity_across(&p.displacement, &end));
+    /// Checks whether a record that is to be one period is one; by its first and last samples where it
+    /// is not held whole.
+    fn seam(&self, recorded: &Windowed, p: &Prepared, end: Option<Record>) -> Vec<Finding> {
+        match (self.extent(), recorded.held.held_to(), end) {
+            (Extent::Open, ..) | (_, Some(_), None) => Vec::new(),
+            (Extent::WholePeriod, Some(_), Some(end)) => {
+                vec![periodicity_across(&p.displacement, &end)]
+            }
+            (Extent::WholePeriod, None, _) => {
+                let claimed = claimed_period(&p.force, p.force.len());
+                std::iter::once(periodicity(&p.displacement)).chain(claimed).collect()
+            }
         }
-        seen
     }
 
     /// Gathers the samples of a record; the displacements of its last two.
@@ -145,16 +143,14 @@ impl SampleFit {
         unknowns: &Unknowns,
     ) -> Result<Fitted, AnalysisError> {
         let mut rows = EquationOfMotion::new(unknowns.dof());
-        let mut before = Vec::new();
+        let (mut before, mut responses) = (Vec::new(), Vec::new());
         for (recorded, p) in records.iter().zip(prepared) {
             let end = self.push_instants(recorded, &mut rows)?;
-            let Some(response) = p.response()? else {
-                return Err(AnalysisError::TimeDomainMotions);
-            };
-            let extent = self.extent_of(&recorded.held);
-            let seen = before_equation_of_motion(&response, &p.force, unknowns, extent)?;
-            before.push(self.with_seam(seen, recorded, p, end));
+            responses.push(p.response()?.ok_or(AnalysisError::TimeDomainMotions)?);
+            before.push(self.seam(recorded, p, end));
         }
+        let measured = responses.iter().zip(prepared).map(|(response, p)| (response, &p.force));
+        let before_all = before_equation_of_motion(&Vec::from_iter(measured), unknowns)?;
         let estimate = rows.solve(unknowns)?;
         // Says what the data leave open, before anything is made of it.
         estimate.system()?;
@@ -168,6 +164,7 @@ impl SampleFit {
             least_squares: false,
             equations: rows.rows(),
             frequency: None,
+            before_all,
             before,
             after,
             after_all: Vec::new(),
@@ -209,10 +206,12 @@ impl SampleFit {
         let mut before = Vec::new();
         for (recorded, p) in records.iter().zip(prepared) {
             let end = self.push_steps(recorded, p, &mut rows)?;
-            let [x, v, force] = p.states();
-            let method = TimeDomain::new(discretisation, self.extent_of(&recorded.held));
-            before.push(self.with_seam(before_fit(method, x, v, force)?, recorded, p, end));
+            before.push(self.seam(recorded, p, end));
         }
+        let held_whole = records.iter().all(|recorded| recorded.held.held_to().is_none());
+        let extent = if held_whole { self.extent() } else { Extent::Open };
+        let states: Vec<[&Record; 3]> = prepared.iter().map(Prepared::states).collect();
+        let before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
         let left = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
@@ -236,6 +235,7 @@ impl SampleFit {
             least_squares: false,
             equations: rows.rows(),
             frequency: None,
+            before_all,
             before,
             after: prepared.iter().map(late).collect(),
             after_all: Vec::new(),

@@ -4,7 +4,7 @@ use std::fmt;
 
 use mechid_estimate::checks::{
     AfterSpectralFit, Finding, SpectralResidual, Subject, Verdict, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, fitted_band,
+    before_spectral_fit, delay_of_lines, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
@@ -39,6 +39,8 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
+    /// Findings before the fit on all records together.
+    pub before_all: Vec<Finding>,
     /// Findings before the fit, record by record.
     pub before: Vec<Vec<Finding>>,
     /// Findings after the fit beside those on the residuals, record by record.
@@ -122,8 +124,8 @@ pub(super) fn fit(
     estimate.system()?;
     let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
     for (Windowed { held, .. }, (periods, lines)) in records.iter().zip(&spectra) {
-        let (motion, kind) = held.response();
-        let checks = before_spectral_fit(lines, &held.force, motion, kind, unknowns)?;
+        let motion = held.response().0;
+        let checks = steady_periods(&held.force, motion, held.period)?;
         // What differs between windows that are no periods is no noise.
         let repeats = !checks.iter().any(no_period);
         let data = if repeats { with_noise(periods)? } else { periods.mean()? };
@@ -140,6 +142,7 @@ pub(super) fn fit(
         estimator,
         least_squares: false,
         equations: 2 * data.len(),
+        before_all: before_spectral_fit(&data, unknowns)?,
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use mechid_estimate::checks::{Finding, adjust_p_values, after_response_fit, before_response_fit};
+use mechid_estimate::checks::{
+    Finding, adjust_p_values, after_response_fit, before_spectral_fit, coherence,
+};
 use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
 use mechid_estimate::{Estimate, Frf, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, ResponseFunction, SystemMatrices};
@@ -66,10 +68,12 @@ pub fn identify_responses(
     }
     let unknowns = how.mass.unknowns(data.dof())?;
     let fit = Fit::of(&data, &unknowns, &measured, how.method)?;
-    let mut findings = Vec::new();
+    let before = before_spectral_fit(&data, &unknowns)?;
+    let mut findings: Vec<(When, Option<String>, Finding)> =
+        before.into_iter().map(|finding| (When::Before, None, finding)).collect();
     for (table, measured) in tables.iter().zip(&measured) {
         let name = (tables.len() > 1).then(|| table.file.clone());
-        for (when, finding) in measured.findings(&unknowns, &fit.estimate, data.len())? {
+        for (when, finding) in measured.findings(&fit.estimate, data.len())? {
             findings.push((when, name.clone(), finding));
         }
     }
@@ -385,7 +389,6 @@ impl Tabulated {
     /// Returns the findings before and after the fit; `all` is the number of rows of all tables.
     fn findings(
         &self,
-        unknowns: &Unknowns,
         estimate: &Estimate,
         all: usize,
     ) -> Result<Vec<(When, Finding)>, AnalysisError> {
@@ -393,9 +396,8 @@ impl Tabulated {
         for (frf, driven) in &self.coherent {
             let own = (driven.len() * frf.omega().len()) as f64 / all as f64;
             let fitted = own * estimate.parameters().len() as f64;
-            let before = before_response_fit(frf, driven, unknowns)?;
             let after = after_response_fit(frf, driven, estimate, fitted)?;
-            findings.extend(before.into_iter().map(|finding| (When::Before, finding)));
+            findings.push((When::Before, coherence(frf)));
             findings.extend(after.into_iter().map(|finding| (When::After, finding)));
         }
         Ok(findings)

@@ -4,19 +4,20 @@ use std::f64::consts::TAU;
 
 use mechid_model::{Discretisation, RealSchur, Response, SecondOrderSystem};
 use mechid_signal::measures::persistent_excitation_order;
-use mechid_signal::{Extent, Record, Spectrum};
+use mechid_signal::{Record, Spectrum};
 
-use super::claimed_period;
 use super::finding::{Finding, ModeLimit};
 use super::thresholds::EXCITED_LINE;
-use crate::time_domain::{TimeDomain, Transitions, equation_of_motion};
-use crate::{Estimate, EstimateError, Unknowns};
+use crate::time_domain::{TimeDomain, Transitions};
+use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 
-/// Checks excitation, conditioning, periodicity (if claimed) and step before a time-domain fit
-/// of displacement (m), velocity (m/s) and force (N).
+/// Checks excitation, conditioning and step before a time-domain fit of displacement (m), velocity
+/// (m/s) and force (N) of one record or several that are fitted together, since one shaker at a time
+/// excites one degree of freedom each.
 ///
 /// # Errors
-/// As [`Transitions::push`], and [`EstimateError::TooFewRows`].
+/// [`EstimateError::NoDof`] without a record; as [`Transitions::push`], and
+/// [`EstimateError::TooFewRows`].
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 13 (persistence of
@@ -24,44 +25,45 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// the limits are ours.
 pub fn before_fit(
     method: TimeDomain,
-    displacement: &Record,
-    velocity: &Record,
-    force: &Record,
+    records: &[[&Record; 3]],
 ) -> Result<Vec<Finding>, EstimateError> {
-    let dof = displacement.channels();
-    let mut rows = Transitions::new(dof, displacement.sampling().dt())?;
-    rows.push(displacement, velocity, force, method.extent())?;
+    let [first, ..] = records else { return Err(EstimateError::NoDof) };
+    let dof = first[0].channels();
+    let mut rows = Transitions::new(dof, first[0].sampling().dt())?;
+    for [displacement, velocity, force] in records {
+        rows.push(displacement, velocity, force, method.extent())?;
+    }
     let next = usize::from(method.discretisation() == Discretisation::FirstOrderHold);
-    let mut findings = excitation(force, 2 * dof + 1 + next);
+    let mut findings = excitation(records.iter().map(|record| record[2]), 2 * dof + 1 + next);
     let (condition_number, undetermined) = rows.condition(method.discretisation())?;
     findings.push(Finding::Conditioning { condition_number, undetermined });
-    if method.extent() == Extent::WholePeriod {
-        findings.push(periodicity(displacement));
-        findings.extend(claimed_period(force, force.len()));
-    }
     findings.push(step(&rows, method.discretisation())?);
     Ok(findings)
 }
 
-/// Checks excitation, conditioning, periodicity (if claimed) and step before the equation of motion
-/// is fitted sample by sample to a response (x, ẋ, ẍ) and a force (N).
+/// Checks excitation, conditioning and step before the equation of motion is fitted sample by sample to
+/// responses (x, ẋ, ẍ) and forces (N) of one record or several that are fitted together.
 ///
 /// # Errors
-/// As [`crate::EquationOfMotion::push_rows`] and [`crate::EquationOfMotion::solve`].
+/// As [`EquationOfMotion::push_rows`] and [`EquationOfMotion::solve`].
+///
+/// # Source
+/// As [`before_fit`].
 pub fn before_equation_of_motion(
-    response: &Response,
-    force: &Record,
+    records: &[(&Response, &Record)],
     unknowns: &Unknowns,
-    extent: Extent,
 ) -> Result<Vec<Finding>, EstimateError> {
-    let estimate = equation_of_motion(response, force, unknowns)?;
-    let mut findings = excitation(force, unknowns_of_an_equation(unknowns));
-    findings.push(conditioning(&estimate));
-    if extent == Extent::WholePeriod {
-        findings.push(periodicity(response.displacement()));
-        findings.extend(claimed_period(force, force.len()));
+    let mut rows = EquationOfMotion::new(unknowns.dof());
+    for (response, force) in records {
+        let [x, v, a] = [response.displacement(), response.velocity(), response.acceleration()];
+        let [x, v, a, force] = [x, v, a, *force].map(|record| record.data().as_view());
+        rows.push_rows(a, v, x, force)?;
     }
-    if let Ok(system) = estimate.system() {
+    let estimate = rows.solve(unknowns)?;
+    let forces = records.iter().map(|(_, force)| *force);
+    let mut findings = excitation(forces, unknowns_of_an_equation(unknowns));
+    findings.push(conditioning(&estimate));
+    if let (Ok(system), Some((_, force))) = (estimate.system(), records.first()) {
         let [frequency_hz, samples_per_period] = highest_mode(&system, force.sampling().dt())?;
         let limit = ModeLimit::AtSamples;
         findings.push(Finding::HighestMode { frequency_hz, samples_per_period, limit });
@@ -89,14 +91,20 @@ pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 
     Ok([highest / TAU, TAU / (highest * dt)])
 }
 
-/// Order of persistent excitation of each force, against the number of states and inputs, or of
-/// unknowns.
-fn excitation(force: &Record, needed: usize) -> Vec<Finding> {
-    let spectrum = Spectrum::of(force);
-    let order =
-        |channel| persistent_excitation_order(&spectrum, channel, EXCITED_LINE).unwrap_or(0);
-    let one = |force| Finding::PersistentExcitation { force, order: order(force), needed };
-    (0..force.channels()).map(one).collect()
+/// Order of persistent excitation of each force in the record that excites it most, against the number of
+/// states and inputs, or of unknowns.
+fn excitation<'a>(records: impl Iterator<Item = &'a Record>, needed: usize) -> Vec<Finding> {
+    let mut orders: Vec<usize> = Vec::new();
+    for force in records {
+        let spectrum = Spectrum::of(force);
+        orders.resize(orders.len().max(force.channels()), 0);
+        for (channel, order) in orders.iter_mut().enumerate() {
+            let own = persistent_excitation_order(&spectrum, channel, EXCITED_LINE);
+            *order = (*order).max(own.unwrap_or(0));
+        }
+    }
+    let finding = |(force, order)| Finding::PersistentExcitation { force, order, needed };
+    orders.into_iter().enumerate().map(finding).collect()
 }
 
 /// Checks whether a record of any response quantity is one whole period of a steady state: the

@@ -1,65 +1,63 @@
 //! Checks of a record before a fit of its spectra or frequency responses.
 
-use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 
 use super::before::{conditioning, highest_mode, periodicity, unknowns_of_an_equation};
 use super::claimed_period;
 use super::finding::{Finding, ModeLimit};
 use super::thresholds::EXCITED_LINE;
-use crate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods, equation_rows};
+use crate::frequency_domain::{FrequencyData, Lines, equation_rows};
 use crate::{Estimate, EstimateError, Frf, Unknowns};
 
-/// Checks excitation, conditioning and periodicity (of the response, and by [`claimed_period`] of the
-/// force) before the spectra of whole periods of force (N) and response are fitted; `lines`
-/// belong to one period.
+/// Checks excitation and conditioning before spectra or frequency responses are fitted: of all
+/// experiments that are fitted together, since one shaker at a time excites one degree of freedom each.
 ///
 /// # Errors
-/// As [`RepeatedPeriods::new`] and [`equation_error`](crate::frequency_domain::equation_error).
+/// As [`equation_error`](crate::frequency_domain::equation_error).
 ///
 /// # Source
 /// As [`before_fit`](super::before_fit).
 pub fn before_spectral_fit(
-    lines: &Lines,
-    force: &Record,
-    response: &Record,
-    measured: ResponseQuantity,
+    data: &FrequencyData,
     unknowns: &Unknowns,
 ) -> Result<Vec<Finding>, EstimateError> {
-    let data = RepeatedPeriods::new(lines, force, response, measured)?.mean()?;
-    let excitation = excitation(&data, unknowns);
-    let estimate = match equation_rows(&data)?.solve(unknowns) {
+    let mut findings = vec![excitation(data, unknowns)];
+    match equation_rows(data)?.solve(unknowns) {
         // Nothing else can be checked then.
-        Err(EstimateError::TooFewRows { .. }) => return Ok(vec![excitation]),
-        solved => solved?,
-    };
-    let period = lines.sampling().len();
-    let mut findings = vec![excitation, conditioning(&estimate), repetition(response, period)?];
+        Err(EstimateError::TooFewRows { .. }) => {}
+        solved => findings.push(conditioning(&solved?)),
+    }
+    Ok(findings)
+}
+
+/// Checks whether force (N) and response of one record, in any quantity, consist of periods of `period`
+/// samples: the deviation of the periods from their mean or the seam of a single one, and by
+/// [`claimed_period`] the force.
+///
+/// # Errors
+/// [`EstimateError::Signal`] if the records are no whole number of periods.
+///
+/// # Source
+/// Ours.
+pub fn steady_periods(
+    force: &Record,
+    response: &Record,
+    period: usize,
+) -> Result<Vec<Finding>, EstimateError> {
+    let mut findings = vec![repetition(response, period)?];
     findings.extend(claimed_period(force, period));
     Ok(findings)
 }
 
-/// Checks excitation, conditioning and coherence before frequency responses are fitted; forces act
-/// at the degrees of freedom `force_dof`, as for [`Frf::data`].
+/// Checks the coherence of frequency responses, whose median is judged.
 ///
-/// # Errors
-/// As [`Frf::data`] and [`equation_error`](crate::frequency_domain::equation_error).
-pub fn before_response_fit(
-    frf: &Frf,
-    force_dof: &[usize],
-    unknowns: &Unknowns,
-) -> Result<Vec<Finding>, EstimateError> {
-    let data = frf.data(force_dof)?;
-    let mut findings = vec![excitation(&data, unknowns)];
-    match equation_rows(&data)?.solve(unknowns) {
-        Err(EstimateError::TooFewRows { .. }) => {}
-        solved => findings.push(conditioning(&solved?)),
-    }
+/// # Source
+/// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 6; the limits are ours.
+pub fn coherence(frf: &Frf) -> Finding {
     let mut coherence: Vec<f64> = frf.coherence().iter().copied().collect();
     coherence.sort_by(f64::total_cmp);
     let (minimum, median) = (coherence[0], coherence[coherence.len() / 2]);
-    findings.push(Finding::Coherence { median, minimum, averages: frf.averages() });
-    Ok(findings)
+    Finding::Coherence { median, minimum, averages: frf.averages() }
 }
 
 /// Number of lines that carry force, against the unknowns.

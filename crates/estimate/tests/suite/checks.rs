@@ -2,7 +2,7 @@
 
 use mechid_estimate::checks::{
     Finding, PeriodFault, Subject, Verdict, before_fit, claimed_period, cross_correlation,
-    whiteness, whiteness_beyond,
+    steady_periods, whiteness, whiteness_beyond,
 };
 use mechid_estimate::time_domain::TimeDomain;
 use mechid_estimate::{Estimate, EstimateError, Unknowns, fit_percent, predict, sweep};
@@ -23,7 +23,11 @@ fn force(sampling: Sampling, lines: std::ops::RangeInclusive<usize>) -> Record {
 }
 
 fn verdict(method: TimeDomain, motion: &Response, force: &Record, subject: Subject) -> Verdict {
-    let checks = before_fit(method, motion.displacement(), motion.velocity(), force).unwrap();
+    let states = [motion.displacement(), motion.velocity(), force];
+    let mut checks = before_fit(method, &[states]).unwrap();
+    if method.extent() == Extent::WholePeriod {
+        checks.extend(steady_periods(force, motion.displacement(), force.len()).unwrap());
+    }
     checks.iter().filter(|c| c.subject() == subject).map(Finding::verdict).max().unwrap()
 }
 

@@ -1,10 +1,10 @@
 //! Checks of spectral fits and of residuals, and predictions of records that were not fitted.
 
 use mechid_estimate::checks::{
-    Finding, Subject, Verdict, after_fit, before_equation_of_motion, before_response_fit,
-    before_spectral_fit, fitted_band,
+    self, Finding, Subject, Verdict, after_fit, before_equation_of_motion, before_spectral_fit,
+    fitted_band, steady_periods,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods, equation_error};
 use mechid_estimate::{
     EstimateError, Frf, StartFit, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
 };
@@ -43,8 +43,11 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
         let three = noise::add_white(&three, NoiseLevel::FractionOfRms(noisy), 1).unwrap();
         let lines = Lines::new(one.sampling().with_len(period).unwrap(), lines).unwrap();
         let force = one.repeated(3).unwrap();
-        before_spectral_fit(&lines, &force, &three, ResponseQuantity::Displacement, &unknowns)
-            .unwrap()
+        let measured = ResponseQuantity::Displacement;
+        let data = RepeatedPeriods::new(&lines, &force, &three, measured).unwrap().mean().unwrap();
+        let mut findings = before_spectral_fit(&data, &unknowns).unwrap();
+        findings.extend(steady_periods(&force, &three, period).unwrap());
+        findings
     };
     let good = look(0.2, 1..=60, 512, 0.01);
     assert_eq!(good.iter().map(|c| c.verdict()).max(), Some(Verdict::Good), "{good:?}");
@@ -54,7 +57,7 @@ fn trouble_with_spectra_is_seen_before_the_fit() {
 
     // Two equations, four unknowns; then four for four.
     let poor = look(0.2, 5..=5, 512, 0.0);
-    assert_eq!((poor.len(), poor[0].verdict()), (1, Verdict::Bad));
+    assert_eq!((poor[0].verdict(), poor[1].subject()), (Verdict::Bad, Subject::Periodicity));
     let tight = look(0.2, 5..=6, 512, 0.0);
     assert_eq!(of(&tight, Subject::Excitation).verdict(), Verdict::Doubtful);
 
@@ -93,7 +96,7 @@ fn trouble_with_samples_is_seen_before_the_equation_of_motion_is_fitted() {
     let look = |lines: std::ops::RangeInclusive<usize>, dt: f64| {
         let force = force(dt, 512, lines);
         let motion = exact_harmonic_periodic(&system, &force).unwrap();
-        before_equation_of_motion(&motion, &force, &unknowns, Extent::WholePeriod).unwrap()
+        before_equation_of_motion(&[(&motion, &force)], &unknowns).unwrap()
     };
     let good = look(1..=60, 0.2);
     assert_eq!(good.len(), 5);
@@ -115,7 +118,9 @@ fn trouble_with_responses_is_seen_before_they_are_fitted() {
         let coherence = DMatrix::from_element(lines, 2, coherence);
         let frf =
             Frf::new(omega, response, coherence, 20.0, ResponseQuantity::Displacement).unwrap();
-        before_response_fit(&frf, &[0, 1], &unknowns).unwrap()
+        let mut findings = before_spectral_fit(&frf.data(&[0, 1]).unwrap(), &unknowns).unwrap();
+        findings.push(checks::coherence(&frf));
+        findings
     };
     let good = look(30, 0.99);
     assert!(good.iter().all(|c| c.verdict() == Verdict::Good), "{good:?}");

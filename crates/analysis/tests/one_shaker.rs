@@ -1,0 +1,109 @@
+//! One shaker at a time, a record for each place: excitation and noise are those of all records together.
+
+use mechid_analysis::identify::{Fit, SampleFit};
+use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
+use mechid_model::{Response, SecondOrderSystem};
+use mechid_problems::exact_harmonic_periodic;
+use mechid_problems::machines::{Support, chain};
+use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use nalgebra::DMatrix;
+
+const DOFS: usize = 3;
+const PERIOD: usize = 256;
+const PERIODS: usize = 4;
+
+fn machine() -> SecondOrderSystem {
+    chain(DOFS, Support::Held, 0.02, 3)
+}
+
+/// A period of the force at one degree of freedom and the steady motion that it makes, in closed form.
+fn test(driven: usize, seed: u64) -> (Record, Response) {
+    let period = Sampling::new(0.008, PERIOD).unwrap();
+    let lines = Multisine::flat(1..=70, 10.0, Phases::Random { seed }).unwrap();
+    let shaker = lines.sample(period).unwrap();
+    let force =
+        DMatrix::from_fn(
+            PERIOD,
+            DOFS,
+            |k, dof| {
+                if dof == driven { shaker.data()[(k, 0)] } else { 0.0 }
+            },
+        );
+    let force = Record::new(period, force).unwrap();
+    let motion = exact_harmonic_periodic(&machine(), &force).unwrap();
+    (force, motion)
+}
+
+/// Records of the displacement, one for each shaker, with noise on response and on every channel of
+/// the force, as parts of their RMS and of that of the shaker.
+fn records(seed: u64, [on_response, on_force]: [f64; 2]) -> Vec<Measurement> {
+    let record = |driven: usize| {
+        let (force, motion) = test(driven, 10 * seed + driven as u64);
+        let level = force.column(driven).norm() / (PERIOD as f64).sqrt() * on_force;
+        let noisy = |record: &Record, level, seed| {
+            let all = record.repeated(PERIODS).unwrap();
+            if level == NoiseLevel::StandardDeviation(0.0) {
+                return all;
+            }
+            noise::add_white(&all, level, seed).unwrap()
+        };
+        let seed = 100 * seed + 10 * driven as u64;
+        let force = noisy(&force, NoiseLevel::StandardDeviation(level), seed);
+        let x = noisy(motion.displacement(), NoiseLevel::FractionOfRms(on_response), seed + 1);
+        let responses = [(ResponseQuantity::Displacement, &x)];
+        Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
+    };
+    (0..DOFS).map(record).collect()
+}
+
+fn error(found: &SecondOrderSystem) -> f64 {
+    let exact = machine();
+    let pairs = [
+        (found.mass(), exact.mass()),
+        (found.damping(), exact.damping()),
+        (found.stiffness(), exact.stiffness()),
+    ];
+    pairs.map(|(a, b)| (a - b).amax() / b.amax()).into_iter().fold(0.0, f64::max)
+}
+
+#[test]
+fn idle_channels_do_not_keep_exact_records_from_a_fit() {
+    let found = identify(&records(1, [0.0, 0.0]), &Identify::default()).unwrap();
+    assert!(error(&found.system().unwrap()) < 1e-9, "{found}");
+
+    let samples = |driven| {
+        let (force, motion) = test(driven, driven as u64);
+        let responses = [
+            (ResponseQuantity::Displacement, motion.displacement()),
+            (ResponseQuantity::Velocity, motion.velocity()),
+            (ResponseQuantity::Acceleration, motion.acceleration()),
+        ];
+        Measurement::from_records(&force, &responses).unwrap()
+    };
+    let records: Vec<Measurement> = (0..DOFS).map(samples).collect();
+    let how = Identify { fit: Fit::Samples(SampleFit::default()), ..Identify::default() };
+    let found = identify(&records, &how).unwrap();
+    assert!(error(&found.system().unwrap()) < 1e-9, "{found}");
+}
+
+#[test]
+fn noise_in_idle_channels_is_no_cause_for_warnings() {
+    const RUNS: u64 = 50;
+    let exact = machine();
+    let (mut warned, mut held, mut all) = (0, 0, 0);
+    for seed in 0..RUNS {
+        let found = identify(&records(seed, [0.005, 0.002]), &Identify::default()).unwrap();
+        warned += u64::from(found.checks().iter().any(|check| check.is_conspicuous()));
+        for estimated in found.estimate().parameters() {
+            let parameter = estimated.parameter;
+            let truth = exact.matrix(parameter.matrix())[(parameter.row(), parameter.column())];
+            let [low, high] = estimated.interval(0.95).unwrap();
+            held += u64::from((low..=high).contains(&truth));
+            all += 1;
+        }
+    }
+    // With a rate of 1 in 50 more than four of fifty warn with a probability of 0.003.
+    assert!(warned <= 4, "{warned} of {RUNS} warn");
+    let coverage = held as f64 / f64::from(all);
+    assert!((0.93..0.97).contains(&coverage), "{coverage}");
+}
