@@ -106,8 +106,9 @@ impl Command {
     /// What to say while it computes, if that takes long; nothing if it says so itself, or must not.
     pub fn waiting(&self) -> Option<&'static str> {
         match self {
-            Command::Multisine(_) | Command::Sweep(_) => None,
+            Command::Sweep(_) => None,
             _ if self.report().quiet => None,
+            Command::Multisine(_) => Some("designing the multisine"),
             Command::Simulate(_) => Some("simulating"),
             Command::Force(_) => Some("looking for the force"),
             Command::Bearing(_) | Command::Identify(_) | Command::Report(_) => Some("identifying"),

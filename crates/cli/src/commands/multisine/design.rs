@@ -1,16 +1,10 @@
 //! From options to multisines.
 
-use std::time::Duration;
-
-use indicatif::ProgressBar;
 use mechid::signal::multi_input::{Mixing, orthogonal};
 use mechid::signal::{CrestSearch, Multisine, Phases, Record, Sampling, SignalError, lines};
 
 use super::{MultisineArgs, PhaseLaw, Separation};
 use crate::error::CliError;
-
-/// Above so many lines in all a search takes long enough to say that it is under way.
-const MANY_LINES: usize = 300;
 
 /// One column of the record.
 #[derive(Debug)]
@@ -82,21 +76,10 @@ impl MultisineArgs {
         let amplitude = self.amplitude.unwrap_or(1.0);
         let sloped = |n: &usize| amplitude * (*n as f64 / first).powf(self.slope / 20.0);
         let amplitudes = lines.iter().map(sloped).collect();
-        let many = lines.len() * self.inputs > MANY_LINES;
         let multisine = Multisine::new(lines, amplitudes, law)?;
         if self.phases != PhaseLaw::LowCrest {
             return Ok(multisine);
         }
-        let wait = if many && !self.report.quiet { spinner() } else { ProgressBar::hidden() };
-        let found = CrestSearch { starts: self.starts, seed }.minimise(&multisine);
-        wait.finish_and_clear();
-        found
+        CrestSearch { starts: self.starts, seed }.minimise(&multisine)
     }
-}
-
-/// A sign of life, on a terminal only.
-fn spinner() -> ProgressBar {
-    let spinner = ProgressBar::new_spinner().with_message("searching for a low crest factor");
-    spinner.enable_steady_tick(Duration::from_millis(100));
-    spinner
 }
