@@ -12,7 +12,8 @@ use nalgebra::{Complex, DMatrix};
 
 use super::IdentifyBearing;
 use crate::AnalysisError;
-use crate::identify::lines::choose_lines;
+use crate::identify::Disturbance;
+use crate::identify::left_out::LineRule;
 use crate::identify::tables::{IdentifyResponses, response_data};
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Measurement, Windowed};
 
@@ -87,7 +88,12 @@ impl BearingData {
         }
         let mass = how.stator_mass;
         let keep: Vec<usize> = (0..d.len())
-            .filter(|row| !rotates(d.omega()[*row] / TAU, how.rotation_hz, spacing(d.omega())))
+            .filter(|row| {
+                let (hz, spacing_hz) = (d.omega()[*row] / TAU, spacing(d.omega()));
+                let others = &how.without.frequencies;
+                !rotates(hz, how.rotation_hz, spacing_hz)
+                    && !others.iter().any(|other| other.reaches(hz, spacing_hz))
+            })
             .collect();
         let omega: Vec<f64> = keep.iter().map(|row| d.omega()[*row]).collect();
         let motion = d.displacement().select_rows(&keep);
@@ -136,7 +142,8 @@ impl BearingData {
         let (_, d) = of_film(held, how.stator_mass)?;
         let period = held.force.sampling().with_len(held.period)?;
         let spacing_hz = period.line_spacing_hz();
-        let chosen = choose_lines(&held.force, held.period, &how.lines)?;
+        let rule = LineRule { choice: &how.lines, without: &how.without };
+        let chosen = rule.lines(&held.force, held.period)?;
         let (rotating, kept): (Vec<usize>, Vec<usize>) = chosen
             .into_iter()
             .partition(|line| rotates(*line as f64 * spacing_hz, how.rotation_hz, spacing_hz));
@@ -222,12 +229,9 @@ fn spacing(omega: &[f64]) -> f64 {
     if smallest.is_finite() { smallest / TAU } else { 0.0 }
 }
 
-/// Whether a frequency lies within half a line of the rotation or a multiple of it.
+/// Whether the rotation or a multiple of it shows on a line.
 fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
-    let Some(rotation_hz) = rotation_hz else { return false };
-    let nearest = (hz / rotation_hz).round().max(1.0) * rotation_hz;
-    // Of a rotation between two lines both show it.
-    (hz - nearest).abs() < spacing_hz * (1.0 - 1e-6)
+    rotation_hz.is_some_and(|rotation| Disturbance::rotation(rotation).reaches(hz, spacing_hz))
 }
 
 /// f − M_s a and d of consecutive samples.

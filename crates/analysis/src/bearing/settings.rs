@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
-use crate::identify::LineChoice;
+use crate::identify::{LeftOut, LineChoice};
 
 /// Settings of the identification of a bearing.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,8 @@ pub struct IdentifyBearing {
     pub coefficients: Coefficients,
     /// Spectral lines to use.
     pub lines: LineChoice,
+    /// Spectral lines to leave out of these, beside those of the rotation.
+    pub without: LeftOut,
 }
 
 /// Size of a bearing and its oil, as far as it is known.

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 pub use self::table::FrfTable;
 use crate::AnalysisError;
-use crate::identify::lines::{LineChoice, choose_lines};
+use crate::identify::left_out::{LeftOut, LineRule};
+use crate::identify::lines::LineChoice;
 use crate::measurement::{Hold, Measurement, Windowed};
 
 /// Settings of an estimate of frequency responses.
@@ -20,6 +21,8 @@ pub struct FrfSettings {
     pub estimator: Estimator,
     /// Spectral lines of a segment.
     pub lines: LineChoice,
+    /// Spectral lines to leave out of these.
+    pub without: LeftOut,
     /// Segments that are averaged.
     pub segments: Segmentation,
 }
@@ -34,7 +37,8 @@ pub struct FrfSettings {
 /// and if a file cannot be read again.
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
     let recorded = measurement.hold(how.segments.hold())?;
-    let found = Responses::of(&recorded, &how.segments, how.estimator, &how.lines)?;
+    let lines = LineRule { choice: &how.lines, without: &how.without };
+    let found = Responses::of(&recorded, &how.segments, how.estimator, lines)?;
     Ok(FrfTable::new(&recorded.held, &found, how))
 }
 
@@ -161,21 +165,21 @@ pub(crate) struct Responses {
 }
 
 impl Responses {
-    /// Estimates them from the forces that act to the first kind of response measured, on the lines that `choice`
+    /// Estimates them from the forces that act to the first kind of response measured, on the lines that `rule`
     /// finds in a segment of the force.
     pub fn of(
         recorded: &Windowed,
         segments: &Segmentation,
         estimator: Estimator,
-        choice: &LineChoice,
+        rule: LineRule<'_>,
     ) -> Result<Self, AnalysisError> {
         let held = &recorded.held;
         let segments = segments.segments(held.period)?;
         let (force, driven) = (&held.force, held.driven.clone());
         let len = segments.samples();
         let chosen = match segments {
-            Segments::Periods(period) => choose_lines(force, period, choice)?,
-            Segments::Windowed { len, .. } => choose_lines(&force.window(0, len)?, len, choice)?,
+            Segments::Periods(period) => rule.lines(force, period)?,
+            Segments::Windowed { len, .. } => rule.lines(&force.window(0, len)?, len)?,
         };
         let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
         let average = average(recorded, &lines, segments)?;

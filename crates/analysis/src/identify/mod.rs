@@ -3,7 +3,7 @@
 //! | File | What it does |
 //! |---|---|
 //! | `options` | settings, as values |
-//! | `lines`, `mass` | spectral lines to use; known masses |
+//! | `lines`, `left_out`, `mass` | spectral lines to use and to leave out; known masses |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `tables` | frequency responses that were measured elsewhere |
 //! | `nonlinear` | whole periods with nonlinear terms |
@@ -15,6 +15,7 @@
 
 pub mod checks;
 mod derivatives;
+pub mod left_out;
 pub mod lines;
 pub mod mass;
 pub mod nonlinear;
@@ -35,6 +36,8 @@ use mechid_model::SecondOrderSystem;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
+use self::left_out::LineRule;
+pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
 pub use self::nonlinear::Nonlinear;
@@ -110,17 +113,18 @@ impl Identify {
     }
 
     fn fitted(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+        let lines = LineRule { choice: &self.lines, without: &self.without };
         if let Some(how) = &self.nonlinear {
             let Fit::Spectra { method } = &self.fit else {
                 let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
                            and `from_frf` out";
                 return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
             };
-            return nonlinear::fit(records, unknowns, &self.lines, *method, how);
+            return nonlinear::fit(records, unknowns, lines, *method, how);
         }
         match &self.fit {
-            Fit::Spectra { method } => spectra::fit(records, unknowns, &self.lines, *method),
-            Fit::Responses(how) => responses::fit(records, unknowns, &self.lines, how),
+            Fit::Spectra { method } => spectra::fit(records, unknowns, lines, *method),
+            Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
             Fit::Samples(how) => how.fit(records, unknowns),
         }
     }

@@ -12,7 +12,8 @@ use mechid_model::Terms;
 use mechid_signal::{Extent, Record, driven_lines, lines};
 use serde::{Deserialize, Serialize};
 
-use super::lines::{LineChoice, choose_lines};
+use super::left_out::LineRule;
+use super::lines::LineChoice;
 use super::options::Method;
 use super::prediction::{Model, Prediction};
 use super::spectra::{Fitted, Residual, SampleResidual, one_motion_of, periods};
@@ -111,14 +112,13 @@ pub struct DistortionRow {
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    choice: &LineChoice,
+    rule: LineRule<'_>,
     method: Option<Method>,
     how: &Nonlinear,
 ) -> Result<Fitted, AnalysisError> {
     let first = &records[0].held;
     let (kind, dofs) = (first.response().1, first.force.channels());
-    let band =
-        Lines::new(first.force.sampling().with_len(first.period)?, all_lines(first, choice)?)?;
+    let band = Lines::new(first.force.sampling().with_len(first.period)?, all_lines(first, rule)?)?;
     let mut data = SteadyExperiments::new(&band, dofs, kind);
     for Windowed { held, .. } in records {
         data.push(&held.force, held.response().0)?;
@@ -145,7 +145,8 @@ pub(super) fn fit(
     let (mut before, mut spectra) = (Vec::new(), None::<FrequencyData>);
     for recorded in records {
         let held = &recorded.held;
-        let chosen = choose_lines(&held.force, held.period, &LineChoice::Driven)?;
+        let chosen =
+            LineRule { choice: &LineChoice::Driven, ..rule }.lines(&held.force, held.period)?;
         let driven = Lines::new(band.sampling(), chosen)?;
         before.push(steady_periods(&held.force, held.response().0, held.period)?);
         let own = periods(recorded, &driven)?.mean()?;
@@ -187,17 +188,18 @@ pub(super) fn fit(
 
 /// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
 /// cancel.
-fn all_lines(held: &Block, choice: &LineChoice) -> Result<Vec<usize>, AnalysisError> {
+fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
-    let driven = choose_lines(&held.force, held.period, choice)?;
-    Ok(match choice {
+    let driven = rule.lines(&held.force, held.period)?;
+    let all = match rule.choice {
         LineChoice::Lines(_) => driven,
         LineChoice::Band(band) => lines::band(sampling, band.low_hz, band.high_hz),
         LineChoice::Driven => {
             let last = driven_lines(&held.force, held.period)?.last().copied().unwrap_or(1);
             (1..=last).collect()
         }
-    })
+    };
+    rule.without.keep(all, sampling)
 }
 
 /// Returns, record by record, the part of the response that the steady state under the measured force

@@ -8,6 +8,7 @@ use mechid_model::Discretisation;
 use mechid_signal::{Extent, Interpolation};
 use serde::{Deserialize, Serialize};
 
+use super::left_out::LeftOut;
 use super::lines::LineChoice;
 use super::mass::KnownMass;
 use super::nonlinear::Nonlinear;
@@ -31,6 +32,8 @@ pub struct Identify {
     pub fit: Fit,
     /// Spectral lines to use, of spectra and frequency responses.
     pub lines: LineChoice,
+    /// Spectral lines to leave out of these.
+    pub without: LeftOut,
     /// Known masses.
     pub mass: KnownMass,
     /// Nonlinear springs and dampers, fitted to the spectra of whole periods; `None`: a linear system.
@@ -233,6 +236,12 @@ impl Identify {
     #[must_use]
     pub fn lines(self, lines: LineChoice) -> Self {
         Self { lines, ..self }
+    }
+
+    /// Leaves out the lines that carry something else than the response to the force.
+    #[must_use]
+    pub fn without(self, without: LeftOut) -> Self {
+        Self { without, ..self }
     }
 
     /// Fits nonlinear springs and dampers, too.

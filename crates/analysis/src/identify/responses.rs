@@ -9,7 +9,7 @@ use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
-use super::lines::LineChoice;
+use super::left_out::LineRule;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
 use super::spectra::{Fitted, Misfit, one_motion_of};
@@ -26,7 +26,7 @@ use crate::measurement::{Block, Windowed};
 pub fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    lines: &LineChoice,
+    lines: LineRule<'_>,
     how: &ResponseFit,
 ) -> Result<Fitted, AnalysisError> {
     let ResponseFit { estimator, segments, method } = how;

@@ -14,7 +14,7 @@ use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
 
-use super::lines::{LineChoice, choose_lines};
+use super::left_out::LineRule;
 use super::nonlinear::WithTerms;
 use super::options::Method;
 use super::prediction::{Model, Prediction};
@@ -102,18 +102,18 @@ const LIKELIHOOD_PARAMETERS: usize = 1200;
 /// The periods of a record on the lines found in its force.
 type Spectra = (RepeatedPeriods, Lines);
 
-/// Fits the spectra of the windows of one or several records, each on the lines that `choose` finds
-/// in a period of its force.
+/// Fits the spectra of the windows of one or several records, each on the lines that `lines`
+/// finds in a period of its force.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
-    lines: &LineChoice,
+    lines: LineRule<'_>,
     method: Option<Method>,
 ) -> Result<Fitted, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
         let held = &recorded.held;
-        let chosen = choose_lines(&held.force, held.period, lines)?;
+        let chosen = lines.lines(&held.force, held.period)?;
         let lines = Lines::new(held.force.sampling().with_len(held.period)?, chosen)?;
         spectra.push((periods(recorded, &lines)?, lines));
     }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use mechid::analysis::identify::{
-    Band, Derivatives, Fit, Identified, IdentifiedResponses, Identify, IdentifyResponses,
-    KnownMass, LineChoice, Method, Nonlinear, Refinement, ResponseFit, SampleFit, ValidationWindow,
+    Band, Derivatives, Disturbance, Fit, Identified, IdentifiedResponses, Identify,
+    IdentifyResponses, KnownMass, LeftOut, LineChoice, Method, Nonlinear, Refinement, ResponseFit,
+    SampleFit, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
 use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
@@ -88,6 +89,13 @@ pub struct LineArgs {
     /// Use the lines with force between two frequencies, in Hz
     #[arg(long, value_name = "LOW:HIGH")]
     band_hz: Option<Band>,
+    /// Lines to leave out of these, numbers and ranges as for --lines
+    #[arg(long, value_name = "LINES")]
+    without_lines: Option<LineSpec>,
+    /// Frequencies whose lines are left out, in Hz, such as 50 (mains), 50:0.5 (half a hertz to
+    /// either side) and 24.5:multiples (rotation)
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',')]
+    without_hz: Vec<Disturbance>,
 }
 
 /// Nonlinear springs and dampers.
@@ -168,7 +176,7 @@ pub struct TableArgs {
     /// The files are tables of frequency responses: text with columns h_1_1_real, h_1_1_imaginary …
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["force", "displacement", "velocity", "acceleration",
-          "sample_rate", "time", "period", "detrend", "lines", "from_frf", "segment", "nonlinear",
+          "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz", "from_frf", "segment", "nonlinear",
           "between_samples", "extent", "derivatives", "refine", "validate", "validate_start",
           "validate_samples", "skip_lines"])]
     frf_table: bool,
@@ -219,10 +227,17 @@ impl LineArgs {
         }
     }
 
+    /// Returns the lines to leave out.
+    pub fn without(&self) -> LeftOut {
+        LeftOut { lines: self.without_lines.clone(), frequencies: self.without_hz.clone() }
+    }
+
     /// Returns the first of these options that was given.
     fn given(&self) -> Option<&'static str> {
         let lines = self.lines.as_ref().map(|_| "--lines");
-        lines.or(self.band_hz.map(|_| "--band-hz"))
+        let without = self.without_lines.as_ref().map(|_| "--without-lines");
+        let frequencies = self.without_hz.first().map(|_| "--without-hz");
+        lines.or(self.band_hz.map(|_| "--band-hz")).or(without).or(frequencies)
     }
 }
 
@@ -343,6 +358,7 @@ impl FitArgs {
         Identify {
             fit,
             lines: self.lines.choice(),
+            without: self.lines.without(),
             mass: self.mass.clone(),
             nonlinear: self.nonlinear.settings(),
         }

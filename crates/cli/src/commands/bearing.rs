@@ -45,7 +45,7 @@ pub struct BearingArgs {
     /// The file describes tests at several speeds and loads
     #[arg(long, conflicts_with_all = ["more", "baseline", "force", "displacement", "acceleration",
           "velocity", "stator_mass", "rotation_hz", "load", "period", "sample_rate", "time",
-          "detrend", "lines", "band_hz", "clearance", "diameter", "length", "viscosity"])]
+          "detrend", "lines", "without_lines", "without_hz", "band_hz", "clearance", "diameter", "length", "viscosity"])]
     campaign: bool,
     #[command(flatten)]
     channels: ChannelArgs,
@@ -138,6 +138,7 @@ impl BearingArgs {
             size: BearingSize { clearance, diameter, length, viscosity },
             coefficients: self.coefficients.into(),
             lines: self.lines.choice(),
+            without: self.lines.without(),
         }
     }
 

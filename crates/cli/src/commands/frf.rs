@@ -68,6 +68,7 @@ impl FrfArgs {
         let how = FrfSettings {
             estimator: self.estimator.into(),
             lines: self.lines.choice(),
+            without: self.lines.without(),
             segments: self.segments.segmentation(),
         };
         let found = mechid::frf(&self.input.open(&channels)?, &how)?;

@@ -1,6 +1,6 @@
-//! One shaker at a time, a record for each place: excitation and noise are those of all records together.
+//! What real rigs do: one shaker at a time, and disturbances with lines of their own.
 
-use mechid_analysis::identify::{Fit, SampleFit};
+use mechid_analysis::identify::{Disturbance, Fit, LeftOut, SampleFit};
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
 use mechid_model::{Response, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
@@ -106,4 +106,41 @@ fn noise_in_idle_channels_is_no_cause_for_warnings() {
     assert!(warned <= 4, "{warned} of {RUNS} warn");
     let coverage = held as f64 / f64::from(all);
     assert!((0.93..0.97).contains(&coverage), "{coverage}");
+}
+
+#[test]
+fn lines_of_a_disturbance_are_left_out() {
+    // Lines are 1/(256 · 0.008 s) = 0.488 Hz apart; run-out at lines 12, 24, 36 … repeats like a response.
+    let line_hz = 1.0 / (PERIOD as f64 * 0.008);
+    let shaken = |seed: u64| {
+        let records = records(seed, [0.002, 0.0]);
+        records
+            .into_iter()
+            .map(|record| {
+                let (force, x) = (record.force().unwrap(), record.responses().unwrap().remove(0).1);
+                let level = 0.2 * x.data().amax();
+                let data = DMatrix::from_fn(x.len(), DOFS, |k, dof| {
+                    let turn = std::f64::consts::TAU * 12.0 * k as f64 / PERIOD as f64;
+                    x.data()[(k, dof)]
+                        + level * (turn.sin() + 0.5 * (2.0 * turn).cos() + 0.2 * (3.0 * turn).sin())
+                });
+                let x = Record::new(x.sampling(), data).unwrap();
+                let responses = [(ResponseQuantity::Displacement, &x)];
+                Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap()
+            })
+            .collect::<Vec<_>>()
+    };
+    let records = shaken(5);
+    let spoilt = identify(&records, &Identify::default()).unwrap();
+    assert!(spoilt.checks().iter().any(|check| check.is_bad()));
+    assert!(error(&spoilt.system().unwrap()) > 0.1);
+
+    let lines = LeftOut { lines: Some("12,24,36".parse().unwrap()), ..LeftOut::default() };
+    let rotation = Disturbance::rotation(12.0 * line_hz);
+    let rotation = LeftOut { frequencies: vec![rotation], ..LeftOut::default() };
+    for without in [lines, rotation] {
+        let found = identify(&records, &Identify::default().without(without)).unwrap();
+        assert!(!found.checks().iter().any(|check| check.is_bad()), "{found}");
+        assert!(error(&found.system().unwrap()) < 0.01, "{found}");
+    }
 }
