@@ -6,7 +6,8 @@
 //! cargo run --release -p mechid-estimate --example noise_study -- 500 auto
 //! ```
 //!
-//! The numbers are experiments and the noise model: `auto`, `white`, `smooth`, `neighbours:N` or `per-line`.
+//! What follows are the number of experiments, the noise model (`auto`, `white`, `smooth`, `neighbours:N` or
+//! `per-line`) and, if not all are wanted, the first letters of a noise.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]
 
@@ -204,13 +205,14 @@ fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let runs: u64 = arguments.next().map_or(Ok(500), |a| a.parse())?;
     let pooling: Pooling = arguments.next().map_or(Ok(Pooling::Automatic), |a| a.parse())?;
+    let only = arguments.next().unwrap_or_default();
     println!(
         "| Degrees of freedom | Noise | Periods | Over bound, least | most | Held, least | most | Mean \
          | Chosen, % |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for (dof, lines) in [(1, 100), (2, 120)] {
-        for colour in Colour::ALL {
+        for colour in Colour::ALL.into_iter().filter(|c| c.name().starts_with(&only)) {
             for periods in [1, 2, 4, 8] {
                 row(&Study::new(dof, lines, colour, periods)?, runs, pooling)?;
             }

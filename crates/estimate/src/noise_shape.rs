@@ -1,4 +1,4 @@
-//! The spectrum of noise of which few periods are known: smooth, with bands of their own level.
+//! The spectrum of noise of which few periods are known: smooth, with bumps.
 
 use std::ops::Range;
 
@@ -8,11 +8,25 @@ use nalgebra::{DMatrix, DVector};
 const MAX_ORDER: usize = 6;
 /// Minimum number of lines per order.
 const LINES_PER_ORDER: usize = 8;
-/// Maximum number of bands.
-const MAX_BANDS: usize = 24;
+/// Maximum number of bumps.
+const MAX_BUMPS: usize = 24;
 /// Complex deviations that a level below those beside it is made of at least: few lines may be quiet by
 /// chance, and would then have all the weight.
 const QUIET_DEVIATIONS: f64 = 12.0;
+/// Power of a peak over the floor that is tried first.
+const PEAK: f64 = 100.0;
+/// Factor by which the width of a peak is varied.
+const WIDER: f64 = 1.3;
+/// Factor by which the power of a peak over the floor is varied, its flanks being kept.
+const HIGHER: f64 = 3.0;
+/// Distance at which a peak ends, over that at which it is as high as the floor.
+const PEAK_REACH: f64 = 10.0;
+/// Rounds of variations of a bump.
+const VARIATIONS: usize = 12;
+/// Steps of the search for the height of a tent.
+const HEIGHT_STEPS: usize = 10;
+/// Largest height, in the logarithm of the power.
+const HIGHEST: f64 = 30.0;
 /// Steps of the search for the log power.
 const STEPS: usize = 200;
 /// Change of the log power (RMS) below which it is found.
@@ -21,24 +35,129 @@ const TOLERANCE: f64 = 1e-9;
 const FLOOR: f64 = 1e-9;
 
 /// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the frequency,
-/// and a constant is added to it in each of some bands.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// with bumps on it.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Form {
     /// Order of the polynomial.
     pub(crate) order: usize,
-    /// Bands, as places of lines by rising frequency; they may overlap.
-    pub(crate) bands: Vec<Range<usize>>,
+    /// Bumps, by places of lines by rising frequency; they may overlap.
+    pub(crate) bumps: Vec<Bump>,
+}
+
+/// What is added to a log power about a line, times an unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bump {
+    shape: Shape,
+    /// Middle, in places of lines.
+    middle: f64,
+    /// Lines to either side within which it is not zero.
+    reach: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shape {
+    /// Equal on all lines.
+    Flat,
+    /// Straight from the middle to both ends.
+    Tent,
+    /// ln(1 + A/(1 + x²)), x = 1 at a distance of `half_width` lines: a resonance over a floor.
+    Peak { above_floor: f64, half_width: f64 },
+}
+
+impl Bump {
+    fn flat(band: &Range<usize>) -> Self {
+        let middle = 0.5 * (band.start + band.end - 1) as f64;
+        Self { shape: Shape::Flat, middle, reach: 0.5 * band.len() as f64 }
+    }
+
+    fn tent(middle: f64, reach: f64) -> Self {
+        Self { shape: Shape::Tent, middle, reach }
+    }
+
+    fn peak(middle: f64, half_width: f64, above_floor: f64) -> Self {
+        let reach = PEAK_REACH * half_width * above_floor.sqrt();
+        Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
+    }
+
+    /// Others that might do better than the flat one of a band.
+    fn about(band: &Range<usize>) -> [Self; 3] {
+        let Self { middle, reach, .. } = Self::flat(band);
+        [
+            Self::tent(middle, 2.0 * reach),
+            Self::peak(middle, 0.5 * reach, PEAK),
+            Self::peak(middle, reach, PEAK),
+        ]
+    }
+
+    /// The same a little moved, wider, narrower, higher or lower; none of a flat one, whose places are all
+    /// looked at.
+    fn varied(&self) -> Vec<Self> {
+        let middle = self.middle;
+        match self.shape {
+            Shape::Flat => Vec::new(),
+            Shape::Tent => {
+                let by = 0.25 * self.reach;
+                vec![
+                    Self::tent(middle - by, self.reach),
+                    Self::tent(middle + by, self.reach),
+                    Self::tent(middle, self.reach - by),
+                    Self::tent(middle, self.reach + by),
+                ]
+            }
+            Shape::Peak { above_floor, half_width } => vec![
+                Self::peak(middle - 0.5 * half_width, half_width, above_floor),
+                Self::peak(middle + 0.5 * half_width, half_width, above_floor),
+                Self::peak(middle, half_width / WIDER, above_floor),
+                Self::peak(middle, half_width * WIDER, above_floor),
+                Self::peak(middle, half_width * HIGHER.sqrt(), above_floor / HIGHER),
+                Self::peak(middle, half_width / HIGHER.sqrt(), above_floor * HIGHER),
+            ],
+        }
+    }
+
+    fn at(&self, line: usize) -> f64 {
+        let away = (line as f64 - self.middle).abs();
+        match self.shape {
+            Shape::Flat => f64::from(u8::from(away < self.reach)),
+            Shape::Tent => (1.0 - away / self.reach).max(0.0),
+            Shape::Peak { .. } if away > self.reach => 0.0,
+            Shape::Peak { above_floor, half_width } => {
+                (above_floor / (1.0 + (away / half_width).powi(2))).ln_1p() / above_floor.ln_1p()
+            }
+        }
+    }
+
+    /// Lines within which it is half its height or more.
+    fn band(&self, lines: usize) -> Range<usize> {
+        let half = match self.shape {
+            Shape::Flat => self.reach - 0.5,
+            Shape::Tent => 0.5 * self.reach,
+            // Half of the logarithm of the peak.
+            Shape::Peak { above_floor, half_width } => half_width * above_floor.powf(0.25),
+        };
+        // The line nearest to the middle, at least.
+        let nearest = (self.middle.round().max(0.0) as usize).min(lines.saturating_sub(1));
+        let first = (self.middle - half).ceil().max(0.0) as usize;
+        let last = (self.middle + half).floor().max(0.0) as usize;
+        first.min(nearest)..(last.max(nearest) + 1).min(lines)
+    }
+
+    /// Lines within which it is not zero.
+    fn support(&self, lines: usize) -> Range<usize> {
+        let first = (self.middle - self.reach).ceil().max(0.0) as usize;
+        first..((self.middle + self.reach).floor() as usize + 1).min(lines)
+    }
 }
 
 impl Form {
     /// Number of unknowns of each channel.
     pub(crate) fn terms(&self) -> usize {
-        self.order + 1 + self.bands.len()
+        self.order + 1 + self.bumps.len()
     }
 
-    /// Bands that do not overlap or touch, as places of lines.
-    pub(crate) fn joined_bands(&self) -> Vec<Range<usize>> {
-        let mut bands = self.bands.clone();
+    /// Bands of the bumps, those that overlap or touch as one, as places of `lines` lines.
+    pub(crate) fn bands(&self, lines: usize) -> Vec<Range<usize>> {
+        let mut bands: Vec<Range<usize>> = self.bumps.iter().map(|b| b.band(lines)).collect();
         bands.sort_by_key(|band| band.start);
         let mut joined: Vec<Range<usize>> = Vec::new();
         for band in bands {
@@ -48,25 +167,6 @@ impl Form {
             }
         }
         joined
-    }
-
-    /// Raises what is quieter than both its sides, and of too few lines to be sure of that, to the quieter
-    /// of them.
-    fn fill_notches(&self, log_power: &mut DVector<f64>, nu: f64) {
-        let lines = log_power.len();
-        let mut edges: Vec<usize> = self.bands.iter().flat_map(|b| [b.start, b.end]).collect();
-        edges.extend([0, lines]);
-        edges.sort_unstable();
-        edges.dedup();
-        for cell in edges.windows(2).map(|pair| pair[0]..pair[1]) {
-            if cell.len() as f64 * nu >= QUIET_DEVIATIONS || cell.len() == lines {
-                continue;
-            }
-            let beside = [cell.start.checked_sub(1), Some(cell.end)];
-            let beside = beside.into_iter().flatten().filter_map(|line| log_power.get(line));
-            let least = beside.copied().fold(f64::INFINITY, f64::min);
-            log_power.rows_range_mut(cell).apply(|log| *log = log.max(least));
-        }
     }
 
     /// Orthonormal columns that span all log powers of this form.
@@ -81,17 +181,32 @@ impl Form {
                     let t = 2.0 * (omega[line] / least).ln() / span - 1.0;
                     (column as f64 * t.clamp(-1.0, 1.0).acos()).cos()
                 }
-                Some(band) => f64::from(u8::from(self.bands[band].contains(&line))),
+                Some(bump) => self.bumps[bump].at(line),
             }
         });
         columns.qr().q()
     }
 }
 
+/// Raises a spectrum where it is lower than within fewer lines to both sides: morphological closing.
+fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
+    let half = lines / 2;
+    let around = |at: usize| at.saturating_sub(half)..(at + half + 1).min(log_power.len());
+    let extreme = |of: &DVector<f64>, pick: fn(f64, f64) -> f64| {
+        DVector::from_fn(of.len(), |at, _| {
+            of.rows_range(around(at)).iter().copied().reduce(pick).unwrap_or(of[at])
+        })
+    };
+    let closed = extreme(&extreme(log_power, f64::max), f64::min);
+    *log_power = closed;
+}
+
 /// A spectrum of a form that was fitted to sample variances.
 #[derive(Debug, Clone)]
 pub(crate) struct Smooth {
     pub(crate) form: Form,
+    /// Orthonormal columns that span the log powers of the form, lines × terms.
+    pub(crate) basis: DMatrix<f64>,
     /// Logarithm of the power, lines × channels.
     pub(crate) log_power: DMatrix<f64>,
     /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
@@ -101,13 +216,13 @@ pub(crate) struct Smooth {
 /// The spectrum that makes sample variances (lines × channels, positive) most likely, by rising `omega`
 /// (rad/s), each variance a mean of `nu` squares of complex numbers.
 ///
-/// Order and bands are those of least Bayesian information criterion; bands are added one by one, each the
-/// one that gains most, and their edges count as unknowns, too.
+/// Order and bumps are those of least Bayesian information criterion; bumps are added one by one, each the
+/// one that gains most, and their places count as unknowns, too.
 ///
 /// # Source
 /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic link);
-/// Schwarz (1978), Annals of Statistics 6, 461–464; Olshen, Venkatraman, Lucito & Wigler (2004),
-/// Biostatistics 5, 557–572 (bands found by a scan over all intervals).
+/// Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995), Journal of Time
+/// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
 pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let (lines, channels) = (omega.len(), variances.ncols() as f64);
     let per_term = (nu * lines as f64).max(2.0).ln();
@@ -116,16 +231,16 @@ pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth
     let cost = |found: &Smooth| {
         2.0 * nu * found.misfit
             + channels * found.form.terms() as f64 * per_term
-            + 2.0 * found.form.bands.len() as f64 * per_place
+            + 2.0 * found.form.bumps.len() as f64 * per_place
     };
     let mut best: Option<(f64, Smooth)> = None;
     for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
-        let mut found = fit(Form { order, bands: Vec::new() }, omega, variances, nu);
+        let mut found = fit(Form { order, bumps: Vec::new() }, omega, variances, nu);
         let mut least = cost(&found);
-        while found.form.bands.len() < MAX_BANDS && 4 * (found.form.terms() + 1) <= lines {
-            let Some(band) = most_conspicuous(variances, &found.log_power, nu) else { break };
+        while found.form.bumps.len() < MAX_BUMPS && 4 * (found.form.terms() + 1) <= lines {
+            let Some(bump) = most_conspicuous(variances, &found.log_power, nu) else { break };
             let mut form = found.form.clone();
-            form.bands.push(band);
+            form.bumps.push(bump);
             let more = fit(form, omega, variances, nu);
             let now = cost(&more);
             if now >= least {
@@ -137,7 +252,7 @@ pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth
             best = Some((least, found));
         }
     }
-    let white = || fit(Form { order: 0, bands: Vec::new() }, omega, variances, nu);
+    let white = || fit(Form { order: 0, bumps: Vec::new() }, omega, variances, nu);
     best.map_or_else(white, |(_, found)| found)
 }
 
@@ -148,11 +263,13 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
     let mut misfit = 0.0;
     for (mut column, own) in log_power.column_iter_mut().zip(variances.column_iter()) {
         let (mut found, least) = most_likely(&basis, &own.into_owned());
-        form.fill_notches(&mut found, nu);
+        if !form.bumps.is_empty() {
+            fill_notches(&mut found, (QUIET_DEVIATIONS / nu) as usize);
+        }
         column.copy_from(&found);
         misfit += least;
     }
-    Smooth { form, log_power, misfit }
+    Smooth { form, basis, log_power, misfit }
 }
 
 /// Widths of the bands that are looked at: 1, 2, 3, 4, 6, 8, 12 …, to a third of the lines.
@@ -162,41 +279,94 @@ fn widths(lines: usize) -> impl Iterator<Item = usize> {
     all.take_while(move |width| *width <= (lines / 3).max(1))
 }
 
-/// The band whose own level makes the variances most likely.
+/// The bump that makes the variances most likely, of all flat ones and of tents about the best of them.
 fn most_conspicuous(
     variances: &DMatrix<f64>,
     log_power: &DMatrix<f64>,
     nu: f64,
-) -> Option<Range<usize>> {
+) -> Option<Bump> {
     let (lines, channels) = variances.shape();
+    let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
     // Sums of the levels below each line.
     let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
     for channel in 0..channels {
         for line in 0..lines {
-            let level = variances[(line, channel)] * (-log_power[(line, channel)]).exp();
-            below[(line + 1, channel)] = below[(line, channel)] + level;
+            below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
         }
     }
-    let mut best: Option<(f64, Range<usize>)> = None;
-    for width in widths(lines) {
-        let count = width as f64;
-        for start in 0..=lines - width {
-            let mut gain = 0.0;
-            for channel in 0..channels {
-                let sum: f64 = below[(start + width, channel)] - below[(start, channel)];
-                let level = sum / count;
-                if level > 1.0 {
-                    gain += count * (level - 1.0 - level.ln());
-                } else if count * nu >= QUIET_DEVIATIONS {
-                    gain += count * (level - 1.0 - level.max(FLOOR).ln());
-                }
+    let gain_of_flat = |start: usize, width: usize| {
+        let (count, others) = (width as f64, (lines - width) as f64);
+        let of_channel = |channel: usize| {
+            let inside = below[(start + width, channel)] - below[(start, channel)];
+            let all = below[(lines, channel)];
+            let [mean, own, other] =
+                [all / (count + others), inside / count, (all - inside) / others]
+                    .map(|level: f64| level.max(FLOOR));
+            match own > other || count * nu >= QUIET_DEVIATIONS {
+                true => count * (mean / own).ln() + others * (mean / other).ln(),
+                false => 0.0,
             }
-            if best.as_ref().is_none_or(|(most, _)| gain > *most) {
-                best = Some((gain, start..start + width));
-            }
+        };
+        (0..channels).map(of_channel).sum::<f64>()
+    };
+    let of_width = |width: usize| {
+        let starts = 0..=lines - width;
+        let best = starts.map(|start| (gain_of_flat(start, width), start));
+        best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(gain, at)| (gain, at..at + width))
+    };
+    let flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
+    let with_gain = |bump: Bump| (gain_of(&bump, &levels, nu), bump);
+    let best = |of: &mut dyn Iterator<Item = (f64, Bump)>| of.max_by(|a, b| a.0.total_cmp(&b.0));
+    let of_flat = best(&mut flat.iter().map(|(gain, band)| (*gain, Bump::flat(band))))?;
+    let others = flat.iter().flat_map(|(_, band)| Bump::about(band)).map(with_gain);
+    let mut other = best(&mut others.into_iter())?;
+    for _ in 0..VARIATIONS {
+        let varied = other.1.varied().into_iter();
+        let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
+        let varied = best(&mut inside.map(with_gain));
+        match varied.filter(|varied| varied.0 > other.0) {
+            Some(varied) => other = varied,
+            None => break,
         }
     }
-    best.filter(|(gain, _)| *gain > 0.0).map(|(_, band)| band)
+    let best = Some(if of_flat.0 >= other.0 { of_flat } else { other });
+    best.filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
+}
+
+/// What a bump of the best height on the best level takes off Σ log p + v/p, from the levels v/p.
+fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
+    let lines = levels.nrows() as f64;
+    let support = bump.support(levels.nrows());
+    let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
+    let area: f64 = parts.iter().sum();
+    let of_channel = |channel: usize| {
+        let all = levels.column(channel);
+        let own = all.rows_range(support.clone());
+        let (total, outside) = (all.sum(), all.sum() - own.sum());
+        let (mut height, mut least, mut most) = (0.0, -HIGHEST, HIGHEST);
+        let mut sum = total;
+        for _ in 0..HEIGHT_STEPS {
+            let (mut first, mut second) = (0.0, 0.0);
+            sum = outside;
+            for (part, level) in parts.iter().zip(own.iter()) {
+                let left = level * f64::exp(-height * part);
+                sum += left;
+                first += part * left;
+                second += part * part * left;
+            }
+            // Derivatives of L log Σ v/p + height Σ part, which is convex.
+            let slope = area - lines * first / sum;
+            let curvature = lines * (second / sum - (first / sum).powi(2));
+            if slope < 0.0 { least = height } else { most = height }
+            let next = height - slope / curvature;
+            height = if next > least && next < most { next } else { 0.5 * (least + most) };
+        }
+        if height <= 0.0 && area * nu < QUIET_DEVIATIONS {
+            return 0.0;
+        }
+        lines * (total / sum).ln() - height * area
+    };
+    (0..levels.ncols()).map(of_channel).sum()
 }
 
 /// The log power within a basis of which the variances of a channel are samples, by maximum likelihood, and

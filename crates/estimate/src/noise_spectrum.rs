@@ -140,6 +140,17 @@ pub struct NoiseSpectrum {
     degrees_of_freedom: f64,
     total_degrees_of_freedom: f64,
     models: Vec<NoiseModel>,
+    /// What each of the models was fitted with, if it is a smooth spectrum or white.
+    parts: Vec<Option<SmoothPart>>,
+}
+
+/// What the log powers of an experiment were fitted with.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SmoothPart {
+    /// Orthonormal columns, rows × terms.
+    pub(crate) basis: DMatrix<f64>,
+    /// Complex deviations that each sample covariance was made of.
+    pub(crate) nu: f64,
 }
 
 impl NoiseSpectrum {
@@ -180,6 +191,7 @@ impl NoiseSpectrum {
             degrees_of_freedom: known,
             total_degrees_of_freedom: known,
             models: Vec::new(),
+            parts: Vec::new(),
         })
     }
 
@@ -221,7 +233,7 @@ impl NoiseSpectrum {
         degrees_of_freedom: usize,
         pooling: Pooling,
     ) -> Result<Self, EstimateError> {
-        let Pooled { mut covariance, model, freedom } =
+        let Pooled { mut covariance, model, freedom, basis } =
             pooled(omega, covariance, degrees_of_freedom as f64, pooling);
         to_displacement(omega, &mut covariance, measured);
         let known = Self::new(omega.to_vec(), covariance)?;
@@ -229,6 +241,7 @@ impl NoiseSpectrum {
             degrees_of_freedom: freedom,
             total_degrees_of_freedom: (degrees_of_freedom * omega.len()) as f64,
             models: vec![model],
+            parts: vec![basis.map(|basis| SmoothPart { basis, nu: degrees_of_freedom as f64 })],
             ..known
         })
     }
@@ -283,6 +296,13 @@ impl NoiseSpectrum {
         &self.models
     }
 
+    /// What the log powers were fitted with, experiment by experiment; `None` unless each of them is smooth or
+    /// white, and at least one is not white.
+    pub(crate) fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
+        let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
+        parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
+    }
+
     /// How many of the covariances are independent of one another; infinite or undefined for known
     /// noise.
     pub(crate) fn groups(&self) -> f64 {
@@ -318,6 +338,7 @@ impl NoiseSpectrum {
             total_degrees_of_freedom: self.total_degrees_of_freedom
                 + other.total_degrees_of_freedom,
             models: [&self.models[..], &other.models].concat(),
+            parts: [&self.parts[..], &other.parts].concat(),
         }
     }
 }

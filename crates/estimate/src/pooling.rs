@@ -22,6 +22,8 @@ pub(crate) struct Pooled {
     pub(crate) model: NoiseModel,
     /// Complex deviations that each covariance is made of.
     pub(crate) freedom: f64,
+    /// Orthonormal columns that span the log powers, lines × terms, of a smooth spectrum.
+    pub(crate) basis: Option<DMatrix<f64>>,
 }
 
 /// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled.
@@ -33,11 +35,10 @@ pub(crate) fn pooled(
 ) -> Pooled {
     let lines = covariance.len();
     match pooling {
-        Pooling::PerLine => Pooled { covariance, model: NoiseModel::PerLine, freedom: nu },
+        Pooling::PerLine => Pooled { covariance, model: NoiseModel::PerLine, freedom: nu, basis: None },
         Pooling::AllLines => {
             let all = mean(&covariance, 0..lines);
-            let freedom = nu * lines as f64;
-            Pooled { covariance: vec![all; lines], model: NoiseModel::White, freedom }
+            white(all, nu, lines)
         }
         Pooling::Neighbours(half_width) => {
             let places = Places::new(omega);
@@ -46,10 +47,21 @@ pub(crate) fn pooled(
             let means = (0..lines).map(|place| mean(&sorted, window(place))).collect();
             let model = NoiseModel::Neighbours { half_width: half_width.min(lines) };
             let freedom = nu * window(0).len() as f64;
-            Pooled { covariance: places.unsorted(means), model, freedom }
+            Pooled { covariance: places.unsorted(means), model, freedom, basis: None }
         }
         Pooling::Smooth => Candidate::new(omega, covariance, nu).smooth(),
         Pooling::Automatic => Candidate::new(omega, covariance, nu).best(),
+    }
+}
+
+/// One covariance for all lines.
+fn white(covariance: DMatrix<Complex<f64>>, nu: f64, lines: usize) -> Pooled {
+    let level = DMatrix::from_element(lines, 1, (lines as f64).sqrt().recip());
+    Pooled {
+        covariance: vec![covariance; lines],
+        model: NoiseModel::White,
+        freedom: nu * lines as f64,
+        basis: Some(level),
     }
 }
 
@@ -111,17 +123,21 @@ impl Candidate {
 
     /// The smooth spectrum, with the mean correlation of the channels.
     fn smooth(&self) -> Pooled {
-        let (lines, white) = (self.covariance.len(), NoiseModel::White);
+        let lines = self.covariance.len();
         let Some(smooth) = self.smooth.as_ref().filter(|smooth| smooth.form.terms() > 1) else {
-            let (covariance, freedom) = (mean(&self.covariance, 0..lines), self.nu * lines as f64);
-            return Pooled { covariance: vec![covariance; lines], model: white, freedom };
+            return white(mean(&self.covariance, 0..lines), self.nu, lines);
         };
         let deviations = self.deviations(smooth);
         let level = mean(&scaled(&self.covariance, &deviations, |value, by| value / by), 0..lines);
         let covariance = scaled(&vec![level; lines], &deviations, |value, by| value * by);
         let model = model_of(&smooth.form, &self.omega);
         let freedom = freedom(&smooth.form, self.nu, lines, self.covariance[0].nrows() / 2);
-        Pooled { covariance: self.places.unsorted(covariance), model, freedom }
+        let mut basis = smooth.basis.clone();
+        for (sorted, row) in smooth.basis.row_iter().zip(&self.places.0) {
+            basis.row_mut(*row).copy_from(&sorted);
+        }
+        let covariance = self.places.unsorted(covariance);
+        Pooled { covariance, model, freedom, basis: Some(basis) }
     }
 
     /// The smooth spectrum, or the means over lines that predict better than it does.
@@ -189,7 +205,7 @@ pub(crate) fn model_of(form: &Form, omega: &[f64]) -> NoiseModel {
         return NoiseModel::White;
     }
     let hz = |place: usize| omega[place] / TAU;
-    let bands = form.joined_bands();
+    let bands = form.bands(omega.len());
     let bands_hz = bands.into_iter().map(|band| [hz(band.start), hz(band.end - 1)]).collect();
     NoiseModel::Smooth { order: form.order, bands_hz }
 }

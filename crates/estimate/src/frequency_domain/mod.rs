@@ -55,6 +55,7 @@ mod periods;
 mod residual_noise;
 mod search;
 mod starts;
+mod weight_uncertainty;
 mod whitened;
 
 pub use data::FrequencyData;

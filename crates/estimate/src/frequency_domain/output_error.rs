@@ -8,6 +8,7 @@ use super::multi_start::{Found, Plausible, search};
 use super::residual_noise::with_residual_noise;
 use super::search::SumOfSquares;
 use super::starts::Starts;
+use super::weight_uncertainty::WeightUncertainty;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, equation_error};
 use crate::estimate::Findings;
 use crate::least_squares::size;
@@ -140,7 +141,9 @@ fn with_known_noise(
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let found = search(&mut misfit, &starts, plausible)?;
     let scale = Scale {
-        variance: inflation,
+        level: 1.0,
+        inflation,
+        weights: WeightUncertainty::of(data, unknowns, &found.minimum.theta, noise),
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: found.minimum.cost / expected,
         deviance: Some(found.minimum.cost / inflation),
@@ -157,7 +160,11 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
 
 /// How the covariance follows from the Fisher information.
 pub(super) struct Scale {
-    pub(super) variance: f64,
+    /// Power of the noise over that of the weights.
+    pub(super) level: f64,
+    /// By which the covariance is larger for weights that are uncertain, where nothing better is known.
+    pub(super) inflation: f64,
+    pub(super) weights: Option<WeightUncertainty>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,
     pub(super) deviance: Option<f64>,
@@ -173,6 +180,13 @@ pub(super) fn finish(
 ) -> Result<OutputErrorFit, EstimateError> {
     let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
+    let (covariance, degrees_of_freedom) = match scale.weights {
+        None => (covariance * scale.inflation, scale.degrees_of_freedom),
+        Some(weights) => {
+            let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
+            (covariance + weights.excess, fewest as usize)
+        }
+    };
     let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors
@@ -183,8 +197,8 @@ pub(super) fn finish(
     let estimate = Estimate::new(Findings {
         unknowns: unknowns.clone(),
         values: found.minimum.theta.iter().copied().collect(),
-        covariance: covariance * scale.variance,
-        degrees_of_freedom: scale.degrees_of_freedom,
+        covariance: covariance * scale.level,
+        degrees_of_freedom,
         residual_nrmse,
         condition,
         undetermined: Vec::new(),

@@ -10,6 +10,7 @@ use super::output_error::{
 };
 use super::search::SumOfSquares;
 use super::starts::Starts;
+use super::weight_uncertainty::WeightUncertainty;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, Whitened};
 use crate::{EstimateError, Unknowns};
 
@@ -58,15 +59,15 @@ pub(super) fn with_residual_noise(
     misfit.accept();
     let free = spare(data, unknowns);
     let level = fit.minimum.cost / free.max(1) as f64;
-    let (inflation, groups) = match is_white {
-        true => (1.0, 1.0),
-        false => {
-            (sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?, noise.groups())
-        }
+    let inflation = match is_white {
+        true => 1.0,
+        false => sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?,
     };
     let scale = Scale {
-        variance: level * inflation,
-        degrees_of_freedom: (free as f64 / groups) as usize,
+        level,
+        inflation,
+        weights: WeightUncertainty::of(data, unknowns, &fit.minimum.theta, &noise),
+        degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,
         noise: if is_white { vec![NoiseModel::White] } else { noise.models().to_vec() },
