@@ -243,10 +243,8 @@ fn row(study: &Study, runs: u64, pooling: Pooling) -> Result<()> {
     for fit in &found {
         *chosen.entry(fit.noise.first().map_or("", kind)).or_insert(0u64) += 1;
     }
-    let chosen: Vec<String> = chosen
-        .iter()
-        .map(|(name, n)| format!("{name} {:.0}", 100.0 * *n as f64 / count))
-        .collect();
+    let chosen: Vec<String> =
+        chosen.iter().map(|(name, n)| format!("{name} {:.0}", 100.0 * *n as f64 / count)).collect();
     let least = |v: &[f64]| v.iter().copied().fold(f64::INFINITY, f64::min);
     let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
     println!(

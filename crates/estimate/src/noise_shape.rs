@@ -280,11 +280,7 @@ fn widths(lines: usize) -> impl Iterator<Item = usize> {
 }
 
 /// The bump that makes the variances most likely, of all flat ones and of tents about the best of them.
-fn most_conspicuous(
-    variances: &DMatrix<f64>,
-    log_power: &DMatrix<f64>,
-    nu: f64,
-) -> Option<Bump> {
+fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64) -> Option<Bump> {
     let (lines, channels) = variances.shape();
     let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
     // Sums of the levels below each line.
@@ -357,7 +353,11 @@ fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
             // Derivatives of L log Σ v/p + height Σ part, which is convex.
             let slope = area - lines * first / sum;
             let curvature = lines * (second / sum - (first / sum).powi(2));
-            if slope < 0.0 { least = height } else { most = height }
+            if slope < 0.0 {
+                least = height
+            } else {
+                most = height
+            }
             let next = height - slope / curvature;
             height = if next > least && next < most { next } else { 0.5 * (least + most) };
         }

@@ -27,15 +27,12 @@ pub(crate) struct Pooled {
 }
 
 /// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled.
-pub(crate) fn pooled(
-    omega: &[f64],
-    covariance: Covariances,
-    nu: f64,
-    pooling: Pooling,
-) -> Pooled {
+pub(crate) fn pooled(omega: &[f64], covariance: Covariances, nu: f64, pooling: Pooling) -> Pooled {
     let lines = covariance.len();
     match pooling {
-        Pooling::PerLine => Pooled { covariance, model: NoiseModel::PerLine, freedom: nu, basis: None },
+        Pooling::PerLine => {
+            Pooled { covariance, model: NoiseModel::PerLine, freedom: nu, basis: None }
+        }
         Pooling::AllLines => {
             let all = mean(&covariance, 0..lines);
             white(all, nu, lines)
@@ -153,8 +150,9 @@ impl Candidate {
         let to_beat = misfit + (unknowns - MARGIN) / self.nu;
         let half_widths = (0..usize::BITS).map(|power| (1usize << power) - 1);
         let half_widths = half_widths.take_while(|half| 4 * half + 2 <= covariance.len());
-        let enough = half_widths
-            .filter(|half| (2 * half + 1) as f64 * self.nu >= (2.0 * channels).max(channels + SPARE));
+        let enough = half_widths.filter(|half| {
+            (2 * half + 1) as f64 * self.nu >= (2.0 * channels).max(channels + SPARE)
+        });
         let scored = enough.filter_map(|half_width| {
             let score = match half_width {
                 0 => of_single_lines(&covariance, self.nu),

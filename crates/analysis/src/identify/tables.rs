@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_estimate::checks::{Finding, adjust_p_values, after_response_fit, before_response_fit};
-use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
+use mechid_estimate::frequency_domain::{FrequencyData, NoiseModel, equation_error, output_error};
 use mechid_estimate::{Estimate, Frf, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, ResponseFunction, SystemMatrices};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -102,6 +102,7 @@ pub fn identify_responses(
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
             unexplained_motion: unexplained_motion(&data, &system)?,
             misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
+            noise: fit.noise.clone(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
             unknowns: estimate.parameters().len(),
@@ -251,6 +252,7 @@ struct Fit {
     name: &'static str,
     estimate: Estimate,
     misfit: Option<Misfit>,
+    noise: Vec<NoiseModel>,
 }
 
 impl Fit {
@@ -265,7 +267,8 @@ impl Fit {
         }
         if method == Some(Method::LeastSquares) {
             let name = "least squares on frequency responses, all alike";
-            return Ok(Self { name, estimate: equation_error(data, unknowns)?, misfit: None });
+            let estimate = equation_error(data, unknowns)?;
+            return Ok(Self { name, estimate, misfit: None, noise: Vec::new() });
         }
         let fit = output_error(data, unknowns)?;
         let noise = measured[0].noise;
@@ -281,7 +284,7 @@ impl Fit {
             }
         };
         let misfit = noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise });
-        Ok(Self { name, estimate: fit.estimate, misfit })
+        Ok(Self { name, estimate: fit.estimate, misfit, noise: fit.noise })
     }
 }
 

@@ -9,6 +9,7 @@ use mechid::analysis::identify::{
     KnownMass, LineChoice, Method, Nonlinear, Refinement, ResponseFit, SampleFit, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
+use mechid::estimate::frequency_domain::Pooling;
 use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
@@ -40,6 +41,10 @@ pub struct FitArgs {
     /// more show the noise or with --from-frf, otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodChoice>,
+    /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
+    /// N lines to either side), per-line, or auto, which chooses
+    #[arg(long, value_name = "NOISE")]
+    noise: Option<Pooling>,
     /// Assumption on the force between samples, in the time domain [default: the equation of motion
     /// at the samples if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_enum)]
@@ -338,7 +343,9 @@ impl FitArgs {
                 segments: self.segments.segmentation(),
                 method,
             }),
-            (Domain::Frequency, None) => Fit::Spectra { method },
+            (Domain::Frequency, None) => {
+                Fit::Spectra { method, noise: self.noise.unwrap_or_default() }
+            }
         };
         Identify {
             fit,
@@ -354,6 +361,7 @@ impl FitArgs {
         let of_frequency = [
             self.lines.given(),
             self.method.map(|_| "--method"),
+            self.noise.map(|_| "--noise"),
             self.from_frf.map(|_| "--from-frf"),
             self.nonlinear.nonlinear.as_ref().map(|_| "--nonlinear"),
         ];
@@ -364,7 +372,10 @@ impl FitArgs {
         };
         let alone =
             (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
-        match misplaced.map(|o| (o, why)).or(alone.map(|o| (o, "belongs to --from-frf"))) {
+        let of_periods = (self.from_frf.is_some() && self.noise.is_some()).then_some("--noise");
+        let alone = alone.map(|o| (o, "belongs to --from-frf"));
+        let of_periods = of_periods.map(|o| (o, "belongs to whole periods, without --from-frf"));
+        match misplaced.map(|o| (o, why)).or(alone).or(of_periods) {
             Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
             None => Ok(()),
         }
