@@ -13,6 +13,7 @@
 
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::f64::consts::TAU;
 
 use mechid_estimate::frequency_domain::{
     Lines, NoiseModel, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods, output_error,
@@ -20,8 +21,9 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::ResponseQuantity;
+use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, Test, chain, repeated, steady_test};
-use mechid_signal::{Record, Sampling, noise};
+use mechid_signal::{Multisine, Phases, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
@@ -102,8 +104,51 @@ impl Colour {
     }
 }
 
+/// A chain of masses with a damping ratio of about 3 %, and where its modes are among the lines.
+enum Machine {
+    /// One mass, whose mode is at line 12 of 100.
+    LowMode,
+    /// One mass, whose mode is at line 77 of 100.
+    HighMode,
+    /// Two masses, whose higher mode is at line 92 of 120.
+    TwoModes,
+}
+
+impl Machine {
+    const ALL: [Self; 3] = [Self::LowMode, Self::HighMode, Self::TwoModes];
+
+    fn name(&self) -> &'static str {
+        match self {
+            Self::LowMode => "one mass, low mode",
+            Self::HighMode => "one mass, high mode",
+            Self::TwoModes => "two masses",
+        }
+    }
+
+    fn dof(&self) -> usize {
+        if let Self::TwoModes = self { 2 } else { 1 }
+    }
+
+    fn test(&self) -> Result<Test> {
+        let system = chain(self.dof(), Support::Held, 0.03, 7);
+        let lines = if let Self::TwoModes = self { 120 } else { 100 };
+        let test = steady_test("", system, false, lines, 7)?;
+        let Self::LowMode = self else { return Ok(test) };
+        let (system, period) = (test.system.clone(), test.force.sampling());
+        let mode = system.modes()?[0].natural_frequency();
+        let period = Sampling::new(12.0 * TAU / (mode * period.len() as f64), period.len())?;
+        let multisine = Multisine::flat(1..=lines, 10.0, Phases::Random { seed: 7 })?;
+        let force = multisine.sample(period)?;
+        let exact = exact_harmonic_periodic(&system, &force)?;
+        let [displacement, acceleration] =
+            [exact.displacement().clone(), exact.acceleration().clone()];
+        Ok(Test { force, displacement, acceleration, ..test })
+    }
+}
+
 /// A machine, its steady test, and the noise on its response.
 struct Study {
+    machine: &'static str,
     test: Test,
     lines: Lines,
     unknowns: Unknowns,
@@ -118,12 +163,13 @@ struct Study {
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
 impl Study {
-    fn new(dof: usize, lines: usize, colour: Colour, periods: usize) -> Result<Self> {
-        let test = steady_test("", chain(dof, Support::Held, 0.03, 7), false, lines, 7)?;
+    fn new(machine: &Machine, colour: Colour, periods: usize) -> Result<Self> {
+        let (test, dof) = (machine.test()?, machine.dof());
         let period = test.force.sampling();
         let rms = |c| test.displacement.column(c).norm() / (period.len() as f64).sqrt();
         let size = colour.size();
         Ok(Self {
+            machine: machine.name(),
             lines: Lines::new(period, test.lines.iter().copied())?,
             unknowns: Unknowns::unknown_mass(dof)?,
             colour,
@@ -207,14 +253,14 @@ fn main() -> Result<()> {
     let pooling: Pooling = arguments.next().map_or(Ok(Pooling::Automatic), |a| a.parse())?;
     let only = arguments.next().unwrap_or_default();
     println!(
-        "| Degrees of freedom | Noise | Periods | Over bound, least | most | Held, least | most | Mean \
+        "| Machine | Noise | Periods | Over bound, least | most | Held, least | most | Mean \
          | Chosen, % |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    for (dof, lines) in [(1, 100), (2, 120)] {
+    for machine in &Machine::ALL {
         for colour in Colour::ALL.into_iter().filter(|c| c.name().starts_with(&only)) {
             for periods in [1, 2, 4, 8] {
-                row(&Study::new(dof, lines, colour, periods)?, runs, pooling)?;
+                row(&Study::new(machine, colour, periods)?, runs, pooling)?;
             }
         }
     }
@@ -249,7 +295,7 @@ fn row(study: &Study, runs: u64, pooling: Pooling) -> Result<()> {
     let most = |v: &[f64]| v.iter().copied().fold(0.0, f64::max);
     println!(
         "| {} | {} | {} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} | {}{} |",
-        study.scale.len(),
+        study.machine,
         study.colour.name(),
         study.periods,
         least(&over),

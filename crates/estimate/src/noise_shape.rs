@@ -21,6 +21,8 @@ const WIDER: f64 = 1.3;
 const HIGHER: f64 = 3.0;
 /// Distance at which a peak ends, over that at which it is as high as the floor.
 const PEAK_REACH: f64 = 10.0;
+/// Number of flat bands, of different widths, about which others are tried.
+const BEST_WIDTHS: usize = 6;
 /// Rounds of variations of a bump.
 const VARIATIONS: usize = 12;
 /// Steps of the search for the height of a tent.
@@ -310,7 +312,9 @@ fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64)
         let best = starts.map(|start| (gain_of_flat(start, width), start));
         best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(gain, at)| (gain, at..at + width))
     };
-    let flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
+    let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
+    flat.sort_by(|a, b| b.0.total_cmp(&a.0));
+    flat.truncate(BEST_WIDTHS);
     let with_gain = |bump: Bump| (gain_of(&bump, &levels, nu), bump);
     let best = |of: &mut dyn Iterator<Item = (f64, Bump)>| of.max_by(|a, b| a.0.total_cmp(&b.0));
     let of_flat = best(&mut flat.iter().map(|(gain, band)| (*gain, Bump::flat(band))))?;

@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_estimate::checks::{Finding, adjust_p_values, after_response_fit, before_response_fit};
-use mechid_estimate::frequency_domain::{FrequencyData, NoiseModel, equation_error, output_error};
+use mechid_estimate::frequency_domain::{
+    FrequencyData, NoiseModel, Pooling, equation_error, output_error_pooling,
+};
 use mechid_estimate::{Estimate, Frf, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, ResponseFunction, SystemMatrices};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -270,7 +272,7 @@ impl Fit {
             let estimate = equation_error(data, unknowns)?;
             return Ok(Self { name, estimate, misfit: None, noise: Vec::new() });
         }
-        let fit = output_error(data, unknowns)?;
+        let fit = output_error_pooling(data, unknowns, Pooling::AllLines)?;
         let noise = measured[0].noise;
         let name = match noise {
             Noise::Stated => {

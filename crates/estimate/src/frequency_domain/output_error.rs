@@ -184,7 +184,7 @@ pub(super) fn finish(
         None => (covariance * scale.inflation, scale.degrees_of_freedom),
         Some(weights) => {
             let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
-            (covariance + weights.excess, fewest as usize)
+            (covariance + weights.excess, fewest.max(1.0) as usize)
         }
     };
     let errors = misfit.errors();

@@ -23,7 +23,7 @@ const MAX_ROUNDS: usize = 10;
 /// Rounds of weighting by a spectrum: the first is efficient already, the others find its form.
 const COLOURED_ROUNDS: usize = 3;
 /// Maximum number of sensitivities, residuals times parameters, of which leverages are computed.
-const SENSITIVITIES: usize = 1 << 22;
+const SENSITIVITIES: usize = 1 << 20;
 /// Least power of a residual, relative to that of the noise before.
 const LEAST: f64 = 1e-12;
 /// Least part of its noise that a residual is taken to keep.

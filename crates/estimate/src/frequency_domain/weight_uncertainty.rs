@@ -6,7 +6,7 @@ use super::{FrequencyData, NoiseSpectrum, Whitened};
 use crate::Unknowns;
 
 /// Maximum number of sensitivities, residuals times parameters.
-const SENSITIVITIES: usize = 1 << 22;
+const SENSITIVITIES: usize = 1 << 20;
 
 /// Correction of the covariance of an estimate, and how well that covariance itself is known.
 pub(super) struct WeightUncertainty {
