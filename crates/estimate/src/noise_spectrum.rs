@@ -10,7 +10,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::EstimateError;
 use crate::pooling::{Pooled, pooled};
 
-/// How the covariance of noise follows from its samples at each line.
+/// Choice of the lines that share a covariance of the noise.
 ///
 /// A covariance of few periods is itself uncertain, and an estimator weighted with it
 /// loses by that. Noise spectra are smooth, so lines may share theirs. As text: `auto`, `white`, `smooth`,

@@ -1,4 +1,4 @@
-//! What the uncertainty of a smooth noise spectrum adds to that of an estimate weighted by it.
+//! Uncertainty of an estimate that follows from that of the smooth noise spectrum by which it is weighted.
 
 use nalgebra::{DMatrix, DVector};
 
