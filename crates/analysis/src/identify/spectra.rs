@@ -262,8 +262,11 @@ fn with_noise(periods: &RepeatedPeriods, noise: Pooling) -> Result<FrequencyData
     if periods.count() < 2 {
         return periods.mean();
     }
-    let noisy = periods.mean_with_noise(noise)?;
-    if noisy.noise_above_rounding().is_some() { Ok(noisy) } else { periods.mean() }
+    // Rounding has no spectrum that could be found.
+    match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
+        Some(_) => periods.mean_with_noise(noise),
+        None => periods.mean(),
+    }
 }
 
 /// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
