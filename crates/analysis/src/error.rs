@@ -2,7 +2,7 @@
 
 use mechid_estimate::EstimateError;
 use mechid_model::ResponseQuantity;
-use mechid_signal::{counted, ordinal, told, told_to};
+use mechid_signal::message;
 
 use crate::text::significant;
 
@@ -90,7 +90,7 @@ pub enum AnalysisError {
     /// The columns do not pair up with the degrees of freedom.
     #[error(
         "`{response}` names {} and `force` {forces}: every degree of freedom needs one of each \
-         (`force` 0 where no force acts)", counted(*got, "column")
+         (`force` 0 where no force acts)", message::count(*got, "column")
     )]
     ColumnCount {
         /// Kind of response with the wrong number of columns.
@@ -134,7 +134,7 @@ pub enum AnalysisError {
     /// The number of response columns is not that of the degrees of freedom of the system.
     #[error(
         "`{response}` names {}, the system has {}: name one for each, 0 where it was not measured",
-        counted(*got, "column"), counted(*dofs, "degree of freedom")
+        message::count(*got, "column"), message::count(*dofs, "degree of freedom")
     )]
     MotionCount {
         /// Kind of response with the wrong number of columns.
@@ -147,7 +147,7 @@ pub enum AnalysisError {
     /// A force is to be identified on a degree of freedom that the system does not have.
     #[error(
         "`forced` names degree of freedom {dof} (counted from 1), the system has {}",
-        counted(*dofs, "degree of freedom")
+        message::count(*dofs, "degree of freedom")
     )]
     Forced {
         /// Degree of freedom, counted from 1.
@@ -158,7 +158,7 @@ pub enum AnalysisError {
     /// The number of noise levels is not that of the measured columns.
     #[error(
         "`noise` gives {}, the response has {}: give one for each",
-        counted(*levels, "level"), counted(*columns, "column")
+        message::count(*levels, "level"), message::count(*columns, "column")
     )]
     NoiseCount {
         /// Number of levels given.
@@ -207,7 +207,7 @@ pub enum AnalysisError {
         columns: String,
     },
     /// A known mass is not positive.
-    #[error("a mass must be positive and finite, got {value} kg", value = told(*value))]
+    #[error("a mass must be positive and finite, got {value} kg", value = message::number(*value))]
     Mass {
         /// The value given, in kg.
         value: f64,
@@ -215,7 +215,7 @@ pub enum AnalysisError {
     /// The number of masses fits neither the degrees of freedom nor the entries of their matrix.
     #[error(
         "`mass` gives {}, the record has {}: give one mass for each, or all entries of the \
-         {dof}×{dof} matrix row by row", counted(*got, "value"), counted(*dof, "degree of freedom")
+         {dof}×{dof} matrix row by row", message::count(*got, "value"), message::count(*dof, "degree of freedom")
     )]
     MassCount {
         /// Number of values given.
@@ -224,7 +224,7 @@ pub enum AnalysisError {
         dof: usize,
     },
     /// The force has no spectral line.
-    #[error("no excited line: over a period of {} the force does not vary", counted(*period, "sample"))]
+    #[error("no excited line: over a period of {} the force does not vary", message::count(*period, "sample"))]
     StillForce {
         /// Number of samples in the period.
         period: usize,
@@ -233,8 +233,8 @@ pub enum AnalysisError {
     #[error(
         "no excited line between {low_hz} and {high_hz} Hz: the force has its lines between \
          {first_hz} and {last_hz} Hz",
-        low_hz = told(*low_hz), high_hz = told(*high_hz),
-        first_hz = told_to(*first_hz, 6), last_hz = told_to(*last_hz, 6)
+        low_hz = message::number(*low_hz), high_hz = message::number(*high_hz),
+        first_hz = message::number_to(*first_hz, 6), last_hz = message::number_to(*last_hz, 6)
     )]
     EmptyBand {
         /// Lower end asked for, in Hz.
@@ -345,7 +345,7 @@ pub enum AnalysisError {
         value: f64,
     },
     /// A period is no whole number of the samples taken.
-    #[error("a period of {} is no whole number of every {} sample", counted(*period, "sample"), ordinal(*factor))]
+    #[error("a period of {} is no whole number of every {} sample", message::count(*period, "sample"), message::ordinal(*factor))]
     DecimatedPeriod {
         /// Number of samples in a period.
         period: usize,
@@ -364,7 +364,7 @@ pub enum AnalysisError {
     /// No setting of a sweep gave an estimate.
     #[error(
         "no setting gave an estimate; at the first one, {setting}: {reason}",
-        setting = told(*setting)
+        setting = message::number(*setting)
     )]
     EmptySweep {
         /// First setting, in the unit of its kind.

@@ -1,13 +1,13 @@
 //! Errors of bearings that cannot be described or have no solution.
 
-use mechid_signal::told;
+use mechid_signal::message;
 
 /// A bearing that cannot be described or solved; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum BearingError {
     /// A parameter is out of range.
-    #[error("the {name} must be {requirement}, got {value}", value = told(*value))]
+    #[error("the {name} must be {requirement}, got {value}", value = message::number(*value))]
     Parameter {
         /// Name of the parameter.
         name: &'static str,
@@ -19,7 +19,7 @@ pub enum BearingError {
     /// The journal touches the bore: no film is left.
     #[error(
         "the journal touches the bore: eccentricity {eccentricity} of the clearance",
-        eccentricity = told(*eccentricity)
+        eccentricity = message::number(*eccentricity)
     )]
     Contact {
         /// Eccentricity over the clearance, a ratio of at least 1.
@@ -29,8 +29,8 @@ pub enum BearingError {
     #[error(
         "the equations of the film are singular with the journal at ({}, {}) clearances \
          along and across the load",
-        told(position[0]),
-        told(position[1])
+        message::number(position[0]),
+        message::number(position[1])
     )]
     SingularFilm {
         /// Position of the journal along the load and across over the clearance, a ratio each.
@@ -41,8 +41,8 @@ pub enum BearingError {
         "the ends of the film did not converge in {iterations} iterations \
          (last change {change:.1e} rad) with the journal at ({}, {}) clearances; \
          a finer mesh may help",
-        told(position[0]),
-        told(position[1])
+        message::number(position[0]),
+        message::number(position[1])
     )]
     FilmNotConverged {
         /// Iterations made.
@@ -56,7 +56,7 @@ pub enum BearingError {
     #[error(
         "no equilibrium was found for the Sommerfeld number {sommerfeld} in {iterations} \
          iterations (last step {step:.1e} clearances); a finer mesh may help",
-        sommerfeld = told(*sommerfeld)
+        sommerfeld = message::number(*sommerfeld)
     )]
     EquilibriumNotConverged {
         /// Sommerfeld number asked for, dimensionless.
@@ -78,7 +78,7 @@ pub enum BearingError {
     #[error(
         "entry ({row}, {column}) of the covariance of the coefficients is {value}: \
          expected finite entries and variances of at least 0",
-        value = told(*value)
+        value = message::number(*value)
     )]
     CovarianceEntry {
         /// Row, counted from 1.

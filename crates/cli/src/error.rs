@@ -2,7 +2,7 @@
 
 use mechid::analysis::AnalysisError;
 use mechid::io::IoError;
-use mechid::signal::counted;
+use mechid::signal::message;
 
 /// A failure of a subcommand; its message is all the user sees.
 #[derive(Debug, thiserror::Error)]
@@ -57,7 +57,7 @@ pub enum CliError {
     /// Two things on one stream.
     #[error(
         "standard output takes one thing, not {}{}",
-        counted(*files, "file"),
+        message::count(*files, "file"),
         if *json { " and the report: name files, or leave --json out" } else { ": name the others" }
     )]
     SharedOutput {

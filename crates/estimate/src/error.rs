@@ -1,7 +1,7 @@
 //! Errors of an identification.
 
 use mechid_model::Matrix;
-use mechid_signal::counted;
+use mechid_signal::message;
 
 /// An identification that cannot be done; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -44,9 +44,9 @@ pub enum EstimateError {
     /// Fewer equations than unknowns.
     #[error(
         "{} {} not determine {}: use a longer record or fewer unknowns",
-        counted(*rows, "equation"),
+        message::count(*rows, "equation"),
         if *rows == 1 { "does" } else { "do" },
-        counted(*unknowns, "unknown")
+        message::count(*unknowns, "unknown")
     )]
     TooFewRows {
         /// Equations (rows) given.
@@ -122,7 +122,7 @@ pub enum EstimateError {
         parameter: String,
     },
     /// Segments that do not move on, or leave samples out.
-    #[error("segments of {} cannot start {} apart: from 1 to {len}", counted(*len, "sample"), counted(*hop, "sample"))]
+    #[error("segments of {} cannot start {} apart: from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
     Hop {
         /// Samples of a segment.
         len: usize,
@@ -140,7 +140,7 @@ pub enum EstimateError {
     /// A sliding polynomial cannot be fitted, or has no such derivative.
     #[error(
         "a polynomial of order {order} through {}: the window must have more samples \
-         than the order, and the order must be at least that of the derivative", counted(*samples, "sample")
+         than the order, and the order must be at least that of the derivative", message::count(*samples, "sample")
     )]
     Window {
         /// Samples of the window.
@@ -162,7 +162,7 @@ pub enum EstimateError {
         order: usize,
     },
     /// A record is too short for what is asked of it.
-    #[error("the record has {} where at least {needed} are needed", counted(*samples, "sample"))]
+    #[error("the record has {} where at least {needed} are needed", message::count(*samples, "sample"))]
     TooShort {
         /// Samples of the record.
         samples: usize,
@@ -192,7 +192,7 @@ pub enum EstimateError {
     #[error(
         "the response of the nonlinear system grows beyond all bounds within {}: its spring or damper \
          turns negative at that amplitude",
-        counted(*len, "sample")
+        message::count(*len, "sample")
     )]
     Diverged {
         /// Samples of the record.

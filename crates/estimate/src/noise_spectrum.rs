@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use mechid_model::ResponseQuantity;
-use mechid_signal::{Sampling, counted};
+use mechid_signal::{Sampling, message};
 use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
@@ -117,11 +117,11 @@ impl fmt::Display for NoiseModel {
                 }
                 match bands_hz.len().saturating_sub(SHOWN) {
                     0 => Ok(()),
-                    more => write!(f, " and in {}", counted(more, "more band")),
+                    more => write!(f, " and in {}", message::count(more, "more band")),
                 }
             }
             Self::Neighbours { half_width } => {
-                write!(f, "averaged over {}", counted(2 * half_width + 1, "line"))
+                write!(f, "averaged over {}", message::count(2 * half_width + 1, "line"))
             }
             Self::PerLine => f.write_str("line by line"),
         }

@@ -1,7 +1,7 @@
 //! Errors of the reconstruction of a force.
 
 use mechid_model::ModelError;
-use mechid_signal::{SignalError, counted, told_to};
+use mechid_signal::{SignalError, message};
 
 /// A force that cannot be reconstructed; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -10,7 +10,7 @@ pub enum ForceError {
     /// System and response differ in size.
     #[error(
         "the system has {}, the response has {}: \
-         give one channel per degree of freedom, or name the measured ones in a `Measurement`", counted(*system, "degree of freedom"), counted(*response, "channel")
+         give one channel per degree of freedom, or name the measured ones in a `Measurement`", message::count(*system, "degree of freedom"), message::count(*response, "channel")
     )]
     Dof {
         /// Degrees of freedom of the system.
@@ -19,7 +19,7 @@ pub enum ForceError {
         response: usize,
     },
     /// The response is shorter than the method needs.
-    #[error("a response of {} is too short: this method needs {needed}", counted(*samples, "sample"))]
+    #[error("a response of {} is too short: this method needs {needed}", message::count(*samples, "sample"))]
     TooShort {
         /// Samples given.
         samples: usize,
@@ -27,7 +27,7 @@ pub enum ForceError {
         needed: usize,
     },
     /// A record and its list of channels differ in size.
-    #[error("the record has {}, {described} are described", counted(*record, "channel"))]
+    #[error("the record has {}, {described} are described", message::count(*record, "channel"))]
     ChannelCount {
         /// Channels of the record.
         record: usize,
@@ -60,7 +60,7 @@ pub enum ForceError {
     /// More unknown forces than measured channels.
     #[error(
         "{forces} unknown forces cannot be told apart with {}: \
-         measure more degrees of freedom, or name fewer forced ones", counted(*measurements, "measured channel")
+         measure more degrees of freedom, or name fewer forced ones", message::count(*measurements, "measured channel")
     )]
     MoreForcesThanMeasurements {
         /// Unknown forces.
@@ -90,9 +90,9 @@ pub enum ForceError {
         "the machine is unstable: its free response grows e-fold every {} s, by a factor of \
          10^{:.0} within {} s, which leaves no digits for the force; use whole periods in steady \
          state, the Kalman smoother, a shorter record or a shorter time step",
-        told_to(rate.recip(), 3),
+        message::number_to(rate.recip(), 3),
         rate * duration / std::f64::consts::LN_10,
-        told_to(*duration, 6)
+        message::number_to(*duration, 6)
     )]
     Unstable {
         /// Largest real part of an eigenvalue, in 1/s.
@@ -117,7 +117,7 @@ pub enum ForceError {
          degree of freedom {} (counted from 1) to the measured channels (reciprocal \
          condition {reciprocal_condition:.1e}): leave the line out, measure another degree of \
          freedom or quantity, or name fewer forces",
-        told_to(*omega, 6),
+        message::number_to(*omega, 6),
         dof + 1
     )]
     NotTransmitted {
@@ -134,7 +134,7 @@ pub enum ForceError {
     #[error(
         "at line {line} (ω = {} rad/s) the dynamic stiffness is singular: an undamped \
          resonance has no periodic response; leave the line out",
-        told_to(*omega, 6)
+        message::number_to(*omega, 6)
     )]
     Resonance {
         /// The line.

@@ -1,13 +1,13 @@
 //! Errors of an integration.
 
-use mechid_signal::{counted, told, told_to};
+use mechid_signal::message;
 
 /// An integration that cannot be set up or carried out; every variant carries the offending numbers.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IntegrateError {
     /// The time step is not a positive finite number of seconds.
-    #[error("time step must be positive and finite, got {dt} s", dt = told(*dt))]
+    #[error("time step must be positive and finite, got {dt} s", dt = message::number(*dt))]
     TimeStep {
         /// The step given, in seconds.
         dt: f64,
@@ -15,7 +15,7 @@ pub enum IntegrateError {
     /// A parameter of a scheme lies outside its range.
     #[error(
         "{scheme}: {parameter} must lie between {least} and {most}, got {value}",
-        least = told(*least), most = told(*most), value = told(*value)
+        least = message::number(*least), most = message::number(*most), value = message::number(*value)
     )]
     Parameter {
         /// Name of the scheme.
@@ -30,7 +30,7 @@ pub enum IntegrateError {
         value: f64,
     },
     /// A force, or an initial or starting vector, does not have one entry per degree of freedom.
-    #[error("{what} has {}, the system has {}", counted(*got, "component"), counted(*dof, "degree of freedom"))]
+    #[error("{what} has {}, the system has {}", message::count(*got, "component"), message::count(*dof, "degree of freedom"))]
     Components {
         /// Name of the input.
         what: &'static str,
@@ -42,7 +42,7 @@ pub enum IntegrateError {
     /// A degree of freedom was selected that the system does not have.
     #[error(
         "degree of freedom {index} (counted from 0) was selected, the system has {}",
-        counted(*dof, "degree of freedom")
+        message::count(*dof, "degree of freedom")
     )]
     DofOutside {
         /// The degree of freedom selected, counted from 0.
@@ -58,8 +58,8 @@ pub enum IntegrateError {
     },
     /// The forces within the steps do not lie on the time axis of the force.
     #[error(
-        "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", counted(*got, "sample"),
-        got_dt = told(*got_dt), dt = told(*dt)
+        "the forces within the steps have {} at {got_dt} s, the force {expected} at {dt} s", message::count(*got, "sample"),
+        got_dt = message::number(*got_dt), dt = message::number(*dt)
     )]
     MidStepSampling {
         /// Samples of the forces within the steps.
@@ -80,7 +80,7 @@ pub enum IntegrateError {
     /// A value given or computed by the caller's function is NaN or infinite.
     #[error(
         "{what}, component {component}, is {value} at t = {time} s, not a finite number",
-        time = told(*time), value = told(*value)
+        time = message::number(*time), value = message::number(*value)
     )]
     NotFinite {
         /// Name of the input.
@@ -95,7 +95,7 @@ pub enum IntegrateError {
     /// The matrix the scheme has to solve with is singular.
     #[error(
         "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)",
-        dt = told(*dt)
+        dt = message::number(*dt)
     )]
     SingularEffectiveMass {
         /// Name of the scheme.
@@ -109,7 +109,7 @@ pub enum IntegrateError {
     #[error(
         "{scheme} is unstable at Δt = {dt} s: spectral radius {radius}; {}",
         limit_text(*.critical_step),
-        dt = told(*dt), radius = told_to(*spectral_radius, 6)
+        dt = message::number(*dt), radius = message::number_to(*spectral_radius, 6)
     )]
     Unstable {
         /// The scheme's name.
@@ -124,7 +124,7 @@ pub enum IntegrateError {
     /// A start from rest was asked for, but the machine moves.
     #[error(
         "the start from rest needs zero initial velocity, component {component} is {velocity} m/s",
-        velocity = told(*velocity)
+        velocity = message::number(*velocity)
     )]
     NotAtRest {
         /// Component, counted from 1.
@@ -136,7 +136,7 @@ pub enum IntegrateError {
     #[error(
         "no unique response repeats every {period} s: the free motion repeats too \
          (reciprocal condition {reciprocal_condition:.1e}, rounding {rounding:.1e})",
-        period = told(*period)
+        period = message::number(*period)
     )]
     NoPeriodicState {
         /// Period of the force, in seconds.
@@ -150,7 +150,7 @@ pub enum IntegrateError {
     #[error(
         "no response that repeats every {period} s is found from there: the best still changes by \
          {missed:.1e} of its size in a period; start nearer, or let the motion settle for longer",
-        period = told(*period)
+        period = message::number(*period)
     )]
     NoOrbit {
         /// Period of the force, in seconds.
@@ -162,7 +162,7 @@ pub enum IntegrateError {
     #[error(
         "the nonlinear forces cannot be balanced at t = {time} s: Newton's method ends with \
          accelerations that miss their equation by {residual:.1e} m/s²; take smaller steps",
-        time = told(*time)
+        time = message::number(*time)
     )]
     NotSolved {
         /// Instant, in seconds.
@@ -177,7 +177,7 @@ pub enum IntegrateError {
         what: &'static str,
     },
     /// A scheme is for fewer degrees of freedom.
-    #[error("{scheme} is for at most {}, the system has {dof}", counted(*most, "degree of freedom"))]
+    #[error("{scheme} is for at most {}, the system has {dof}", message::count(*most, "degree of freedom"))]
     TooManyDof {
         /// Name of the scheme.
         scheme: &'static str,
@@ -197,7 +197,7 @@ pub enum IntegrateError {
     /// An accuracy analysis needs a motion that oscillates.
     #[error(
         "the damping ratio must be at least 0 and less than 1, got {damping_ratio}",
-        damping_ratio = told(*damping_ratio)
+        damping_ratio = message::number(*damping_ratio)
     )]
     DampingRatio {
         /// The ratio given.

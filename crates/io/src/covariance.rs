@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mechid_signal::{counted, told};
+use mechid_signal::message;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
@@ -62,7 +62,7 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     if covariance.matrix.len() != n || covariance.matrix.iter().any(|row| row.len() != n) {
         return Err(wrong(format!(
             "the covariance of {} must be a {n}×{n} matrix",
-            counted(n, "parameter")
+            message::count(n, "parameter")
         )));
     }
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
@@ -85,7 +85,7 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
         if variance < 0.0 {
             return Err(wrong(format!(
                 "the variance of {name} is {}, less than zero",
-                told(variance)
+                message::number(variance)
             )));
         }
     }

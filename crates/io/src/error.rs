@@ -1,7 +1,7 @@
 //! Errors of reading and writing files.
 
 use mechid_model::ModelError;
-use mechid_signal::{SignalError, counted, told};
+use mechid_signal::{SignalError, message};
 
 use crate::escape::Message;
 use crate::{DecimalSign, Limit, Place, Quantity};
@@ -87,7 +87,7 @@ pub enum IoError {
     /// Other text precedes the table.
     #[error("{}", Message(format_args!("{file}: the table seems to begin on line {line}, with {}; if so, skip the lines \
          above it with --skip-lines {}",
-        counted(*fields, "field"),
+        message::count(*fields, "field"),
         line - 1)))]
     AboveTable {
         /// The file.
@@ -112,7 +112,7 @@ pub enum IoError {
         found: &'static str,
     },
     /// A line has more or fewer fields than the first one.
-    #[error("{}", Message(format_args!("{file}, line {line}: {} where the first line has {expected}", counted(*got, "field"))))]
+    #[error("{}", Message(format_args!("{file}, line {line}: {} where the first line has {expected}", message::count(*got, "field"))))]
     Ragged {
         /// The file.
         file: String,
@@ -221,7 +221,7 @@ pub enum IoError {
         wanted: Quantity,
     },
     /// A sample is NaN or infinite.
-    #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = told(*value))))]
+    #[error("{}", Message(format_args!("{file}, {at}, column {column}: {value} is not a finite number", value = message::number(*value))))]
     NotFinite {
         /// The file.
         file: String,
@@ -235,8 +235,8 @@ pub enum IoError {
     /// The instants of the time column are not equally spaced.
     #[error("{}", Message(format_args!("{file}: the time steps are not uniform: {} s up to {at}, where the usual step is \
          {} s ({})",
-        told(six_digits(*step)),
-        told(six_digits(*usual)),
+        message::number(six_digits(*step)),
+        message::number(six_digits(*usual)),
         remedy(*step, *usual))))]
     NonUniformTime {
         /// The file.
@@ -273,10 +273,10 @@ pub enum IoError {
     /// Columns of one record were sampled at different instants.
     #[error("{}", Message(format_args!("{file}: the columns of a record need the same time axis; {first} has steps of {first_step} \
          s from {first_start} s, {second} of {second_step} s from {second_start} s",
-        first_start = told(*first_start),
-        first_step = told(*first_step),
-        second_start = told(*second_start),
-        second_step = told(*second_step))))]
+        first_start = message::number(*first_start),
+        first_step = message::number(*first_step),
+        second_start = message::number(*second_start),
+        second_step = message::number(*second_step))))]
     TimeAxes {
         /// The file.
         file: String,
@@ -296,7 +296,7 @@ pub enum IoError {
     /// The rate given is not that of the file.
     #[error("{}", Message(format_args!("the sample rate {rate_hz} Hz contradicts {file}: column {column} has {own_hz} Hz (leave \
          the rate out)",
-        own_hz = told(*own_hz), rate_hz = told(*rate_hz))))]
+        own_hz = message::number(*own_hz), rate_hz = message::number(*rate_hz))))]
     RateContradicts {
         /// The file.
         file: String,
@@ -309,7 +309,7 @@ pub enum IoError {
     },
     /// The sampling rate is not usable.
     #[error("{}", Message(format_args!("the sample rate must be a positive finite number of Hz, got {rate_hz}",
-        rate_hz = told(*rate_hz))))]
+        rate_hz = message::number(*rate_hz))))]
     SampleRate {
         /// The rate given, in Hz.
         rate_hz: f64,
@@ -389,7 +389,7 @@ pub enum IoError {
     },
     /// A spectral line does not exist in a period.
     #[error("{}", Message(format_args!("lines {lines}: line {line} is not between 1 and {highest}, the last line below the Nyquist \
-         frequency of a period of {}", counted(*len, "sample"))))]
+         frequency of a period of {}", message::count(*len, "sample"))))]
     LineOutside {
         /// Text of the choice.
         lines: String,

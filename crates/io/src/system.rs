@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_model::{SecondOrderSystem, Terms};
-use mechid_signal::counted;
+use mechid_signal::message;
 use nalgebra::DMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
@@ -197,7 +197,7 @@ impl<'de> Deserialize<'de> for Entries {
                         return Err(de::Error::custom(format_args!(
                             "row {} of a matrix has {}, the first has {}",
                             rows.len() + 1,
-                            counted(row.len(), "entry"),
+                            message::count(row.len(), "entry"),
                             first.len()
                         )));
                     }

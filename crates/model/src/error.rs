@@ -1,6 +1,6 @@
 //! Errors of models.
 
-use mechid_signal::{counted, told};
+use mechid_signal::message;
 
 use crate::{Matrix, Parameter};
 
@@ -23,7 +23,7 @@ pub enum ModelError {
     /// A matrix entry is NaN or infinite.
     #[error(
         "entry ({row}, {column}) of the {matrix} matrix is {value}, not a finite number",
-        value = told(*value)
+        value = message::number(*value)
     )]
     NotFinite {
         /// Matrix concerned.
@@ -55,7 +55,7 @@ pub enum ModelError {
     #[error("a system needs at least one degree of freedom")]
     NoDof,
     /// Displacement, velocity and acceleration do not belong together.
-    #[error("displacement has {}, {quantity} has {got}", counted(*expected, "channel"))]
+    #[error("displacement has {}, {quantity} has {got}", message::count(*expected, "channel"))]
     Channels {
         /// `"velocity"` or `"acceleration"`.
         quantity: &'static str,
@@ -65,7 +65,7 @@ pub enum ModelError {
         expected: usize,
     },
     /// A scalar parameter is out of range.
-    #[error("the {name} must be {requirement}, got {value}", value = told(*value))]
+    #[error("the {name} must be {requirement}, got {value}", value = message::number(*value))]
     Parameter {
         /// Name of the parameter.
         name: &'static str,
@@ -75,7 +75,7 @@ pub enum ModelError {
         value: f64,
     },
     /// Displacement and velocity of a state, or a state and a system, do not fit.
-    #[error("the state has {} for {}", counted(*got, "entry"), counted(*dof, "degree of freedom"))]
+    #[error("the state has {} for {}", message::count(*got, "entry"), message::count(*dof, "degree of freedom"))]
     StateLength {
         /// Number of entries found.
         got: usize,
@@ -85,7 +85,7 @@ pub enum ModelError {
     /// An initial displacement or velocity is NaN or infinite.
     #[error(
         "the initial {quantity} of degree of freedom {dof} is {value}, not a finite number",
-        value = told(*value)
+        value = message::number(*value)
     )]
     StateNotFinite {
         /// `"displacement"` or `"velocity"`.
@@ -96,7 +96,7 @@ pub enum ModelError {
         value: f64,
     },
     /// A force record does not have one channel per degree of freedom.
-    #[error("the force has {} for {}", counted(*got, "channel"), counted(*dof, "degree of freedom"))]
+    #[error("the force has {} for {}", message::count(*got, "channel"), message::count(*dof, "degree of freedom"))]
     ForceChannels {
         /// Number of channels found.
         got: usize,
@@ -107,7 +107,7 @@ pub enum ModelError {
     #[error(
         "the dynamic stiffness is singular at {omega} rad/s \
          (reciprocal condition about {reciprocal_condition:.1e}): an undamped resonance",
-        omega = told(*omega)
+        omega = message::number(*omega)
     )]
     SingularDynamicStiffness {
         /// Angular frequency, in rad/s.
@@ -122,7 +122,7 @@ pub enum ModelError {
         largest: f64,
     },
     /// The eigenvalue or singular value iteration did not converge.
-    #[error("the modes of a system with {} did not converge", counted(*dof, "degree of freedom"))]
+    #[error("the modes of a system with {} did not converge", message::count(*dof, "degree of freedom"))]
     ModesNotConverged {
         /// Degrees of freedom.
         dof: usize,
@@ -173,7 +173,7 @@ pub enum ModelError {
     /// An entry outside M, C and K.
     #[error(
         "{matrix} has no entry ({row}, {column}): the system has {}",
-        counted(*dof, "degree of freedom")
+        message::count(*dof, "degree of freedom")
     )]
     NoSuchEntry {
         /// Matrix concerned.
@@ -188,7 +188,7 @@ pub enum ModelError {
     /// A name that no entry of M, C and K has.
     #[error(
         "a system of {} has no parameter `{name}`: {}",
-        counted(*dof, "degree of freedom"),
+        message::count(*dof, "degree of freedom"),
         names(*dof)
     )]
     NoSuchParameter {
@@ -198,7 +198,7 @@ pub enum ModelError {
         dof: usize,
     },
     /// A covariance has not one row and column per parameter.
-    #[error("the covariance is {rows}×{columns} for {}", counted(*parameters, "parameter"))]
+    #[error("the covariance is {rows}×{columns} for {}", message::count(*parameters, "parameter"))]
     CovarianceShape {
         /// Number of its rows.
         rows: usize,
@@ -211,7 +211,7 @@ pub enum ModelError {
     #[error(
         "{parameter} has the variance {variance} or a covariance that is not finite: \
          leave out the parameters that the data do not determine",
-        variance = told(*variance)
+        variance = message::number(*variance)
     )]
     Covariance {
         /// Name of the parameter concerned.
@@ -240,7 +240,7 @@ pub enum ModelError {
         name: String,
     },
     /// Nonlinear terms do not have one finite coefficient each.
-    #[error("{} for {}: one finite number for each", counted(*got, "coefficient"), counted(*terms, "nonlinear term"))]
+    #[error("{} for {}: one finite number for each", message::count(*got, "coefficient"), message::count(*terms, "nonlinear term"))]
     Coefficients {
         /// Coefficients found.
         got: usize,
@@ -248,7 +248,7 @@ pub enum ModelError {
         terms: usize,
     },
     /// A mode that the system does not have.
-    #[error("there is no mode {mode}: {} without damping", counted(*modes, "oscillating mode"))]
+    #[error("there is no mode {mode}: {} without damping", message::count(*modes, "oscillating mode"))]
     NoSuchMode {
         /// The one asked for, counted from 1.
         mode: usize,

@@ -1,6 +1,6 @@
 //! Errors of signals.
 
-use crate::{Sampling, counted, told};
+use crate::{Sampling, message};
 
 /// A signal that cannot be made or used; every variant carries the offending numbers.
 ///
@@ -9,7 +9,7 @@ use crate::{Sampling, counted, told};
 #[non_exhaustive]
 pub enum SignalError {
     /// The time step is not a positive finite number of seconds.
-    #[error("time step must be positive and finite, got {dt} s", dt = told(*dt))]
+    #[error("time step must be positive and finite, got {dt} s", dt = message::number(*dt))]
     TimeStep {
         /// The step given, in seconds.
         dt: f64,
@@ -18,7 +18,7 @@ pub enum SignalError {
     #[error("a record needs at least one sample")]
     Empty,
     /// The data do not have as many samples as the sampling says.
-    #[error("channel {} has {} where the sampling has {expected}", channel + 1, counted(*got, "sample"))]
+    #[error("channel {} has {} where the sampling has {expected}", channel + 1, message::count(*got, "sample"))]
     Length {
         /// Channel, counted from 0.
         channel: usize,
@@ -31,7 +31,7 @@ pub enum SignalError {
     #[error(
         "sample {} of channel {} is {value}, not a finite number",
         sample + 1, channel + 1,
-        value = told(*value)
+        value = message::number(*value)
     )]
     NotFinite {
         /// Sample, counted from 0.
@@ -42,7 +42,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A record does not fit in memory.
-    #[error("{} of {} do not fit in memory", counted(*channels, "channel"), counted(*samples, "sample"))]
+    #[error("{} of {} do not fit in memory", message::count(*channels, "channel"), message::count(*samples, "sample"))]
     Memory {
         /// Samples of a channel.
         samples: usize,
@@ -58,7 +58,7 @@ pub enum SignalError {
         channels: usize,
     },
     /// The lines of a spectrum do not belong to its sampling.
-    #[error("{} where the sampling has {expected}", counted(*got, "line"))]
+    #[error("{} where the sampling has {expected}", message::count(*got, "line"))]
     SpectrumLength {
         /// Lines given.
         got: usize,
@@ -85,8 +85,8 @@ pub enum SignalError {
     },
     /// Two records that must share a time axis do not.
     #[error(
-        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", counted(*left_len, "sample"),
-        left_dt = told(*left_dt), right_dt = told(*right_dt)
+        "time axes differ: {} at {left_dt} s against {right_len} at {right_dt} s", message::count(*left_len, "sample"),
+        left_dt = message::number(*left_dt), right_dt = message::number(*right_dt)
     )]
     SamplingMismatch {
         /// Number of samples of the first record.
@@ -118,7 +118,7 @@ pub enum SignalError {
         line: usize,
     },
     /// A list that must have one entry per line has another length.
-    #[error("{} but {got} {what}", counted(*lines, "line"))]
+    #[error("{} but {got} {what}", message::count(*lines, "line"))]
     PerLine {
         /// Name of the entries.
         what: &'static str,
@@ -136,7 +136,7 @@ pub enum SignalError {
         len: usize,
     },
     /// A quantity that must be finite and not negative is not.
-    #[error("{what} must be finite and not negative, got {value}", value = told(*value))]
+    #[error("{what} must be finite and not negative, got {value}", value = message::number(*value))]
     Negative {
         /// The quantity.
         what: &'static str,
@@ -144,7 +144,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite is not.
-    #[error("{what} must be finite, got {value}", value = told(*value))]
+    #[error("{what} must be finite, got {value}", value = message::number(*value))]
     Infinite {
         /// The quantity.
         what: &'static str,
@@ -152,7 +152,7 @@ pub enum SignalError {
         value: f64,
     },
     /// A quantity that must be finite and greater than zero is not.
-    #[error("{what} must be finite and positive, got {value}", value = told(*value))]
+    #[error("{what} must be finite and positive, got {value}", value = message::number(*value))]
     NotPositive {
         /// The quantity.
         what: &'static str,
@@ -162,7 +162,7 @@ pub enum SignalError {
     /// A frequency at or above half the sampling rate cannot be sampled.
     #[error(
         "{frequency_hz} Hz is not below half the sampling rate, {nyquist_hz} Hz",
-        frequency_hz = told(*frequency_hz), nyquist_hz = told(*nyquist_hz)
+        frequency_hz = message::number(*frequency_hz), nyquist_hz = message::number(*nyquist_hz)
     )]
     AboveNyquist {
         /// The frequency, in Hz.
@@ -174,7 +174,7 @@ pub enum SignalError {
     #[error(
         "the band from {low_hz} Hz to {high_hz} Hz is empty: its lower end must be at least 0 and below \
          its upper end",
-        low_hz = told(*low_hz), high_hz = told(*high_hz)
+        low_hz = message::number(*low_hz), high_hz = message::number(*high_hz)
     )]
     Band {
         /// Lower end, in Hz.
@@ -185,7 +185,7 @@ pub enum SignalError {
     /// No spectral line lies in the band.
     #[error(
         "no spectral line lies between {low_hz} Hz and {high_hz} Hz: the lines are {spacing_hz} Hz apart",
-        low_hz = told(*low_hz), high_hz = told(*high_hz), spacing_hz = told(*spacing_hz)
+        low_hz = message::number(*low_hz), high_hz = message::number(*high_hz), spacing_hz = message::number(*spacing_hz)
     )]
     EmptyBand {
         /// Lower end, in Hz.
@@ -198,7 +198,7 @@ pub enum SignalError {
     /// A quantity lies outside the range it may have.
     #[error(
         "{what} must be between {low} and {high}, got {value}",
-        value = told(*value), low = told(*low), high = told(*high)
+        value = message::number(*value), low = message::number(*low), high = message::number(*high)
     )]
     Range {
         /// The quantity.

@@ -64,8 +64,10 @@ impl IdentifyBearing {
             ("viscosity", size.viscosity),
         ] {
             if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
-                let why =
-                    format!("a positive number is needed, not {}", mechid_signal::told(value));
+                let why = format!(
+                    "a positive number is needed, not {}",
+                    mechid_signal::message::number(value)
+                );
                 return Err(AnalysisError::Setting { setting, why });
             }
         }

@@ -139,7 +139,7 @@ impl Segmentation {
         if !(0.0..100.0).contains(&self.overlap_percent) {
             let why = format!(
                 "an overlap lies from 0 to below 100 %, got {}",
-                mechid_signal::told(self.overlap_percent)
+                mechid_signal::message::number(self.overlap_percent)
             );
             return Err(AnalysisError::Setting { setting: "segment_overlap", why });
         }

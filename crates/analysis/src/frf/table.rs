@@ -6,7 +6,7 @@ use std::fmt::{self, Write as _};
 
 use mechid_estimate::{Segments, Window};
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
-use mechid_signal::counted;
+use mechid_signal::message;
 use nalgebra::Complex;
 use serde::Serialize;
 
@@ -127,9 +127,9 @@ impl FrfTable {
     fn text(&self) -> String {
         let s = &self.segments;
         let cut = match s.window {
-            None => format!("periods of {}", counted(s.samples, "sample")),
+            None => format!("periods of {}", message::count(s.samples, "sample")),
             Some(window) => {
-                let samples = counted(s.samples, "sample");
+                let samples = message::count(s.samples, "sample");
                 format!("segments of {samples} every {} under a {window} window", s.hop)
             }
         };
@@ -178,8 +178,8 @@ impl FrfTable {
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
         if !points.is_empty() && points.len() != dofs {
-            let given = counted(points.len(), "point");
-            let why = format!("{given} for {}", counted(dofs, "degree of freedom"));
+            let given = message::count(points.len(), "point");
+            let why = format!("{given} for {}", message::count(dofs, "degree of freedom"));
             return Err(AnalysisError::Setting { setting: "points", why });
         }
         let point = |dof: usize| points.get(dof - 1).cloned().unwrap_or_else(|| format!("{dof}+X"));

@@ -7,7 +7,7 @@ use mechid_estimate::checks::{
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
 use mechid_model::Discretisation;
-use mechid_signal::{Extent, Interpolation, Record, counted};
+use mechid_signal::{Extent, Interpolation, Record, message};
 
 use super::CONSPICUOUS;
 use super::derivatives::Prepared;
@@ -269,7 +269,7 @@ impl SampleFit {
             let open = way != Interpolation::BandLimited && self.extent() == Extent::WholePeriod;
             remarks.push(format!(
                 "{} in every interval; the standard errors count measured samples only{}",
-                counted(factor, "step"),
+                message::count(factor, "step"),
                 if open { ", and the interpolation takes the window as open" } else { "" }
             ));
         }

@@ -8,7 +8,7 @@ use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::CONSPICUOUS;
@@ -305,7 +305,7 @@ impl IdentificationSummary {
             let rate = compact(window.sample_rate_hz, 8);
             let periods = match (self.repeats, window.periods) {
                 (false, _) => String::new(),
-                (_, n) => format!(", {} of {}", counted(n, "period"), window.period_samples),
+                (_, n) => format!(", {} of {}", message::count(n, "period"), window.period_samples),
             };
             let (first, last) = (window.first_sample, window.last_sample);
             text += &format!("{file}: samples {first} to {last}{periods}, {rate} Hz\n");
@@ -352,8 +352,8 @@ pub(super) fn verdict(checks: &[CheckRow]) -> String {
     let all = checks.len();
     let warnings: Vec<&CheckRow> = checks.iter().filter(|check| check.is_conspicuous()).collect();
     let mut text = match warnings.len() {
-        0 => format!("{all} of {} passed\n", counted(all, "check")),
-        some => format!("{some} of {}: warning\n", counted(all, "check")),
+        0 => format!("{all} of {} passed\n", message::count(all, "check")),
+        some => format!("{some} of {}: warning\n", message::count(all, "check")),
     };
     for check in warnings {
         text += &format!("  {}: {}\n", check.subject, check.sentence());

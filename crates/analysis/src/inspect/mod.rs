@@ -8,7 +8,7 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis};
-use mechid_signal::{self as signal, counted};
+use mechid_signal::{self as signal, message};
 use serde::{Deserialize, Serialize, Serializer};
 
 pub use self::measured::Drawn;
@@ -194,7 +194,7 @@ impl Inspection<'_> {
                 Ok(tally) => left_out.push(format!(
                     "column {} has {}, most have {}",
                     table.label(column),
-                    counted(tally.samples, "sample"),
+                    message::count(tally.samples, "sample"),
                     inventory.samples
                 )),
                 Err(reason) if !self.columns.is_empty() => return Err(reason.into()),

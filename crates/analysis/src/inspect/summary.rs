@@ -3,7 +3,7 @@
 use std::fmt;
 
 use mechid_io::{Table, escaped};
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::InspectSettings;
@@ -112,8 +112,8 @@ impl RecordSummary {
             "{}: {}, {}, {}",
             self.file,
             self.format,
-            counted(self.columns, "column"),
-            counted(self.samples, "sample")
+            message::count(self.columns, "column"),
+            message::count(self.samples, "sample")
         );
         if let Some(WindowRow { first_sample, last_sample }) = &self.window {
             text += &format!("; shown: samples {first_sample} to {last_sample}");

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Write as _};
 
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::method::told;
@@ -86,8 +86,11 @@ impl ForceSummary {
             Some(1) => "one period".into(),
             Some(n) => format!("mean of {n} periods"),
         };
-        let mut text =
-            format!("{}: {} at {rate} Hz, {extent}\n", self.file, counted(self.samples, "sample"));
+        let mut text = format!(
+            "{}: {} at {rate} Hz, {extent}\n",
+            self.file,
+            message::count(self.samples, "sample")
+        );
         let _ = writeln!(text, "machine: {}", self.machine);
         let _ = writeln!(text, "method: {}\n  because: {}", self.method, self.why);
         for Chosen { name, value, unit } in &self.chosen {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use mechid_estimate::{Estimate, SweepPoint};
 use mechid_model::SecondOrderSystem;
-use mechid_signal::counted;
+use mechid_signal::message;
 use serde::Serialize;
 
 use super::SweepSettings;
@@ -143,7 +143,7 @@ impl SweepSummary {
             "{}: {}, {} in a period",
             self.file,
             self.estimator,
-            counted(self.samples_per_period, "sample")
+            message::count(self.samples_per_period, "sample")
         );
         if let Some(hz) = self.natural_frequency_hz {
             text += &format!(", natural frequency {} Hz", significant(hz, 6));

@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use mechid_signal::{counted, told};
+use mechid_signal::message;
 
 use super::finding::{
     Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
@@ -20,9 +20,9 @@ impl Display for Finding {
                 write!(
                     f,
                     "{} with force: {} for {} in each equation of motion",
-                    counted(*lines, "line"),
-                    counted(2 * lines, "equation"),
-                    counted(*unknowns, "unknown")
+                    message::count(*lines, "line"),
+                    message::count(2 * lines, "equation"),
+                    message::count(*unknowns, "unknown")
                 )?;
                 f.write_str(match self.verdict() {
                     Verdict::Good => "",
@@ -91,12 +91,12 @@ impl Display for Finding {
                 "{channel} is clipped at {}: {} at that level, three or more in a row; choose a wider \
                  range of the amplifier or converter and measure again",
                 six_digits(*level),
-                counted(*samples, "sample")
+                message::count(*samples, "sample")
             ),
             Finding::ConstantChannel { channel, level, samples } => write!(
                 f,
                 "{channel} is {} in all {samples} samples: no response there, or a dead channel; check the sensor",
-                told(*level)
+                message::number(*level)
             ),
             Finding::Quantisation { channel, levels, step } => write!(
                 f,
@@ -198,7 +198,7 @@ fn conditioning(
 ) -> fmt::Result {
     if undetermined > 0 {
         let does = if undetermined == 1 { "does" } else { "do" };
-        let combinations = counted(undetermined, "combination");
+        let combinations = message::count(undetermined, "combination");
         return write!(
             f,
             "{combinations} of displacements, velocities and forces {does} not vary in the data: some \

@@ -8,7 +8,7 @@ mod scheme;
 use std::path::Path;
 
 use mechid_model::{InitialState, SecondOrderSystem};
-use mechid_signal::{Record, Sampling, counted};
+use mechid_signal::{Record, Sampling, message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
 
@@ -167,7 +167,8 @@ impl Experiment {
     pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
         let dof = self.system()?.dof();
         let wrong = |got| {
-            let (got, dof) = (counted(got, "entry"), counted(dof, "degree of freedom"));
+            let (got, dof) =
+                (message::count(got, "entry"), message::count(dof, "degree of freedom"));
             format!("{what} has {got}, the system has {dof}")
         };
         given.values(dof).map_err(|got| self.wrong(wrong(got)))

@@ -1,6 +1,6 @@
 //! The variables of a MATLAB file.
 
-use mechid_signal::told;
+use mechid_signal::message;
 
 use super::element::{Element, Elements, Endian, MATRIX};
 use crate::contents::Fault;
@@ -86,7 +86,7 @@ fn lengths(size: &Element<'_>, endian: Endian) -> Result<Vec<usize>, Fault> {
         // Every u32 is a number exactly; no file has room for a longer dimension.
         let whole = (0.0..=f64::from(u32::MAX)).contains(value) && value.fract() == 0.0;
         whole.then_some(*value as usize).ok_or_else(|| {
-            Fault::new(size.at, format!("a dimension of {} is no length", told(*value)))
+            Fault::new(size.at, format!("a dimension of {} is no length", message::number(*value)))
         })
     };
     lengths.iter().map(length).collect()

@@ -14,7 +14,7 @@ mod sampling;
 use std::io::Read as _;
 
 use flate2::read::ZlibDecoder;
-use mechid_signal::counted;
+use mechid_signal::message;
 
 use self::array::{Array, Value};
 use self::element::{COMPRESSED, Elements, Endian, MATRIX};
@@ -117,7 +117,7 @@ fn add(
             }
             format!(
                 "a matrix of {} and {columns} columns (transpose it: a channel is a column)",
-                counted(rows, "row")
+                message::count(rows, "row")
             )
         }
         Value::Other(what) => what.into(),

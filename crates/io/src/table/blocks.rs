@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, Read};
 
-use mechid_signal::counted;
+use mechid_signal::message;
 use memchr::{memchr, memchr_iter};
 
 use super::dialect::is_sample;
@@ -38,7 +38,8 @@ pub(super) struct TextEnd {
 impl TextEnd {
     /// Remark on the end of a text.
     pub fn remark(self) -> Option<String> {
-        let bytes = counted(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
+        let bytes =
+            message::count(usize::try_from(self.padding).ok().filter(|n| *n > 0)?, "zero byte");
         Some(format!("left out: {bytes} behind the last line (a preallocated file not filled?)"))
     }
 }

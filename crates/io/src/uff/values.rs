@@ -1,6 +1,6 @@
 //! The values of a function, printed or binary.
 
-use mechid_signal::counted;
+use mechid_signal::message;
 
 use super::header::Header;
 use super::lines::{Line, Lines, is_mark, number};
@@ -19,7 +19,7 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
         if is_mark(line.text) {
             let what = format!(
                 "a function of {} ends after {}",
-                counted(expected, "number"),
+                message::count(expected, "number"),
                 values.len()
             );
             return Err(line.fault(what));
@@ -27,7 +27,7 @@ pub(crate) fn printed(header: &Header, lines: &mut Lines<'_>) -> Result<Vec<f64>
         row(header, &line, &mut values)?;
     }
     if values.len() > expected {
-        let what = format!("a function of {} has more", counted(expected, "number"));
+        let what = format!("a function of {} has more", message::count(expected, "number"));
         return Err(Fault::new(lines.at().saturating_sub(1), what));
     }
     Ok(values)

@@ -3,7 +3,7 @@
 use mechid_analysis::Inspected;
 use mechid_analysis::inspect::Drawn;
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
-use mechid_signal::counted;
+use mechid_signal::message;
 
 use crate::ReportError;
 
@@ -74,9 +74,10 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     }
     let (hz, amplitude): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
     let (title, curve) = match period {
-        Some(period) => {
-            (format!("period of {}", counted(period, "sample")), Curve::stems("", &hz, &amplitude))
-        }
+        Some(period) => (
+            format!("period of {}", message::count(period, "sample")),
+            Curve::stems("", &hz, &amplitude),
+        ),
         None => ("Hann window, no period".into(), Curve::line("", &hz, &amplitude).width(1.0)),
     };
     panel(Axis::log10("Amplitude", unit(column)).range(low, high), title, curve)

@@ -10,7 +10,7 @@ use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Residual, sizes};
 use mechid_analysis::review::{RecordReview, judgement};
 use mechid_analysis::text::{compact, significant};
-use mechid_signal::counted;
+use mechid_signal::message;
 
 use super::tables::Table;
 use super::{Captions as _, Contents, checks, figure, figures};
@@ -88,10 +88,11 @@ fn facts(contents: &Contents<'_>, part: &RecordReview<'_>) -> Vec<Vec<String>> {
     if let Some((lines, _)) = &contents.review.found.fitted().frequency {
         let len = lines.sampling().len();
         facts.push(match part.lines {
-            Some(_) => {
-                pair("Periods", format!("{} of {}", measured.periods, counted(len, "sample")))
-            }
-            None => pair("Segments", format!("of {}", counted(len, "sample"))),
+            Some(_) => pair(
+                "Periods",
+                format!("{} of {}", measured.periods, message::count(len, "sample")),
+            ),
+            None => pair("Segments", format!("of {}", message::count(len, "sample"))),
         });
         let spacing = lines.sampling().line_spacing_hz();
         facts.push(pair("Line spacing", format!("{} Hz", compact(spacing, 6))));

@@ -1,6 +1,6 @@
 //! The measures of an excitation, for people and for programs.
 
-use mechid::signal::{Sampling, SignalError, Spectrum, counted, measures};
+use mechid::signal::{Sampling, SignalError, Spectrum, measures, message};
 use serde::Serialize;
 
 use super::design::Channel;
@@ -58,7 +58,7 @@ impl Report {
 
     pub fn text(&self) -> String {
         let Self { samples, channels, .. } = self;
-        let samples = counted(*samples, "sample");
+        let samples = message::count(*samples, "sample");
         let digits = |v: f64| significant(v, 6);
         let text = format!(
             "{samples} at {} Hz, a period of {} s, lines every {} Hz\n\n",

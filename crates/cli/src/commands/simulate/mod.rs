@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::Simulation;
 use mechid::io::{CsvFile, Experiment, ResponseKind, SystemMatrices};
-use mechid::signal::{Record, counted};
+use mechid::signal::{Record, message};
 use serde::Serialize;
 
 use crate::args::{PlotArgs, ReportArgs};
@@ -217,9 +217,9 @@ impl Report {
         let mut text = format!(
             "{}: {} at {} Hz, {}, {kind}\nscheme: {}\n",
             self.record,
-            counted(self.samples, "sample"),
+            message::count(self.samples, "sample"),
             compact(self.sample_rate_hz, 8),
-            counted(self.periods, "period"),
+            message::count(self.periods, "period"),
             self.scheme,
         );
         for Convention { what, choice } in &self.conventions {
