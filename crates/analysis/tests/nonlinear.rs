@@ -7,6 +7,7 @@ use mechid_analysis::{
     AnalysisError, Channels, Identify, Machine, Measurement, ModalSummary, Predict, Reconstruct,
     ResponseQuantity, identify, predict, reconstruct,
 };
+use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::{ShapeConstants, Weighting};
 use mechid_model::{NonlinearSystem, Response, Sdof, UncertainNonlinearSystem};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
@@ -202,8 +203,10 @@ fn output_error_takes_noise_on_the_response() {
     let (force, x) = steady_state();
     let x = noise::add_white(&x, noise::NoiseLevel::FractionOfRms(0.01), 3).unwrap();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    let likely =
-        Identify { fit: Fit::Spectra { method: Some(Method::MaximumLikelihood) }, ..how() };
+    let likely = Identify {
+        fit: Fit::Spectra { method: Some(Method::MaximumLikelihood), noise: Pooling::default() },
+        ..how()
+    };
     let found = identify(&[test], &likely).unwrap();
     let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().found;
     assert!((cubic.value - 4e6).abs() < 4.0 * cubic.standard_error, "{cubic:?}");
@@ -232,9 +235,10 @@ fn a_force_alone_is_enough_for_a_prediction() {
 fn what_nonlinear_terms_cannot_be_fitted_to_is_refused() {
     let (force, x) = steady_state();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
-    for fit in
-        [Fit::Samples(SampleFit::default()), Fit::Spectra { method: Some(Method::Instrumental) }]
-    {
+    for fit in [
+        Fit::Samples(SampleFit::default()),
+        Fit::Spectra { method: Some(Method::Instrumental), noise: Pooling::default() },
+    ] {
         let error = identify(std::slice::from_ref(&test), &Identify { fit, ..how() }).unwrap_err();
         assert!(matches!(error, AnalysisError::Setting { setting: "nonlinear", .. }), "{error}");
     }

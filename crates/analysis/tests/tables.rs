@@ -3,12 +3,13 @@
 
 use std::f64::consts::TAU;
 
-use mechid_analysis::identify::{Band, Method};
+use mechid_analysis::identify::{Band, Fit, Method};
 use mechid_analysis::{
     AnalysisError, FrfSettings, Identify, IdentifyResponses, Measurement, ResponseQuantity, frf,
     identify, identify_responses,
 };
 use mechid_estimate::Estimate;
+use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
@@ -80,9 +81,10 @@ fn a_record_and_its_table_agree() {
     let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.05), 7).unwrap();
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
-    let of_record =
-        identify(std::slice::from_ref(&test), &Identify::spectra(Method::MaximumLikelihood))
-            .unwrap();
+    // Line by line, as the coherence weighs.
+    let fit = Fit::Spectra { method: Some(Method::MaximumLikelihood), noise: Pooling::PerLine };
+    let how = Identify { fit, ..Identify::default() };
+    let of_record = identify(std::slice::from_ref(&test), &how).unwrap();
     let table = frf(&test, &FrfSettings::default()).unwrap();
 
     let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();

@@ -1,26 +1,131 @@
 //! The covariance of measurement noise, frequency by frequency.
 
+use std::fmt;
+use std::str::FromStr;
+
 use mechid_model::ResponseQuantity;
-use mechid_signal::Sampling;
+use mechid_signal::{Sampling, message};
 use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
+use crate::pooling::{Pooled, pooled};
 
-/// Lines over which a noise covariance is averaged.
+/// Choice of the lines that share a covariance of the noise.
 ///
 /// A covariance of few periods is itself uncertain, and an estimator weighted with it
-/// loses by that. Noise spectra are smooth, so neighbouring lines may share theirs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// loses by that. Noise spectra are smooth, so lines may share theirs. As text: `auto`, `white`, `smooth`,
+/// `neighbours:N` or `per-line`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+#[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
 pub enum Pooling {
-    /// Every line has its own covariance: from about 8 periods on.
-    PerLine,
+    /// The one of the others that predicts the samples best.
+    #[default]
+    Automatic,
+    /// One covariance for all lines: white noise in the quantity measured.
+    AllLines,
+    /// A spectrum of each channel whose logarithm is a polynomial in that of the frequency, with levels of
+    /// their own in some bands; correlations of channels are the same on all lines. Order and bands are
+    /// chosen from the samples, so that white noise is found to be white.
+    Smooth,
     /// Every line takes the mean of the covariances of this many chosen lines to either side; at the
     /// ends of the band, of as many lines altogether.
     Neighbours(usize),
-    /// One covariance for all lines: white noise in the quantity measured.
-    AllLines,
+    /// Every line has its own covariance: of many periods.
+    PerLine,
+}
+
+impl fmt::Display for Pooling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Automatic => f.write_str("auto"),
+            Self::AllLines => f.write_str("white"),
+            Self::Smooth => f.write_str("smooth"),
+            Self::Neighbours(lines) => write!(f, "neighbours:{lines}"),
+            Self::PerLine => f.write_str("per-line"),
+        }
+    }
+}
+
+impl From<Pooling> for String {
+    fn from(pooling: Pooling) -> Self {
+        pooling.to_string()
+    }
+}
+
+impl FromStr for Pooling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let neighbours = || text.strip_prefix("neighbours:")?.parse().ok().map(Self::Neighbours);
+        match text {
+            "auto" => Ok(Self::Automatic),
+            "white" => Ok(Self::AllLines),
+            "smooth" => Ok(Self::Smooth),
+            "per-line" => Ok(Self::PerLine),
+            _ => neighbours().ok_or_else(|| {
+                "write auto, white, smooth, neighbours:N (lines to either side) or per-line".into()
+            }),
+        }
+    }
+}
+
+impl TryFrom<String> for Pooling {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// Spectrum that was made of the samples of a noise.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(tag = "kind", rename_all = "snake_case"))]
+pub enum NoiseModel {
+    /// One level for all lines.
+    White,
+    /// A smooth spectrum.
+    Smooth {
+        /// Order of the polynomial of log power in log frequency.
+        order: usize,
+        /// Bands with levels of their own, such as those of a disturbance: lowest and highest line, in Hz.
+        bands_hz: Vec<[f64; 2]>,
+    },
+    /// Means over neighbouring lines.
+    Neighbours {
+        /// Number of lines to either side.
+        half_width: usize,
+    },
+    /// A level at every line.
+    PerLine,
+}
+
+impl fmt::Display for NoiseModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::White => f.write_str("white"),
+            Self::Smooth { order, bands_hz } => {
+                match order {
+                    0 => f.write_str("white")?,
+                    order => write!(f, "smooth (order {order})")?,
+                }
+                const SHOWN: usize = 3;
+                for (at, [low, high]) in bands_hz.iter().take(SHOWN).enumerate() {
+                    let before = if at == 0 { ", other levels at" } else { "," };
+                    write!(f, "{before} {low:.4} to {high:.4} Hz")?;
+                }
+                match bands_hz.len().saturating_sub(SHOWN) {
+                    0 => Ok(()),
+                    more => write!(f, " and in {}", message::count(more, "more band")),
+                }
+            }
+            Self::Neighbours { half_width } => {
+                write!(f, "averaged over {}", message::count(2 * half_width + 1, "line"))
+            }
+            Self::PerLine => f.write_str("line by line"),
+        }
+    }
 }
 
 /// Covariance of the measured displacement and force amplitudes, one matrix per row of data.
@@ -34,6 +139,18 @@ pub struct NoiseSpectrum {
     covariance: Vec<DMatrix<Complex<f64>>>,
     degrees_of_freedom: f64,
     total_degrees_of_freedom: f64,
+    models: Vec<NoiseModel>,
+    /// What each of the models was fitted with, if it is a smooth spectrum or white.
+    parts: Vec<Option<SmoothPart>>,
+}
+
+/// What the log powers of an experiment were fitted with.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct SmoothPart {
+    /// Orthonormal columns, rows × terms.
+    pub(crate) basis: DMatrix<f64>,
+    /// Complex deviations that each sample covariance was made of.
+    pub(crate) nu: f64,
 }
 
 impl NoiseSpectrum {
@@ -68,7 +185,14 @@ impl NoiseSpectrum {
             }
         }
         let known = f64::INFINITY;
-        Ok(Self { omega, covariance, degrees_of_freedom: known, total_degrees_of_freedom: known })
+        Ok(Self {
+            omega,
+            covariance,
+            degrees_of_freedom: known,
+            total_degrees_of_freedom: known,
+            models: Vec::new(),
+            parts: Vec::new(),
+        })
     }
 
     /// White noise of known standard deviation on the samples of every motion channel (in
@@ -109,12 +233,17 @@ impl NoiseSpectrum {
         degrees_of_freedom: usize,
         pooling: Pooling,
     ) -> Result<Self, EstimateError> {
-        let (mut covariance, pooled) = pool(covariance, pooling);
+        let Pooled { mut covariance, model, freedom, basis } =
+            pooled(omega, covariance, degrees_of_freedom as f64, pooling);
         to_displacement(omega, &mut covariance, measured);
-        let total_degrees_of_freedom = (degrees_of_freedom * omega.len()) as f64;
-        let degrees_of_freedom = (degrees_of_freedom * pooled) as f64;
         let known = Self::new(omega.to_vec(), covariance)?;
-        Ok(Self { degrees_of_freedom, total_degrees_of_freedom, ..known })
+        Ok(Self {
+            degrees_of_freedom: freedom,
+            total_degrees_of_freedom: (degrees_of_freedom * omega.len()) as f64,
+            models: vec![model],
+            parts: vec![basis.map(|basis| SmoothPart { basis, nu: degrees_of_freedom as f64 })],
+            ..known
+        })
     }
 
     /// The same noise with the force taken as known exactly.
@@ -162,6 +291,18 @@ impl NoiseSpectrum {
         self.degrees_of_freedom
     }
 
+    /// Spectra that were made of samples, one of each experiment; none of known noise.
+    pub fn models(&self) -> &[NoiseModel] {
+        &self.models
+    }
+
+    /// What the log powers were fitted with, experiment by experiment; `None` unless each of them is smooth or
+    /// white, and at least one is not white.
+    pub(crate) fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
+        let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
+        parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
+    }
+
     /// How many of the covariances are independent of one another; infinite or undefined for known
     /// noise.
     pub(crate) fn groups(&self) -> f64 {
@@ -196,37 +337,10 @@ impl NoiseSpectrum {
             degrees_of_freedom: self.degrees_of_freedom.min(other.degrees_of_freedom),
             total_degrees_of_freedom: self.total_degrees_of_freedom
                 + other.total_degrees_of_freedom,
+            models: [&self.models[..], &other.models].concat(),
+            parts: [&self.parts[..], &other.parts].concat(),
         }
     }
-}
-
-/// Mean covariances, and how many lines each of them is made of.
-fn pool(
-    covariance: Vec<DMatrix<Complex<f64>>>,
-    pooling: Pooling,
-) -> (Vec<DMatrix<Complex<f64>>>, usize) {
-    let len = covariance.len();
-    let half_width = match pooling {
-        Pooling::PerLine => return (covariance, 1),
-        Pooling::Neighbours(half_width) => half_width.min(len),
-        Pooling::AllLines => len,
-    };
-    // All of one width, so that one number of degrees of freedom holds for all.
-    let width = (2 * half_width + 1).min(len);
-    let window = |row: usize| {
-        let first = row.saturating_sub(half_width).min(len - width);
-        first..first + width
-    };
-    let mean = |range: std::ops::Range<usize>| {
-        let count = range.len() as f64;
-        let mut sum = covariance[range.start].clone();
-        covariance[range.start + 1..range.end].iter().for_each(|c| sum += c);
-        sum.unscale(count)
-    };
-    if width == len {
-        return (vec![mean(0..len); len], len);
-    }
-    ((0..len).map(|row| mean(window(row))).collect(), width)
 }
 
 /// Turns covariances of the quantity measured into covariances of displacement.

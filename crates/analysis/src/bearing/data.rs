@@ -173,8 +173,8 @@ impl BearingData {
         let mut remarks = held.unit_remarks.clone();
         if noise.is_none() {
             remarks.push(format!(
-                "{}: the periods show no noise ({count} of them); it was taken as white on the \
-                 displacement, of the level that the residual has",
+                "{}: the periods show no noise ({count} of them); it was taken from the residual, on the \
+                 displacement alone",
                 held.file
             ));
         }

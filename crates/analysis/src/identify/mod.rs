@@ -30,6 +30,7 @@ pub mod validation;
 
 use std::fmt;
 
+use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::SecondOrderSystem;
@@ -115,15 +116,21 @@ impl Identify {
     fn fitted(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
         let lines = LineRule { choice: &self.lines, without: &self.without };
         if let Some(how) = &self.nonlinear {
-            let Fit::Spectra { method } = &self.fit else {
+            let Fit::Spectra { method, noise } = &self.fit else {
                 let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
                            and `from_frf` out";
                 return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
             };
+            if *noise != Pooling::Automatic {
+                let why = "fits with nonlinear terms have weights of their own: leave it out";
+                return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
+            }
             return nonlinear::fit(records, unknowns, lines, *method, how);
         }
         match &self.fit {
-            Fit::Spectra { method } => spectra::fit(records, unknowns, lines, *method),
+            Fit::Spectra { method, noise } => {
+                spectra::fit(records, unknowns, lines, *method, *noise)
+            }
             Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
             Fit::Samples(how) => how.fit(records, unknowns),
         }

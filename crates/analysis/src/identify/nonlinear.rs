@@ -180,6 +180,7 @@ pub(super) fn fit(
         residuals: steady_residuals(records, &model)?,
         prediction: Prediction::Steady,
         misfit: None,
+        noise: Vec::new(),
         remarks,
         estimate: found.linear().clone(),
         nonlinear: Some(WithTerms { found, distortion: seen }),

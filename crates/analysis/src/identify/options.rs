@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use mechid_estimate::derivatives::SavitzkyGolay;
+use mechid_estimate::frequency_domain::Pooling;
 use mechid_model::Discretisation;
 use mechid_signal::{Extent, Interpolation};
 use serde::{Deserialize, Serialize};
@@ -51,6 +52,10 @@ pub enum Fit {
         /// least squares.
         #[serde(default)]
         method: Option<Method>,
+        /// Spectrum of the noise that weighs maximum likelihood and by which the residual is tested: from
+        /// the scatter of the periods or, of one period, from the residual.
+        #[serde(default)]
+        noise: Pooling,
     },
     /// Frequency responses, averaged over segments.
     Responses(ResponseFit),
@@ -60,7 +65,7 @@ pub enum Fit {
 
 impl Default for Fit {
     fn default() -> Self {
-        Fit::Spectra { method: None }
+        Fit::Spectra { method: None, noise: Pooling::Automatic }
     }
 }
 
@@ -217,7 +222,8 @@ impl fmt::Display for Derivatives {
 impl Identify {
     /// Fits spectral lines of whole periods.
     pub fn spectra(method: Method) -> Self {
-        Self { fit: Fit::Spectra { method: Some(method) }, ..Self::default() }
+        let fit = Fit::Spectra { method: Some(method), noise: Pooling::Automatic };
+        Self { fit, ..Self::default() }
     }
 
     /// Fits frequency responses averaged over segments.
@@ -309,6 +315,10 @@ mod tests {
         let all = [
             Identify::default(),
             Identify::spectra(Method::Instrumental).lines("odd".parse().unwrap()),
+            Identify {
+                fit: Fit::Spectra { method: None, noise: Pooling::Neighbours(3) },
+                ..Identify::default()
+            },
             Identify::responses(Estimator::Hv, Segmentation::default()),
             Identify { fit: Fit::Samples(samples), ..Identify::default() }
                 .mass("2.5,unknown".parse().unwrap()),

@@ -68,6 +68,7 @@ pub fn fit(
             },
         },
         misfit,
+        noise: Vec::new(),
         remarks: one_motion_of(&records[0].held),
         estimate: found,
         nonlinear: None,

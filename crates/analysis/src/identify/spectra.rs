@@ -7,8 +7,8 @@ use mechid_estimate::checks::{
     before_spectral_fit, delay_of_lines, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables,
-    output_error,
+    FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, equation_error,
+    instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
@@ -53,6 +53,8 @@ pub struct Fitted {
     pub prediction: Prediction,
     /// Residual power against that of the noise, where the noise is known.
     pub misfit: Option<Misfit>,
+    /// Noise spectra that were estimated: one of each record, or one from the residual.
+    pub noise: Vec<NoiseModel>,
     /// Remarks on how the fit was done.
     pub remarks: Vec<String>,
 }
@@ -109,6 +111,7 @@ pub(super) fn fit(
     unknowns: &Unknowns,
     lines: LineRule<'_>,
     method: Option<Method>,
+    noise: Pooling,
 ) -> Result<Fitted, AnalysisError> {
     let mut spectra = Vec::new();
     for recorded in records {
@@ -118,8 +121,8 @@ pub(super) fn fit(
         spectra.push((periods(recorded, &lines)?, lines));
     }
     let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, mut misfit, remark } =
-        found(&spectra, &data, unknowns, method)?;
+    let Found { estimator, estimate, mut misfit, noise: models, remark } =
+        found(&spectra, &data, unknowns, method, noise)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let (mut before, mut after, mut weighted) = (Vec::new(), Vec::new(), Vec::new());
@@ -128,7 +131,7 @@ pub(super) fn fit(
         let checks = steady_periods(&held.force, motion, held.period)?;
         // What differs between windows that are no periods is no noise.
         let repeats = !checks.iter().any(no_period);
-        let data = if repeats { with_noise(periods)? } else { periods.mean()? };
+        let data = if repeats { with_noise(periods, noise)? } else { periods.mean()? };
         misfit = misfit.filter(|_| repeats);
         before.push(checks);
         let band = fitted_band(&estimate, lines)?;
@@ -150,6 +153,7 @@ pub(super) fn fit(
         residuals: residuals.into_iter().map(Residual::Lines).collect(),
         prediction: Prediction::Steady,
         misfit,
+        noise: models,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
         estimate,
@@ -166,6 +170,7 @@ struct Found {
     estimator: &'static str,
     estimate: Estimate,
     misfit: Option<Misfit>,
+    noise: Vec<NoiseModel>,
     remark: Option<String>,
 }
 
@@ -176,20 +181,24 @@ fn found(
     data: &FrequencyData,
     unknowns: &Unknowns,
     method: Option<Method>,
+    noise: Pooling,
 ) -> Result<Found, AnalysisError> {
+    let with_noise = |periods: &RepeatedPeriods| with_noise(periods, noise);
     let least_squares = |remark| -> Result<Found, AnalysisError> {
         let estimator = "least squares on the equation of motion, in the frequency domain";
         let estimate = equation_error(data, unknowns)?;
-        Ok(Found { estimator, estimate, misfit: None, remark })
+        Ok(Found { estimator, estimate, misfit: None, noise: Vec::new(), remark })
     };
     let likelihood = |noisy: &FrequencyData| -> Result<Found, EstimateError> {
-        let (fit, noise) = (output_error(noisy, unknowns)?, "estimated from the periods");
+        let fit = output_error_pooling(noisy, unknowns, noise)?;
+        let source = "estimated from the periods";
         let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
         Ok(Found {
             estimator: "maximum likelihood, in the frequency domain",
             estimate: fit.estimate,
-            misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise }),
-            remark: of_pooling(fewest, noisy.noise().is_some()),
+            misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
+            remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
+            noise: fit.noise,
         })
     };
     match method {
@@ -201,6 +210,7 @@ fn found(
                 estimator: "instrumental variables, half of the periods against the other",
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
+                noise: Vec::new(),
                 remark: None,
             })
         }
@@ -251,36 +261,32 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
 }
 
 /// The mean of the periods, with their noise if they show more than rounding.
-fn with_noise(periods: &RepeatedPeriods) -> Result<FrequencyData, EstimateError> {
-    let Some(pooling) = pooling(periods.count()) else { return periods.mean() };
-    let noisy = periods.mean_with_noise(pooling)?;
-    if noisy.noise_above_rounding().is_some() { Ok(noisy) } else { periods.mean() }
-}
-
-/// Returns how the noise of `periods` periods is averaged over the lines; `None` for one period.
-fn pooling(periods: usize) -> Option<Pooling> {
-    match periods {
-        0 | 1 => None,
-        2..8 => Some(Pooling::AllLines),
-        _ => Some(Pooling::PerLine),
+fn with_noise(periods: &RepeatedPeriods, noise: Pooling) -> Result<FrequencyData, EstimateError> {
+    if periods.count() < 2 {
+        return periods.mean();
+    }
+    // Rounding has no spectrum that could be found.
+    match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
+        Some(_) => periods.mean_with_noise(noise),
+        None => periods.mean(),
     }
 }
 
-/// Returns the remark on weights from `periods` periods, whose noise shows or not.
-fn of_pooling(periods: usize, shows: bool) -> Option<String> {
-    match periods {
-        0 | 1 => Some(
-            "one period does not show its noise: it was taken as white on the motion, of the level \
-             the residual has"
-                .into(),
+/// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
+fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
+    let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
+    distinct.dedup();
+    let model = distinct.join("; ");
+    match (periods, shows) {
+        (0 | 1, _) => format!(
+            "one period does not show its noise: it was taken from the residual, on the motion alone; \
+             noise spectrum: {model}"
         ),
-        _ if !shows => Some(
-            "the periods differ by rounding only: the noise was taken as white on the motion, of the \
-             level the residual has"
-                .into(),
+        (_, false) => format!(
+            "the periods differ by rounding only: the noise was taken from the residual, on the motion \
+             alone; noise spectrum: {model}"
         ),
-        few @ 2..8 => Some(format!("{few} periods are few: one noise level for all lines")),
-        _ => None,
+        (periods, true) => format!("noise spectrum, from {periods} periods: {model}"),
     }
 }
 

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_estimate::checks::Subject;
+use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::Parameter;
@@ -163,6 +164,9 @@ pub struct FitRow {
     /// Power of the residual over the power that the noise explains, a ratio; `None` where the noise is not
     /// known.
     pub misfit_ratio: Option<f64>,
+    /// Noise spectra by which maximum likelihood was weighted where they were estimated: one of each record,
+    /// from its periods, or one from the residual.
+    pub noise: Vec<NoiseModel>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of real equations per degree of freedom.
@@ -201,6 +205,7 @@ impl IdentificationSummary {
                 },
                 unexplained_motion,
                 misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
+                noise: fitted.noise.clone(),
                 condition_number: estimate.condition(),
                 equations: fitted.equations,
                 unknowns: match &fitted.nonlinear {

@@ -6,7 +6,9 @@ use std::fmt;
 use mechid_estimate::checks::{
     Finding, adjust_p_values, after_response_fit, before_spectral_fit, coherence,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
+use mechid_estimate::frequency_domain::{
+    FrequencyData, NoiseModel, Pooling, equation_error, output_error_pooling,
+};
 use mechid_estimate::{Estimate, Frf, Unknowns};
 use mechid_io::{FrequencyResponses, ParameterCovariance, ResponseFunction, SystemMatrices};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
@@ -106,6 +108,7 @@ pub fn identify_responses(
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
             unexplained_motion: unexplained_motion(&data, &system)?,
             misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
+            noise: fit.noise.clone(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
             unknowns: estimate.parameters().len(),
@@ -255,6 +258,7 @@ struct Fit {
     name: &'static str,
     estimate: Estimate,
     misfit: Option<Misfit>,
+    noise: Vec<NoiseModel>,
 }
 
 impl Fit {
@@ -269,9 +273,10 @@ impl Fit {
         }
         if method == Some(Method::LeastSquares) {
             let name = "least squares on frequency responses, all alike";
-            return Ok(Self { name, estimate: equation_error(data, unknowns)?, misfit: None });
+            let estimate = equation_error(data, unknowns)?;
+            return Ok(Self { name, estimate, misfit: None, noise: Vec::new() });
         }
-        let fit = output_error(data, unknowns)?;
+        let fit = output_error_pooling(data, unknowns, Pooling::AllLines)?;
         let noise = measured[0].noise;
         let name = match noise {
             Noise::Stated => {
@@ -285,7 +290,7 @@ impl Fit {
             }
         };
         let misfit = noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise });
-        Ok(Self { name, estimate: fit.estimate, misfit })
+        Ok(Self { name, estimate: fit.estimate, misfit, noise: fit.noise })
     }
 }
 

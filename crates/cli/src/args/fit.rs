@@ -10,6 +10,7 @@ use mechid::analysis::identify::{
     SampleFit, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
+use mechid::estimate::frequency_domain::Pooling;
 use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
@@ -41,6 +42,10 @@ pub struct FitArgs {
     /// more show the noise or with --from-frf, otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodChoice>,
+    /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
+    /// N lines to either side), per-line, or auto, which chooses
+    #[arg(long, value_name = "NOISE")]
+    noise: Option<Pooling>,
     /// Assumption on the force between samples, in the time domain [default: the equation of motion
     /// at the samples if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_enum)]
@@ -353,7 +358,9 @@ impl FitArgs {
                 segments: self.segments.segmentation(),
                 method,
             }),
-            (Domain::Frequency, None) => Fit::Spectra { method },
+            (Domain::Frequency, None) => {
+                Fit::Spectra { method, noise: self.noise.unwrap_or_default() }
+            }
         };
         Identify {
             fit,
@@ -370,6 +377,7 @@ impl FitArgs {
         let of_frequency = [
             self.lines.given(),
             self.method.map(|_| "--method"),
+            self.noise.map(|_| "--noise"),
             self.from_frf.map(|_| "--from-frf"),
             self.nonlinear.nonlinear.as_ref().map(|_| "--nonlinear"),
         ];
@@ -380,7 +388,10 @@ impl FitArgs {
         };
         let alone =
             (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
-        match misplaced.map(|o| (o, why)).or(alone.map(|o| (o, "belongs to --from-frf"))) {
+        let of_periods = (self.from_frf.is_some() && self.noise.is_some()).then_some("--noise");
+        let alone = alone.map(|o| (o, "belongs to --from-frf"));
+        let of_periods = of_periods.map(|o| (o, "belongs to whole periods, without --from-frf"));
+        match misplaced.map(|o| (o, why)).or(alone).or(of_periods) {
             Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
             None => Ok(()),
         }

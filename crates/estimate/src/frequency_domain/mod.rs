@@ -33,7 +33,7 @@
 //!
 //! let lines = Lines::new(period, [1, 3, 5, 7, 9])?;
 //! let periods = RepeatedPeriods::new(&lines, &force, &x, ResponseQuantity::Displacement)?;
-//! let data = periods.mean_with_noise(Pooling::AllLines)?;
+//! let data = periods.mean_with_noise(Pooling::Automatic)?;
 //! let fit = output_error(&data, &Unknowns::unknown_mass(1)?)?;
 //! let stiffness = fit.estimate.parameter("k")?;
 //! assert!((stiffness.value - 5000.0).abs() < 4.0 * stiffness.standard_error);
@@ -52,8 +52,10 @@ mod multi_start;
 mod normal_equations;
 mod output_error;
 mod periods;
+mod residual_noise;
 mod search;
 mod starts;
+mod weight_uncertainty;
 mod whitened;
 
 pub use data::FrequencyData;
@@ -64,8 +66,8 @@ pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use lines::Lines;
 pub(crate) use lines::check_sampling;
 pub(crate) use output_error::in_units_of_noise;
-pub use output_error::{OutputErrorFit, output_error, output_error_near};
+pub use output_error::{OutputErrorFit, output_error, output_error_near, output_error_pooling};
 pub use periods::RepeatedPeriods;
 pub(crate) use whitened::Whitened;
 
-pub use crate::noise_spectrum::{NoiseSpectrum, Pooling};
+pub use crate::noise_spectrum::{NoiseModel, NoiseSpectrum, Pooling};

@@ -5,9 +5,11 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::misfit::Misfit;
 use super::multi_start::{Found, Plausible, search};
+use super::residual_noise::with_residual_noise;
 use super::search::SumOfSquares;
 use super::starts::Starts;
-use super::{FrequencyData, NoiseSpectrum, equation_error};
+use super::weight_uncertainty::WeightUncertainty;
+use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, equation_error};
 use crate::estimate::Findings;
 use crate::least_squares::size;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -35,16 +37,13 @@ pub struct OutputErrorFit {
     /// Number of searches that ended at this minimum; of two or more it is the global one as far as
     /// searches can tell.
     pub agreeing: usize,
+    /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
+    /// periods, or one from the residual; none where the noise is known beforehand.
+    pub noise: Vec<NoiseModel>,
 }
 
-/// Relative change of the noise levels below which another round of weighting is useless.
-const WEIGHT_TOLERANCE: f64 = 1e-3;
-/// A residual this small against the motion is rounding.
-const ROUNDING: f64 = 1e-12;
 /// Standard deviations by which the misfit ratio of a right model may differ from 1.
 const PLAUSIBLE: f64 = 6.0;
-/// Rounds of weighting; the second is nearly always the last but one.
-const MAX_ROUNDS: usize = 10;
 
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
 ///
@@ -56,8 +55,8 @@ const MAX_ROUNDS: usize = 10;
 ///
 /// - noise on displacement alone (force exact): the output-error estimator;
 /// - noise on force too: errors in variables, the true force being eliminated row by row;
-/// - no noise stated: white noise in the quantity measured, its level per channel found from
-///   the residual, the force exact.
+/// - no noise stated: the noise of each channel found from the residual, white in the quantity measured or
+///   of a smooth spectrum ([`Pooling::Automatic`]), the force exact.
 ///
 /// Weights from few repeated periods are themselves uncertain; the covariance allows for that.
 ///
@@ -74,7 +73,7 @@ pub fn output_error(
     data: &FrequencyData,
     unknowns: &Unknowns,
 ) -> Result<OutputErrorFit, EstimateError> {
-    output_error_near(data, unknowns, None)
+    search_near(data, unknowns, None, Pooling::Automatic)
 }
 
 /// [`output_error`] that also starts its search from a machine that is expected to be near, such as a
@@ -94,11 +93,36 @@ pub fn output_error_near(
     if let Some(system) = nominal {
         size("degrees of freedom of the machine expected", unknowns.dof(), system.dof())?;
     }
+    search_near(data, unknowns, nominal, Pooling::Automatic)
+}
+
+/// [`output_error`] with a given way to find the noise from the residual where the data state none.
+///
+/// # Errors
+/// As [`output_error`]; [`EstimateError::TooFewAverages`] for [`Pooling::PerLine`] where the data state no
+/// noise: the residual is one sample of each line.
+///
+/// # Source
+/// That of [`output_error`].
+pub fn output_error_pooling(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    residual: Pooling,
+) -> Result<OutputErrorFit, EstimateError> {
+    search_near(data, unknowns, None, residual)
+}
+
+fn search_near(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    nominal: Option<&SecondOrderSystem>,
+    residual: Pooling,
+) -> Result<OutputErrorFit, EstimateError> {
     // Refuses what no estimator can determine.
     equation_error(data, unknowns)?.check_determined()?;
     match data.noise() {
         Some(noise) => with_known_noise(data, unknowns, noise, nominal),
-        None => with_white_noise(data, unknowns, nominal),
+        None => with_residual_noise(data, unknowns, nominal, residual),
     }
 }
 
@@ -117,75 +141,37 @@ fn with_known_noise(
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
     let found = search(&mut misfit, &starts, plausible)?;
     let scale = Scale {
-        variance: inflation,
+        level: 1.0,
+        inflation,
+        weights: WeightUncertainty::of(data, unknowns, &found.minimum.theta, noise),
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: found.minimum.cost / expected,
         deviance: Some(found.minimum.cost / inflation),
+        noise: noise.models().to_vec(),
     };
     finish(data, unknowns, &mut misfit, &found, scale)
 }
 
-/// White noise of unknown level per channel, found in turn with the parameters.
-fn with_white_noise(
-    data: &FrequencyData,
-    unknowns: &Unknowns,
-    nominal: Option<&SecondOrderSystem>,
-) -> Result<OutputErrorFit, EstimateError> {
-    let measured = measured_size(data, data.displacement());
-    let mut levels = measured.clone();
-    let mut last: Option<Found> = None;
-    for _ in 0..MAX_ROUNDS {
-        let noise = white_noise(data, &levels)?;
-        let mut misfit = Misfit::new(data, unknowns, &noise)?;
-        let fit = match last {
-            None => {
-                let starts = Starts::new(data, unknowns, &noise).with_nominal(nominal);
-                let spare = spare(data, unknowns) as f64;
-                search(&mut misfit, &starts, plausible(None, spare, spare))?
-            }
-            Some(before) => before.followed(&mut misfit)?,
-        };
-        let found = measured_size(data, &misfit.errors());
-        // Only the ratios between the channels weigh; the common level is the residual's.
-        let common = found[0] / levels[0];
-        let settled =
-            found.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
-        // Rounding has no level that could settle.
-        let exact = found.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
-        if settled || exact || data.dof() == 1 {
-            let spare = spare(data, unknowns);
-            let scale = Scale {
-                variance: fit.minimum.cost / spare.max(1) as f64,
-                degrees_of_freedom: spare,
-                misfit_ratio: 1.0,
-                deviance: None,
-            };
-            return finish(data, unknowns, &mut misfit, &fit, scale);
-        }
-        last = Some(fit);
-        // A channel without any residual must not take all the weight.
-        let least = found.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
-        levels = found.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
-    }
-    let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
-    Err(EstimateError::NotConverged { searches, steps })
-}
-
 /// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
-fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
+pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
     let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
     Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
 }
 
 /// How the covariance follows from the Fisher information.
-struct Scale {
-    variance: f64,
-    degrees_of_freedom: usize,
-    misfit_ratio: f64,
-    deviance: Option<f64>,
+pub(super) struct Scale {
+    /// Power of the noise over that of the weights.
+    pub(super) level: f64,
+    /// By which the covariance is larger for weights that are uncertain, where nothing better is known.
+    pub(super) inflation: f64,
+    pub(super) weights: Option<WeightUncertainty>,
+    pub(super) degrees_of_freedom: usize,
+    pub(super) misfit_ratio: f64,
+    pub(super) deviance: Option<f64>,
+    pub(super) noise: Vec<NoiseModel>,
 }
 
-fn finish(
+pub(super) fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
     misfit: &mut Misfit<'_>,
@@ -194,6 +180,13 @@ fn finish(
 ) -> Result<OutputErrorFit, EstimateError> {
     let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
+    let (covariance, degrees_of_freedom) = match scale.weights {
+        None => (covariance * scale.inflation, scale.degrees_of_freedom),
+        Some(weights) => {
+            let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
+            (covariance + weights.excess, fewest.max(1.0) as usize)
+        }
+    };
     let errors = misfit.errors();
     let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
     let residual_nrmse = errors
@@ -204,8 +197,8 @@ fn finish(
     let estimate = Estimate::new(Findings {
         unknowns: unknowns.clone(),
         values: found.minimum.theta.iter().copied().collect(),
-        covariance: covariance * scale.variance,
-        degrees_of_freedom: scale.degrees_of_freedom,
+        covariance: covariance * scale.level,
+        degrees_of_freedom,
         residual_nrmse,
         condition,
         undetermined: Vec::new(),
@@ -217,38 +210,13 @@ fn finish(
         steps: found.minimum.steps,
         searches: found.searches,
         agreeing: found.agreeing,
+        noise: scale.noise,
     })
 }
 
 /// Real equations less unknowns.
-fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
+pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
     (2 * data.dof() * data.len()).saturating_sub(unknowns.free().len())
-}
-
-/// Root mean square of displacement amplitudes, per channel, in the quantity measured.
-fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Vec<f64> {
-    let power = |column: usize| {
-        let terms = amplitudes
-            .column(column)
-            .into_iter()
-            .zip(data.omega())
-            .map(|(x, w)| (x * data.measured().per_displacement(*w)).norm_sqr());
-        terms.sum::<f64>()
-    };
-    (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
-}
-
-/// White noise of the given levels of the quantity measured, the force exact.
-fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, EstimateError> {
-    let n = data.dof();
-    let covariance = data.omega().iter().map(|w| {
-        let scale = data.measured().per_displacement(*w).norm();
-        DMatrix::from_fn(2 * n, 2 * n, |i, j| {
-            let level = if i == j && i < n { levels[i] / scale } else { 0.0 };
-            Complex::from(level * level)
-        })
-    });
-    NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())
 }
 
 /// Covariance over the inverse of the Fisher information computed with sampled weights.
@@ -260,7 +228,7 @@ fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, Es
 ///
 /// # Errors
 /// [`EstimateError::TooFewAverages`] where it does not exist.
-fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
+pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
     if nu.is_infinite() {
         return Ok(1.0);
     }

@@ -177,25 +177,38 @@ impl RepeatedPeriods {
     }
 
     /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
-    /// pooled over lines.
+    /// pooled over lines; [`NoiseSpectrum::models`] tells what was chosen.
     ///
     /// A force that is the same in every period to rounding is taken as exact.
     ///
     /// # Errors
     /// [`EstimateError::TooFewAverages`] if there is only one period.
+    ///
+    /// # Source
+    /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (smooth spectra: variances with
+    /// a logarithmic link); Schwarz (1978), Annals of Statistics 6, 461–464 (order and bands); Stone
+    /// (1974), Journal of the Royal Statistical Society B 36, 111–147 (choice by prediction).
     pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, EstimateError> {
         self.at_least(2)?;
         let count = self.count;
         // Of the mean: the scatter of one period, divided by their number once more.
         let scale = Complex::from(1.0 / ((count - 1) * count) as f64);
-        let noise = NoiseSpectrum::of_measured(
+        let (n, repeats) = (self.dof, self.force_repeats());
+        let of_mean = |scatter: &DMatrix<Complex<f64>>| {
+            let mut covariance = scatter * scale;
+            if repeats {
+                covariance.rows_mut(n, n).fill(Complex::default());
+                covariance.columns_mut(n, n).fill(Complex::default());
+            }
+            covariance
+        };
+        NoiseSpectrum::of_measured(
             &self.lines.omega(),
-            self.scatter.iter().map(|scatter| scatter * scale).collect(),
+            self.scatter.iter().map(of_mean).collect(),
             self.measured,
             count - 1,
             pooling,
-        )?;
-        Ok(if self.force_repeats() { noise.with_exact_force() } else { noise })
+        )
     }
 
     /// Whether the force is the same in every period, to rounding: a computed one, not measured.

@@ -15,6 +15,7 @@ mod logarithm;
 mod modal;
 mod monte_carlo;
 mod noise;
+mod noise_colour;
 mod nonlinear_exact;
 mod nonlinear_silverbox;
 mod nonlinear_study;

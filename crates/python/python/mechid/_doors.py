@@ -73,6 +73,7 @@ Weight: TypeAlias = Literal["hann", "hamming", "blackman", "rectangular"]
 def identify(
     *sources: object,
     method: Method | None = None,
+    noise: str | None = None,
     lines: str | None = None,
     band_hz: tuple[float, float] | None = None,
     mass: float | Sequence[float | None] | None = None,
@@ -109,6 +110,10 @@ def identify(
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
         Estimator of the parameters from spectra; least squares unless `from_frf` is given, then
         maximum likelihood.
+    noise : str, optional
+        Noise spectrum by which maximum likelihood weighs the lines of whole periods: ``"white"``,
+        ``"smooth"``, ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or
+        ``"auto"``, which chooses.
     lines : str, optional
         Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
         ``"1:2:335"``; every line at which the force exceeds its noise, without.
@@ -173,7 +178,7 @@ def identify(
     if settings is None:
         band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
         told = _identify_settings(
-            method, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
+            method, noise, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
             extent, derivatives, refine, interpolation, lines, band, tuple(_mass(mass)), nonlinear,
             tuple(search), weighting,
         )
@@ -631,6 +636,7 @@ def multisine(
 @lru_cache(maxsize=64, typed=True)
 def _identify_settings(
     method: str | None,
+    noise: str | None,
     domain: str,
     from_frf: str | None,
     segment: int | None,
@@ -650,7 +656,7 @@ def _identify_settings(
 ) -> str:
     """Return the settings of `identify` as JSON; kept, for studies call with the same ones."""
     fit = _fit(
-        method, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
+        method, noise, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
         between_samples, extent, derivatives, refine, interpolation,
     )
     if domain == "time" and (lines is not None or band_hz is not None):
@@ -666,6 +672,7 @@ def _identify_settings(
 
 def _fit(
     method: str | None,
+    noise: str | None,
     domain: str,
     from_frf: str | None,
     segments: dict[str, Any],
@@ -683,7 +690,7 @@ def _fit(
         "interpolation": interpolation,
     }
     if domain == "time":
-        _refuse({"method": method, "from_frf": from_frf}, "belongs to domain='frequency'")
+        _refuse({"method": method, "noise": noise, "from_frf": from_frf}, "belongs to domain='frequency'")
         if (refine is None) != (interpolation is None):
             raise TypeError("`refine` and `interpolation` go together")
         return {
@@ -699,13 +706,14 @@ def _fit(
         raise ValueError(f"`domain` is frequency or time, got {domain!r}")
     _refuse(of_time, "belongs to domain='time'")
     if from_frf is not None:
+        _refuse({"noise": noise}, "belongs to whole periods, without `from_frf`")
         return {
             "domain": "responses",
             "estimator": from_frf,
             "segments": segments,
             "method": method,
         }
-    return {"domain": "spectra", "method": method}
+    return {"domain": "spectra", "method": method, "noise": noise or "auto"}
 
 
 def _refuse(options: dict[str, Any], why: str) -> None:

@@ -1,0 +1,217 @@
+//! Maximum likelihood where the noise is known from the residual alone.
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::misfit::Misfit;
+use super::multi_start::{Found, search};
+use super::output_error::{
+    OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare,
+};
+use super::search::SumOfSquares;
+use super::starts::Starts;
+use super::weight_uncertainty::WeightUncertainty;
+use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, Whitened};
+use crate::{EstimateError, Unknowns};
+
+/// Relative change of the noise levels below which another round of weighting is useless.
+const WEIGHT_TOLERANCE: f64 = 1e-3;
+/// A residual this small against the motion is rounding.
+const ROUNDING: f64 = 1e-12;
+/// Rounds of weighting by levels; the second is nearly always the last but one.
+const MAX_ROUNDS: usize = 10;
+/// Rounds of weighting by a spectrum: the first is efficient already, the others find its form.
+const COLOURED_ROUNDS: usize = 3;
+/// Maximum number of sensitivities, residuals times parameters, of which leverages are computed.
+const SENSITIVITIES: usize = 1 << 20;
+/// Least power of a residual, relative to that of the noise before.
+const LEAST: f64 = 1e-12;
+/// Least part of its noise that a residual is taken to keep.
+const KEPT: f64 = 0.1;
+
+/// A fit and the noise by which it was weighted.
+struct Weighted {
+    fit: Found,
+    noise: NoiseSpectrum,
+}
+
+/// Noise of unknown level of each channel, white or of the spectrum that the residual shows, found in turn
+/// with the parameters.
+pub(super) fn with_residual_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    nominal: Option<&SecondOrderSystem>,
+    pooling: Pooling,
+) -> Result<OutputErrorFit, EstimateError> {
+    if pooling == Pooling::PerLine {
+        return Err(EstimateError::TooFewAverages { got: 1, needed: 2 });
+    }
+    let (white, is_rounding) = with_white_noise(data, unknowns, nominal)?;
+    let coloured = match pooling {
+        Pooling::AllLines => None,
+        _ if is_rounding => None,
+        _ => with_coloured_noise(data, unknowns, &white, pooling)?,
+    };
+    let is_white = coloured.is_none();
+    let Weighted { fit, noise } = coloured.unwrap_or(white);
+    let mut misfit = Misfit::new(data, unknowns, &noise)?;
+    misfit.try_at(&fit.minimum.theta).ok_or(EstimateError::Overflow)?;
+    misfit.accept();
+    let free = spare(data, unknowns);
+    let level = fit.minimum.cost / free.max(1) as f64;
+    let inflation = match is_white {
+        true => 1.0,
+        false => sampled_weight_inflation(noise.degrees_of_freedom(), data.dof())?,
+    };
+    let scale = Scale {
+        level,
+        inflation,
+        weights: WeightUncertainty::of(data, unknowns, &fit.minimum.theta, &noise),
+        degrees_of_freedom: free,
+        misfit_ratio: 1.0,
+        deviance: None,
+        noise: if is_white { vec![NoiseModel::White] } else { noise.models().to_vec() },
+    };
+    finish(data, unknowns, &mut misfit, &fit, scale)
+}
+
+/// White noise of unknown level per channel, and whether the residual is only rounding.
+fn with_white_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    nominal: Option<&SecondOrderSystem>,
+) -> Result<(Weighted, bool), EstimateError> {
+    let measured = measured_size(data, data.displacement());
+    let mut levels = measured.clone();
+    let mut last: Option<Found> = None;
+    for _ in 0..MAX_ROUNDS {
+        let noise = white_noise(data, &levels)?;
+        let mut misfit = Misfit::new(data, unknowns, &noise)?;
+        let fit = match last {
+            None => {
+                let starts = Starts::new(data, unknowns, &noise).with_nominal(nominal);
+                let spare = spare(data, unknowns) as f64;
+                search(&mut misfit, &starts, plausible(None, spare, spare))?
+            }
+            Some(before) => before.followed(&mut misfit)?,
+        };
+        let found = measured_size(data, &misfit.errors());
+        // Only the ratios between the channels weigh; the common level is the residual's.
+        let common = found[0] / levels[0];
+        let settled =
+            found.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
+        // Rounding has no level that could settle.
+        let exact = found.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
+        if settled || exact || data.dof() == 1 {
+            drop(misfit);
+            return Ok((Weighted { fit, noise }, exact));
+        }
+        last = Some(fit);
+        // A channel without any residual must not take all the weight.
+        let least = found.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
+        levels = found.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
+    }
+    let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
+    Err(EstimateError::NotConverged { searches, steps })
+}
+
+/// Fits weighted by the spectrum of the residual of the one before; `None` where that is white.
+fn with_coloured_noise(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    white: &Weighted,
+    pooling: Pooling,
+) -> Result<Option<Weighted>, EstimateError> {
+    let mut last: Option<Weighted> = None;
+    for _ in 0..COLOURED_ROUNDS {
+        let before = last.as_ref().unwrap_or(white);
+        let noise = spectrum_of_residual(data, unknowns, before, pooling)?;
+        if noise.models() == [NoiseModel::White] {
+            return Ok(None);
+        }
+        let mut misfit = Misfit::new(data, unknowns, &noise)?;
+        match before.fit.clone().followed(&mut misfit) {
+            Ok(fit) => last = Some(Weighted { fit, noise }),
+            // The fit before stands, with its own weights.
+            Err(_) => break,
+        }
+    }
+    Ok(last)
+}
+
+/// The noise that a residual shows, of each channel by itself.
+fn spectrum_of_residual(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    before: &Weighted,
+    pooling: Pooling,
+) -> Result<NoiseSpectrum, EstimateError> {
+    let (n, theta) = (data.dof(), &before.fit.minimum.theta);
+    let mut misfit = Misfit::new(data, unknowns, &before.noise)?;
+    misfit.try_at(theta).ok_or(EstimateError::Overflow)?;
+    misfit.accept();
+    let (errors, leverage) = (misfit.errors(), leverage(data, unknowns, before));
+    let covariance = data.omega().iter().enumerate().map(|(row, omega)| {
+        let scale = data.measured().per_displacement(*omega).norm_sqr();
+        let mut covariance = DMatrix::zeros(2 * n, 2 * n);
+        for channel in 0..n {
+            // No residual at all would take all the weight.
+            let least = LEAST * before.noise.covariance(row)[(channel, channel)].re;
+            let power = scale * errors[(row, channel)].norm_sqr().max(least);
+            let kept = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(KEPT));
+            covariance[(channel, channel)] = Complex::from(power / kept);
+        }
+        covariance
+    });
+    NoiseSpectrum::of_measured(data.omega(), covariance.collect(), data.measured(), 1, pooling)
+}
+
+/// Share of the noise at each row and channel that the parameters take up, rows × n; `None` of large fits,
+/// where it is small.
+fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option<DMatrix<f64>> {
+    let (n, rows) = (data.dof(), data.len());
+    if 2 * n * rows * unknowns.free().len() > SENSITIVITIES {
+        return None;
+    }
+    let theta: &DVector<f64> = &fit.fit.minimum.theta;
+    let covariance = |row: usize| fit.noise.covariance(row).clone();
+    let mut sensitivity = Whitened::of(data, unknowns, theta, covariance)?.sensitivity;
+    for mut column in sensitivity.column_iter_mut() {
+        let length = column.norm();
+        if length > 0.0 {
+            column /= length;
+        }
+    }
+    let q = sensitivity.qr().q();
+    let part = |at: usize| q.row(at).norm_squared();
+    Some(DMatrix::from_fn(rows, n, |row, channel| {
+        let at = 2 * (n * row + channel);
+        0.5 * (part(at) + part(at + 1))
+    }))
+}
+
+/// Root mean square of displacement amplitudes, per channel, in the quantity measured.
+fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Vec<f64> {
+    let power = |column: usize| {
+        let terms = amplitudes
+            .column(column)
+            .into_iter()
+            .zip(data.omega())
+            .map(|(x, w)| (x * data.measured().per_displacement(*w)).norm_sqr());
+        terms.sum::<f64>()
+    };
+    (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
+}
+
+/// White noise of the given levels of the quantity measured, the force exact.
+fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, EstimateError> {
+    let n = data.dof();
+    let covariance = data.omega().iter().map(|w| {
+        let scale = data.measured().per_displacement(*w).norm();
+        DMatrix::from_fn(2 * n, 2 * n, |i, j| {
+            let level = if i == j && i < n { levels[i] / scale } else { 0.0 };
+            Complex::from(level * level)
+        })
+    });
+    NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())
+}

@@ -1,0 +1,409 @@
+//! The spectrum of noise of which few periods are known: smooth, with bumps.
+
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector};
+
+/// Highest order of log power in log frequency.
+const MAX_ORDER: usize = 6;
+/// Minimum number of lines per order.
+const LINES_PER_ORDER: usize = 8;
+/// Maximum number of bumps.
+const MAX_BUMPS: usize = 24;
+/// Complex deviations that a level below those beside it is made of at least: few lines may be quiet by
+/// chance, and would then have all the weight.
+const QUIET_DEVIATIONS: f64 = 12.0;
+/// Power of a peak over the floor that is tried first.
+const PEAK: f64 = 100.0;
+/// Factor by which the width of a peak is varied.
+const WIDER: f64 = 1.3;
+/// Factor by which the power of a peak over the floor is varied, its flanks being kept.
+const HIGHER: f64 = 3.0;
+/// Distance at which a peak ends, over that at which it is as high as the floor.
+const PEAK_REACH: f64 = 10.0;
+/// Number of flat bands, of different widths, about which others are tried.
+const BEST_WIDTHS: usize = 6;
+/// Rounds of variations of a bump.
+const VARIATIONS: usize = 12;
+/// Steps of the search for the height of a tent.
+const HEIGHT_STEPS: usize = 10;
+/// Largest height, in the logarithm of the power.
+const HIGHEST: f64 = 30.0;
+/// Steps of the search for the log power.
+const STEPS: usize = 200;
+/// Change of the log power (RMS) below which it is found.
+const TOLERANCE: f64 = 1e-9;
+/// Smallest power, relative to the mean over the lines, at which the search starts.
+const FLOOR: f64 = 1e-9;
+
+/// Form of a noise spectrum: the logarithm of the power is a polynomial in the logarithm of the frequency,
+/// with bumps on it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Form {
+    /// Order of the polynomial.
+    pub(crate) order: usize,
+    /// Bumps, by places of lines by rising frequency; they may overlap.
+    pub(crate) bumps: Vec<Bump>,
+}
+
+/// What is added to a log power about a line, times an unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bump {
+    shape: Shape,
+    /// Middle, in places of lines.
+    middle: f64,
+    /// Lines to either side within which it is not zero.
+    reach: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Shape {
+    /// Equal on all lines.
+    Flat,
+    /// Straight from the middle to both ends.
+    Tent,
+    /// ln(1 + A/(1 + x²)), x = 1 at a distance of `half_width` lines: a resonance over a floor.
+    Peak { above_floor: f64, half_width: f64 },
+}
+
+impl Bump {
+    fn flat(band: &Range<usize>) -> Self {
+        let middle = 0.5 * (band.start + band.end - 1) as f64;
+        Self { shape: Shape::Flat, middle, reach: 0.5 * band.len() as f64 }
+    }
+
+    fn tent(middle: f64, reach: f64) -> Self {
+        Self { shape: Shape::Tent, middle, reach }
+    }
+
+    fn peak(middle: f64, half_width: f64, above_floor: f64) -> Self {
+        let reach = PEAK_REACH * half_width * above_floor.sqrt();
+        Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
+    }
+
+    /// Others that might do better than the flat one of a band.
+    fn about(band: &Range<usize>) -> [Self; 3] {
+        let Self { middle, reach, .. } = Self::flat(band);
+        [
+            Self::tent(middle, 2.0 * reach),
+            Self::peak(middle, 0.5 * reach, PEAK),
+            Self::peak(middle, reach, PEAK),
+        ]
+    }
+
+    /// The same a little moved, wider, narrower, higher or lower; none of a flat one, whose places are all
+    /// looked at.
+    fn varied(&self) -> Vec<Self> {
+        let middle = self.middle;
+        match self.shape {
+            Shape::Flat => Vec::new(),
+            Shape::Tent => {
+                let by = 0.25 * self.reach;
+                vec![
+                    Self::tent(middle - by, self.reach),
+                    Self::tent(middle + by, self.reach),
+                    Self::tent(middle, self.reach - by),
+                    Self::tent(middle, self.reach + by),
+                ]
+            }
+            Shape::Peak { above_floor, half_width } => vec![
+                Self::peak(middle - 0.5 * half_width, half_width, above_floor),
+                Self::peak(middle + 0.5 * half_width, half_width, above_floor),
+                Self::peak(middle, half_width / WIDER, above_floor),
+                Self::peak(middle, half_width * WIDER, above_floor),
+                Self::peak(middle, half_width * HIGHER.sqrt(), above_floor / HIGHER),
+                Self::peak(middle, half_width / HIGHER.sqrt(), above_floor * HIGHER),
+            ],
+        }
+    }
+
+    fn at(&self, line: usize) -> f64 {
+        let away = (line as f64 - self.middle).abs();
+        match self.shape {
+            Shape::Flat => f64::from(u8::from(away < self.reach)),
+            Shape::Tent => (1.0 - away / self.reach).max(0.0),
+            Shape::Peak { .. } if away > self.reach => 0.0,
+            Shape::Peak { above_floor, half_width } => {
+                (above_floor / (1.0 + (away / half_width).powi(2))).ln_1p() / above_floor.ln_1p()
+            }
+        }
+    }
+
+    /// Lines within which it is half its height or more.
+    fn band(&self, lines: usize) -> Range<usize> {
+        let half = match self.shape {
+            Shape::Flat => self.reach - 0.5,
+            Shape::Tent => 0.5 * self.reach,
+            // Half of the logarithm of the peak.
+            Shape::Peak { above_floor, half_width } => half_width * above_floor.powf(0.25),
+        };
+        // The line nearest to the middle, at least.
+        let nearest = (self.middle.round().max(0.0) as usize).min(lines.saturating_sub(1));
+        let first = (self.middle - half).ceil().max(0.0) as usize;
+        let last = (self.middle + half).floor().max(0.0) as usize;
+        first.min(nearest)..(last.max(nearest) + 1).min(lines)
+    }
+
+    /// Lines within which it is not zero.
+    fn support(&self, lines: usize) -> Range<usize> {
+        let first = (self.middle - self.reach).ceil().max(0.0) as usize;
+        first..((self.middle + self.reach).floor() as usize + 1).min(lines)
+    }
+}
+
+impl Form {
+    /// Number of unknowns of each channel.
+    pub(crate) fn terms(&self) -> usize {
+        self.order + 1 + self.bumps.len()
+    }
+
+    /// Bands of the bumps, those that overlap or touch as one, as places of `lines` lines.
+    pub(crate) fn bands(&self, lines: usize) -> Vec<Range<usize>> {
+        let mut bands: Vec<Range<usize>> = self.bumps.iter().map(|b| b.band(lines)).collect();
+        bands.sort_by_key(|band| band.start);
+        let mut joined: Vec<Range<usize>> = Vec::new();
+        for band in bands {
+            match joined.last_mut() {
+                Some(last) if band.start <= last.end => last.end = last.end.max(band.end),
+                _ => joined.push(band),
+            }
+        }
+        joined
+    }
+
+    /// Orthonormal columns that span all log powers of this form.
+    fn basis(&self, omega: &[f64]) -> DMatrix<f64> {
+        let ends = (omega.first().copied(), omega.last().copied());
+        let (least, most) = (ends.0.unwrap_or(1.0), ends.1.unwrap_or(1.0));
+        let span = f64::max((most / least).ln(), f64::MIN_POSITIVE);
+        let columns = DMatrix::from_fn(omega.len(), self.terms(), |line, column| {
+            match column.checked_sub(self.order + 1) {
+                None => {
+                    // Chebyshev polynomials.
+                    let t = 2.0 * (omega[line] / least).ln() / span - 1.0;
+                    (column as f64 * t.clamp(-1.0, 1.0).acos()).cos()
+                }
+                Some(bump) => self.bumps[bump].at(line),
+            }
+        });
+        columns.qr().q()
+    }
+}
+
+/// Raises a spectrum where it is lower than within fewer lines to both sides: morphological closing.
+fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
+    let half = lines / 2;
+    let around = |at: usize| at.saturating_sub(half)..(at + half + 1).min(log_power.len());
+    let extreme = |of: &DVector<f64>, pick: fn(f64, f64) -> f64| {
+        DVector::from_fn(of.len(), |at, _| {
+            of.rows_range(around(at)).iter().copied().reduce(pick).unwrap_or(of[at])
+        })
+    };
+    let closed = extreme(&extreme(log_power, f64::max), f64::min);
+    *log_power = closed;
+}
+
+/// A spectrum of a form that was fitted to sample variances.
+#[derive(Debug, Clone)]
+pub(crate) struct Smooth {
+    pub(crate) form: Form,
+    /// Orthonormal columns that span the log powers of the form, lines × terms.
+    pub(crate) basis: DMatrix<f64>,
+    /// Logarithm of the power, lines × channels.
+    pub(crate) log_power: DMatrix<f64>,
+    /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
+    pub(crate) misfit: f64,
+}
+
+/// The spectrum that makes sample variances (lines × channels, positive) most likely, by rising `omega`
+/// (rad/s), each variance a mean of `nu` squares of complex numbers.
+///
+/// Order and bumps are those of least Bayesian information criterion; bumps are added one by one, each the
+/// one that gains most, and their places count as unknowns, too.
+///
+/// # Source
+/// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic link);
+/// Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995), Journal of Time
+/// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
+pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
+    let (lines, channels) = (omega.len(), variances.ncols() as f64);
+    let per_term = (nu * lines as f64).max(2.0).ln();
+    // Intervals that are looked at.
+    let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
+    let cost = |found: &Smooth| {
+        2.0 * nu * found.misfit
+            + channels * found.form.terms() as f64 * per_term
+            + 2.0 * found.form.bumps.len() as f64 * per_place
+    };
+    let mut best: Option<(f64, Smooth)> = None;
+    for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
+        let mut found = fit(Form { order, bumps: Vec::new() }, omega, variances, nu);
+        let mut least = cost(&found);
+        while found.form.bumps.len() < MAX_BUMPS && 4 * (found.form.terms() + 1) <= lines {
+            let Some(bump) = most_conspicuous(variances, &found.log_power, nu) else { break };
+            let mut form = found.form.clone();
+            form.bumps.push(bump);
+            let more = fit(form, omega, variances, nu);
+            let now = cost(&more);
+            if now >= least {
+                break;
+            }
+            (found, least) = (more, now);
+        }
+        if best.as_ref().is_none_or(|(before, _)| least < *before) {
+            best = Some((least, found));
+        }
+    }
+    let white = || fit(Form { order: 0, bumps: Vec::new() }, omega, variances, nu);
+    best.map_or_else(white, |(_, found)| found)
+}
+
+/// The spectrum of a given form.
+pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
+    let basis = form.basis(omega);
+    let mut log_power = variances.clone();
+    let mut misfit = 0.0;
+    for (mut column, own) in log_power.column_iter_mut().zip(variances.column_iter()) {
+        let (mut found, least) = most_likely(&basis, &own.into_owned());
+        if !form.bumps.is_empty() {
+            fill_notches(&mut found, (QUIET_DEVIATIONS / nu) as usize);
+        }
+        column.copy_from(&found);
+        misfit += least;
+    }
+    Smooth { form, basis, log_power, misfit }
+}
+
+/// Widths of the bands that are looked at: 1, 2, 3, 4, 6, 8, 12 …, to a third of the lines.
+fn widths(lines: usize) -> impl Iterator<Item = usize> {
+    let powers = (0..usize::BITS).map(|power| 1usize << power);
+    let all = powers.flat_map(|p| if p == 1 { vec![1] } else { vec![p, p + p / 2] });
+    all.take_while(move |width| *width <= (lines / 3).max(1))
+}
+
+/// The bump that makes the variances most likely, of all flat ones and of tents about the best of them.
+fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64) -> Option<Bump> {
+    let (lines, channels) = variances.shape();
+    let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
+    // Sums of the levels below each line.
+    let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
+    for channel in 0..channels {
+        for line in 0..lines {
+            below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
+        }
+    }
+    let gain_of_flat = |start: usize, width: usize| {
+        let (count, others) = (width as f64, (lines - width) as f64);
+        let of_channel = |channel: usize| {
+            let inside = below[(start + width, channel)] - below[(start, channel)];
+            let all = below[(lines, channel)];
+            let [mean, own, other] =
+                [all / (count + others), inside / count, (all - inside) / others]
+                    .map(|level: f64| level.max(FLOOR));
+            match own > other || count * nu >= QUIET_DEVIATIONS {
+                true => count * (mean / own).ln() + others * (mean / other).ln(),
+                false => 0.0,
+            }
+        };
+        (0..channels).map(of_channel).sum::<f64>()
+    };
+    let of_width = |width: usize| {
+        let starts = 0..=lines - width;
+        let best = starts.map(|start| (gain_of_flat(start, width), start));
+        best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(gain, at)| (gain, at..at + width))
+    };
+    let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
+    flat.sort_by(|a, b| b.0.total_cmp(&a.0));
+    flat.truncate(BEST_WIDTHS);
+    let with_gain = |bump: Bump| (gain_of(&bump, &levels, nu), bump);
+    let best = |of: &mut dyn Iterator<Item = (f64, Bump)>| of.max_by(|a, b| a.0.total_cmp(&b.0));
+    let of_flat = best(&mut flat.iter().map(|(gain, band)| (*gain, Bump::flat(band))))?;
+    let others = flat.iter().flat_map(|(_, band)| Bump::about(band)).map(with_gain);
+    let mut other = best(&mut others.into_iter())?;
+    for _ in 0..VARIATIONS {
+        let varied = other.1.varied().into_iter();
+        let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
+        let varied = best(&mut inside.map(with_gain));
+        match varied.filter(|varied| varied.0 > other.0) {
+            Some(varied) => other = varied,
+            None => break,
+        }
+    }
+    let best = Some(if of_flat.0 >= other.0 { of_flat } else { other });
+    best.filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
+}
+
+/// What a bump of the best height on the best level takes off Σ log p + v/p, from the levels v/p.
+fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
+    let lines = levels.nrows() as f64;
+    let support = bump.support(levels.nrows());
+    let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
+    let area: f64 = parts.iter().sum();
+    let of_channel = |channel: usize| {
+        let all = levels.column(channel);
+        let own = all.rows_range(support.clone());
+        let (total, outside) = (all.sum(), all.sum() - own.sum());
+        let (mut height, mut least, mut most) = (0.0, -HIGHEST, HIGHEST);
+        let mut sum = total;
+        for _ in 0..HEIGHT_STEPS {
+            let (mut first, mut second) = (0.0, 0.0);
+            sum = outside;
+            for (part, level) in parts.iter().zip(own.iter()) {
+                let left = level * f64::exp(-height * part);
+                sum += left;
+                first += part * left;
+                second += part * part * left;
+            }
+            // Derivatives of L log Σ v/p + height Σ part, which is convex.
+            let slope = area - lines * first / sum;
+            let curvature = lines * (second / sum - (first / sum).powi(2));
+            if slope < 0.0 {
+                least = height
+            } else {
+                most = height
+            }
+            let next = height - slope / curvature;
+            height = if next > least && next < most { next } else { 0.5 * (least + most) };
+        }
+        if height <= 0.0 && area * nu < QUIET_DEVIATIONS {
+            return 0.0;
+        }
+        lines * (total / sum).ln() - height * area
+    };
+    (0..levels.ncols()).map(of_channel).sum()
+}
+
+/// The log power within a basis of which the variances of a channel are samples, by maximum likelihood, and
+/// Σ log p + v/p.
+fn most_likely(basis: &DMatrix<f64>, variances: &DVector<f64>) -> (DVector<f64>, f64) {
+    let floor = (FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
+    let logarithms = variances.map(|v| v.max(floor).ln());
+    let mut log_power = basis * basis.tr_mul(&logarithms);
+    // The level follows from the sum of the likelihood.
+    let level = variances.zip_map(&log_power, |v, log| v * (-log).exp()).mean();
+    log_power.add_scalar_mut(level.max(f64::MIN_POSITIVE).ln());
+    let mut misfit = deviance(&log_power, variances);
+    let tolerance = TOLERANCE * (variances.len() as f64).sqrt();
+    for _ in 0..STEPS {
+        let excess = variances.zip_map(&log_power, |v, log| v * (-log).exp() - 1.0);
+        // The expected information is the identity.
+        let mut step = basis.tr_mul(&excess);
+        while step.norm() > tolerance {
+            let next = &log_power + basis * &step;
+            let lower = deviance(&next, variances);
+            if lower < misfit {
+                (log_power, misfit) = (next, lower);
+                break;
+            }
+            step *= 0.5;
+        }
+        if step.norm() <= tolerance {
+            break;
+        }
+    }
+    (log_power, misfit)
+}
+
+fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>) -> f64 {
+    log_power.iter().zip(variances.iter()).map(|(log, v)| log + v * (-log).exp()).sum()
+}

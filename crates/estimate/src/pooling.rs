@@ -1,0 +1,282 @@
+//! Sample covariances of single lines made into one noise spectrum.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::noise_shape::{self, Form, Smooth};
+use crate::noise_spectrum::{NoiseModel, Pooling};
+
+type Covariances = Vec<DMatrix<Complex<f64>>>;
+
+/// Complex deviations, beyond the channels, that a covariance is made of at least where the choice is free.
+const SPARE: f64 = 6.0;
+/// Advantage in the log likelihood of new data, per complex deviation of all, by which a mean over lines has
+/// to predict better than a smooth spectrum.
+const MARGIN: f64 = 4.0;
+
+/// A noise spectrum made of samples.
+pub(crate) struct Pooled {
+    pub(crate) covariance: Covariances,
+    pub(crate) model: NoiseModel,
+    /// Complex deviations that each covariance is made of.
+    pub(crate) freedom: f64,
+    /// Orthonormal columns that span the log powers, lines × terms, of a smooth spectrum.
+    pub(crate) basis: Option<DMatrix<f64>>,
+}
+
+/// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled.
+pub(crate) fn pooled(omega: &[f64], covariance: Covariances, nu: f64, pooling: Pooling) -> Pooled {
+    let lines = covariance.len();
+    match pooling {
+        Pooling::PerLine => {
+            Pooled { covariance, model: NoiseModel::PerLine, freedom: nu, basis: None }
+        }
+        Pooling::AllLines => {
+            let all = mean(&covariance, 0..lines);
+            white(all, nu, lines)
+        }
+        Pooling::Neighbours(half_width) => {
+            let places = Places::new(omega);
+            let sorted = places.sorted(&covariance);
+            let window = |place| window(place, half_width, lines);
+            let means = (0..lines).map(|place| mean(&sorted, window(place))).collect();
+            let model = NoiseModel::Neighbours { half_width: half_width.min(lines) };
+            let freedom = nu * window(0).len() as f64;
+            Pooled { covariance: places.unsorted(means), model, freedom, basis: None }
+        }
+        Pooling::Smooth => Candidate::new(omega, covariance, nu).smooth(),
+        Pooling::Automatic => Candidate::new(omega, covariance, nu).best(),
+    }
+}
+
+/// One covariance for all lines.
+fn white(covariance: DMatrix<Complex<f64>>, nu: f64, lines: usize) -> Pooled {
+    let level = DMatrix::from_element(lines, 1, (lines as f64).sqrt().recip());
+    Pooled {
+        covariance: vec![covariance; lines],
+        model: NoiseModel::White,
+        freedom: nu * lines as f64,
+        basis: Some(level),
+    }
+}
+
+/// Places of lines by rising frequency.
+struct Places(Vec<usize>);
+
+impl Places {
+    fn new(omega: &[f64]) -> Self {
+        let mut places: Vec<usize> = (0..omega.len()).collect();
+        places.sort_by(|a, b| omega[*a].total_cmp(&omega[*b]));
+        Self(places)
+    }
+
+    fn sorted<T: Clone>(&self, all: &[T]) -> Vec<T> {
+        self.0.iter().map(|at| all[*at].clone()).collect()
+    }
+
+    fn unsorted<T: Clone>(&self, sorted: Vec<T>) -> Vec<T> {
+        let mut all = sorted.clone();
+        for (value, at) in sorted.into_iter().zip(&self.0) {
+            all[*at] = value;
+        }
+        all
+    }
+}
+
+/// Sample covariances by rising frequency, and what a smooth spectrum makes of them.
+struct Candidate {
+    places: Places,
+    omega: Vec<f64>,
+    covariance: Covariances,
+    nu: f64,
+    /// Channels that have noise.
+    noisy: Vec<usize>,
+    smooth: Option<Smooth>,
+}
+
+impl Candidate {
+    fn new(omega: &[f64], covariance: Covariances, nu: f64) -> Self {
+        let places = Places::new(omega);
+        let (omega, covariance) = (places.sorted(omega), places.sorted(&covariance));
+        let channels = 0..covariance.first().map_or(0, DMatrix::nrows);
+        let power = |channel: usize| covariance.iter().map(move |c| c[(channel, channel)].re);
+        let noisy: Vec<usize> = channels
+            .filter(|channel| {
+                let sum = power(*channel).sum::<f64>();
+                // Squares that overflow or vanish have no logarithm.
+                sum.is_finite() && sum > f64::MIN_POSITIVE / f64::EPSILON
+            })
+            .collect();
+        let smooth = (!noisy.is_empty()).then(|| {
+            let variances = DMatrix::from_fn(omega.len(), noisy.len(), |line, at| {
+                covariance[line][(noisy[at], noisy[at])].re
+            });
+            noise_shape::choose(&omega, &variances, nu)
+        });
+        Self { places, omega, covariance, nu, noisy, smooth }
+    }
+
+    /// The smooth spectrum, with the mean correlation of the channels.
+    fn smooth(&self) -> Pooled {
+        let lines = self.covariance.len();
+        let Some(smooth) = self.smooth.as_ref().filter(|smooth| smooth.form.terms() > 1) else {
+            return white(mean(&self.covariance, 0..lines), self.nu, lines);
+        };
+        let deviations = self.deviations(smooth);
+        let level = mean(&scaled(&self.covariance, &deviations, |value, by| value / by), 0..lines);
+        let covariance = scaled(&vec![level; lines], &deviations, |value, by| value * by);
+        let model = model_of(&smooth.form, &self.omega);
+        let freedom = freedom(&smooth.form, self.nu, lines, self.covariance[0].nrows() / 2);
+        let mut basis = smooth.basis.clone();
+        for (sorted, row) in smooth.basis.row_iter().zip(&self.places.0) {
+            basis.row_mut(*row).copy_from(&sorted);
+        }
+        let covariance = self.places.unsorted(covariance);
+        Pooled { covariance, model, freedom, basis: Some(basis) }
+    }
+
+    /// The smooth spectrum, or the means over lines that predict better than it does.
+    fn best(self) -> Pooled {
+        let smooth = self.smooth();
+        let channels = self.noisy.len() as f64;
+        let Some(found) = &self.smooth else { return smooth };
+        let covariance = self.noisy_part(&self.covariance);
+        let own = self.noisy_part(&self.places.sorted(&smooth.covariance));
+        let each = own.iter().zip(&covariance).map(|(s, sample)| misfit(s, sample));
+        let Some(misfit) = each.sum::<Option<f64>>() else { return smooth };
+        let unknowns = channels * found.form.terms() as f64 + channels * (channels - 1.0);
+        let to_beat = misfit + (unknowns - MARGIN) / self.nu;
+        let half_widths = (0..usize::BITS).map(|power| (1usize << power) - 1);
+        let half_widths = half_widths.take_while(|half| 4 * half + 2 <= covariance.len());
+        let enough = half_widths.filter(|half| {
+            (2 * half + 1) as f64 * self.nu >= (2.0 * channels).max(channels + SPARE)
+        });
+        let scored = enough.filter_map(|half_width| {
+            let score = match half_width {
+                0 => of_single_lines(&covariance, self.nu),
+                _ => of_neighbours(&covariance, half_width),
+            };
+            Some((score?, half_width))
+        });
+        let best = scored.min_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((_, half_width)) = best.filter(|(score, _)| *score < to_beat) else {
+            return smooth;
+        };
+        let pooling = match half_width {
+            0 => Pooling::PerLine,
+            wide => Pooling::Neighbours(wide),
+        };
+        let Self { places, omega, covariance, nu, .. } = self;
+        let found = pooled(&omega, covariance, nu, pooling);
+        Pooled { covariance: places.unsorted(found.covariance), ..found }
+    }
+
+    /// Standard deviations of a smooth spectrum, lines × all channels; 1 where there is no noise.
+    fn deviations(&self, smooth: &Smooth) -> DMatrix<f64> {
+        let mut all = DMatrix::from_element(self.omega.len(), self.covariance[0].nrows(), 1.0);
+        for (at, channel) in self.noisy.iter().enumerate() {
+            let own = smooth.log_power.column(at).map(|log| (0.5 * log).exp());
+            all.set_column(*channel, &own);
+        }
+        all
+    }
+
+    fn noisy_part(&self, all: &[DMatrix<Complex<f64>>]) -> Covariances {
+        all.iter().map(|c| c.select_rows(&self.noisy).select_columns(&self.noisy)).collect()
+    }
+}
+
+/// Complex deviations n/ν of which a covariance of n displacements would have the relative uncertainty that
+/// a smooth spectrum has on average over the lines.
+///
+/// A level that is one of `terms` fitted to `lines` has the leverage `terms/lines`; correlations are those
+/// of all lines.
+pub(crate) fn freedom(form: &Form, nu: f64, lines: usize, n: usize) -> f64 {
+    (n * lines) as f64 * nu / (form.terms() + n - 1) as f64
+}
+
+/// What a form says of the noise.
+pub(crate) fn model_of(form: &Form, omega: &[f64]) -> NoiseModel {
+    if form.terms() == 1 {
+        return NoiseModel::White;
+    }
+    let hz = |place: usize| omega[place] / TAU;
+    let bands = form.bands(omega.len());
+    let bands_hz = bands.into_iter().map(|band| [hz(band.start), hz(band.end - 1)]).collect();
+    NoiseModel::Smooth { order: form.order, bands_hz }
+}
+
+fn mean(covariance: &[DMatrix<Complex<f64>>], range: Range<usize>) -> DMatrix<Complex<f64>> {
+    let count = range.len() as f64;
+    let mut sum = covariance[range.start].clone();
+    covariance[range.start + 1..range.end].iter().for_each(|c| sum += c);
+    sum.unscale(count)
+}
+
+/// `2 half_width + 1` lines around one, as far as there are so many; all of one width, so that one number of
+/// degrees of freedom holds for all.
+fn window(line: usize, half_width: usize, lines: usize) -> Range<usize> {
+    let width = half_width.saturating_mul(2).saturating_add(1).min(lines);
+    let first = line.saturating_sub(half_width).min(lines - width);
+    first..first + width
+}
+
+/// Covariances with the deviations of both their channels, lines × channels, put in or out.
+fn scaled(
+    covariance: &[DMatrix<Complex<f64>>],
+    deviations: &DMatrix<f64>,
+    put: impl Fn(Complex<f64>, f64) -> Complex<f64>,
+) -> Covariances {
+    let one = |(line, c): (usize, &DMatrix<Complex<f64>>)| {
+        DMatrix::from_fn(c.nrows(), c.ncols(), |i, j| {
+            put(c[(i, j)], deviations[(line, i)] * deviations[(line, j)])
+        })
+    };
+    covariance.iter().enumerate().map(one).collect()
+}
+
+/// log det S + tr(S⁻¹Ŝ): minus the log likelihood of a sample Ŝ, per complex deviation. `None` for a singular
+/// S.
+fn misfit(s: &DMatrix<Complex<f64>>, sample: &DMatrix<Complex<f64>>) -> Option<f64> {
+    let factor = s.clone().cholesky()?;
+    Some(log_determinant(factor.l_dirty())? + factor.solve(sample).trace().re)
+}
+
+/// Twice the sum of the logarithms of a triangle's diagonal, `None` unless it is positive.
+fn log_determinant(lower: &DMatrix<Complex<f64>>) -> Option<f64> {
+    let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
+    let diagonal = lower.diagonal();
+    diagonal.iter().all(positive).then(|| diagonal.iter().map(|z| 2.0 * z.re.ln()).sum())
+}
+
+/// Sum of what every line costs when the mean of the others around it predicts it.
+///
+/// # Source
+/// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147.
+fn of_neighbours(covariance: &[DMatrix<Complex<f64>>], half_width: usize) -> Option<f64> {
+    let lines = covariance.len();
+    let each = (0..lines).map(|line| {
+        let window = window(line, half_width, lines);
+        let count = window.len() as f64;
+        let others = mean(covariance, window) * Complex::from(count) - &covariance[line];
+        misfit(&others.unscale(count - 1.0), &covariance[line])
+    });
+    each.sum()
+}
+
+/// The same for covariances of single lines that are used for other samples of the same lines: expectation
+/// of the logarithm and the inverse of a sample of `nu` complex deviations.
+///
+/// # Source
+/// Goodman (1963), Annals of Mathematical Statistics 34, 152–177 (complex Wishart distribution).
+fn of_single_lines(covariance: &[DMatrix<Complex<f64>>], nu: f64) -> Option<f64> {
+    let channels = covariance.first()?.nrows() as f64;
+    if nu <= channels {
+        return None;
+    }
+    let inverse = channels * nu / (nu - channels);
+    let each = covariance.iter();
+    each.map(|c| Some(log_determinant(c.clone().cholesky()?.l_dirty())? + inverse)).sum()
+}

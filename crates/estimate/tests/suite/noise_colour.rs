@@ -1,0 +1,199 @@
+//! Noise that is not white, of few periods: what is made of its spectrum, and what that does to estimates.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::{
+    FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, output_error,
+    output_error_pooling,
+};
+use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
+use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::{Multisine, Phases, Record, Sampling, noise};
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+/// Noise over the response, in the RMS.
+const LEVEL: f64 = 0.05;
+const KIND: ResponseQuantity = ResponseQuantity::Displacement;
+
+/// x_k = 0.9 x_{k−1} + e_k, of unit power.
+fn autoregressive(len: usize, seed: u64) -> Vec<f64> {
+    const BEFORE: usize = 200;
+    let time = Sampling::new(1.0, len + BEFORE).unwrap();
+    let mut x = noise::white(time, 1, f64::sqrt(1.0 - 0.81), seed).unwrap().channel(0).to_vec();
+    (1..x.len()).for_each(|k| x[k] += 0.9 * x[k - 1]);
+    x.split_off(BEFORE)
+}
+
+/// White noise of unit power.
+fn white(len: usize, seed: u64) -> Vec<f64> {
+    let time = Sampling::new(1.0, len).unwrap();
+    noise::white(time, 1, 1.0, seed).unwrap().channel(0).to_vec()
+}
+
+/// 10 ẍ + 67 ẋ + 45000 x = F with its mode at line 12, driven on 100 lines.
+struct Rig {
+    system: SecondOrderSystem,
+    /// One period.
+    force: Record,
+    displacement: Record,
+    lines: Lines,
+    periods: usize,
+    /// RMS of the noise, in m.
+    deviation: f64,
+}
+
+impl Rig {
+    fn new(periods: usize) -> Self {
+        let oscillator = Sdof::new(10.0, 67.0, 45_000.0).unwrap();
+        let (system, mode) = (oscillator.system(), f64::sqrt(4500.0));
+        let period = Sampling::new(12.0 * TAU / (mode * 400.0), 400).unwrap();
+        let multisine = Multisine::flat(1..=100, 10.0, Phases::Random { seed: 7 }).unwrap();
+        let force = multisine.sample(period).unwrap();
+        let exact = exact_harmonic_periodic(&system, &force).unwrap();
+        let displacement = exact.displacement().clone();
+        let deviation = LEVEL * displacement.column(0).norm() / f64::sqrt(400.0);
+        let lines = Lines::new(period, 1..=100).unwrap();
+        Self { system, force, displacement, lines, periods, deviation }
+    }
+
+    fn measure(&self, noise: impl Fn(usize, u64) -> Vec<f64>, seed: u64) -> RepeatedPeriods {
+        let force = self.force.repeated(self.periods).unwrap();
+        let exact = self.displacement.repeated(self.periods).unwrap();
+        let noise = noise(exact.len(), seed);
+        let noisy = exact.channel(0).iter().zip(noise).map(|(x, e)| x + self.deviation * e);
+        let x = Record::from_channel(exact.sampling(), noisy.collect()).unwrap();
+        RepeatedPeriods::new(&self.lines, &force, &x, KIND).unwrap()
+    }
+
+    /// Standard errors of maximum likelihood that knows a spectrum of noise of unit power, by the angle
+    /// from sample to sample.
+    fn bound(&self, power: impl Fn(f64) -> f64) -> Vec<f64> {
+        let (period, all) = (self.lines.sampling(), self.lines.as_slice().iter());
+        let samples = (period.len() * self.periods) as f64;
+        let covariance = self.lines.omega().into_iter().map(|omega| {
+            let variance = 4.0 * self.deviation.powi(2) * power(omega * period.dt()) / samples;
+            DMatrix::from_diagonal(&vec![Complex::from(variance), Complex::from(0.0)].into())
+        });
+        let noise = NoiseSpectrum::new(self.lines.omega(), covariance.collect()).unwrap();
+        let (force, x) = (&self.force, &self.displacement);
+        let data = FrequencyData::from_records(force, x, KIND, all.copied()).unwrap();
+        let data = data.with_noise(noise).unwrap();
+        let fit = output_error(&data, &Unknowns::unknown_mass(1).unwrap()).unwrap();
+        fit.estimate.parameters().map(|p| p.standard_error).collect()
+    }
+
+    /// Least and largest share of 95 % intervals that hold, and largest scatter over the bound.
+    fn judge(&self, pooling: Pooling, bound: &[f64], runs: u64) -> [f64; 3] {
+        let unknowns = Unknowns::unknown_mass(1).unwrap();
+        let fits: Vec<_> = (0..runs)
+            .into_par_iter()
+            .map(|seed| {
+                let periods = self.measure(autoregressive, seed);
+                let data = match self.periods {
+                    1 => periods.mean(),
+                    _ => periods.mean_with_noise(pooling),
+                };
+                output_error_pooling(&data.unwrap(), &unknowns, pooling).unwrap().estimate
+            })
+            .collect();
+        let [mut least, mut largest, mut scatter] = [1.0f64, 0.0, 0.0];
+        for (at, (parameter, bound)) in unknowns.free().iter().zip(bound).enumerate() {
+            let truth = self.system.matrix(parameter.matrix())[(0, 0)];
+            let found: Vec<_> = fits.iter().map(|e| e.parameters().nth(at).unwrap()).collect();
+            let held = found.iter().filter(|p| {
+                let [low, high] = p.interval(0.95).unwrap();
+                (low..=high).contains(&truth)
+            });
+            let share = held.count() as f64 / runs as f64;
+            let power: f64 = found.iter().map(|p| (p.value - truth).powi(2)).sum();
+            (least, largest) = (least.min(share), largest.max(share));
+            scatter = scatter.max((power / runs as f64).sqrt() / bound);
+        }
+        [least, largest, scatter]
+    }
+}
+
+/// The share that holds is 91 to 95 %: the mode is where the noise begins to fall, on few lines. Of 300
+/// intervals of 92 % fewer than 87 % hold with a probability of 0.001, and standard deviations of 300
+/// scatter by 4 %. Noise taken as white leaves intervals of which some 70 to 76 % hold.
+#[test]
+fn intervals_hold_under_coloured_noise_of_few_periods() {
+    for periods in [1, 2, 4] {
+        let rig = Rig::new(periods);
+        let ar = |angle: f64| 0.19 / (1.81 - 1.8 * angle.cos());
+        let bound = rig.bound(ar);
+        let [least, largest, scatter] = rig.judge(Pooling::Automatic, &bound, 300);
+        assert!(least > 0.87 && largest < 0.985, "{periods} periods: {least} to {largest}");
+        assert!(scatter < 1.2, "{periods} periods: {scatter} times the bound");
+        let [least, ..] = rig.judge(Pooling::AllLines, &bound, 100);
+        assert!(least < 0.85, "white, {periods} periods: {least}");
+    }
+}
+
+#[test]
+fn the_noise_model_is_chosen_from_the_scatter() {
+    let models = |rig: &Rig, noise: &(dyn Fn(usize, u64) -> Vec<f64> + Sync)| -> Vec<NoiseModel> {
+        let chosen = |seed| {
+            let found = rig.measure(noise, seed).noise(Pooling::Automatic).unwrap();
+            found.models()[0].clone()
+        };
+        (0..100).into_par_iter().map(chosen).collect()
+    };
+    let share = |models: &[NoiseModel], of: &dyn Fn(&NoiseModel) -> bool| {
+        models.iter().filter(|model| of(model)).count()
+    };
+    for periods in [2, 8] {
+        let rig = Rig::new(periods);
+        let of_white = models(&rig, &white);
+        let count = share(&of_white, &|model| *model == NoiseModel::White);
+        assert!(count >= 85, "{periods} periods: {count} of 100 white");
+        let coloured = models(&rig, &autoregressive);
+        let count = share(&coloured, &|m| matches!(m, NoiseModel::Smooth { order: 1.., .. }));
+        assert!(count >= 80, "{periods} periods: {count} of 100 smooth");
+        // A sine of five times the noise, of a frequency that drifts away from line 50.
+        let spacing_hz = rig.lines.sampling().line_spacing_hz();
+        let period = rig.lines.sampling().len() as f64;
+        let disturbed = |len: usize, seed| {
+            let angle = TAU * 50.3 / period;
+            let sine = move |k: usize| 5.0 * (angle * k as f64 + seed as f64).sin();
+            white(len, seed).into_iter().enumerate().map(|(k, e)| e + sine(k)).collect()
+        };
+        let found = models(&rig, &disturbed);
+        let count = share(&found, &|model| match model {
+            NoiseModel::Smooth { bands_hz, .. } => bands_hz.iter().any(|[low, high]| {
+                (low - 0.5 * spacing_hz..high + 0.5 * spacing_hz).contains(&(50.3 * spacing_hz))
+            }),
+            _ => false,
+        });
+        assert!(count >= 90, "{periods} periods: {count} of 100 with the disturbance");
+    }
+}
+
+#[test]
+fn single_samples_of_a_line_make_no_spectrum() {
+    let one = Rig::new(1).measure(white, 1).mean().unwrap();
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let refused = output_error_pooling(&one, &unknowns, Pooling::PerLine).unwrap_err();
+    let expected = mechid_estimate::EstimateError::TooFewAverages { got: 1, needed: 2 };
+    assert_eq!(refused, expected);
+}
+
+#[test]
+fn poolings_are_read_as_they_are_written() {
+    let all = [
+        ("auto", Pooling::Automatic),
+        ("white", Pooling::AllLines),
+        ("smooth", Pooling::Smooth),
+        ("neighbours:4", Pooling::Neighbours(4)),
+        ("per-line", Pooling::PerLine),
+    ];
+    for (text, pooling) in all {
+        assert_eq!(text.parse(), Ok(pooling));
+        assert_eq!(pooling.to_string(), text);
+    }
+    for text in ["", "neighbours", "neighbours:", "neighbours:-1", "pink"] {
+        assert!(text.parse::<Pooling>().is_err(), "{text}");
+    }
+}
