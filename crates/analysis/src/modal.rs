@@ -48,6 +48,9 @@ pub struct ModeRow {
     pub natural_frequency_hz: Uncertain,
     /// Dimensionless.
     pub damping_ratio: Uncertain,
+    /// Rate at which the free response grows, in 1/s, of an unstable mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub growth_rate: Option<f64>,
     /// One entry per degree of freedom; the largest is 1.
     pub shape: Vec<ShapeEntry>,
 }
@@ -80,7 +83,8 @@ impl ModalSummary {
     pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
         let known = machine.is_exact();
         let modes = machine.modes()?;
-        let rows = modes.iter().map(|mode| ModeRow::of(mode, known));
+        let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
+        let rows = modes.iter().map(|mode| ModeRow::of(mode, known, GROWTH * largest));
         Ok(Self {
             file: machine.name.clone(),
             degrees_of_freedom: machine.system().dof(),
@@ -92,6 +96,10 @@ impl ModalSummary {
         })
     }
 }
+
+/// Growth rate over the largest modulus of an eigenvalue that rounding does not explain: a double zero,
+/// as of a free machine, is found within the root of the machine precision.
+const GROWTH: f64 = 1e-7;
 
 /// Amplitudes of a backbone.
 const AMPLITUDES: usize = 10;
@@ -132,7 +140,8 @@ impl Machine {
 }
 
 impl ModeRow {
-    fn of(found: &IdentifiedMode, known: bool) -> Result<Self, AnalysisError> {
+    /// Growth rates up to `rounding` (1/s) are those of rounding.
+    fn of(found: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
         let uncertain = |value: &mechid_estimate::Uncertain| match known {
             true => Ok(Uncertain::known(value.value)),
             false => Uncertain::of(value),
@@ -145,6 +154,7 @@ impl ModeRow {
             damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
             natural_frequency_hz: uncertain(&found.natural_frequency_hz)?,
             damping_ratio: uncertain(&found.damping_ratio)?,
+            growth_rate: Some(eigenvalue.re).filter(|rate| *rate > rounding),
             shape: entries
                 .map(|(value, error)| ShapeEntry {
                     value: [value.re, value.im],
@@ -171,13 +181,32 @@ impl ModalSummary {
             .iter()
             .map(|terms| format!("\nmodes of small amplitudes; the nonlinear terms are {terms}"));
         format!(
-            "{}: {dof} {freedom} of freedom, {modes} mode{}{}\n\n{}\n{}",
+            "{}: {dof} {freedom} of freedom, {modes} mode{}{}\n\n{}{}\n{}",
             self.file,
             plural(modes),
             small.collect::<String>(),
             self.mode_table(),
+            self.instability(),
             self.shape_table()
         ) + &self.backbone_table()
+    }
+
+    /// Returns a line for each unstable mode; where the interval of its damping ratio contains zero, the
+    /// line says so.
+    fn instability(&self) -> String {
+        let line = |(number, mode): (usize, &ModeRow)| {
+            let seconds = significant(mode.growth_rate?.recip(), 3);
+            let interval = mode.damping_ratio.interval;
+            let doubt = match interval.is_some_and(|[_, high]| high >= 0.0) {
+                true => "; the interval of its damping ratio contains zero",
+                false => "",
+            };
+            Some(format!(
+                "mode {number} is unstable: its free response grows e-fold every {seconds} s{doubt}\n"
+            ))
+        };
+        let lines: String = (1..).zip(&self.modes).filter_map(line).collect();
+        if lines.is_empty() { lines } else { format!("\n{lines}") }
     }
 
     fn backbone_table(&self) -> String {

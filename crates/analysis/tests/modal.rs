@@ -1,0 +1,40 @@
+//! Modes of a machine: instability is told, rounding is not taken for it.
+
+use mechid_analysis::{Machine, ModalSummary};
+use mechid_model::SecondOrderSystem;
+use nalgebra::{DMatrix, dmatrix};
+
+fn summary(mass: DMatrix<f64>, damping: DMatrix<f64>, stiffness: DMatrix<f64>) -> ModalSummary {
+    let system = SecondOrderSystem::new(mass, damping, stiffness).unwrap();
+    ModalSummary::of(&Machine::known(system)).unwrap()
+}
+
+#[test]
+fn an_unstable_mode_is_told_with_its_growth() {
+    // ẍ − ẋ + 100 x = 0 grows as e^(t/2).
+    let found = summary(
+        DMatrix::identity(2, 2),
+        dmatrix![-1.0, 0.0; 0.0, 3.0],
+        dmatrix![100.0, 0.0; 0.0, 400.0],
+    );
+    let growth: Vec<f64> = found.modes.iter().filter_map(|mode| mode.growth_rate).collect();
+    assert_eq!(growth.len(), 1);
+    assert!((growth[0] - 0.5).abs() < 1e-12, "{growth:?}");
+    let text = found.to_string();
+    assert!(
+        text.contains("mode 1 is unstable: its free response grows e-fold every 2.00 s"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_free_or_undamped_machine_is_not_called_unstable() {
+    for damping in [0.0, 1.0] {
+        for scale in [1e-3, 1.0, 1e6] {
+            let chain = dmatrix![1.0, -1.0, 0.0; -1.0, 2.0, -1.0; 0.0, -1.0, 1.0];
+            let mass = DMatrix::from_diagonal(&nalgebra::dvector![1.3, 0.7, 2.9]);
+            let found = summary(mass, 0.01 * damping * &chain, scale * &chain);
+            assert!(!found.to_string().contains("unstable"), "{found}");
+        }
+    }
+}
