@@ -132,7 +132,7 @@ fn lines_of_a_disturbance_are_left_out() {
     };
     let records = shaken(5);
     let spoilt = identify(&records, &Identify::default()).unwrap();
-    assert!(spoilt.checks().iter().any(|check| check.is_bad()));
+    assert!(spoilt.checks().iter().any(|check| check.is_conspicuous()), "{spoilt}");
     assert!(error(&spoilt.system().unwrap()) > 0.1);
 
     let lines = LeftOut { lines: Some("12,24,36".parse().unwrap()), ..LeftOut::default() };
@@ -140,7 +140,7 @@ fn lines_of_a_disturbance_are_left_out() {
     let rotation = LeftOut { frequencies: vec![rotation], ..LeftOut::default() };
     for without in [lines, rotation] {
         let found = identify(&records, &Identify::default().without(without)).unwrap();
-        assert!(!found.checks().iter().any(|check| check.is_bad()), "{found}");
+        assert!(!found.checks().iter().any(|check| check.is_conspicuous()), "{found}");
         assert!(error(&found.system().unwrap()) < 0.01, "{found}");
     }
 }
