@@ -31,6 +31,8 @@ CASES = [
     case(X, period=256, lines="odd"),
     case(X, period=256, lines="4:2:60", method="maximum-likelihood"),
     case(X, period=256, band_hz=(5.0, 20.5)),
+    case(X, period=256, without_lines="10:20", noise="smooth"),
+    case(X, period=256, without_hz=[10.0, 12.5], noise="neighbours:3"),
     case(X, period=256, mass=25.0),
     case(X, period=256, detrend="mean"),
     case(X, period=256, from_frf="h1"),
@@ -60,7 +62,7 @@ def words(kinds: dict[str, str], options: dict[str, Any]) -> list[str]:
         if isinstance(value, tuple):
             value = ":".join(str(part) for part in value)
         if isinstance(value, list):
-            value = ",".join(value)
+            value = ",".join(str(part) for part in value)
         told += [f"--{name.replace('_', '-')}", str(value)]
     return told
 

@@ -76,6 +76,8 @@ def identify(
     noise: str | None = None,
     lines: str | None = None,
     band_hz: tuple[float, float] | None = None,
+    without_lines: str | None = None,
+    without_hz: Sequence[float | Mapping[str, Any]] = (),
     mass: float | Sequence[float | None] | None = None,
     domain: Literal["frequency", "time"] = "frequency",
     from_frf: Estimator | None = None,
@@ -108,8 +110,8 @@ def identify(
         mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
         arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator of the parameters from spectra; least squares unless `from_frf` is given, then
-        maximum likelihood.
+        Estimator of the parameters; without, maximum likelihood where the periods show the noise or
+        `from_frf` is given, otherwise least squares.
     noise : str, optional
         Noise spectrum by which maximum likelihood weighs the lines of whole periods: ``"white"``,
         ``"smooth"``, ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or
@@ -119,6 +121,11 @@ def identify(
         ``"1:2:335"``; every line at which the force exceeds its noise, without.
     band_hz : (float, float), optional
         Use the lines with force between two frequencies, in Hz.
+    without_lines : str, optional
+        Lines to leave out of these, numbers and ranges as for `lines`.
+    without_hz : sequence of float or dict, optional
+        Frequencies whose lines are left out, in Hz: a number, or a dict of ``frequency_hz``,
+        ``half_width_hz`` and ``multiples`` (True for a rotation).
     mass : float or sequence of float or None, optional
         Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
         one.
@@ -179,8 +186,8 @@ def identify(
         band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
         told = _identify_settings(
             method, noise, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
-            extent, derivatives, refine, interpolation, lines, band, tuple(_mass(mass)), nonlinear,
-            tuple(search), weighting,
+            extent, derivatives, refine, interpolation, lines, band,
+            _without(without_lines, without_hz), tuple(_mass(mass)), nonlinear, tuple(search), weighting,
         )
     else:
         told = json.dumps(settings)
@@ -202,6 +209,8 @@ def frf(
     estimator: Estimator = "h1",
     lines: str | None = None,
     band_hz: tuple[float, float] | None = None,
+    without_lines: str | None = None,
+    without_hz: Sequence[float | Mapping[str, Any]] = (),
     segment: int | None = None,
     segment_window: Weight | None = None,
     segment_overlap: float | None = None,
@@ -220,7 +229,7 @@ def frf(
         The record, as in `identify`.
     estimator : {"h1", "h2", "hv"}
         Where the noise is: on the response, on the force, or on both.
-    lines, band_hz : optional
+    lines, band_hz, without_lines, without_hz : optional
         Spectral lines of a segment, as in `identify`.
     segment, segment_window, segment_overlap : optional
         Samples of a segment, its weights, and the part that the next one repeats, in per cent.
@@ -243,6 +252,7 @@ def frf(
         settings = {
             "estimator": estimator,
             "lines": _lines(lines, band_hz),
+            "without": json.loads(_without(without_lines, without_hz)),
             "segments": _segments(True, segment, segment_window, segment_overlap),
         }
     return FrequencyResponses(_mechid.frf(found._inner, json.dumps(settings), threads))
@@ -649,6 +659,7 @@ def _identify_settings(
     interpolation: str | None,
     lines: str | None,
     band_hz: tuple[float, float] | None,
+    without: str,
     mass: tuple[float | None, ...],
     nonlinear: str | None,
     search: tuple[str, ...],
@@ -661,9 +672,12 @@ def _identify_settings(
     )
     if domain == "time" and (lines is not None or band_hz is not None):
         raise TypeError("`lines` and `band_hz` belong to domain='frequency'")
+    if domain == "time" and without != _without(None, ()):
+        raise TypeError("`without_lines` and `without_hz` belong to domain='frequency'")
     settings = {
         "fit": fit,
         "lines": _lines(lines, band_hz),
+        "without": json.loads(without),
         "mass": list(mass),
         "nonlinear": _nonlinear(nonlinear, search, weighting),
     }
@@ -731,6 +745,12 @@ def _segments(
         _refuse({"segment_window": window, "segment_overlap": overlap}, "needs `segment`")
     kept = {"segment": segment, "window": window, "overlap_percent": overlap}
     return {name: value for name, value in kept.items() if value is not None}
+
+
+def _without(lines: str | None, hz: Sequence[float | Mapping[str, Any]]) -> str:
+    """Return the lines to leave out as JSON."""
+    frequencies = [dict(one) if isinstance(one, Mapping) else {"frequency_hz": float(one)} for one in hz]
+    return json.dumps({"lines": lines, "frequencies": frequencies})
 
 
 def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
