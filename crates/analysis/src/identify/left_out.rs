@@ -30,7 +30,7 @@ pub struct Disturbance {
     /// between lines.
     #[serde(default)]
     pub half_width_hz: Option<f64>,
-    /// Whether its multiples are disturbed, too.
+    /// Flag for its multiples being disturbed, too.
     #[serde(default)]
     pub multiples: bool,
 }

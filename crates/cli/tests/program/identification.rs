@@ -332,7 +332,7 @@ fn several_records_are_one_fit() {
     assert_eq!(found["fit"]["equations"], 512);
     let (_, text, _) = run(folder, &format!("identify a.csv b.csv {columns}"));
     assert!(text.contains("b.csv: samples 1 to 256, 100 Hz\n"), "{text}");
-    assert!(text.contains("b.csv: force 1 is persistently exciting of order 2"), "{text}");
+    assert!(text.contains("excitation: force 1 is persistently exciting of order 2"), "{text}");
     refused(folder, &format!("identify a.csv d.csv {columns}"), &["cannot read d.csv"]);
 }
 

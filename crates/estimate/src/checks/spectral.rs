@@ -74,7 +74,7 @@ fn excitation(data: &FrequencyData, unknowns: &Unknowns) -> Finding {
 
 /// Deviation of the periods from their mean; of a single period, its seam.
 fn repetition(response: &Record, period: usize) -> Result<Finding, EstimateError> {
-    if response.len() < 2 * period {
+    if response.len() / 2 < period {
         return Ok(periodicity(response));
     }
     let mean = response.period_mean(period)?;
