@@ -42,7 +42,7 @@ pub fn fit(
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
-        let mut checks = vec![coherence(&r.frf)];
+        let mut checks = Vec::from_iter(coherence(&r.frf));
         if periodic {
             checks.extend(claimed_period(&held.force, held.period));
         }

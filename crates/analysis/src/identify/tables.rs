@@ -402,7 +402,7 @@ impl Tabulated {
             let own = (driven.len() * frf.omega().len()) as f64 / all as f64;
             let fitted = own * estimate.parameters().len() as f64;
             let after = after_response_fit(frf, driven, estimate, fitted)?;
-            findings.push((When::Before, coherence(frf)));
+            findings.extend(coherence(frf).map(|finding| (When::Before, finding)));
             findings.extend(after.into_iter().map(|finding| (When::After, finding)));
         }
         Ok(findings)

@@ -49,15 +49,15 @@ pub fn steady_periods(
     Ok(findings)
 }
 
-/// Checks the coherence of frequency responses, whose median is judged.
+/// Checks the coherence of frequency responses, whose median is judged; `None` without a response.
 ///
 /// # Source
 /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 6; the limits are ours.
-pub fn coherence(frf: &Frf) -> Finding {
+pub fn coherence(frf: &Frf) -> Option<Finding> {
     let mut coherence: Vec<f64> = frf.coherence().iter().copied().collect();
     coherence.sort_by(f64::total_cmp);
-    let (minimum, median) = (coherence[0], coherence[coherence.len() / 2]);
-    Finding::Coherence { median, minimum, averages: frf.averages() }
+    let (minimum, median) = (*coherence.first()?, coherence[coherence.len() / 2]);
+    Some(Finding::Coherence { median, minimum, averages: frf.averages() })
 }
 
 /// Number of lines that carry force, against the unknowns.

@@ -119,7 +119,7 @@ fn trouble_with_responses_is_seen_before_they_are_fitted() {
         let frf =
             Frf::new(omega, response, coherence, 20.0, ResponseQuantity::Displacement).unwrap();
         let mut findings = before_spectral_fit(&frf.data(&[0, 1]).unwrap(), &unknowns).unwrap();
-        findings.push(checks::coherence(&frf));
+        findings.extend(checks::coherence(&frf));
         findings
     };
     let good = look(30, 0.99);
