@@ -1,4 +1,4 @@
-//! What real rigs do: one shaker at a time, and disturbances with lines of their own.
+//! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
 
 use mechid_analysis::identify::{Disturbance, Fit, LeftOut, SampleFit};
 use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};

@@ -6,7 +6,7 @@
 //! cargo run --release -p mechid-estimate --example noise_study -- 500 auto
 //! ```
 //!
-//! What follows are the number of experiments, the noise model (`auto`, `white`, `smooth`, `neighbours:N` or
+//! The arguments are the number of experiments, the noise model (`auto`, `white`, `smooth`, `neighbours:N` or
 //! `per-line`) and, if not all are wanted, the first letters of a noise.
 
 #![allow(clippy::print_stdout, reason = "the table is the result")]

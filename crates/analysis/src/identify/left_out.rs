@@ -97,7 +97,7 @@ impl LineRule<'_> {
     /// Returns the lines of a period of the force.
     ///
     /// # Errors
-    /// As [`choose_lines`]; [`AnalysisError::Setting`] if all of them are left out, and if a line to leave
+    /// Those of [`choose_lines`]; [`AnalysisError::Setting`] if all of them are left out, and if a line to leave
     /// out does not exist.
     pub fn lines(&self, force: &Record, period: usize) -> Result<Vec<usize>, AnalysisError> {
         let chosen = choose_lines(force, period, self.choice)?;

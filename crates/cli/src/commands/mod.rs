@@ -64,8 +64,8 @@ pub enum Command {
 }
 
 impl Command {
-    /// What the command found; nothing is printed or written yet. `words` are the arguments that name
-    /// it, for a report that tells how it is made again.
+    /// Runs the command and returns its result; nothing is printed or written yet. `words` are the
+    /// arguments that name it, for a report that tells how it is made again.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
         match self {
             Command::Bearing(args) => args.run(),

@@ -45,7 +45,7 @@ pub fn before_fit(
 /// responses (x, ẋ, ẍ) and forces (N) of one record or several that are fitted together.
 ///
 /// # Errors
-/// As [`EquationOfMotion::push_rows`] and [`EquationOfMotion::solve`].
+/// Those of [`EquationOfMotion::push_rows`] and [`EquationOfMotion::solve`].
 ///
 /// # Source
 /// As [`before_fit`].
