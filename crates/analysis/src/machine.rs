@@ -90,18 +90,19 @@ impl Machine {
                 })
             }
         };
-        let Some(found) = read_covariance(path)? else {
+        let Some(covariance) = read_covariance(path)? else {
             return Ok(Self { name, nonlinear, ..Self::known(system) });
         };
-        let (nonlinear, found) = match nonlinear {
-            None => (None, found),
+        let (nonlinear, covariance) = match nonlinear {
+            None => (None, covariance),
             Some(part) => {
                 let system = part.system().clone();
-                let entries = part_of(&found, |name| Parameter::named(name, system.dof()).is_ok());
+                let entries =
+                    part_of(&covariance, |name| Parameter::named(name, system.dof()).is_ok());
                 let of_channels = |name: &str| {
                     CHANNELS.contains(&name) && NonlinearParameter::named(name, &system).is_err()
                 };
-                let own = part_of(&found, |name| !of_channels(name));
+                let own = part_of(&covariance, |name| !of_channels(name));
                 let names = own.parameters.iter();
                 let parameters = names.map(|parameter| {
                     NonlinearParameter::named(parameter, &system)
@@ -112,9 +113,9 @@ impl Machine {
                 (Some(NonlinearPart { uncertain, ..part }), entries)
             }
         };
-        let parameters = parameters(&name, &system, &found)?;
-        let degrees_of_freedom = found.degrees_of_freedom;
-        let uncertain = UncertainSystem::new(system, parameters, found.matrix())?;
+        let parameters = parameters(&name, &system, &covariance)?;
+        let degrees_of_freedom = covariance.degrees_of_freedom;
+        let uncertain = UncertainSystem::new(system, parameters, covariance.matrix())?;
         Ok(Self { name, uncertain, degrees_of_freedom, nonlinear })
     }
 

@@ -9,7 +9,7 @@ use mechid_model::{ModelError, Terms};
 use serde::Serialize;
 
 use crate::AnalysisError;
-use crate::identify::summary::{CONFIDENCE, Uncertain};
+use crate::identify::rows::{CONFIDENCE, Uncertain};
 use crate::machine::Machine;
 use crate::text::{compact, significant, text_table};
 
@@ -83,7 +83,7 @@ impl ModalSummary {
     pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
         let known = machine.is_exact();
         let modes = machine.modes()?;
-        let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
+        let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
         let rows = modes.iter().map(|mode| ModeRow::of(mode, known, GROWTH * largest));
         Ok(Self {
             file: machine.name.clone(),
@@ -141,19 +141,19 @@ impl Machine {
 
 impl ModeRow {
     /// Growth rates up to `rounding` (1/s) are those of rounding.
-    fn of(found: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
+    fn of(identified: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
         let uncertain = |value: &mechid_estimate::Uncertain| match known {
             true => Ok(Uncertain::known(value.value)),
             false => Uncertain::of(value),
         };
-        let eigenvalue = found.mode.eigenvalue();
-        let entries = found.mode.shape().iter().zip(found.shape_standard_error.iter());
+        let eigenvalue = identified.mode.eigenvalue();
+        let entries = identified.mode.shape().iter().zip(identified.shape_standard_error.iter());
         Ok(Self {
-            oscillates: found.mode.oscillates(),
+            oscillates: identified.mode.oscillates(),
             eigenvalue: [eigenvalue.re, eigenvalue.im],
-            damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
-            natural_frequency_hz: uncertain(&found.natural_frequency_hz)?,
-            damping_ratio: uncertain(&found.damping_ratio)?,
+            damped_frequency_hz: uncertain(&identified.damped_frequency_hz)?,
+            natural_frequency_hz: uncertain(&identified.natural_frequency_hz)?,
+            damping_ratio: uncertain(&identified.damping_ratio)?,
             growth_rate: Some(eigenvalue.re).filter(|rate| *rate > rounding),
             shape: entries
                 .map(|(value, error)| ShapeEntry {

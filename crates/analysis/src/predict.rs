@@ -5,11 +5,11 @@ use std::fmt;
 use mechid_estimate::EstimateError;
 use mechid_estimate::nonlinear::{self, ChannelPhase};
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
-use mechid_signal::{Extent, Record, measures};
+use mechid_signal::{Extent, measures};
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::AnalysisError;
-use crate::identify::prediction::{channels, steady_state};
+use crate::identify::prediction::{channels, shown, steady_state};
 use crate::machine::{Machine, NonlinearPart};
 use crate::measurement::channels::ABSENT;
 use crate::measurement::{Block, Measurement};
@@ -181,22 +181,8 @@ fn steady_from_rest(
     let force = block.force.period_mean(block.period)?;
     let (force, _) = phase.correct(&force, &force)?;
     let rest = InitialState::rest(system.dof());
-    let found = nonlinear::predict(system, &force, Extent::WholePeriod, &rest)?;
-    shown(&found, phase, block.periods)
-}
-
-/// A response as the channels show it, over a number of periods.
-pub(crate) fn shown(
-    response: &Response,
-    phase: ChannelPhase,
-    periods: usize,
-) -> Result<Response, EstimateError> {
-    let one = |record: &Record| -> Result<Record, EstimateError> {
-        Ok(phase.as_measured(record)?.repeated(periods)?)
-    };
-    let [x, v, a] =
-        [response.displacement(), response.velocity(), response.acceleration()].map(one);
-    Ok(Response::new(x?, v?, a?)?)
+    let steady = nonlinear::predict(system, &force, Extent::WholePeriod, &rest)?;
+    shown(&steady, phase, block.periods)
 }
 
 impl PredictionError {
@@ -210,9 +196,9 @@ impl PredictionError {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let about = mean(measured);
         let apart = if without_mean { about - mean(predicted) } else { 0.0 };
-        let left: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p - apart).collect();
+        let error: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p - apart).collect();
         let size: Vec<f64> = measured.iter().map(|x| x - about).collect();
-        let (rmse, size) = (measures::rms(&left), measures::rms(&size));
+        let (rmse, size) = (measures::rms(&error), measures::rms(&size));
         let (degree_of_freedom, unit) = (dof + 1, quantity.unit());
         Self { quantity, degree_of_freedom, unit, rmse, nrmse: rmse / size }
     }

@@ -55,7 +55,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
     let test = test_of(&force, &x).period(PERIOD).unwrap();
     let mut found = identify(std::slice::from_ref(&test), &how()).unwrap();
     for (name, value) in [("m", 10.0), ("c", 40.0), ("k", 5000.0), ("k2", 8e4), ("k3", 4e6)] {
-        let got = found.nonlinear().unwrap().parameter(name).unwrap().found.value;
+        let got = found.nonlinear().unwrap().parameter(name).unwrap().estimate.value;
         assert!((got / value - 1.0).abs() < 1e-9, "{name} = {got}");
     }
     assert!(found.validate(&test).unwrap().channels[0].fit_percent > 99.99);
@@ -208,7 +208,7 @@ fn output_error_takes_noise_on_the_response() {
         ..how()
     };
     let found = identify(&[test], &likely).unwrap();
-    let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().found;
+    let cubic = found.nonlinear().unwrap().parameter("k3").unwrap().estimate;
     assert!((cubic.value - 4e6).abs() < 4.0 * cubic.standard_error, "{cubic:?}");
     assert!(cubic.standard_error < 0.05 * 4e6, "{cubic:?}");
 }

@@ -177,8 +177,8 @@ impl EquationOfMotion {
     fn groups(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<Vec<Group>, EstimateError> {
         let mut shared: Vec<(Columns, Vec<usize>)> = Vec::new();
         for equation in 0..self.dof {
-            let own = free.iter().filter(|p| p.row() == equation);
-            let columns: Columns = own.map(|p| (p.matrix(), p.column())).collect();
+            let parameters = free.iter().filter(|p| p.row() == equation);
+            let columns: Columns = parameters.map(|p| (p.matrix(), p.column())).collect();
             match shared.iter_mut().find(|(same, _)| *same == columns) {
                 _ if columns.is_empty() => {}
                 Some((_, equations)) => equations.push(equation),
@@ -274,11 +274,14 @@ impl Group {
         let mut found = Vec::new();
         for direction in &self.solution.undetermined {
             for equation in &self.equations {
-                let own: Vec<&Parameter> = free.iter().filter(|p| p.row() == *equation).collect();
+                let parameters: Vec<&Parameter> =
+                    free.iter().filter(|p| p.row() == *equation).collect();
                 let involved = direction.involved.iter().enumerate().filter(|(_, i)| **i);
                 found.push(Undetermined {
                     relative_singular_value: direction.relative_singular_value,
-                    terms: involved.map(|(at, _)| (*own[at], direction.combination[at])).collect(),
+                    terms: involved
+                        .map(|(at, _)| (*parameters[at], direction.combination[at]))
+                        .collect(),
                 });
             }
         }
@@ -287,7 +290,7 @@ impl Group {
 }
 
 pub(crate) fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
-    let own = unknowns.free().into_iter().filter(|p| p.row() == equation);
-    let parameters = message::list(own, ", ", NAMED_PARAMETERS);
+    let of_equation = unknowns.free().into_iter().filter(|p| p.row() == equation);
+    let parameters = message::list(of_equation, ", ", NAMED_PARAMETERS);
     EstimateError::OnlyRatios { dof: equation + 1, parameters }
 }

@@ -93,7 +93,9 @@ impl Generator {
         blocks.iter().try_for_each(|block| check_block(&t, *block))?;
         blocks.extend((states..states + inputs).map(|at| (at, 1)));
         let input_scale = match (one_norm(difference), one_norm(input)) {
-            (own, other) if own > 0.0 && other > 0.0 => own / other,
+            (numerator, denominator) if numerator > 0.0 && denominator > 0.0 => {
+                numerator / denominator
+            }
             _ => 1.0,
         };
         let mut x = DMatrix::zeros(states + inputs, states + inputs);
@@ -132,8 +134,8 @@ impl Generator {
         let (states, all) = (self.q.nrows(), self.x.nrows());
         let powers = 2f64.powi(self.roots.len() as i32);
         let mut value = &self.q * logarithm.rows(0, states) * powers;
-        let own = value.columns(0, states) * self.q.transpose();
-        value.columns_mut(0, states).copy_from(&own);
+        let rotated = value.columns(0, states) * self.q.transpose();
+        value.columns_mut(0, states).copy_from(&rotated);
         value.columns_mut(states, all - states).unscale_mut(self.input_scale);
         value
     }
@@ -221,9 +223,9 @@ mod tests {
                     change[(row, column)] = 1.0;
                     let step = 1e-6;
                     let moved = |sign: f64| {
-                        let own = &difference + change.columns(0, states) * (sign * step);
+                        let shifted = &difference + change.columns(0, states) * (sign * step);
                         let input = &input + change.columns(states, 2) * (sign * step);
-                        Generator::new(&own, &input).unwrap().value
+                        Generator::new(&shifted, &input).unwrap().value
                     };
                     let quotient = (moved(1.0) - moved(-1.0)) / (2.0 * step);
                     let derivative = generator.derivative(&change).unwrap();

@@ -188,7 +188,7 @@ impl Sensitivity {
         // Entry (i, j) of a matrix acts on equation i alone: n right-hand sides serve all.
         let mut unit = DMatrix::identity(n + 1, n);
         let regular = bordered.lu().solve_mut(&mut unit);
-        let mut found = Self {
+        let mut derivatives = Self {
             eigenvalue: DVector::zeros(parameters.len()),
             shape: DMatrix::zeros(n, parameters.len()),
         };
@@ -201,10 +201,10 @@ impl Sensitivity {
             let push =
                 if regular { power * shape[parameter.column()] } else { Complex::from(f64::NAN) };
             let answer = unit.column(parameter.row()) * -push;
-            found.eigenvalue[at] = answer[n];
-            found.shape.column_mut(at).copy_from(&answer.rows(0, n));
+            derivatives.eigenvalue[at] = answer[n];
+            derivatives.shape.column_mut(at).copy_from(&answer.rows(0, n));
         }
-        found
+        derivatives
     }
 }
 

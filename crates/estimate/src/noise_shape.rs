@@ -263,8 +263,8 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
     let basis = form.basis(omega);
     let mut log_power = variances.clone();
     let mut misfit = 0.0;
-    for (mut column, own) in log_power.column_iter_mut().zip(variances.column_iter()) {
-        let (mut found, least) = most_likely(&basis, &own.into_owned());
+    for (mut column, channel) in log_power.column_iter_mut().zip(variances.column_iter()) {
+        let (mut found, least) = most_likely(&basis, &channel.into_owned());
         if !form.bumps.is_empty() {
             fill_notches(&mut found, (QUIET_DEVIATIONS / nu) as usize);
         }
@@ -297,11 +297,11 @@ fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64)
         let of_channel = |channel: usize| {
             let inside = below[(start + width, channel)] - below[(start, channel)];
             let all = below[(lines, channel)];
-            let [mean, own, other] =
+            let [mean, inside, other] =
                 [all / (count + others), inside / count, (all - inside) / others]
                     .map(|level: f64| level.max(FLOOR));
-            match own > other || count * nu >= QUIET_DEVIATIONS {
-                true => count * (mean / own).ln() + others * (mean / other).ln(),
+            match inside > other || count * nu >= QUIET_DEVIATIONS {
+                true => count * (mean / inside).ln() + others * (mean / other).ln(),
                 false => 0.0,
             }
         };
@@ -341,14 +341,14 @@ fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
     let area: f64 = parts.iter().sum();
     let of_channel = |channel: usize| {
         let all = levels.column(channel);
-        let own = all.rows_range(support.clone());
-        let (total, outside) = (all.sum(), all.sum() - own.sum());
+        let inside = all.rows_range(support.clone());
+        let (total, outside) = (all.sum(), all.sum() - inside.sum());
         let (mut height, mut least, mut most) = (0.0, -HIGHEST, HIGHEST);
         let mut sum = total;
         for _ in 0..HEIGHT_STEPS {
             let (mut first, mut second) = (0.0, 0.0);
             sum = outside;
-            for (part, level) in parts.iter().zip(own.iter()) {
+            for (part, level) in parts.iter().zip(inside.iter()) {
                 let left = level * f64::exp(-height * part);
                 sum += left;
                 first += part * left;

@@ -1,12 +1,14 @@
 //! Sample covariances of single lines made into one noise spectrum.
 
 use std::f64::consts::TAU;
+use std::fmt;
 use std::ops::Range;
+use std::str::FromStr;
 
+use mechid_signal::message;
 use nalgebra::{Complex, DMatrix};
 
 use crate::noise_shape::{self, Form, Smooth};
-use crate::noise_spectrum::{NoiseModel, Pooling};
 
 type Covariances = Vec<DMatrix<Complex<f64>>>;
 
@@ -15,6 +17,124 @@ const SPARE: f64 = 6.0;
 /// Advantage in the log likelihood of new data, per complex deviation of all, by which a mean over lines has
 /// to predict better than a smooth spectrum.
 const MARGIN: f64 = 4.0;
+
+/// Choice of the lines that share a covariance of the noise.
+///
+/// A covariance of few periods is itself uncertain, and an estimator weighted with it
+/// loses by that. Noise spectra are smooth, so lines may share theirs. As text: `auto`, `white`, `smooth`,
+/// `neighbours:N` or `per-line`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
+pub enum Pooling {
+    /// The one of the others that predicts the samples best.
+    #[default]
+    Automatic,
+    /// One covariance for all lines: white noise in the quantity measured.
+    AllLines,
+    /// A spectrum of each channel whose logarithm is a polynomial in that of the frequency, with levels of
+    /// their own in some bands; correlations of channels are the same on all lines. Order and bands are
+    /// chosen from the samples, so that white noise is found to be white.
+    Smooth,
+    /// Every line takes the mean of the covariances of this many chosen lines to either side; at the
+    /// ends of the band, of as many lines altogether.
+    Neighbours(usize),
+    /// Every line has its own covariance: of many periods.
+    PerLine,
+}
+
+impl fmt::Display for Pooling {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Automatic => f.write_str("auto"),
+            Self::AllLines => f.write_str("white"),
+            Self::Smooth => f.write_str("smooth"),
+            Self::Neighbours(lines) => write!(f, "neighbours:{lines}"),
+            Self::PerLine => f.write_str("per-line"),
+        }
+    }
+}
+
+impl From<Pooling> for String {
+    fn from(pooling: Pooling) -> Self {
+        pooling.to_string()
+    }
+}
+
+impl FromStr for Pooling {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let neighbours = || text.strip_prefix("neighbours:")?.parse().ok().map(Self::Neighbours);
+        match text {
+            "auto" => Ok(Self::Automatic),
+            "white" => Ok(Self::AllLines),
+            "smooth" => Ok(Self::Smooth),
+            "per-line" => Ok(Self::PerLine),
+            _ => neighbours().ok_or_else(|| {
+                "write auto, white, smooth, neighbours:N (lines to either side) or per-line".into()
+            }),
+        }
+    }
+}
+
+impl TryFrom<String> for Pooling {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+/// Spectrum that was made of the samples of a noise.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(tag = "kind", rename_all = "snake_case"))]
+pub enum NoiseModel {
+    /// One level for all lines.
+    White,
+    /// A smooth spectrum.
+    Smooth {
+        /// Order of the polynomial of log power in log frequency.
+        order: usize,
+        /// Bands with levels of their own, such as those of a disturbance: lowest and highest line, in Hz.
+        bands_hz: Vec<[f64; 2]>,
+    },
+    /// Means over neighbouring lines.
+    Neighbours {
+        /// Number of lines to either side.
+        half_width: usize,
+    },
+    /// A level at every line.
+    PerLine,
+}
+
+impl fmt::Display for NoiseModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::White => f.write_str("white"),
+            Self::Smooth { order, bands_hz } => {
+                match order {
+                    0 => f.write_str("white")?,
+                    order => write!(f, "smooth (order {order})")?,
+                }
+                const SHOWN: usize = 3;
+                for (at, [low, high]) in bands_hz.iter().take(SHOWN).enumerate() {
+                    let before = if at == 0 { ", other levels at" } else { "," };
+                    write!(f, "{before} {low:.4} to {high:.4} Hz")?;
+                }
+                match bands_hz.len().saturating_sub(SHOWN) {
+                    0 => Ok(()),
+                    more => write!(f, " and in {}", message::count(more, "more band")),
+                }
+            }
+            Self::Neighbours { half_width } => {
+                write!(f, "averaged over {}", message::count(2 * half_width + 1, "line"))
+            }
+            Self::PerLine => f.write_str("line by line"),
+        }
+    }
+}
 
 /// A noise spectrum made of samples.
 pub(crate) struct Pooled {
@@ -141,12 +261,12 @@ impl Candidate {
     fn best(self) -> Pooled {
         let smooth = self.smooth();
         let channels = self.noisy.len() as f64;
-        let Some(found) = &self.smooth else { return smooth };
+        let Some(Smooth { form, .. }) = &self.smooth else { return smooth };
         let covariance = self.noisy_part(&self.covariance);
-        let own = self.noisy_part(&self.places.sorted(&smooth.covariance));
-        let each = own.iter().zip(&covariance).map(|(s, sample)| misfit(s, sample));
+        let modelled = self.noisy_part(&self.places.sorted(&smooth.covariance));
+        let each = modelled.iter().zip(&covariance).map(|(s, sample)| misfit(s, sample));
         let Some(misfit) = each.sum::<Option<f64>>() else { return smooth };
-        let unknowns = channels * found.form.terms() as f64 + channels * (channels - 1.0);
+        let unknowns = channels * form.terms() as f64 + channels * (channels - 1.0);
         let to_beat = misfit + (unknowns - MARGIN) / self.nu;
         let half_widths = (0..usize::BITS).map(|power| (1usize << power) - 1);
         let half_widths = half_widths.take_while(|half| 4 * half + 2 <= covariance.len());
@@ -169,16 +289,16 @@ impl Candidate {
             wide => Pooling::Neighbours(wide),
         };
         let Self { places, omega, covariance, nu, .. } = self;
-        let found = pooled(&omega, covariance, nu, pooling);
-        Pooled { covariance: places.unsorted(found.covariance), ..found }
+        let means = pooled(&omega, covariance, nu, pooling);
+        Pooled { covariance: places.unsorted(means.covariance), ..means }
     }
 
     /// Standard deviations of a smooth spectrum, lines × all channels; 1 where there is no noise.
     fn deviations(&self, smooth: &Smooth) -> DMatrix<f64> {
         let mut all = DMatrix::from_element(self.omega.len(), self.covariance[0].nrows(), 1.0);
         for (at, channel) in self.noisy.iter().enumerate() {
-            let own = smooth.log_power.column(at).map(|log| (0.5 * log).exp());
-            all.set_column(*channel, &own);
+            let deviations = smooth.log_power.column(at).map(|log| (0.5 * log).exp());
+            all.set_column(*channel, &deviations);
         }
         all
     }

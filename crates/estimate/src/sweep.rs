@@ -66,7 +66,7 @@ where
     let done = std::sync::atomic::AtomicUsize::new(0);
     let point = |setting: &S| {
         let outcome = estimate(setting);
-        let error = outcome.as_ref().ok().and_then(|found| rate(found, reference));
+        let error = outcome.as_ref().ok().and_then(|estimate| rate(estimate, reference));
         progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed));
         SweepPoint { setting: setting.clone(), outcome, error }
     };
@@ -86,19 +86,19 @@ impl<S, E> Sweep<S, E> {
     }
 }
 
-fn rate(found: &Estimate, reference: Option<&SecondOrderSystem>) -> Option<f64> {
-    found.system().ok()?;
-    let [mass, damping, stiffness] = [found.mass(), found.damping(), found.stiffness()];
+fn rate(estimate: &Estimate, reference: Option<&SecondOrderSystem>) -> Option<f64> {
+    estimate.system().ok()?;
+    let [mass, damping, stiffness] = [estimate.mass(), estimate.damping(), estimate.stiffness()];
     let error = match reference {
         Some(system) => {
             [(&mass, system.mass()), (&damping, system.damping()), (&stiffness, system.stiffness())]
                 .iter()
-                .map(|(found, known)| {
-                    (*found - *known).amax() / known.amax().max(f64::MIN_POSITIVE)
+                .map(|(estimate, known)| {
+                    (*estimate - *known).amax() / known.amax().max(f64::MIN_POSITIVE)
                 })
                 .fold(0.0, f64::max)
         }
-        None => found
+        None => estimate
             .parameters()
             .map(|p| {
                 let whole = match p.parameter.matrix() {

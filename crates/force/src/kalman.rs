@@ -114,13 +114,13 @@ pub fn kalman(
             std::iter::once(0.0).chain(walk.iter().map(|w| (w / unit).ln())).collect()
         }
     };
-    let found = model.solve(system, measured, forced, &scale, &parameters)?;
-    let stated = (*tuning != Tuning::Likelihood).then_some(&found.noise_std[..]);
+    let smoothed = model.solve(system, measured, forced, &scale, &parameters)?;
+    let stated = (*tuning != Tuning::Likelihood).then_some(&smoothed.noise_std[..]);
     let rest = measured.exceeds(forced).then(|| {
-        let motion = [&found.displacement, &found.velocity, found.force.record()];
+        let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
         Rest::of_motion(system, measured, motion, stated)
     });
-    Ok(KalmanForce { force: found.force.with_rest(rest), ..found })
+    Ok(KalmanForce { force: smoothed.force.with_rest(rest), ..smoothed })
 }
 
 /// The stated noise levels, if they can be any.
@@ -278,9 +278,9 @@ impl Model {
                 if noise.is_none() {
                     point[0] = level.ln();
                 }
-                let found = cost(&point);
-                if found < best.0 {
-                    best = (found, point);
+                let value = cost(&point);
+                if value < best.0 {
+                    best = (value, point);
                 }
             }
         }

@@ -146,8 +146,12 @@ fn least_gcv(filter: Filter, components: &Components, fits: &[Fit]) -> usize {
     let share =
         if matches!(filter, Filter::TruncatedSvd(_)) { LEFT_TO_JUDGE } else { LEFT_BY_TIKHONOV };
     least(fits.iter().map(|fit| {
-        let left = components.data() - fit.unknowns;
-        if left < share * components.data() { f64::INFINITY } else { fit.residual / (left * left) }
+        let freedom = components.data() - fit.unknowns;
+        if freedom < share * components.data() {
+            f64::INFINITY
+        } else {
+            fit.residual / (freedom * freedom)
+        }
     }))
 }
 

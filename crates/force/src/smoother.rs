@@ -276,8 +276,8 @@ mod tests {
         let lu = seen.lu();
         let weights = lu.solve(&y).unwrap();
         let likelihood = -0.5 * (lu.determinant().ln() + y.dot(&weights));
-        let left = prior - &cross * lu.solve(&cross.transpose()).unwrap();
-        (cross * weights, left.diagonal(), likelihood)
+        let posterior = prior - &cross * lu.solve(&cross.transpose()).unwrap();
+        (cross * weights, posterior.diagonal(), likelihood)
     }
 
     #[test]

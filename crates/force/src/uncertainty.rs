@@ -108,13 +108,13 @@ fn propagate(
         let step = STEP * covariance[(at, at)].sqrt();
         if step == 0.0 {
             forces.push(force.record().data() * 0.0);
-            rests.extend(force.rest().map(|rest| rest.left() * 0.0));
+            rests.extend(force.rest().map(|rest| rest.residual() * 0.0));
             continue;
         }
         let (above, below) = (changed(at, step)?, changed(at, -step)?);
         forces.push((above.record().data() - below.record().data()) / (2.0 * step));
         if let (Some(above), Some(below)) = (above.rest(), below.rest()) {
-            rests.push((above.left() - below.left()) / (2.0 * step));
+            rests.push((above.residual() - below.residual()) / (2.0 * step));
         }
     }
     let mut variance = propagated(covariance, force.record().data().shape(), &forces);
@@ -123,7 +123,7 @@ fn propagate(
     }
     let error = Record::new(force.record().sampling(), variance.map(f64::sqrt))?;
     let rest = force.rest().cloned().map(|rest| {
-        let variance = propagated(covariance, rest.left().shape(), &rests);
+        let variance = propagated(covariance, rest.residual().shape(), &rests);
         rest.with_machine(&variance)
     });
     Ok(force.with_standard_error(Some(error)).with_rest(rest))

@@ -44,27 +44,27 @@ impl Unexplained {
 #[derive(Debug, Clone)]
 pub(crate) struct Rest {
     /// Measured less predicted, samples × channels, in the units of the channels.
-    left: DMatrix<f64>,
+    residual: DMatrix<f64>,
     channels: Vec<Unexplained>,
 }
 
 impl Rest {
-    fn of(measured: &DMatrix<f64>, left: DMatrix<f64>, noise: Option<Vec<f64>>) -> Self {
-        let channels = (0..left.ncols())
+    fn of(measured: &DMatrix<f64>, residual: DMatrix<f64>, noise: Option<Vec<f64>>) -> Self {
+        let channels = (0..residual.ncols())
             .map(|c| {
-                let (rest, seen) = (left.column(c), measured.column(c));
+                let (rest, seen) = (residual.column(c), measured.column(c));
                 Unexplained {
-                    rest: rms(rest.norm_squared(), left.nrows()),
+                    rest: rms(rest.norm_squared(), residual.nrows()),
                     motion: rms(
                         seen.norm_squared().max((seen - rest).norm_squared()),
-                        left.nrows(),
+                        residual.nrows(),
                     ),
                     noise: noise.as_ref().map(|level| level[c]),
                     machine: None,
                 }
             })
             .collect();
-        Self { left, channels }
+        Self { residual, channels }
     }
 
     /// On lines of a period: Y_n − S H_n F_n of each.
@@ -84,7 +84,7 @@ impl Rest {
         let scale = vec![1.0; channels.len()];
         let transfer = Transfer { system, channels, forced, scale: &scale };
         let zeros = || DMatrix::<Complex<f64>>::zeros(spectrum.len(), channels.len());
-        let (mut seen, mut left) = (zeros(), zeros());
+        let (mut seen, mut residual) = (zeros(), zeros());
         let mut weight = 0.0;
         for &n in lines {
             let response = transfer.scaled(n, spectrum.omega(n))?;
@@ -93,13 +93,13 @@ impl Rest {
                     .map(|(f, &dof)| response[(c, f)] * force.line(n, dof))
                     .sum::<Complex<f64>>();
                 seen[(n, c)] = spectrum.line(n, c);
-                left[(n, c)] = spectrum.line(n, c) - made;
+                residual[(n, c)] = spectrum.line(n, c) - made;
             }
             weight += noise_weight(measured.sampling().len(), n);
         }
         let in_time = |lines| Spectrum::from_lines(measured.sampling(), lines)?.to_record();
         let noise = level.map(|level| level.iter().map(|sigma| sigma * weight.sqrt()).collect());
-        Ok(Self::of(in_time(seen)?.data(), in_time(left)?.into_data(), noise))
+        Ok(Self::of(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
     }
 
     /// Of an open record: what no force of these samples, linear between them, and no motion at the
@@ -116,20 +116,20 @@ impl Rest {
         let (samples, channels) = (measured.sampling().len(), scale.len());
         let force = DMatrix::from_fn(forced.len(), samples, |f, k| force.channel(forced[f])[k]);
         let made = machine.response(&force);
-        let mut left = DMatrix::from_fn(samples, channels, |k, c| {
+        let mut residual = DMatrix::from_fn(samples, channels, |k, c| {
             measured.record().data()[(k, c)] / scale[c] - made[(c, k)]
         });
         if start == Start::InMotion {
             let free = machine.free_responses(samples).qr().q();
             let rest =
-                left.reshape_generic(nalgebra::Dyn(samples * channels), nalgebra::Const::<1>);
+                residual.reshape_generic(nalgebra::Dyn(samples * channels), nalgebra::Const::<1>);
             let rest = &rest - &free * free.tr_mul(&rest);
-            left = rest.reshape_generic(nalgebra::Dyn(samples), nalgebra::Dyn(channels));
+            residual = rest.reshape_generic(nalgebra::Dyn(samples), nalgebra::Dyn(channels));
         }
-        for (mut column, scale) in left.column_iter_mut().zip(scale) {
+        for (mut column, scale) in residual.column_iter_mut().zip(scale) {
             column *= *scale;
         }
-        Ok(Self::of(measured.record().data(), left, level.map(<[f64]>::to_vec)))
+        Ok(Self::of(measured.record().data(), residual, level.map(<[f64]>::to_vec)))
     }
 
     /// Where displacement, velocity and force of every degree of freedom were found together.
@@ -140,7 +140,7 @@ impl Rest {
         level: Option<&[f64]>,
     ) -> Self {
         let seen = measured.record().data();
-        let mut left = seen.clone();
+        let mut residual = seen.clone();
         let accelerated = measured
             .channels()
             .iter()
@@ -151,7 +151,7 @@ impl Rest {
             balance.gemm(-1.0, system.stiffness(), &displacement.data().transpose(), 1.0);
             system.mass().clone().lu().solve(&balance).expect("M is invertible").transpose()
         });
-        for (mut column, channel) in left.column_iter_mut().zip(measured.channels()) {
+        for (mut column, channel) in residual.column_iter_mut().zip(measured.channels()) {
             let made = match (channel.quantity, &acceleration) {
                 (ResponseQuantity::Acceleration, Some(acceleration)) => {
                     acceleration.column(channel.dof)
@@ -161,11 +161,11 @@ impl Rest {
             };
             column -= made;
         }
-        Self::of(seen, left, level.map(<[f64]>::to_vec))
+        Self::of(seen, residual, level.map(<[f64]>::to_vec))
     }
 
-    pub fn left(&self) -> &DMatrix<f64> {
-        &self.left
+    pub fn residual(&self) -> &DMatrix<f64> {
+        &self.residual
     }
 
     pub fn channels(&self) -> &[Unexplained] {

@@ -135,16 +135,16 @@ fn power_less_identity(change: &DMatrix<f64>, exponent: usize) -> DMatrix<f64> {
     let mut power = DMatrix::zeros(change.nrows(), change.ncols());
     let mut square = change.clone();
     let mut product = power.clone();
-    let mut left = exponent;
+    let mut remaining = exponent;
     loop {
-        if left & 1 == 1 {
+        if remaining & 1 == 1 {
             product.copy_from(&power);
             product += &square;
             product.gemm(1.0, &power, &square, 1.0);
             std::mem::swap(&mut power, &mut product);
         }
-        left >>= 1;
-        if left == 0 {
+        remaining >>= 1;
+        if remaining == 0 {
             return power;
         }
         product.copy_from(&square);

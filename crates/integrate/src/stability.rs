@@ -54,9 +54,9 @@ pub fn spectral_radius(
     let mut start = amplification.start();
     let mut radius = f64::INFINITY;
     for _ in 0..3 {
-        let Some(found) = dominant(start, |z, next| amplification.apply(z, next)) else { break };
-        radius = found.value.norm();
-        start = found.vector.map(|v| v.re);
+        let Some(largest) = dominant(start, |z, next| amplification.apply(z, next)) else { break };
+        radius = largest.value.norm();
+        start = largest.vector.map(|v| v.re);
     }
     Ok(radius)
 }
@@ -189,8 +189,8 @@ impl Examined<'_> {
             let top = passive::top(&equations, which)?;
             let reduced = reduced(&equations, &top.vector.map(Complex::from))?;
             let mut stepper = (self.prepare)(&reduced, dt)?;
-            let found = small_growth(stepper.as_mut(), &reduced, dt, TOLERATED)?;
-            radius = found.into_iter().chain(radius).reduce(f64::max);
+            let growth = small_growth(stepper.as_mut(), &reduced, dt, TOLERATED)?;
+            radius = growth.into_iter().chain(radius).reduce(f64::max);
         }
         Ok(radius)
     }
@@ -207,18 +207,19 @@ impl Examined<'_> {
         let mut amplification = Amplification::of(stepper, fastest);
         let mut start = amplification.start();
         for _ in 0..2 {
-            let found = dominant(start, |z, next| amplification.apply(z, next));
-            let Some(found) = found else { return Ok(Some(f64::INFINITY)) };
-            if found.value.norm().ln() <= TOLERATED {
+            let largest = dominant(start, |z, next| amplification.apply(z, next));
+            let Some(largest) = largest else { return Ok(Some(f64::INFINITY)) };
+            if largest.value.norm().ln() <= TOLERATED {
                 return Ok(None);
             }
-            let reduced = reduced(equations, &found.vector.rows(0, equations.dof()).into_owned())?;
+            let reduced =
+                reduced(equations, &largest.vector.rows(0, equations.dof()).into_owned())?;
             let mut stepper = (self.prepare)(&reduced, dt)?;
             let radius = small_growth(stepper.as_mut(), &reduced, dt, TOLERATED)?;
             if radius.is_some() {
                 return Ok(radius);
             }
-            start = found.vector.map(|v| v.re);
+            start = largest.vector.map(|v| v.re);
         }
         Ok(None)
     }
@@ -390,7 +391,7 @@ fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
     // The unit of time that makes the two halves of the state comparable is found on the way.
     let mut unit = 1.0;
     for _ in 0..4 {
-        let found = dominant(scattered(2 * n), |state, rate| {
+        let largest = dominant(scattered(2 * n), |state, rate| {
             let (x, v) = state.split_at(n);
             let (dx, dv) = rate.split_at_mut(n);
             dx.copy_from_slice(v);
@@ -400,8 +401,8 @@ fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
             let _ = mass.solve(0.0, &v, x, dv);
             dv.iter_mut().for_each(|a| *a *= unit * unit);
         });
-        let Some(found) = found else { break };
-        let rate = found.value.norm();
+        let Some(largest) = largest else { break };
+        let rate = largest.value.norm();
         if rate == 0.0 || (0.5..2.0).contains(&rate) {
             return Ok(rate / unit);
         }

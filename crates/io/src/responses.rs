@@ -103,25 +103,25 @@ impl FrequencyResponses {
     }
 
     fn of_table(table: &Table) -> Result<Self, IoError> {
-        let mut found = Self { file: table.file().into(), ..Self::default() };
+        let mut responses = Self { file: table.file().into(), ..Self::default() };
         let frequency = FREQUENCY.iter().find(|name| table.find(name).is_ok()).unwrap_or(&"1");
-        found.frequency_hz = table.column(frequency)?.to_vec();
+        responses.frequency_hz = table.column(frequency)?.to_vec();
         for name in table.names() {
             let name = name.trim();
             if let Some(prefix) = ["real", "magnitude"].iter().find_map(|end| before(name, end)) {
-                found.functions.push(Self::function(table, name, prefix)?);
+                responses.functions.push(Self::function(table, name, prefix)?);
             } else if let Some(points) = name.strip_prefix("coherence") {
                 let mut points = points.split('_').skip(1).map(str::to_owned);
                 let response = points.next().unwrap_or_else(|| ALONE.into());
                 let (reference, values) = (points.next(), table.column(name)?.to_vec());
-                found.coherence.push(CoherenceFunction { response, reference, values });
+                responses.coherence.push(CoherenceFunction { response, reference, values });
             }
         }
-        if found.functions.is_empty() {
-            let (file, available) = (found.file, table.available());
+        if responses.functions.is_empty() {
+            let (file, available) = (responses.file, table.available());
             return Err(IoError::Responses { file, available });
         }
-        Ok(found)
+        Ok(responses)
     }
 
     /// Returns the response whose first column is called `name`, and the others `prefix` and a word.

@@ -54,7 +54,7 @@ pub fn svd<T: ComplexField<RealField = f64>>(
 pub fn singular_values<T: ComplexField<RealField = f64>>(
     matrix: DMatrix<T>,
 ) -> Result<DVector<f64>, ModelError> {
-    decomposed(matrix, false, 5.0 * f64::EPSILON).map(|found| found.singular_values)
+    decomposed(matrix, false, 5.0 * f64::EPSILON).map(|svd| svd.singular_values)
 }
 
 /// The decomposition, converged to `tolerance` relative to the largest entry.
@@ -72,12 +72,12 @@ pub(crate) fn decomposed<T: ComplexField<RealField = f64>>(
         return Ok(SVD { u, v_t, singular_values: DVector::zeros(0) });
     }
     let limit = ITERATIONS * rows.min(columns);
-    let mut found = SVD::try_new_unordered(matrix, vectors, vectors, tolerance, limit)
-        .filter(|found| found.singular_values.iter().all(|s| s.is_finite()))
-        .filter(|found| [&found.u, &found.v_t].iter().all(|part| sound(part.as_ref())))
+    let mut svd = SVD::try_new_unordered(matrix, vectors, vectors, tolerance, limit)
+        .filter(|svd| svd.singular_values.iter().all(|s| s.is_finite()))
+        .filter(|svd| [&svd.u, &svd.v_t].iter().all(|part| sound(part.as_ref())))
         .ok_or(ModelError::NotConverged { rows, columns })?;
-    found.sort_by_singular_values();
-    Ok(found)
+    svd.sort_by_singular_values();
+    Ok(svd)
 }
 
 /// Returns the eigenvalues, in no order and the unit of the matrix, and the eigenvectors of a
@@ -99,7 +99,7 @@ pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
         return Ok(SymmetricEigen { eigenvectors: matrix, eigenvalues: DVector::zeros(0) });
     }
     SymmetricEigen::try_new(matrix, f64::EPSILON, ITERATIONS * rows)
-        .filter(|found| found.eigenvalues.iter().all(|l| l.is_finite()))
+        .filter(|eigen| eigen.eigenvalues.iter().all(|l| l.is_finite()))
         .ok_or(ModelError::NotConverged { rows, columns })
 }
 
@@ -131,7 +131,7 @@ pub fn exponential(matrix: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
     Some(matrix)
         .filter(|_| norm <= EXPONENTIAL_NORM)
         .map(DMatrix::exp)
-        .filter(|found| found.iter().all(|v| v.is_finite()))
+        .filter(|eigenvalues| eigenvalues.iter().all(|v| v.is_finite()))
         .ok_or(ModelError::ExponentialOverflow { norm })
 }
 

@@ -40,14 +40,14 @@ pub fn identify(
         None => None,
     };
     let find = move || -> Result<mechid::Identified, AnalysisError> {
-        let mut found = mechid::identify(&records, &how)?;
+        let mut identified = mechid::identify(&records, &how)?;
         if let Some((other, samples)) = validate {
-            let other = found.validation_window(other, &samples)?;
-            found.add_validation(&other)?;
+            let other = identified.validation_window(other, &samples)?;
+            identified.add_validation(&other)?;
         }
-        Ok(found)
+        Ok(identified)
     };
-    work::watched(py, threads, || Ok(()), find).map(|found| Identified(Arc::new(found)))
+    work::watched(py, threads, || Ok(()), find).map(|identified| Identified(Arc::new(identified)))
 }
 
 /// A kind of response, measured and predicted.
@@ -94,14 +94,14 @@ impl Identified {
     /// The page of the program's report, as HTML.
     fn page(&self, py: Python<'_>, title: Option<String>, force: bool) -> PyResult<String> {
         let settings = PageSettings { title, reconstruct_force: force, command: None };
-        let found = Arc::clone(&self.0);
-        work::watched(py, None, || Ok(()), move || page(&found, &settings))
+        let identified = Arc::clone(&self.0);
+        work::watched(py, None, || Ok(()), move || page(&identified, &settings))
     }
 
     /// Measured and predicted response of the first record.
     fn compared<'py>(&self, py: Python<'py>) -> PyResult<Vec<Compared<'py>>> {
-        let found = Arc::clone(&self.0);
-        let all = work::watched(py, None, || Ok(()), move || found.compared())?;
+        let identified = Arc::clone(&self.0);
+        let all = work::watched(py, None, || Ok(()), move || identified.compared())?;
         let all = all.into_iter().map(|one| {
             let [measured, predicted] = [one.measured, one.predicted];
             Ok((
@@ -126,16 +126,16 @@ impl Identified {
     /// Frequencies in rad/s, and receptances of frequencies × motions · forces in m/N: measured where one
     /// force acts alone, NaN elsewhere, and of the identified system.
     fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
-        let found = Arc::clone(&self.0);
+        let identified = Arc::clone(&self.0);
         let compare = move || -> Result<_, AnalysisError> {
-            let data = match found.spectra() {
+            let data = match identified.spectra() {
                 Some(data) => data.clone(),
-                None => match Review::of(&found, false)?.receptance {
+                None => match Review::of(&identified, false)?.receptance {
                     Ok(shown) => shown.data,
                     Err(_) => return Err(AnalysisError::NoReceptance),
                 },
             };
-            let (n, models) = (data.dof(), found.system()?.receptances(data.omega())?);
+            let (n, models) = (data.dof(), identified.system()?.receptances(data.omega())?);
             let none = Complex::new(f64::NAN, f64::NAN);
             let measured = DMatrix::from_fn(data.len(), n * n, |row, at| match at % n {
                 force if acts_alone(&data, row, force) => {
@@ -169,10 +169,10 @@ impl Identified {
         samples: &str,
     ) -> PyResult<String> {
         let samples: Samples = failure::settings(py, samples)?;
-        let (found, other) = (Arc::clone(&self.0), other.0.clone());
+        let (identified, other) = (Arc::clone(&self.0), other.0.clone());
         let predict = move || {
-            let other = found.validation_window(other, &samples.into())?;
-            found.validate(&other)
+            let other = identified.validation_window(other, &samples.into())?;
+            identified.validate(&other)
         };
         failure::json(py, &work::watched(py, None, || Ok(()), predict)?)
     }

@@ -82,9 +82,11 @@ impl Machine {
         omega: Vec<f64>,
     ) -> PyResult<Bound<'py, PyArray2<Complex<f64>>>> {
         let system = self.0.system();
-        let found = work::brief(py, || system.receptances(&omega))?;
+        let receptances = work::brief(py, || system.receptances(&omega))?;
         let n = system.dof();
-        let flat = DMatrix::from_fn(found.len(), n * n, |row, at| found[row][(at / n, at % n)]);
+        let flat = DMatrix::from_fn(receptances.len(), n * n, |row, at| {
+            receptances[row][(at / n, at % n)]
+        });
         arrays::matrix(py, flat)
     }
 
@@ -99,7 +101,7 @@ impl Machine {
     fn modal(&self, py: Python<'_>) -> PyResult<(String, String)> {
         let machine = self.0.clone();
         let find = move || -> Result<_, AnalysisError> { ModalSummary::of(&machine) };
-        let found = work::watched(py, None, || Ok(()), find)?;
-        Ok((failure::json(py, &found)?, found.to_string()))
+        let modes = work::watched(py, None, || Ok(()), find)?;
+        Ok((failure::json(py, &modes)?, modes.to_string()))
     }
 }

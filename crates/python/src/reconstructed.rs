@@ -30,7 +30,7 @@ pub fn reconstruct(
     let how: Reconstruct = failure::settings(py, settings)?;
     let (record, machine) = (record.0.clone(), machine.0.clone());
     let find = move || mechid::reconstruct(&record, &machine, &how);
-    work::watched(py, threads, || Ok(()), find).map(|found| Reconstructed(Arc::new(found)))
+    work::watched(py, threads, || Ok(()), find).map(|force| Reconstructed(Arc::new(force)))
 }
 
 /// Frequencies, and amplitudes of frequencies × degrees of freedom.

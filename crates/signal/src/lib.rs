@@ -38,6 +38,7 @@
 //! | the level at which a channel is clipped | [`clipping()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
+//! | transforms planned once for many records | [`transform`] |
 //! | numbers and counts in sentences | [`message`] |
 
 mod clipping;
@@ -59,6 +60,7 @@ pub mod resample;
 mod sampling;
 pub mod spectrum;
 mod statistics;
+pub mod transform;
 
 pub use clipping::{Clipping, clipping};
 pub use crest::CrestSearch;

@@ -126,8 +126,9 @@ fn correlate(x: &[f64], period: usize) -> Vec<f64> {
     correlation.as_slice()[..x.len()].iter().map(|a| scale * a * unit * unit).collect()
 }
 
-/// Largest power of two that is not above a level, or the smallest normal number.
-pub(crate) fn power_of_two(level: f64) -> f64 {
+/// Largest power of two that is not above a positive level, in the unit of the level; at least the smallest
+/// normal number. Samples divided by it are near 1, and no digit of them changes.
+pub fn power_of_two(level: f64) -> f64 {
     const EXPONENT: u64 = 0x7ff0_0000_0000_0000;
     f64::from_bits(level.to_bits() & EXPONENT).max(f64::MIN_POSITIVE)
 }

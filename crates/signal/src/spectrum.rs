@@ -13,8 +13,8 @@
 //! No window is applied: a multisine is measured over whole periods.
 
 use nalgebra::{Complex, DMatrix};
-use realfft::RealFftPlanner;
 
+use crate::transform::{forward, inverse};
 use crate::{Record, Sampling, SignalError};
 
 /// Lines × channels of one-sided complex amplitudes, in the unit of the record; line n stands at n·ω0.
@@ -33,7 +33,7 @@ impl Spectrum {
     /// The spectrum of a record taken as one whole period, any length.
     pub fn of(record: &Record) -> Self {
         let sampling = record.sampling();
-        let plan = RealFftPlanner::new().plan_fft_forward(sampling.len());
+        let plan = forward(sampling.len());
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
         let mut scratch = plan.make_scratch_vec();
         let mut lines = DMatrix::zeros(sampling.lines(), record.channels());
@@ -85,7 +85,7 @@ impl Spectrum {
     /// The samples of the period, samples × channels.
     pub(crate) fn samples(&self) -> DMatrix<f64> {
         let len = self.sampling.len();
-        let plan = RealFftPlanner::new().plan_fft_inverse(len);
+        let plan = inverse(len);
         let (mut input, mut output) = (plan.make_input_vec(), plan.make_output_vec());
         let mut scratch = plan.make_scratch_vec();
         let mut data = DMatrix::zeros(len, self.channels());

@@ -1,5 +1,6 @@
 //! What is tried.
 
+mod analysis;
 mod calls;
 mod draw;
 mod estimate;
@@ -13,5 +14,5 @@ use crate::Target;
 
 /// All targets.
 pub fn all() -> Vec<Target> {
-    [readers::TARGETS, calls::TARGETS].concat()
+    [&readers::TARGETS[..], &calls::TARGETS].concat()
 }

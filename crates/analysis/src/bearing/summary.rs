@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::film::Film;
 use super::{BearingData, IdentifyBearing, StiffnessLine};
 use crate::AnalysisError;
-use crate::identify::summary::{CONFIDENCE, Uncertain, header};
+use crate::identify::rows::{CONFIDENCE, Uncertain, header};
 use crate::text::{compact, paragraph, significant, text_table};
 
 /// Amplitude over clearance above which the linearised film is biased.

@@ -38,8 +38,8 @@ pub struct FrfSettings {
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
     let recorded = measurement.hold(how.segments.hold())?;
     let lines = LineRule { choice: &how.lines, without: &how.without };
-    let found = Responses::of(&recorded, &how.segments, how.estimator, lines)?;
-    Ok(FrfTable::new(&recorded.held, &found, how))
+    let responses = Responses::of(&recorded, &how.segments, how.estimator, lines)?;
+    Ok(FrfTable::new(&recorded.held, &responses, how))
 }
 
 /// Frequency response estimator: where the noise is.

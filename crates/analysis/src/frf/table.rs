@@ -89,12 +89,12 @@ pub struct Coherence {
 }
 
 impl FrfTable {
-    pub(super) fn new(measured: &Block, found: &Responses, how: &FrfSettings) -> Self {
-        let (frf, n) = (&found.frf, measured.force.channels());
+    pub(super) fn new(measured: &Block, averaged: &Responses, how: &FrfSettings) -> Self {
+        let (frf, n) = (&averaged.frf, measured.force.channels());
         let mut responses = Vec::new();
         for motion in 0..n {
-            for (input, dof) in found.driven.iter().enumerate() {
-                responses.push(Response::of(found, (motion, input), *dof));
+            for (input, dof) in averaged.driven.iter().enumerate() {
+                responses.push(Response::of(averaged, (motion, input), *dof));
             }
         }
         let coherence = (0..n).map(|motion| Coherence {
@@ -108,7 +108,7 @@ impl FrfTable {
             last_sample: measured.last_sample(),
             sample_rate_hz: measured.force.sampling().rate_hz(),
             estimator: how.estimator.name(),
-            segments: SegmentRow::of(found),
+            segments: SegmentRow::of(averaged),
             quantity: kind.to_string(),
             unit: match kind {
                 ResponseQuantity::Displacement => "m/N",
@@ -247,8 +247,8 @@ impl fmt::Display for FrfTable {
 }
 
 impl Response {
-    fn of(found: &Responses, (motion, input): (usize, usize), dof: usize) -> Self {
-        let frf = &found.frf;
+    fn of(responses: &Responses, (motion, input): (usize, usize), dof: usize) -> Self {
+        let frf = &responses.frf;
         let lines = 0..frf.omega().len();
         let h: Vec<_> = lines.clone().map(|at| frf.response(at)[(motion, input)]).collect();
         let error = |at| (0.5 * frf.variance(at)[(motion, input)]).sqrt();
@@ -271,9 +271,9 @@ impl Response {
 }
 
 impl SegmentRow {
-    fn of(found: &Responses) -> Self {
-        let averages = found.frf.averages();
-        match found.segments {
+    fn of(responses: &Responses) -> Self {
+        let averages = responses.frf.averages();
+        match responses.segments {
             Segments::Periods(samples) => Self { samples, hop: samples, window: None, averages },
             Segments::Windowed { len, hop, window } => {
                 let name = match window {

@@ -1,6 +1,5 @@
 //! Checks before and after the fit, record by record.
 
-use mechid_estimate::checks::thresholds::{LAGS, SAMPLES_PER_LAG};
 use mechid_estimate::checks::{
     Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, kinematics, power, quantised_channels, spiked_channels,
@@ -8,7 +7,7 @@ use mechid_estimate::checks::{
 use mechid_model::ResponseQuantity;
 use serde::Serialize;
 
-use super::spectra::{Fitted, Residual, SampleResidual};
+use super::fitted::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
 use crate::measurement::Block;
 
@@ -93,17 +92,10 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
 
 /// Tests of a residual; none if it has too few samples.
 fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> {
-    let SampleResidual { left, fitted, force, noise_span } = residual;
+    let SampleResidual { samples, fitted, force, noise_span } = residual;
     match residual.lags() {
         0 => Ok(Vec::new()),
-        lags => Ok(after_fit(left, fitted, force, lags, *noise_span)?),
-    }
-}
-
-impl SampleResidual {
-    /// Returns the number of lags at which it is correlated; 0 if it has too few samples.
-    pub(crate) fn lags(&self) -> usize {
-        LAGS.min(self.left.len().saturating_sub(self.noise_span) / SAMPLES_PER_LAG)
+        lags => Ok(after_fit(samples, fitted, force, lags, *noise_span)?),
     }
 }
 

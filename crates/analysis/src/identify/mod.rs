@@ -11,10 +11,12 @@
 //! | `prediction` | response of the identified system to a measured force |
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
-//! | `summary` | the result: numbers, checks, remarks |
+//! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
 pub mod checks;
 mod derivatives;
+pub(crate) mod fitted;
 pub mod left_out;
 pub mod lines;
 pub mod mass;
@@ -22,6 +24,7 @@ pub mod nonlinear;
 pub mod options;
 pub mod prediction;
 mod responses;
+pub mod rows;
 mod samples;
 pub(crate) mod spectra;
 pub mod summary;
@@ -37,16 +40,15 @@ use mechid_model::SecondOrderSystem;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
+pub use self::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
 use self::left_out::LineRule;
 pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
-pub use self::nonlinear::Nonlinear;
 pub use self::options::{
-    Between, Derivatives, Fit, Identify, Method, Refinement, ResponseFit, SampleFit,
+    Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
-pub use self::spectra::{Fitted, Misfit, Residual, SampleResidual};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::validation::{Validation, ValidationWindow};
@@ -151,7 +153,7 @@ impl Identified {
 
     /// Returns the estimate with nonlinear terms; `None` for a linear system.
     pub fn nonlinear(&self) -> Option<&NonlinearEstimate> {
-        self.fitted.nonlinear.as_ref().map(|fitted| &fitted.found)
+        self.fitted.nonlinear.as_ref().map(|fitted| &fitted.estimate)
     }
 
     /// Returns the identified system with its nonlinear terms, if it has any.

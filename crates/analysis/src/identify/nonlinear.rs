@@ -4,60 +4,23 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{before_spectral_fit, steady_periods};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::nonlinear::{
-    ChannelPhase, Distortion, EquationErrorOptions, Level, NonlinearEstimate, ShapeConstants,
-    StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error,
-    output_error,
+    ChannelPhase, EquationErrorOptions, Level, StandardErrors, SteadyExperiments, SteppedRecord,
+    Weighting, distortion, equation_error, output_error,
 };
 use mechid_model::Terms;
 use mechid_signal::{Extent, Record, driven_lines, lines};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
 use super::left_out::LineRule;
 use super::lines::LineChoice;
-use super::options::Method;
+use super::options::{Method, Nonlinear};
 use super::prediction::{Model, Prediction};
-use super::spectra::{Fitted, Residual, SampleResidual, one_motion_of, periods};
-use super::summary::Uncertain;
+use super::rows::Uncertain;
+use super::spectra::{one_motion_of, periods};
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
 use crate::text::significant;
-
-/// Nonlinear springs and dampers to identify beside M, C and K.
-///
-/// ```
-/// use mechid_analysis::identify::Nonlinear;
-///
-/// let springs: Nonlinear = "k2: x1^2, k3: x1^3".parse()?;
-/// assert_eq!(springs.terms.len(), 2);
-/// # Ok::<(), mechid_analysis::AnalysisError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Nonlinear {
-    /// Terms as they are written, such as `k3: x1^3, c2: |v1| v1`.
-    pub terms: Terms,
-    /// Constants that do not enter linearly, to search for; none by default.
-    pub search: ShapeConstants,
-    /// Weighting of the lines.
-    pub weighting: Weighting,
-}
-
-impl std::str::FromStr for Nonlinear {
-    type Err = AnalysisError;
-
-    fn from_str(text: &str) -> Result<Self, AnalysisError> {
-        Ok(Self { terms: text.parse()?, ..Self::default() })
-    }
-}
-
-/// Result of a fit with nonlinear terms.
-#[derive(Debug)]
-pub struct WithTerms {
-    /// The estimate.
-    pub found: NonlinearEstimate,
-    /// Evidence against a linear system in the first record, before any model.
-    pub distortion: Distortion,
-}
 
 /// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) reads back.
 #[derive(Debug, Serialize)]
@@ -125,7 +88,7 @@ pub(super) fn fit(
     }
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     let start = equation_error(&data, unknowns, &how.terms, &options)?;
-    let (estimator, found) = match method.unwrap_or(Method::LeastSquares) {
+    let (estimator, estimated) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
         }
@@ -141,7 +104,7 @@ pub(super) fn fit(
         }
     };
     let seen = distortion(&band, &first.force, first.response().0, kind, unknowns)?;
-    let model = Model::Nonlinear { system: found.system()?, channels: found.channels() };
+    let model = Model::Nonlinear { system: estimated.system()?, channels: estimated.channels() };
     let (mut before, mut spectra) = (Vec::new(), None::<FrequencyData>);
     for recorded in records {
         let held = &recorded.held;
@@ -149,10 +112,10 @@ pub(super) fn fit(
             LineRule { choice: &LineChoice::Driven, ..rule }.lines(&held.force, held.period)?;
         let driven = Lines::new(band.sampling(), chosen)?;
         before.push(steady_periods(&held.force, held.response().0, held.period)?);
-        let own = periods(recorded, &driven)?.mean()?;
+        let spectrum = periods(recorded, &driven)?.mean()?;
         spectra = Some(match spectra {
-            None => own,
-            Some(all) => all.and(&own)?,
+            None => spectrum,
+            Some(all) => all.and(&spectrum)?,
         });
     }
     let before_all = match &spectra {
@@ -160,7 +123,7 @@ pub(super) fn fit(
         None => Vec::new(),
     };
     let mut remarks = one_motion_of(first);
-    if found.standard_errors() == StandardErrors::White {
+    if estimated.standard_errors() == StandardErrors::White {
         remarks.push(
             "the record is too short for standard errors from the scatter of blocks of time: they \
              take the residual as white"
@@ -171,7 +134,7 @@ pub(super) fn fit(
         domain: "frequency",
         estimator,
         least_squares: false,
-        equations: found.equations() / dofs,
+        equations: estimated.equations() / dofs,
         frequency: spectra.map(|data| (band, data)),
         before_all,
         before,
@@ -182,8 +145,8 @@ pub(super) fn fit(
         misfit: None,
         noise: Vec::new(),
         remarks,
-        estimate: found.linear().clone(),
-        nonlinear: Some(WithTerms { found, distortion: seen }),
+        estimate: estimated.linear().clone(),
+        nonlinear: Some(WithTerms { estimate: estimated, distortion: seen }),
     })
 }
 
@@ -211,7 +174,7 @@ fn steady_residuals(records: &[Windowed], model: &Model) -> Result<Vec<Residual>
         let fitted = held.response().0.without_mean();
         let predicted = Prediction::Steady.predict(model, held)?.swap_remove(0).predicted;
         residuals.push(Residual::Samples(SampleResidual {
-            left: Record::new(fitted.sampling(), fitted.data() - predicted.data())?,
+            samples: Record::new(fitted.sampling(), fitted.data() - predicted.data())?,
             fitted,
             force: held.force.clone(),
             noise_span: 0,
@@ -230,22 +193,22 @@ fn mean_period(held: &Block) -> Result<SteppedRecord, AnalysisError> {
 
 impl NonlinearSummary {
     pub(super) fn of(fitted: &WithTerms) -> Result<Self, AnalysisError> {
-        let WithTerms { found, distortion } = fitted;
-        let linear = found.linear().parameters().len();
-        let ranges = found.ranges().iter().map(|range| Some(*range));
-        let rows = found.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
+        let WithTerms { estimate: fit, distortion } = fitted;
+        let linear = fit.linear().parameters().len();
+        let ranges = fit.ranges().iter().map(|range| Some(*range));
+        let rows = fit.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
         let row = |(parameter, largest): (&mechid_estimate::nonlinear::NamedParameter, _)| {
-            let estimate = Uncertain::of(&parameter.found)?;
+            let estimate = Uncertain::of(&parameter.estimate)?;
             let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
             Ok(TermRow { name, unit, largest, estimate })
         };
         Ok(Self {
-            terms: found.terms().clone(),
-            coefficients: found.system()?.coefficients().to_vec(),
-            channels: found.channels(),
+            terms: fit.terms().clone(),
+            coefficients: fit.system()?.coefficients().to_vec(),
+            channels: fit.channels(),
             parameters: rows.map(row).collect::<Result<_, AnalysisError>>()?,
-            weighting: found.weighting(),
-            blocks: match found.standard_errors() {
+            weighting: fit.weighting(),
+            blocks: match fit.standard_errors() {
                 StandardErrors::Blocks(count) => Some(count),
                 StandardErrors::White => None,
             },

@@ -5,14 +5,14 @@ use std::str::FromStr;
 
 use mechid_estimate::derivatives::SavitzkyGolay;
 use mechid_estimate::frequency_domain::Pooling;
-use mechid_model::Discretisation;
+use mechid_estimate::nonlinear::{ShapeConstants, Weighting};
+use mechid_model::{Discretisation, Terms};
 use mechid_signal::{Extent, Interpolation};
 use serde::{Deserialize, Serialize};
 
 use super::left_out::LeftOut;
 use super::lines::LineChoice;
 use super::mass::KnownMass;
-use super::nonlinear::Nonlinear;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
 
@@ -80,6 +80,34 @@ pub enum Method {
     /// Maximum likelihood on the response, weighted by the noise estimated from the periods; not
     /// biased, of least scatter.
     MaximumLikelihood,
+}
+
+/// Nonlinear springs and dampers to identify beside M, C and K.
+///
+/// ```
+/// use mechid_analysis::identify::Nonlinear;
+///
+/// let springs: Nonlinear = "k2: x1^2, k3: x1^3".parse()?;
+/// assert_eq!(springs.terms.len(), 2);
+/// # Ok::<(), mechid_analysis::AnalysisError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Nonlinear {
+    /// Terms as they are written, such as `k3: x1^3, c2: |v1| v1`.
+    pub terms: Terms,
+    /// Constants that do not enter linearly, to search for; none by default.
+    pub search: ShapeConstants,
+    /// Weighting of the lines.
+    pub weighting: Weighting,
+}
+
+impl FromStr for Nonlinear {
+    type Err = AnalysisError;
+
+    fn from_str(text: &str) -> Result<Self, AnalysisError> {
+        Ok(Self { terms: text.parse()?, ..Self::default() })
+    }
 }
 
 /// Fit of averaged frequency responses.

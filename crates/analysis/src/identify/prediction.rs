@@ -10,7 +10,6 @@ use nalgebra::{Complex, DVector};
 
 use crate::AnalysisError;
 use crate::measurement::Block;
-use crate::predict::shown;
 
 /// Kind of prediction of a record, in keeping with how the machine was identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -124,8 +123,22 @@ pub(crate) fn steady_state(
     let (force, motion) = (measured.force.period_mean(period)?, motion.period_mean(period)?);
     let (force, motion) = channels.correct(&force, &motion)?;
     let start = periodic_start(&motion, kind)?;
-    let found = nonlinear::predict(system, &force, Extent::WholePeriod, &start)?;
-    shown(&found, channels, measured.force.len() / period)
+    let steady = nonlinear::predict(system, &force, Extent::WholePeriod, &start)?;
+    shown(&steady, channels, measured.force.len() / period)
+}
+
+/// A response as the channels show it, over a number of periods.
+pub(crate) fn shown(
+    response: &Response,
+    phase: ChannelPhase,
+    periods: usize,
+) -> Result<Response, EstimateError> {
+    let one = |record: &Record| -> Result<Record, EstimateError> {
+        Ok(phase.as_measured(record)?.repeated(periods)?)
+    };
+    let [x, v, a] =
+        [response.displacement(), response.velocity(), response.acceleration()].map(one);
+    Ok(Response::new(x?, v?, a?)?)
 }
 
 /// Returns displacement and velocity at the first sample of a period of a response.

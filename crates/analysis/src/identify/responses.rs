@@ -9,11 +9,12 @@ use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
+use super::fitted::{Fitted, Misfit};
 use super::left_out::LineRule;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
-use super::spectra::{Fitted, Misfit, one_motion_of};
-use super::summary::LinesUsed;
+use super::rows::LinesUsed;
+use super::spectra::one_motion_of;
 use crate::AnalysisError;
 use crate::frf::Responses;
 use crate::measurement::{Block, Windowed};
@@ -35,10 +36,10 @@ pub fn fit(
     let mut all: Vec<FrequencyData> =
         responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
     let first = all.remove(0);
-    let data = all.iter().try_fold(first, |data, own| data.and(own))?;
-    let (name, found, misfit) = found(&data, unknowns, *method)?;
+    let data = all.iter().try_fold(first, |data, next| data.and(next))?;
+    let (name, estimate, misfit) = estimated(&data, unknowns, *method)?;
     // Says what the data leave open, before anything is made of it.
-    found.system()?;
+    estimate.system()?;
     let periodic = segments.are_periods();
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
@@ -47,7 +48,7 @@ pub fn fit(
             checks.extend(claimed_period(&held.force, held.period));
         }
         before.push(checks);
-        after.push(looked_at(held, r, unknowns, &found, (data.len(), periodic))?);
+        after.push(looked_at(held, r, unknowns, &estimate, (data.len(), periodic))?);
     }
     Ok(Fitted {
         domain: "frequency",
@@ -70,13 +71,13 @@ pub fn fit(
         misfit,
         noise: Vec::new(),
         remarks: one_motion_of(&records[0].held),
-        estimate: found,
+        estimate,
         nonlinear: None,
     })
 }
 
 /// The estimator in words, what it finds, and what it leaves against the coherence.
-fn found(
+fn estimated(
     data: &FrequencyData,
     unknowns: &Unknowns,
     method: Option<Method>,
@@ -102,16 +103,16 @@ fn looked_at(
     held: &Block,
     r: &Responses,
     unknowns: &Unknowns,
-    found: &Estimate,
+    estimate: &Estimate,
     (rows, periodic): (usize, bool),
 ) -> Result<Vec<Finding>, AnalysisError> {
     let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
-    let own = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
-    let fitted = own * found.parameters().len() as f64;
+    let share = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;
+    let fitted = share * estimate.parameters().len() as f64;
     let mut checks = Vec::from_iter(late);
-    checks.extend(after_response_fit(&r.frf, &r.driven, found, fitted)?);
+    checks.extend(after_response_fit(&r.frf, &r.driven, estimate, fitted)?);
     if !periodic {
-        checks.extend(of_linearity(held, r, found)?);
+        checks.extend(of_linearity(held, r, estimate)?);
     }
     Ok(checks)
 }
@@ -121,11 +122,11 @@ fn looked_at(
 fn of_linearity(
     measured: &Block,
     responses: &Responses,
-    found: &Estimate,
+    estimate: &Estimate,
 ) -> Result<Option<Finding>, AnalysisError> {
     let (motion, kind) = measured.response();
     let used = LinesUsed::of(&responses.lines);
-    match linearity(found, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
+    match linearity(estimate, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
         Err(EstimateError::Model(_)) => Ok(None),
         looked => Ok(Some(looked?)),
     }

@@ -11,9 +11,9 @@ use mechid_signal::{Extent, Interpolation, Record, message};
 
 use super::CONSPICUOUS;
 use super::derivatives::Prepared;
+use super::fitted::{Fitted, Residual, SampleResidual};
 use super::options::{Between, Derivatives, SampleFit};
 use super::prediction::Prediction;
-use super::spectra::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Windowed};
 
@@ -103,10 +103,10 @@ impl SampleFit {
                 return Err(AnalysisError::TimeDomainMotions);
             };
             // The next chunk begins with the last sample of this one.
-            let own = if last { p.force.len() } else { p.force.len() - 1 };
+            let count = if last { p.force.len() } else { p.force.len() - 1 };
             let [a, v, x] = [response.acceleration(), response.velocity(), response.displacement()]
-                .map(|r| r.data().rows(0, own));
-            rows.push_rows(a, v, x, p.force.data().rows(0, own))?;
+                .map(|r| r.data().rows(0, count));
+            rows.push_rows(a, v, x, p.force.data().rows(0, count))?;
             end = last_two(&p)?;
             Ok(())
         })?;
@@ -155,7 +155,7 @@ impl SampleFit {
         // Says what the data leave open, before anything is made of it.
         estimate.system()?;
         let span = self.noise_span();
-        let residuals = prepared.iter().filter_map(|p| left_of_equation(p, &estimate, span));
+        let residuals = prepared.iter().filter_map(|p| equation_residual(p, &estimate, span));
         let look = |p: &Prepared| self.at_samples_after(p, &estimate);
         let after = prepared.iter().map(look).collect::<Result<_, _>>()?;
         Ok(Fitted {
@@ -215,16 +215,16 @@ impl SampleFit {
         let before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
-        let left = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
+        let residual = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
             let extent = self.extent_of(&recorded.held);
-            let [left, fitted] =
+            let [samples, fitted] =
                 missing_force(&estimate, p.states(), discretisation, extent, self.refinement())?;
-            let force = p.force.window(0, left.len())?;
+            let force = p.force.window(0, samples.len())?;
             // An error of a measured state is in the interval before it and in the one after.
             let noise_span = self.noise_span() + 1;
-            Ok(Residual::Samples(SampleResidual { left, fitted, force, noise_span }))
+            Ok(Residual::Samples(SampleResidual { samples, fitted, force, noise_span }))
         };
-        let residuals = records.iter().zip(prepared).map(left).collect::<Result<_, _>>()?;
+        let residuals = records.iter().zip(prepared).map(residual).collect::<Result<_, _>>()?;
         let method = TimeDomain::new(discretisation, Extent::Open);
         let late = |p: &Prepared| {
             let [x, v, force] = p.states();
@@ -281,8 +281,8 @@ impl SampleFit {
         } else if self.derivatives.is_some() {
             remarks.push("two of the three motions are derivatives, not measured".into());
         }
-        let left = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
-        if self.derivatives == Some(Derivatives::Spectral) && left > CONSPICUOUS {
+        let residual = estimate.residual_nrmse().iter().copied().fold(0.0, f64::max);
+        if self.derivatives == Some(Derivatives::Spectral) && residual > CONSPICUOUS {
             remarks.push(
                 "spectral derivatives hold the noise of every line, driven or not, and of low ones \
                  most where the acceleration was measured: without --domain time and --derivatives \
@@ -301,22 +301,22 @@ fn last_two(p: &Prepared) -> Result<Option<Record>, AnalysisError> {
 }
 
 /// F − M ẍ − C ẋ − K x, left of the inertia.
-fn left_of_equation(
+fn equation_residual(
     p: &Prepared,
     estimate: &Estimate,
     noise_span: usize,
 ) -> Option<Result<Residual, AnalysisError>> {
     let a = p.acceleration.as_ref()?;
     let inertia = a.data() * estimate.mass().transpose();
-    let left = p.force.data()
+    let samples = p.force.data()
         - &inertia
         - p.velocity.data() * estimate.damping().transpose()
         - p.displacement.data() * estimate.stiffness().transpose();
     let record = |data| Record::new(a.sampling(), data);
     let residual = || {
-        let (left, fitted) = (record(left)?, record(inertia)?);
+        let (samples, fitted) = (record(samples)?, record(inertia)?);
         let force = p.force.clone();
-        Ok(Residual::Samples(SampleResidual { left, fitted, force, noise_span }))
+        Ok(Residual::Samples(SampleResidual { samples, fitted, force, noise_span }))
     };
     Some(residual())
 }

@@ -1,101 +1,21 @@
-//! The estimators, and what the identified model leaves unexplained.
-
-use std::fmt;
+//! Fits of the spectral lines of whole periods.
 
 use mechid_estimate::checks::{
-    AfterSpectralFit, Finding, SpectralResidual, Subject, Verdict, after_spectral_fit,
-    before_spectral_fit, delay_of_lines, fitted_band, steady_periods,
+    AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
+    delay_of_lines, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, equation_error,
     instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
-use mechid_model::SecondOrderSystem;
-use mechid_signal::Record;
 
+use super::fitted::{Fitted, Misfit, Residual};
 use super::left_out::LineRule;
-use super::nonlinear::WithTerms;
 use super::options::Method;
-use super::prediction::{Model, Prediction};
+use super::prediction::Prediction;
 use crate::AnalysisError;
-use crate::machine::NonlinearPart;
 use crate::measurement::{Block, Windowed};
-
-/// An estimate and how it came about.
-#[derive(Debug)]
-pub struct Fitted {
-    /// Domain of the fit: frequency or time.
-    pub domain: &'static str,
-    /// Name of the estimator.
-    pub estimator: &'static str,
-    /// The checks after the fit see the bias of least squares, which another method does not have.
-    pub least_squares: bool,
-    /// Estimate with its uncertainty; with nonlinear terms, of the linear part.
-    pub estimate: Estimate,
-    /// Estimate with nonlinear terms, if there are any.
-    pub nonlinear: Option<WithTerms>,
-    /// Real equations used, of each degree of freedom.
-    pub equations: usize,
-    /// The spectra, if it was done in the frequency domain, and the lines of the first record.
-    pub frequency: Option<(Lines, FrequencyData)>,
-    /// Findings before the fit on all records together.
-    pub before_all: Vec<Finding>,
-    /// Findings before the fit, record by record.
-    pub before: Vec<Vec<Finding>>,
-    /// Findings after the fit beside those on the residuals, record by record.
-    pub after: Vec<Vec<Finding>>,
-    /// Findings after the fit on all records together.
-    pub after_all: Vec<Finding>,
-    /// Residual of each record; empty where it is not tested by itself.
-    pub residuals: Vec<Residual>,
-    /// Kind of prediction of the response to a measured force.
-    pub prediction: Prediction,
-    /// Residual power against that of the noise, where the noise is known.
-    pub misfit: Option<Misfit>,
-    /// Noise spectra that were estimated: one of each record, or one from the residual.
-    pub noise: Vec<NoiseModel>,
-    /// Remarks on how the fit was done.
-    pub remarks: Vec<String>,
-}
-
-/// Power of a residual over what the noise explains: 1 if the model is right.
-#[derive(Debug, Clone, Copy)]
-pub struct Misfit {
-    /// Ratio of residual power to noise power.
-    pub ratio: f64,
-    /// Source of the noise level.
-    pub noise: &'static str,
-}
-
-impl fmt::Display for Misfit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (ratio, noise) = (self.ratio, self.noise);
-        write!(f, "residual power is {ratio:.3} × the noise power {noise}")
-    }
-}
-
-/// Residual of a fit, as it is tested.
-#[derive(Debug)]
-pub enum Residual {
-    /// Samples.
-    Samples(SampleResidual),
-    /// Lines of a spectrum, weighted by their noise.
-    Lines(SpectralResidual),
-}
-
-/// Residual of a fit sample by sample.
-#[derive(Debug)]
-pub struct SampleResidual {
-    /// Residual, samples × degrees of freedom.
-    pub left: Record,
-    /// The fitted signal, used to tell rounding from noise.
-    pub fitted: Record,
-    /// Force, samples × degrees of freedom, in N.
-    pub force: Record,
-    /// Lags over which noise on the motion correlates it.
-    pub noise_span: usize,
-}
 
 /// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
 /// degrees of freedom, which take seconds.
@@ -295,88 +215,4 @@ pub fn one_motion_of(measured: &Block) -> Vec<String> {
     let unused = measured.responses().len() > 1;
     let kind = measured.response().1;
     Vec::from_iter(unused.then(|| format!("of the motions measured, the {kind} was used")))
-}
-
-impl Fitted {
-    /// Returns the identified system.
-    ///
-    /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
-    pub fn model(&self) -> Result<Model, AnalysisError> {
-        Ok(match &self.nonlinear {
-            None => Model::Linear(self.estimate.system()?),
-            Some(WithTerms { found, .. }) => {
-                Model::Nonlinear { system: found.system()?, channels: found.channels() }
-            }
-        })
-    }
-
-    /// Returns the identified system with its nonlinear terms, if it has any.
-    ///
-    /// # Errors
-    /// As [`Fitted::model`].
-    pub(super) fn nonlinear_part(&self) -> Result<Option<NonlinearPart>, AnalysisError> {
-        let Some(WithTerms { found, .. }) = &self.nonlinear else { return Ok(None) };
-        let (uncertain, channels) = (found.uncertain_system()?, found.channels());
-        let largest_displacement = found.ranges().iter().map(|range| range[0]).reduce(f64::max);
-        Ok(Some(NonlinearPart { uncertain, channels, largest_displacement }))
-    }
-
-    /// Residual of the equations over their right-hand sides, all degrees of freedom together.
-    pub(crate) fn nrmse(&self) -> f64 {
-        let each = self.estimate.residual_nrmse();
-        (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
-    }
-
-    /// Returns whether frequency responses were fitted, weighted by their noise.
-    pub(crate) fn is_weighted(&self) -> bool {
-        let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
-        noise_stated && !self.least_squares
-    }
-
-    /// RMS of measured minus modelled response over RMS of the measured response, on the lines used:
-    /// in the quantity measured or, where the fit was weighted by the noise, in units of the noise.
-    ///
-    /// # Errors
-    /// If the model has no receptance at a line.
-    pub(crate) fn unexplained_motion(
-        &self,
-        system: &SecondOrderSystem,
-    ) -> Result<Option<f64>, AnalysisError> {
-        if let Some(WithTerms { found, .. }) = &self.nonlinear {
-            let each = found.unexplained();
-            let mean = each.iter().map(|part| part * part).sum::<f64>() / each.len() as f64;
-            return Ok(Some(mean.sqrt()));
-        }
-        match &self.frequency {
-            Some((_, data)) => unexplained_motion(data, system),
-            None => Ok(None),
-        }
-    }
-}
-
-/// RMS of measured minus modelled motion over RMS of the measured motion, at the frequencies of data,
-/// weighted by the noise where it is known; `None` if nothing moves.
-pub(super) fn unexplained_motion(
-    data: &FrequencyData,
-    system: &SecondOrderSystem,
-) -> Result<Option<f64>, AnalysisError> {
-    let (mut left, mut all) = (0.0, 0.0);
-    for (row, omega) in data.omega().iter().enumerate() {
-        let measured = data.displacement().row(row).transpose();
-        let modelled = system.receptance(*omega)? * data.force().row(row).transpose();
-        // A displacement weighs low lines most, whatever their noise.
-        let quantity = data.measured().per_displacement(*omega).norm_sqr();
-        for channel in 0..data.dof() {
-            let weight = match data.noise() {
-                Some(noise) => noise.covariance(row)[(channel, channel)].re.recip(),
-                None => quantity,
-            };
-            if weight.is_finite() {
-                left += weight * (measured[channel] - modelled[channel]).norm_sqr();
-                all += weight * measured[channel].norm_sqr();
-            }
-        }
-    }
-    Ok((all > 0.0).then(|| (left / all).sqrt()))
 }

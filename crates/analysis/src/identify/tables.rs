@@ -16,10 +16,9 @@ use nalgebra::{Complex, DMatrix};
 use serde::{Deserialize, Serialize};
 
 use super::checks::{CheckRow, When};
-use super::spectra::{Misfit, unexplained_motion};
-use super::summary::{
-    CONFIDENCE, FitRow, ModeRow, ParameterRow, header, mode_table, parameters, verdict,
-};
+use super::fitted::{Misfit, unexplained_motion};
+use super::rows::{CONFIDENCE, ModeRow, ParameterRow, header, mode_table, parameters};
+use super::summary::{FitRow, verdict};
 use super::{Band, KnownMass, Method};
 use crate::AnalysisError;
 use crate::machine::Machine;
@@ -363,7 +362,7 @@ impl Tabulated {
         };
         let response: Vec<_> =
             rows.iter().map(|row| matrix(&|function| function.values[*row])).collect();
-        let own = FrequencyData::from_responses;
+        let from_responses = FrequencyData::from_responses;
         let all = functions.iter().flatten();
         if all.clone().all(|f| f.standard_error.is_some()) {
             let error = |f: &ResponseFunction, row: usize| match &f.standard_error {
@@ -372,11 +371,11 @@ impl Tabulated {
             };
             let variance: Vec<_> =
                 rows.iter().map(|row| matrix(&|f| error(f, *row)).map(|z| z.re)).collect();
-            let data = own(&omega, &response, Some(&variance), measured, &driven)?;
+            let data = from_responses(&omega, &response, Some(&variance), measured, &driven)?;
             return Ok(Self { points, driven, noise: Noise::Stated, data, coherent: Vec::new() });
         }
         let Some(coherent) = coherent(table, how, &points, &forces, &rows, &response)? else {
-            let data = own(&omega, &response, None, measured, &driven)?;
+            let data = from_responses(&omega, &response, None, measured, &driven)?;
             return Ok(Self { points, driven, noise: Noise::Unknown, data, coherent: Vec::new() });
         };
         let mut data: Option<FrequencyData> = None;
@@ -399,8 +398,8 @@ impl Tabulated {
     ) -> Result<Vec<(When, Finding)>, AnalysisError> {
         let mut findings = Vec::new();
         for (frf, driven) in &self.coherent {
-            let own = (driven.len() * frf.omega().len()) as f64 / all as f64;
-            let fitted = own * estimate.parameters().len() as f64;
+            let share = (driven.len() * frf.omega().len()) as f64 / all as f64;
+            let fitted = share * estimate.parameters().len() as f64;
             let after = after_response_fit(frf, driven, estimate, fitted)?;
             findings.extend(coherence(frf).map(|finding| (When::Before, finding)));
             findings.extend(after.into_iter().map(|finding| (When::After, finding)));
@@ -415,8 +414,8 @@ pub(crate) fn response_data(
     table: &FrequencyResponses,
     how: &IdentifyResponses,
 ) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
-    let found = Tabulated::of(table, how)?;
-    Ok((found.data, found.noise.source()))
+    let tabulated = Tabulated::of(table, how)?;
+    Ok((tabulated.data, tabulated.noise.source()))
 }
 
 /// Returns the quantity that the table states or the settings give.

@@ -99,8 +99,8 @@ impl Validation {
                 Prediction::Sampled { discretisation, extent: Extent::Open },
                 Model::Linear(system),
             ) => {
-                let found = in_stretches(recorded, system, discretisation)?;
-                found.into_iter().for_each(|(kind, fits)| add(kind, fits));
+                let errors = in_stretches(recorded, system, discretisation)?;
+                errors.into_iter().for_each(|(kind, fits)| add(kind, fits));
             }
             _ => {
                 for compared in prediction.predict(model, measured)? {

@@ -310,7 +310,8 @@ impl Measurement {
     /// Uses whole periods of this many samples, from the first sample of the window on.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record is shorter than one period.
+    /// [`AnalysisError::Window`] if the record is shorter than one period, [`AnalysisError::Setting`] for a
+    /// period of no sample.
     pub fn period(mut self, samples: usize) -> Result<Self, AnalysisError> {
         self.window.period = Some(samples);
         self.span().map(|_| self)
@@ -319,7 +320,8 @@ impl Measurement {
     /// Uses a part of the record.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of it.
+    /// [`AnalysisError::Window`] if the record does not have all of it, [`AnalysisError::Setting`] for a
+    /// period of no sample.
     pub fn window(mut self, window: Window) -> Result<Self, AnalysisError> {
         self.window = window;
         self.span().map(|_| self)

@@ -32,8 +32,13 @@ impl Window {
     /// record of `samples` samples called `file`.
     ///
     /// # Errors
-    /// [`AnalysisError::Window`] if the record does not have all of them.
+    /// [`AnalysisError::Window`] if the record does not have all of them, [`AnalysisError::Setting`] for a
+    /// period of no sample.
     pub fn span(&self, file: &str, samples: usize) -> Result<(usize, usize), AnalysisError> {
+        if self.period == Some(0) {
+            let why = "a period has one sample or more, not 0".into();
+            return Err(AnalysisError::Setting { setting: "period", why });
+        }
         let start = self.start.saturating_sub(1);
         let rest = samples.saturating_sub(start);
         let period = self.period.unwrap_or(rest);

@@ -270,26 +270,26 @@ fn filtered(
         (_, false) => ForceUnknowns::Samples(request.start),
     };
     let noise = noise(request, Noise::Unknown);
-    let found = regularised(machine.system(), motion, forced, &extent, filter, &noise)?;
+    let regular = regularised(machine.system(), motion, forced, &extent, filter, &noise)?;
     // The machine is moved with the parameter that was chosen, not with another choice.
-    let fixed = match (filter, found.parameter) {
+    let fixed = match (filter, regular.parameter) {
         (Filter::Tikhonov(_), Some(lambda)) => Filter::Tikhonov(Rule::Given(lambda)),
         (Filter::TruncatedSvd(_), Some(lambda)) => Filter::TruncatedSvd(Rule::Given(lambda)),
         _ => filter,
     };
     let find = |system: &SecondOrderSystem| {
-        regularised(system, motion, forced, &extent, fixed, &noise).map(|found| found.force)
+        regularised(system, motion, forced, &extent, fixed, &noise).map(|regular| regular.force)
     };
     let force = match machine.parameters().is_empty() {
-        true => found.force,
+        true => regular.force,
         false => with_machine(machine, &find)?,
     };
     let mut chosen = Vec::new();
-    if let Some(lambda) = found.parameter {
+    if let Some(lambda) = regular.parameter {
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
     }
-    chosen.push(("unknowns let through".into(), found.unknowns, ""));
-    chosen.extend(noise_levels(motion, &found.noise_std, request.averaged));
+    chosen.push(("unknowns let through".into(), regular.unknowns, ""));
+    chosen.extend(noise_levels(motion, &regular.noise_std, request.averaged));
     let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = match filter {
         Filter::Tikhonov(_) => "Tikhonov regularisation",
@@ -358,20 +358,21 @@ fn smoothed(
         [] => Tuning::Likelihood,
         level => Tuning::NoiseKnown(level.to_vec()),
     };
-    let found = kalman(machine.system(), motion, forced, request.start, &tuning)?;
-    let fixed = Tuning::Given { noise_std: found.noise_std.clone(), walk: found.walk.clone() };
+    let smoothed = kalman(machine.system(), motion, forced, request.start, &tuning)?;
+    let fixed =
+        Tuning::Given { noise_std: smoothed.noise_std.clone(), walk: smoothed.walk.clone() };
     let find = |system: &SecondOrderSystem| {
-        kalman(system, motion, forced, request.start, &fixed).map(|found| found.force)
+        kalman(system, motion, forced, request.start, &fixed).map(|smoothed| smoothed.force)
     };
     let force = match machine.parameters().is_empty() {
-        true => found.force,
+        true => smoothed.force,
         false => with_machine(machine, &find)?,
     };
     let mut chosen = Vec::new();
-    for (dof, walk) in forced.iter().zip(&found.walk) {
+    for (dof, walk) in forced.iter().zip(&smoothed.walk) {
         chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
     }
-    chosen.extend(noise_levels(motion, &found.noise_std, 1));
+    chosen.extend(noise_levels(motion, &smoothed.noise_std, 1));
     let mut unexplained = force.unexplained().map(<[_]>::to_vec);
     if request.noise.is_empty() {
         // The level is that of the fit, which takes for noise what it does not explain.

@@ -37,9 +37,9 @@ impl Sums {
         let in_mean: f64 = mean.iter().map(|m| m * m).sum();
         let beside: f64 = mean.windows(2).map(|w| w[0] * w[1]).sum();
         let squares = (self.squares - all * in_mean).max(0.0);
-        let left = ((periods - 1) * mean.len()) as f64;
+        let freedom = ((periods - 1) * mean.len()) as f64;
         Scatter {
-            deviation: (squares / left).sqrt(),
+            deviation: (squares / freedom).sqrt(),
             correlation: (self.products - all * beside) / squares,
         }
     }

@@ -59,15 +59,15 @@ impl Measured {
 }
 
 /// Share of the motion that noise and the machine's uncertainty may leave.
-fn expected(left: &Unexplained) -> Option<f64> {
-    let level = left.noise?.hypot(left.machine.unwrap_or(0.0));
-    (left.motion > 0.0).then_some(level / left.motion)
+fn expected(unexplained: &Unexplained) -> Option<f64> {
+    let level = unexplained.noise?.hypot(unexplained.machine.unwrap_or(0.0));
+    (unexplained.motion > 0.0).then_some(level / unexplained.motion)
 }
 
-fn is_too_much(left: &Unexplained) -> bool {
-    let machine = left.machine.unwrap_or(0.0);
-    let known = left.rest > TOO_MUCH * left.noise.unwrap_or(0.0).hypot(machine);
-    known && left.share() > if left.noise.is_some() { LITTLE } else { SELDOM_NOISE }
+fn is_too_much(unexplained: &Unexplained) -> bool {
+    let machine = unexplained.machine.unwrap_or(0.0);
+    let known = unexplained.rest > TOO_MUCH * unexplained.noise.unwrap_or(0.0).hypot(machine);
+    known && unexplained.share() > if unexplained.noise.is_some() { LITTLE } else { SELDOM_NOISE }
 }
 
 fn percent(share: f64) -> String {
@@ -82,17 +82,18 @@ pub fn remark(
     dofs: usize,
 ) -> Option<String> {
     let all = measured.iter().zip(unexplained?);
-    let told: Vec<&Measured> = all.filter(|(_, left)| is_too_much(left)).map(|m| m.0).collect();
-    if told.is_empty() {
+    let excessive: Vec<&Measured> =
+        all.filter(|(_, unexplained)| is_too_much(unexplained)).map(|m| m.0).collect();
+    if excessive.is_empty() {
         return None;
     }
-    let each = told.iter().map(|m| {
+    let each = excessive.iter().map(|m| {
         let share = percent(m.unexplained.unwrap_or_default());
         let expected = m.expected.map(|share| format!("; expected {}", percent(share)));
         let expected = expected.unwrap_or_default();
         format!("{share} of channel {} ({}{expected})", m.channel, m.column)
     });
-    let unless = if told.iter().any(|m| m.expected.is_none()) {
+    let unless = if excessive.iter().any(|m| m.expected.is_none()) {
         "unless that is noise (--noise states its level), "
     } else {
         ""

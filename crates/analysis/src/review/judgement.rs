@@ -16,18 +16,19 @@ const POOR_FIT: f64 = 50.0;
 
 /// Returns the evidence against the numbers, the worst first.
 pub fn doubts(contents: &Review<'_>) -> Vec<String> {
-    let report = &contents.found.summary();
+    let report = &contents.identified.summary();
     let mut doubts = found_out(&report.checks, Verdict::Bad);
     doubts.extend(report.doubts());
     // Of too large a residual the checks tell.
-    if let Some(misfit) = contents.found.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
+    if let Some(misfit) =
+        contents.identified.fitted().misfit.filter(|misfit| misfit.ratio < OVERSTATED)
     {
         let why = "the noise was taken as larger than it is, and so were the standard errors";
         doubts.push(format!("{misfit}: {why}"));
     }
     doubts.extend(predicted(contents).filter(|(fit, _)| !is_predicted(*fit)).map(|(_, text)| text));
     doubts.extend(found_out(&report.checks, Verdict::Doubtful));
-    doubts.extend(of_least_squares(contents.found.fitted(), &report.checks));
+    doubts.extend(of_least_squares(contents.identified.fitted(), &report.checks));
     doubts
 }
 
@@ -55,7 +56,7 @@ fn found_out(checks: &[CheckRow], verdict: Verdict) -> Vec<String> {
 
 /// Returns the evidence for the numbers.
 pub fn merits(contents: &Review<'_>) -> Vec<String> {
-    let report = &contents.found.summary();
+    let report = &contents.identified.summary();
     let good = report.checks.iter().filter(|check| !check.is_conspicuous());
     let mut subjects: Vec<Subject> = Vec::new();
     for check in good.clone() {
@@ -73,7 +74,7 @@ pub fn merits(contents: &Review<'_>) -> Vec<String> {
         ));
     }
     let explained = good.clone().any(|check| check.subject == Subject::Misfit);
-    let misfit = contents.found.fitted().misfit.filter(|misfit| misfit.ratio >= OVERSTATED);
+    let misfit = contents.identified.fitted().misfit.filter(|misfit| misfit.ratio >= OVERSTATED);
     if let Some(misfit) = misfit.filter(|_| explained) {
         merits.push(format!("{misfit}; 1 is expected"));
     }
@@ -91,7 +92,7 @@ fn is_predicted(fit_percent: f64) -> bool {
 
 /// `true` if samples that were predicted had been fitted: then the prediction proves little.
 pub fn was_fitted(contents: &Review<'_>) -> bool {
-    let report = &contents.found.summary();
+    let report = &contents.identified.summary();
     report.validation.iter().any(|predicted| {
         let overlaps = |first: usize, last: usize| {
             first <= predicted.last_sample && predicted.first_sample <= last
@@ -105,7 +106,7 @@ pub fn was_fitted(contents: &Review<'_>) -> bool {
 
 /// Returns how well another record is predicted: the poorest channel, in per cent and in words.
 fn predicted(contents: &Review<'_>) -> impl Iterator<Item = (f64, String)> {
-    let validation = contents.found.summary().validation.iter();
+    let validation = contents.identified.summary().validation.iter();
     validation.filter_map(|validation| {
         let fits = validation.channels.iter().map(|share| share.fit_percent);
         let least = fits.min_by(f64::total_cmp)?;

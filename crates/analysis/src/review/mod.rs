@@ -23,7 +23,7 @@ use crate::measurement::{Block, Windowed};
 /// Computed content of a page.
 pub struct Review<'a> {
     /// The identification.
-    pub found: &'a Identified,
+    pub identified: &'a Identified,
     /// The records fitted, one by one.
     pub records: Vec<RecordReview<'a>>,
     /// The receptance that the records show, or why there is none.
@@ -60,36 +60,36 @@ impl<'a> Review<'a> {
     ///
     /// # Errors
     /// If a file cannot be read again, and if the force cannot be reconstructed.
-    pub fn of(found: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
-        let records = (0..found.records().len())
-            .map(|at| RecordReview::of(found, at, reconstruct_force))
+    pub fn of(identified: &'a Identified, reconstruct_force: bool) -> Result<Self, AnalysisError> {
+        let records = (0..identified.records().len())
+            .map(|at| RecordReview::of(identified, at, reconstruct_force))
             .collect::<Result<Vec<_>, _>>()?;
-        let validation = match found.validated() {
-            Some(other) => found.prediction().predict(&found.model()?, other)?,
+        let validation = match identified.validated() {
+            Some(other) => identified.prediction().predict(&identified.model()?, other)?,
             None => Vec::new(),
         };
-        let receptance = Receptance::of(found, &records).map_err(|reason| reason.to_string());
-        Ok(Self { found, receptance, records, validation })
+        let receptance = Receptance::of(identified, &records).map_err(|reason| reason.to_string());
+        Ok(Self { identified, receptance, records, validation })
     }
 
     /// Returns the samples held of the record that was not fitted.
     pub fn validated(&self) -> Option<&'a Block> {
-        self.found.validated()
+        self.identified.validated()
     }
 }
 
 impl<'a> RecordReview<'a> {
     fn of(
-        found: &'a Identified,
+        identified: &'a Identified,
         at: usize,
         reconstruct_force: bool,
     ) -> Result<Self, AnalysisError> {
-        let recorded = &found.records()[at];
+        let recorded = &identified.records()[at];
         let held = &recorded.held;
-        let lines = match found.spectra() {
+        let lines = match identified.spectra() {
             // Lines of segments are not those of the record.
-            Some(_) if found.prediction() == Prediction::Steady => {
-                let choice = &found.summary().analysis.lines;
+            Some(_) if identified.prediction() == Prediction::Steady => {
+                let choice = &identified.summary().analysis.lines;
                 Some(choose_lines(&held.force, held.period, choice)?)
             }
             _ => None,
@@ -98,16 +98,16 @@ impl<'a> RecordReview<'a> {
         let mean = whole.mean.as_ref().filter(|_| lines.is_some());
         let period = mean.unwrap_or(held);
         let reconstruction = match reconstruct_force {
-            true => Some(Reconstruction::of(found, period, lines.clone())?),
+            true => Some(Reconstruction::of(identified, period, lines.clone())?),
             false => None,
         };
         Ok(Self {
             recorded,
-            name: (found.records().len() > 1).then_some(held.file.as_str()),
+            name: (identified.records().len() > 1).then_some(held.file.as_str()),
             index: at,
-            channels: channels::channels(held, &whole, found.measurements()[at].channels()),
+            channels: channels::channels(held, &whole, identified.measurements()[at].channels()),
             excitations: excitation::excitations(&period.force)?,
-            residual: Residual::of(found, at, mean).map_err(|reason| reason.to_string()),
+            residual: Residual::of(identified, at, mean).map_err(|reason| reason.to_string()),
             reconstruction,
             lines,
             whole,

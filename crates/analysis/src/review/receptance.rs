@@ -35,9 +35,9 @@ pub struct Receptance {
 /// Returns `true` if on a row of the data, counted from 0, no force acts but the one on degree of freedom
 /// `dof`, counted from 0: motion over force is then the receptance.
 pub fn acts_alone(data: &FrequencyData, row: usize, dof: usize) -> bool {
-    let own = data.force()[(row, dof)].norm();
-    let absent = |k: usize| data.force()[(row, k)].norm() <= ALONE * own;
-    own > 0.0 && (0..data.dof()).all(|k| k == dof || absent(k))
+    let amplitude = data.force()[(row, dof)].norm();
+    let absent = |k: usize| data.force()[(row, k)].norm() <= ALONE * amplitude;
+    amplitude > 0.0 && (0..data.dof()).all(|k| k == dof || absent(k))
 }
 
 impl Receptance {
@@ -46,9 +46,9 @@ impl Receptance {
     ///
     /// # Errors
     /// If the records show none.
-    pub fn of(found: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
-        if let Some((_, data)) = &found.fitted().frequency {
-            let origin = match found.fitted().prediction {
+    pub fn of(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
+        if let Some((_, data)) = &identified.fitted().frequency {
+            let origin = match identified.fitted().prediction {
                 Prediction::Steady => "measured on the lines used",
                 Prediction::Sampled { .. } => "averaged over segments, on the lines used",
             };
@@ -57,7 +57,7 @@ impl Receptance {
         let first = parts[0].held();
         // The beginning of a period is none.
         let held = first.periods > 1 || first.held_to().is_none();
-        let period = match found.fitted().prediction {
+        let period = match identified.fitted().prediction {
             Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => held,
             Prediction::Sampled { .. } => first.periods > 1,
         };

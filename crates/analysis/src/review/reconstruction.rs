@@ -16,7 +16,7 @@ pub struct Reconstruction {
     /// Name of the method.
     pub method: &'static str,
     /// Reconstructed force.
-    pub found: IdentifiedForce,
+    pub force: IdentifiedForce,
     /// Measured force; in the frequency domain its mean period, on the lines used alone.
     pub measured: Record,
     /// Degrees of freedom on which a force acts, counted from 0.
@@ -33,11 +33,11 @@ impl Reconstruction {
     /// # Errors
     /// [`AnalysisError::Force`] if the method refuses the record.
     pub(crate) fn of(
-        found: &Identified,
+        identified: &Identified,
         period: &Block,
         lines: Option<Vec<usize>>,
     ) -> Result<Self, AnalysisError> {
-        let machine = found.machine()?;
+        let machine = identified.machine()?;
         let force = &period.force;
         let forced: Vec<usize> =
             (0..force.channels()).filter(|c| force.column(*c).amax() > 0.0).collect();
@@ -57,8 +57,8 @@ impl Reconstruction {
             None => force.clone(),
         };
         let errors = channel_errors(result.force.record(), &measured)?;
-        let (method, found) = (result.how.method, result.force);
-        Ok(Self { method, found, measured, forced, errors })
+        let (method, force) = (result.how.method, result.force);
+        Ok(Self { method, force, measured, forced, errors })
     }
 }
 

@@ -5,8 +5,8 @@ use mechid_signal::{Record, measures};
 
 use crate::AnalysisError;
 use crate::identify::Identified;
+use crate::identify::fitted;
 use crate::identify::prediction::Compared;
-use crate::identify::spectra;
 use crate::measurement::Block;
 
 /// Share of the response below which a residual is rounding.
@@ -50,15 +50,19 @@ impl Residual {
     ///
     /// # Errors
     /// If the machine has no such motion.
-    pub fn of(found: &Identified, at: usize, mean: Option<&Block>) -> Result<Self, AnalysisError> {
-        let model = found.model()?;
-        let prediction = found.fitted().prediction;
-        let compared = prediction.predict(&model, &found.records()[at].held)?;
+    pub fn of(
+        identified: &Identified,
+        at: usize,
+        mean: Option<&Block>,
+    ) -> Result<Self, AnalysisError> {
+        let model = identified.model()?;
+        let prediction = identified.fitted().prediction;
+        let compared = prediction.predict(&model, &identified.records()[at].held)?;
         let mean = mean.map(|mean| prediction.predict(&model, mean)).transpose()?;
         let mean = mean.map(|mut motions| motions.swap_remove(0));
-        let correlations = match found.fitted().residuals.get(at) {
-            Some(spectra::Residual::Samples(residual)) => of_samples(residual)?,
-            Some(spectra::Residual::Lines(residual)) => of_lines(residual),
+        let correlations = match identified.fitted().residuals.get(at) {
+            Some(fitted::Residual::Samples(residual)) => of_samples(residual)?,
+            Some(fitted::Residual::Lines(residual)) => of_lines(residual),
             None => Vec::new(),
         };
         Ok(Self { compared, correlations, mean })
@@ -71,25 +75,25 @@ pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     let measured = compared.measured.channel(channel);
     let apart: Vec<f64> =
         measured.iter().zip(compared.predicted.channel(channel)).map(|(x, p)| x - p).collect();
-    let (size, left) = (measures::rms(measured), measures::rms(&apart));
-    (size, if left > ROUNDING * size { left } else { 0.0 })
+    let (size, rest) = (measures::rms(measured), measures::rms(&apart));
+    (size, if rest > ROUNDING * size { rest } else { 0.0 })
 }
 
 /// At the lags at which the checks judge the residual.
-fn of_samples(residual: &spectra::SampleResidual) -> Result<Vec<Correlations>, AnalysisError> {
+fn of_samples(residual: &fitted::SampleResidual) -> Result<Vec<Correlations>, AnalysisError> {
     let (force, span, lags) = (&residual.force, residual.noise_span, residual.lags());
     if lags == 0 {
         return Ok(Vec::new());
     }
     let acting = || (0..force.channels()).filter(|c| varies(force, *c));
     let of = |channel: usize| {
-        let own = residual.left.channel(channel);
-        let with = |c: usize| Ok((c, cross_correlation(own, force.channel(c), lags)?));
+        let samples = residual.samples.channel(channel);
+        let with = |c: usize| Ok((c, cross_correlation(samples, force.channel(c), lags)?));
         let forces = acting().map(with).collect::<Result<_, AnalysisError>>()?;
-        let own = OwnCorrelation::Samples { correlation: whiteness(own, lags)?, span };
+        let own = OwnCorrelation::Samples { correlation: whiteness(samples, lags)?, span };
         Ok(Correlations { own: Some(own), lag: force.sampling().dt(), forces })
     };
-    (0..residual.left.channels()).map(of).collect()
+    (0..residual.samples.channels()).map(of).collect()
 }
 
 fn of_lines(residual: &SpectralResidual) -> Vec<Correlations> {

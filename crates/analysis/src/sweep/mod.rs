@@ -90,9 +90,9 @@ pub fn sweep_experiment(
         gathered.solve(&unknowns)
     };
     let run = |setting: &f64| run(setting).map_err(Arc::new);
-    let found = sweep(&how.settings.0, Some(&system), run, |_| progress());
+    let swept = sweep(&how.settings.0, Some(&system), run, |_| progress());
     let file = experiment.file().to_owned();
-    how.summary(file, samples, &found, Some(&system), (Some(natural_frequency_hz), &rate_hz))
+    how.summary(file, samples, &swept, Some(&system), (Some(natural_frequency_hz), &rate_hz))
 }
 
 /// Identifies every n-th sample of a record, with nothing filtered, for every setting.
@@ -145,10 +145,10 @@ pub fn sweep_record(
         Kind::RateHz => setting,
         Kind::Npi | Kind::Decimation => own_hz / setting,
     };
-    let found = sweep(&how.settings.0, reference, run, |_| progress());
+    let swept = sweep(&how.settings.0, reference, run, |_| progress());
     let (file, samples) = (measured.file.clone(), measured.period);
     let mut summary =
-        how.summary(file, samples, &found, reference, (natural_frequency_hz, &rate_hz))?;
+        how.summary(file, samples, &swept, reference, (natural_frequency_hz, &rate_hz))?;
     summary.remarks.extend(measured.unit_remarks.clone());
     if let (true, Some(last)) = (how.estimator.is_of_spectra(), measured.held_to()) {
         let (first, file) = (measured.first_sample, &measured.file);
@@ -200,7 +200,7 @@ impl SweepSettings {
         &self,
         file: String,
         samples_per_period: usize,
-        found: &Sweep<f64, Failure>,
+        swept: &Sweep<f64, Failure>,
         reference: Option<&SecondOrderSystem>,
         (natural_frequency_hz, rate_hz): (Option<f64>, &dyn Fn(f64) -> f64),
     ) -> Result<SweepSummary, AnalysisError> {
@@ -208,9 +208,9 @@ impl SweepSettings {
             let step_s = 1.0 / rate_hz(point.setting);
             Point::new(self.kind, point, reference, step_s, natural_frequency_hz)
         };
-        let points = found.points().iter().map(point).collect::<Result<Vec<_>, _>>()?;
-        let Some(best) = found.best().map(|best| best.setting) else {
-            return Err(nothing_found(found));
+        let points = swept.points().iter().map(point).collect::<Result<Vec<_>, _>>()?;
+        let Some(best) = swept.best().map(|best| best.setting) else {
+            return Err(nothing_found(swept));
         };
         Ok(SweepSummary {
             file,
@@ -218,7 +218,7 @@ impl SweepSettings {
             setting: self.kind,
             samples_per_period,
             natural_frequency_hz,
-            confidence: crate::identify::summary::CONFIDENCE,
+            confidence: crate::identify::rows::CONFIDENCE,
             points,
             best_setting: best,
             best_npi: (self.kind == Kind::Npi).then_some(best),
@@ -229,10 +229,10 @@ impl SweepSettings {
 }
 
 /// Returns the failure at the first setting, in its own words.
-fn nothing_found(found: &Sweep<f64, Failure>) -> AnalysisError {
+fn nothing_found(swept: &Sweep<f64, Failure>) -> AnalysisError {
     let describe = |point: &SweepPoint<f64, Failure>| AnalysisError::EmptySweep {
         setting: point.setting,
         reason: summary::failure(point).unwrap_or_default(),
     };
-    found.points().first().map_or(AnalysisError::NoSetting, describe)
+    swept.points().first().map_or(AnalysisError::NoSetting, describe)
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::SweepSettings;
 use super::settings::Kind;
 use crate::AnalysisError;
-use crate::identify::summary::{CONFIDENCE, Uncertain};
+use crate::identify::rows::{CONFIDENCE, Uncertain};
 use crate::text::{compact, paged_table, paragraph, significant, text_table};
 
 /// Result of a sweep: estimates and errors at every setting.

@@ -281,18 +281,18 @@ impl FitArgs {
         for record in &self.more {
             records.push(self.input.open_other(record, &channels, self.input.window())?);
         }
-        let mut found = mechid::identify(&records, &self.settings())?;
+        let mut identified = mechid::identify(&records, &self.settings())?;
         let predicted = &self.validation;
         let (start, samples) = (predicted.validate_start, predicted.validate_samples);
         let other = match (&predicted.validate, start, samples) {
-            (None, None, None) => return Ok(found),
+            (None, None, None) => return Ok(identified),
             (None, None, Some(samples)) => return Err(CliError::ValidationStart { samples }),
             (Some(record), _, _) => self.input.open_other(record, &channels, Window::default())?,
             (None, _, _) => records.swap_remove(0),
         };
-        let other = found.validation_window(other, &ValidationWindow { start, samples })?;
-        found.add_validation(&other)?;
-        Ok(found)
+        let other = identified.validation_window(other, &ValidationWindow { start, samples })?;
+        identified.add_validation(&other)?;
+        Ok(identified)
     }
 
     /// Identifies the machine from tables of frequency responses, if the files are such.
@@ -331,10 +331,10 @@ impl FitArgs {
     }
 
     /// Returns the result as text, with every check if asked for.
-    pub fn text(&self, found: &Identified) -> String {
+    pub fn text(&self, identified: &Identified) -> String {
         match self.verbose {
-            true => format!("{found}\nchecks:\n{}", found.summary().all_checks()),
-            false => found.to_string(),
+            true => format!("{identified}\nchecks:\n{}", identified.summary().all_checks()),
+            false => identified.to_string(),
         }
     }
 

@@ -105,10 +105,10 @@ impl BearingArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         if self.campaign {
             let plan: BearingPlan = mechid::io::read_json(&self.input.record)?;
-            let found = plan.run()?;
-            let outcome = Outcome::new(found.to_string(), &found)?
-                .with_plot(&self.plot, || Ok(found.figure()?))?;
-            return Ok(self.with_table(outcome, &found));
+            let speeds = plan.run()?;
+            let outcome = Outcome::new(speeds.to_string(), &speeds)?
+                .with_plot(&self.plot, || Ok(speeds.figure()?))?;
+            return Ok(self.with_table(outcome, &speeds));
         }
         let channels = self.channels.channels();
         channels.check_pairs()?;
@@ -123,10 +123,10 @@ impl BearingArgs {
             true => None,
             false => Some(data(&mut self.baseline.iter())?),
         };
-        let found = identify_bearing(&tests, baseline.as_ref(), &how)?;
-        let outcome = Outcome::new(found.to_string(), &found)?
-            .with_plot(&self.plot, || Ok(found.figure()?))?;
-        Ok(self.with_table(outcome, &BearingTable::new([found])))
+        let identified = identify_bearing(&tests, baseline.as_ref(), &how)?;
+        let outcome = Outcome::new(identified.to_string(), &identified)?
+            .with_plot(&self.plot, || Ok(identified.figure()?))?;
+        Ok(self.with_table(outcome, &BearingTable::new([identified])))
     }
 
     fn settings(&self) -> IdentifyBearing {

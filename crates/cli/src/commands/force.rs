@@ -93,16 +93,16 @@ impl ForceArgs {
             let summary = reconstruct_in_chunks(&run, &machine, &how, &mut take)?;
             return rows.deliver(Outcome::new(summary.to_string(), &summary)?);
         }
-        let found = reconstruct_with(&run, &machine, &how, &mut take)?;
-        let mut outcome = rows.deliver(Outcome::new(found.to_string(), &found)?)?;
+        let reconstructed = reconstruct_with(&run, &machine, &how, &mut take)?;
+        let mut outcome = rows.deliver(Outcome::new(reconstructed.to_string(), &reconstructed)?)?;
         if let Some(path) = &self.spectrum {
             let mut file = BegunFile::begin(path)?;
-            for text in spectrum_csv(found.force(), found.lines()) {
+            for text in spectrum_csv(reconstructed.force(), reconstructed.lines()) {
                 file.append(&text)?;
             }
             outcome = outcome.with_begun(file);
         }
-        outcome.with_plot(&self.plot, || Ok(found.figure()?))
+        outcome.with_plot(&self.plot, || Ok(reconstructed.figure()?))
     }
 
     /// Returns the settings of the reconstruction.

@@ -71,16 +71,16 @@ impl FrfArgs {
             without: self.lines.without(),
             segments: self.segments.segmentation(),
         };
-        let found = mechid::frf(&self.input.open(&channels)?, &how)?;
-        let mut outcome = Outcome::new(found.to_string(), &found)?
-            .with_plot(&self.plot, || Ok(found.figure()?))?;
+        let table = mechid::frf(&self.input.open(&channels)?, &how)?;
+        let mut outcome = Outcome::new(table.to_string(), &table)?
+            .with_plot(&self.plot, || Ok(table.figure()?))?;
         if let Some(path) = &self.output {
             let universal = path.extension().is_some_and(|ending| {
                 ["unv", "uff"].iter().any(|known| ending.eq_ignore_ascii_case(known))
             });
             let content = match universal {
-                true => found.to_responses(&self.points)?.to_universal_file()?,
-                false => found.csv(),
+                true => table.to_responses(&self.points)?.to_universal_file()?,
+                false => table.csv(),
             };
             outcome = outcome.with_file(path, content);
         }

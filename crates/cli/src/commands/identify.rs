@@ -54,11 +54,12 @@ impl IdentifyArgs {
 
     /// Reads, identifies, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        if let Some(found) = self.fit.identify_tables(&self.table)? {
-            return Outcome::new(found.to_string(), &found)?
-                .with_plot(&self.plot, || Ok(found.figure()?));
+        if let Some(identified) = self.fit.identify_tables(&self.table)? {
+            return Outcome::new(identified.to_string(), &identified)?
+                .with_plot(&self.plot, || Ok(identified.figure()?));
         }
-        let found = self.fit.identify()?;
-        Outcome::new(self.fit.text(&found), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+        let identified = self.fit.identify()?;
+        Outcome::new(self.fit.text(&identified), &identified)?
+            .with_plot(&self.plot, || Ok(identified.figure()?))
     }
 }

@@ -48,7 +48,8 @@ impl InfoArgs {
         let how =
             InspectSettings { columns: self.columns.clone(), curves: self.plot.plot.is_some() };
         let (reading, window) = (self.input.reading(), self.input.window());
-        let found = mechid::inspect(&self.input.record, &reading, &window, &how)?;
-        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+        let inspected = mechid::inspect(&self.input.record, &reading, &window, &how)?;
+        Outcome::new(inspected.to_string(), &inspected)?
+            .with_plot(&self.plot, || Ok(inspected.figure()?))
     }
 }

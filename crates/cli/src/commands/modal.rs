@@ -44,7 +44,7 @@ impl ModalArgs {
     /// Reads the machine and finds its modes.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let machine = Machine::read(&self.system)?;
-        let found = ModalSummary::of(&machine)?;
-        Outcome::new(found.to_string(), &found)?.with_plot(&self.plot, || Ok(machine.figure()?))
+        let modes = ModalSummary::of(&machine)?;
+        Outcome::new(modes.to_string(), &modes)?.with_plot(&self.plot, || Ok(machine.figure()?))
     }
 }

@@ -52,13 +52,13 @@ impl PredictArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         let machine = Machine::read(&self.model)?;
         let record = self.input.open(&self.channels.channels())?;
-        let found = predict(&record, &machine, &Predict { settle: self.settle })?;
-        let outcome = Outcome::new(found.to_string(), &found)?;
+        let predicted = predict(&record, &machine, &Predict { settle: self.settle })?;
+        let outcome = Outcome::new(predicted.to_string(), &predicted)?;
         let Some(path) = &self.output else { return Ok(outcome) };
-        let columns = found.columns();
+        let columns = predicted.columns();
         let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
         let values: Vec<&[f64]> = columns.iter().map(|(_, values)| *values).collect();
-        let mut rows = CsvFile::begin(path, found.response().sampling(), &names)?;
+        let mut rows = CsvFile::begin(path, predicted.response().sampling(), &names)?;
         rows.append(&values)?;
         Ok(outcome.with_begun(rows.finish()?))
     }

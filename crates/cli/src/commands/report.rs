@@ -60,7 +60,7 @@ fn html_file(text: &str) -> Result<PathBuf, String> {
 #[derive(Serialize)]
 struct Printed<'a> {
     #[serde(flatten)]
-    found: &'a Identified,
+    identified: &'a Identified,
     html: String,
 }
 
@@ -72,15 +72,16 @@ impl PageArgs {
 
     /// Reads, identifies, draws and writes; `words` are the arguments of the program.
     pub fn run(&self, words: &[OsString]) -> Result<Outcome, CliError> {
-        let found = self.fit.identify()?;
+        let identified = self.fit.identify()?;
         let settings = PageSettings {
             title: self.title.clone(),
             reconstruct_force: self.reconstruct_force,
             command: Some(repeat::command(words)),
         };
-        let page = options::spelled(&page(&found, &settings)?);
+        let page = options::spelled(&page(&identified, &settings)?);
         let html = output_name(&self.output);
-        let text = format!("{}\nreport: {html}\n", self.fit.text(&found));
-        Ok(Outcome::new(text, &Printed { found: &found, html })?.with_file(&self.output, page))
+        let text = format!("{}\nreport: {html}\n", self.fit.text(&identified));
+        Ok(Outcome::new(text, &Printed { identified: &identified, html })?
+            .with_file(&self.output, page))
     }
 }

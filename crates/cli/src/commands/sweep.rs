@@ -122,13 +122,13 @@ impl SweepArgs {
             mass,
             natural_frequency_hz: self.natural_frequency_hz,
         };
-        let found = match self.input.record.extension().is_some_and(described) {
+        let swept = match self.input.record.extension().is_some_and(described) {
             true => self.over_experiment(&how, &bar),
             false => self.over_record(&how, &bar),
         };
         bar.finish_and_clear();
-        let found = found?;
-        Outcome::new(found.text(self.best), &found)?.with_plot(&self.plot, || Ok(found.figure()?))
+        let swept = swept?;
+        Outcome::new(swept.text(self.best), &swept)?.with_plot(&self.plot, || Ok(swept.figure()?))
     }
 
     fn over_experiment(

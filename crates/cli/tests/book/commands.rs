@@ -85,6 +85,7 @@ impl Workspace {
             ("run", None) if bins.len() == 1 => Ok(Run::program("bin", bins[0], arguments)),
             ("test", Some((_, test))) => test_knows(&test, own, settings).map(|()| Run::Always),
             ("bench", None) => is_benched(package),
+            ("new", None) | ("add", None) => self.begins_a_crate(own),
             ("install", _) => self.installs(value(own, &["--path"]).unwrap_or_default()),
             ("tree", _) if own.is_empty() => Ok(Run::Always),
             // Whatever needs the whole workspace, the check of every change runs.
@@ -114,6 +115,20 @@ impl Workspace {
             Some(_) => Ok(Run::Install(folder.into())),
             None => Err(format!("no program mechid in \"{folder}\"")),
         }
+    }
+
+    /// A crate of the reader's, beside a clone of the workspace, comes to depend on a crate of it.
+    fn begins_a_crate(&self, words: &[&str]) -> Result<Run, String> {
+        let [name, options @ ..] = words else { return Err("no name".into()) };
+        let beside = tempfile::tempdir().unwrap();
+        cargo(beside.path(), &["new", "--quiet", "--vcs", "none", "rig"]);
+        if let Some(path) = value(options, &["--path"]) {
+            let there = path.strip_prefix("../mechid/").ok_or("not in a clone beside it")?;
+            let there = self.root.join(there);
+            let add = ["add", name, "--offline", "--path", there.to_str().unwrap()];
+            cargo(&beside.path().join("rig"), &add);
+        }
+        Ok(Run::Always)
     }
 
     fn is_run_always(&self, line: &str) -> Result<Run, String> {

@@ -99,8 +99,8 @@ fn excitation<'a>(records: impl Iterator<Item = &'a Record>, needed: usize) -> V
         let spectrum = Spectrum::of(force);
         orders.resize(orders.len().max(force.channels()), 0);
         for (channel, order) in orders.iter_mut().enumerate() {
-            let own = persistent_excitation_order(&spectrum, channel, EXCITED_LINE);
-            *order = (*order).max(own.unwrap_or(0));
+            let excited = persistent_excitation_order(&spectrum, channel, EXCITED_LINE);
+            *order = (*order).max(excited.unwrap_or(0));
         }
     }
     let finding = |(force, order)| Finding::PersistentExcitation { force, order, needed };

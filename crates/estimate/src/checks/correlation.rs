@@ -1,5 +1,6 @@
 //! Correlations over lags, and their p-values.
 
+use mechid_signal::measures::{peak, power_of_two};
 use nalgebra::DVectorView;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -184,14 +185,8 @@ pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f6
     )?;
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     // In units of a power of two, which changes no coefficient: fourth powers stay finite.
-    let largest = values.iter().fold(0.0_f64, |largest, v| largest.max(v.abs()));
-    let unit = power_of_two(largest);
-    Ok(values.iter().map(|v| (v - mean) * unit).collect())
-}
-
-/// Power of two that brings a positive finite value near 1; 1 for any other.
-fn power_of_two(value: f64) -> f64 {
-    if value > 0.0 { (-value.log2().floor().clamp(-1000.0, 1000.0)).exp2() } else { 1.0 }
+    let unit = power_of_two(peak(values));
+    Ok(values.iter().map(|v| (v - mean) / unit).collect())
 }
 
 fn products(a: &[f64], b: &[f64]) -> f64 {

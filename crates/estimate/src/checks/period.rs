@@ -150,9 +150,9 @@ fn squared_mismatches(channels: &[Vec<f64>]) -> Vec<f64> {
         // Squares left out at the end and at the beginning.
         let (mut end, mut beginning) = (0.0, 0.0);
         for (lag, (difference, overlap)) in all.iter_mut().enumerate() {
-            let own = (total - end) + (total - beginning);
-            *overlap += own;
-            *difference += own - 2.0 * products[lag] * len as f64;
+            let power = (total - end) + (total - beginning);
+            *overlap += power;
+            *difference += power - 2.0 * products[lag] * len as f64;
             end += x[len - 1 - lag].powi(2);
             beginning += x[lag].powi(2);
         }

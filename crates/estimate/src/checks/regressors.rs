@@ -42,13 +42,13 @@ pub fn noise_on_response(
     let mut least: Option<Change> = None;
     for dof in 0..equations {
         let free = estimate.unknowns().free();
-        let own: Vec<Parameter> = free.into_iter().filter(|p| p.row() == dof).collect();
-        let enough = LAGS.max(SAMPLES_PER_UNKNOWN * own.len()) + 2 < force.len();
-        if own.is_empty() || !enough {
+        let parameters: Vec<Parameter> = free.into_iter().filter(|p| p.row() == dof).collect();
+        let enough = LAGS.max(SAMPLES_PER_UNKNOWN * parameters.len()) + 2 < force.len();
+        if parameters.is_empty() || !enough {
             continue;
         }
-        let equation = Equation::of(response, force, estimate, dof, &own);
-        let change = equation.change(estimate, &own)?;
+        let equation = Equation::of(response, force, estimate, dof, &parameters);
+        let change = equation.change(estimate, &parameters)?;
         least = match (least, change) {
             (Some(a), Some(b)) => Some(if b.p_value < a.p_value { b } else { a }),
             (a, b) => a.or(b),
@@ -92,7 +92,7 @@ impl Equation {
         force: &Record,
         estimate: &Estimate,
         dof: usize,
-        own: &[Parameter],
+        parameters: &[Parameter],
     ) -> Self {
         let quantities = [response.acceleration(), response.velocity(), response.displacement()];
         let quantities = quantities.map(Record::data);
@@ -108,9 +108,9 @@ impl Equation {
             }
         }
         Self {
-            regressors: DMatrix::from_fn(rows, own.len(), |k, p| at(&own[p], k + 1)),
-            neighbours: DMatrix::from_fn(rows, own.len(), |k, p| {
-                0.5 * (at(&own[p], k) + at(&own[p], k + 2))
+            regressors: DMatrix::from_fn(rows, parameters.len(), |k, p| at(&parameters[p], k + 1)),
+            neighbours: DMatrix::from_fn(rows, parameters.len(), |k, p| {
+                0.5 * (at(&parameters[p], k) + at(&parameters[p], k + 2))
             }),
             target: DMatrix::from_column_slice(rows, 1, target.as_slice()),
         }
@@ -119,9 +119,9 @@ impl Equation {
     fn change(
         &self,
         estimate: &Estimate,
-        own: &[Parameter],
+        parameters: &[Parameter],
     ) -> Result<Option<Change>, EstimateError> {
-        let count = own.len();
+        let count = parameters.len();
         let alone = fit(&self.regressors, &self.target)?;
         if alone.residual_nrmse[0] <= ROUNDING || !alone.undetermined.is_empty() {
             return Ok(None);
@@ -150,7 +150,7 @@ impl Equation {
             return Ok(None);
         };
         let values = both.coefficients.rows(0, count).column(0) + indirect;
-        Ok(largest_change(estimate, own, &values, p_value))
+        Ok(largest_change(estimate, parameters, &values, p_value))
     }
 
     /// Π⁻¹b, with both in units of the regressors.
@@ -183,7 +183,7 @@ fn fit(
 /// Change of the parameter that changes most, in its standard errors.
 fn largest_change(
     estimate: &Estimate,
-    own: &[Parameter],
+    parameters: &[Parameter],
     values: &DVector<f64>,
     p_value: f64,
 ) -> Option<Change> {
@@ -197,7 +197,7 @@ fn largest_change(
             standard_error: fitted.standard_error,
         })
     };
-    let all = own.iter().zip(values.iter()).filter_map(one);
+    let all = parameters.iter().zip(values.iter()).filter_map(one);
     all.max_by(|a, b| a.standard_errors().total_cmp(&b.standard_errors()))
 }
 

@@ -447,10 +447,11 @@ impl SpectralResidual {
                 weights[(at, 2 * line + 1)] = -weight.im;
             }
         }
-        let own: Vec<usize> = rows.iter().flat_map(|row| [*row, row + 1]).collect();
-        let residual = DVector::from_iterator(own.len(), own.iter().map(|row| self.values[*row]));
+        let places: Vec<usize> = rows.iter().flat_map(|row| [*row, row + 1]).collect();
+        let residual =
+            DVector::from_iterator(places.len(), places.iter().map(|row| self.values[*row]));
         let products = &weights * &residual;
-        let covariance = self.covariance(&weights, &own)?;
+        let covariance = self.covariance(&weights, &places)?;
         let size = residual.norm() * forces.norm();
         let mean = covariance.trace();
         Some(Correlation {
@@ -468,7 +469,7 @@ impl SpectralResidual {
 
     /// Covariance A P Σ P Aᵀ of weighted sums A over the `own` rows, with P = I − QQᵀ and the variances
     /// Σ that the residuals show themselves.
-    fn covariance(&self, weights: &DMatrix<f64>, own: &[usize]) -> Option<DMatrix<f64>> {
+    fn covariance(&self, weights: &DMatrix<f64>, places: &[usize]) -> Option<DMatrix<f64>> {
         let deviations = self.deviations();
         let scaled = |mut matrix: DMatrix<f64>, rows: &[usize]| {
             for (mut column, row) in matrix.column_iter_mut().zip(rows) {
@@ -478,11 +479,12 @@ impl SpectralResidual {
         };
         let explained = &self.explained;
         let all: Vec<usize> = (0..self.values.len()).collect();
-        let own_explained = explained.select_rows(own);
-        let loads = weights * &own_explained;
-        let white = scaled(weights.clone(), own);
+        let explained_here = explained.select_rows(places);
+        let loads = weights * &explained_here;
+        let white = scaled(weights.clone(), places);
         let spread = scaled(explained.transpose(), &all);
-        let cross = &white * scaled(own_explained.transpose(), own).transpose() * loads.transpose();
+        let cross =
+            &white * scaled(explained_here.transpose(), places).transpose() * loads.transpose();
         let inner = &loads * (&spread * spread.transpose()) * loads.transpose();
         let covariance = &white * white.transpose() - &cross - cross.transpose() + inner;
         (covariance.trace() > 0.0).then_some(covariance)
@@ -508,9 +510,9 @@ fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
     let parallelograms: f64 = (0..powers.len().saturating_sub(a + b))
         .map(|l| powers[l] * powers[l + a] * powers[l + b] * powers[l + a + b])
         .sum();
-    let own = || -> f64 {
+    let diagonal = || -> f64 {
         let pairs = || powers.iter().zip(&powers[a..]).map(|(x, y)| x * y);
         pairs().sum::<f64>().powi(2) - pairs().map(|pair| pair * pair).sum::<f64>()
     };
-    2.0 * parallelograms + if a == b { own() } else { 0.0 }
+    2.0 * parallelograms + if a == b { diagonal() } else { 0.0 }
 }

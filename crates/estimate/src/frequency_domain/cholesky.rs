@@ -28,11 +28,11 @@ impl Cholesky {
         for start in (0..size).step_by(BLOCK) {
             let width = BLOCK.min(size - start);
             let below = start + width;
-            let own = lower.view((start, start), (width, width)).into_owned();
-            let own = own.cholesky()?.unpack();
-            lower.view_mut((start, start), (width, width)).copy_from(&own);
+            let diagonal = lower.view((start, start), (width, width)).into_owned();
+            let diagonal = diagonal.cholesky()?.unpack();
+            lower.view_mut((start, start), (width, width)).copy_from(&diagonal);
             let mut panel = lower.view((below, start), (size - below, width)).transpose();
-            if !own.solve_lower_triangular_mut(&mut panel) {
+            if !diagonal.solve_lower_triangular_mut(&mut panel) {
                 return None;
             }
             let tall = panel.transpose();
@@ -66,14 +66,14 @@ impl Cholesky {
         let mut inverse = DMatrix::zeros(size, size);
         for start in (0..size).step_by(BLOCK) {
             let width = BLOCK.min(size - start);
-            let own = self.lower.view((start, start), (width, width));
+            let diagonal = self.lower.view((start, start), (width, width));
             // Above these rows: X = −L⁻¹ (row of L) (what is known of the inverse).
             let mut rows = DMatrix::zeros(width, start + width);
             rows.columns_mut(start, width).fill_with_identity();
             let left = self.lower.view((start, 0), (width, start));
             let known = inverse.view((0, 0), (start, start));
             rows.columns_mut(0, start).gemm(-1.0, &left, &known, 0.0);
-            own.solve_lower_triangular_unchecked_mut(&mut rows);
+            diagonal.solve_lower_triangular_unchecked_mut(&mut rows);
             inverse.view_mut((start, 0), (width, start + width)).copy_from(&rows);
         }
         inverse

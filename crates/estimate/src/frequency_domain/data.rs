@@ -4,6 +4,7 @@ use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
+use super::ends::Ends;
 use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
 
@@ -21,6 +22,8 @@ pub struct FrequencyData {
     displacement: DMatrix<Complex<f64>>,
     measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
+    /// Displacement that reads 1 in the quantity measured, rows × open records, on the rows of each.
+    ends: DMatrix<Complex<f64>>,
 }
 
 impl FrequencyData {
@@ -93,7 +96,8 @@ impl FrequencyData {
             let to_displacement = measured.per_displacement(w).inv();
             motion.row_mut(r).apply(|x| *x *= to_displacement);
         }
-        Ok(Self { omega, force, displacement: motion, measured, noise: None })
+        let ends = DMatrix::zeros(omega.len(), 0);
+        Ok(Self { omega, force, displacement: motion, measured, noise: None, ends })
     }
 
     /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
@@ -168,6 +172,76 @@ impl FrequencyData {
         Ok(self)
     }
 
+    /// The same data as those of a record that is no period: begins and ends in motion that differs.
+    ///
+    /// The difference acts on the lines like a force. For displacements it is M(iω Δx + Δv) + C Δx over the
+    /// duration; it is short of what lies above half the sampling rate, so one more power of ω is left free:
+    ///
+    /// ```text
+    /// (K + iωC − ω²M) X + (τ₀ + τ₁ iω − τ₂ ω²) Z = F
+    /// ```
+    ///
+    /// with unknown real τ, of every degree of freedom, and Z = 1, 1/(iω) or −1/ω² as displacement, velocity
+    /// or acceleration was measured. [`output_error`](super::output_error()) finds them with the machine;
+    /// the rows are to be all lines of a band, for it is on neighbouring lines that the two differ.
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on arbitrary
+    /// excitations (transient terms of a plant) and on continuous-time models of band-limited signals.
+    #[must_use]
+    pub fn of_open_record(mut self) -> Self {
+        let unit = |omega: &f64| self.measured.per_displacement(*omega).inv();
+        self.ends = DMatrix::from_iterator(self.len(), 1, self.omega.iter().map(unit));
+        self
+    }
+
+    /// Displacement that reads 1 in the quantity measured, rows × open records; zero on the rows of others.
+    pub(crate) fn ends(&self) -> &DMatrix<Complex<f64>> {
+        &self.ends
+    }
+
+    /// The rows that belong to periods: those of open records with the unknown load of their ends, by `tau`
+    /// in the order of [`Ends`], taken off the force.
+    pub(crate) fn with_load_of_ends(&self, tau: &[f64]) -> Self {
+        let ends = Ends::new(self, tau);
+        let mut closed = self.clone();
+        for row in 0..self.len() {
+            let mut force = self.force.row(row).transpose();
+            ends.take_off(row, force.as_mut_slice());
+            closed.force.row_mut(row).copy_from(&force.transpose());
+        }
+        closed.ends = DMatrix::zeros(self.len(), 0);
+        closed
+    }
+
+    /// Second differences of neighbouring lines of the same spacing, in which the ends of a record count little:
+    /// the spectra under a Hann window. Rows at the ends of a band stay as they are.
+    ///
+    /// # Source
+    /// Harris (1978), Proceedings of the IEEE 66, 51–83 (windows as convolutions of lines).
+    pub(crate) fn under_hann_window(&self) -> Self {
+        let windowed = |amplitudes: &DMatrix<Complex<f64>>, unit: &dyn Fn(f64) -> Complex<f64>| {
+            let mut windowed = amplitudes.clone();
+            for row in 1..self.len().saturating_sub(1) {
+                let [before, at, after] = [row - 1, row, row + 1].map(|row| self.omega[row]);
+                if ((at - before) - (after - at)).abs() > 1e-6 * (at - before).abs() {
+                    continue;
+                }
+                let sides = amplitudes.row(row - 1) * (unit(before) / unit(at))
+                    + amplitudes.row(row + 1) * (unit(after) / unit(at));
+                let here = amplitudes.row(row).scale(0.5) - sides.scale(0.25);
+                windowed.row_mut(row).copy_from(&here);
+            }
+            windowed
+        };
+        Self {
+            force: windowed(&self.force, &|_| Complex::from(1.0)),
+            displacement: windowed(&self.displacement, &|w| self.measured.per_displacement(w)),
+            ends: DMatrix::zeros(self.len(), 0),
+            ..self.clone()
+        }
+    }
+
     /// The rows of both: several experiments on one system.
     ///
     /// The noise is kept if it is known of both.
@@ -202,7 +276,16 @@ impl FrequencyData {
             displacement: stack(&self.displacement, &other.displacement),
             measured: self.measured,
             noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
+            ends: self.ends_of_both(other),
         })
+    }
+
+    fn ends_of_both(&self, other: &Self) -> DMatrix<Complex<f64>> {
+        let (rows, columns) = (self.len() + other.len(), self.ends.ncols() + other.ends.ncols());
+        let mut both = DMatrix::zeros(rows, columns);
+        both.view_mut((0, 0), self.ends.shape()).copy_from(&self.ends);
+        both.view_mut(self.ends.shape(), other.ends.shape()).copy_from(&other.ends);
+        both
     }
 
     /// The same data with the force `delay` seconds later.

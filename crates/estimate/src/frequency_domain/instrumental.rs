@@ -48,8 +48,8 @@ pub fn instrumental_variables(
     let free = unknowns.free();
     let mut equations = Vec::new();
     for dof in 0..first.dof() {
-        let own: Vec<Parameter> = free.iter().filter(|p| p.row() == dof).copied().collect();
-        equations.push(Equation::solve(&both, unknowns, dof, &own)?);
+        let parameters: Vec<Parameter> = free.iter().filter(|p| p.row() == dof).copied().collect();
+        equations.push(Equation::solve(&both, unknowns, dof, &parameters)?);
     }
     assemble(&equations, unknowns, &free)
 }
@@ -74,9 +74,9 @@ impl Terms {
         }
     }
 
-    fn regressors(&self, own: &[Parameter]) -> DMatrix<f64> {
-        let mut regressors = DMatrix::zeros(self.force.nrows(), own.len());
-        for (mut column, p) in regressors.column_iter_mut().zip(own) {
+    fn regressors(&self, parameters: &[Parameter]) -> DMatrix<f64> {
+        let mut regressors = DMatrix::zeros(self.force.nrows(), parameters.len());
+        for (mut column, p) in regressors.column_iter_mut().zip(parameters) {
             column.copy_from(&self.motions[p.matrix() as usize].column(p.column()));
         }
         regressors
@@ -98,7 +98,7 @@ impl Terms {
 
 /// One equation of motion, solved.
 struct Equation {
-    own: Vec<Parameter>,
+    parameters: Vec<Parameter>,
     values: DVector<f64>,
     /// Change of the values per change of the right-hand side, times the residual: one
     /// column per row of the equations.
@@ -113,24 +113,24 @@ impl Equation {
         [first, second]: &[Terms; 2],
         unknowns: &Unknowns,
         dof: usize,
-        own: &[Parameter],
+        parameters: &[Parameter],
     ) -> Result<Self, EstimateError> {
-        let regressors = stack(&first.regressors(own), &second.regressors(own));
-        let instruments = stack(&second.regressors(own), &first.regressors(own));
+        let regressors = stack(&first.regressors(parameters), &second.regressors(parameters));
+        let instruments = stack(&second.regressors(parameters), &first.regressors(parameters));
         let (upper, lower) = (first.target(unknowns, dof), second.target(unknowns, dof));
         let target =
             DVector::from_iterator(regressors.nrows(), upper.iter().chain(lower.iter()).copied());
         let (influence, condition) =
-            influence(&regressors, instruments).ok_or_else(|| open(own))?;
+            influence(&regressors, instruments).ok_or_else(|| open(parameters))?;
         let values = &influence * &target;
         if values.iter().any(|v| !v.is_finite()) {
-            return Err(open(own));
+            return Err(open(parameters));
         }
         let residual = &target - &regressors * &values;
         let mut scores = influence;
         scores.column_iter_mut().zip(residual.iter()).for_each(|(mut c, e)| c *= *e);
         Ok(Self {
-            own: own.to_vec(),
+            parameters: parameters.to_vec(),
             values,
             scores,
             rows: target.len(),
@@ -141,7 +141,7 @@ impl Equation {
 
     /// The two measurements together have as many independent rows, less the unknowns.
     fn degrees_of_freedom(&self) -> usize {
-        self.rows.saturating_sub(self.own.len())
+        self.rows.saturating_sub(self.parameters.len())
     }
 }
 
@@ -165,8 +165,8 @@ fn influence(
     Some((influence, singular_values.max() / singular_values.min()))
 }
 
-fn open(own: &[Parameter]) -> EstimateError {
-    let names: Vec<String> = own.iter().map(Parameter::to_string).collect();
+fn open(parameters: &[Parameter]) -> EstimateError {
+    let names: Vec<String> = parameters.iter().map(Parameter::to_string).collect();
     EstimateError::Undetermined {
         parameters: names.join(", "),
         directions: "the two measurements have nothing in common".to_owned(),
@@ -189,7 +189,11 @@ fn assemble(
         .iter()
         .map(|p| {
             let equation = &equations[p.row()];
-            let at = equation.own.iter().position(|own| own == p).expect("its own equation");
+            let at = equation
+                .parameters
+                .iter()
+                .position(|parameters| parameters == p)
+                .expect("its own equation");
             (equation, at)
         })
         .collect();
@@ -199,7 +203,7 @@ fn assemble(
         let correction = left.rows as f64 / spare.sqrt();
         correction * left.scores.row(p).dot(&right.scores.row(q))
     });
-    let solved = equations.iter().filter(|e| !e.own.is_empty());
+    let solved = equations.iter().filter(|e| !e.parameters.is_empty());
     Estimate::new(Findings {
         unknowns: unknowns.clone(),
         values: places.iter().map(|(equation, at)| equation.values[*at]).collect(),

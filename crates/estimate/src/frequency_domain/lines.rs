@@ -3,9 +3,9 @@
 use std::fmt;
 use std::sync::Arc;
 
+use mechid_signal::transform::{self, RealToComplex};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix};
-use realfft::{RealFftPlanner, RealToComplex};
 
 use crate::EstimateError;
 
@@ -50,7 +50,7 @@ impl Lines {
         if let Some(&line) = lines.iter().find(|&&line| line == 0 || line > last) {
             return Err(EstimateError::LineOutOfRange { line, last });
         }
-        let plan = RealFftPlanner::new().plan_fft_forward(sampling.len());
+        let plan = transform::forward(sampling.len());
         Ok(Self { sampling, lines, plan })
     }
 

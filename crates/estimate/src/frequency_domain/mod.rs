@@ -43,6 +43,7 @@
 
 mod cholesky;
 mod data;
+mod ends;
 mod equation_error;
 mod instrumental;
 mod likelihood_ratio;
@@ -51,6 +52,7 @@ mod misfit;
 mod multi_start;
 mod normal_equations;
 mod output_error;
+mod output_error_fit;
 mod periods;
 mod residual_noise;
 mod search;
@@ -66,8 +68,10 @@ pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use lines::Lines;
 pub(crate) use lines::check_sampling;
 pub(crate) use output_error::in_units_of_noise;
-pub use output_error::{OutputErrorFit, output_error, output_error_near, output_error_pooling};
+pub use output_error::{output_error, output_error_near, output_error_pooling};
+pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use periods::RepeatedPeriods;
 pub(crate) use whitened::Whitened;
 
-pub use crate::noise_spectrum::{NoiseModel, NoiseSpectrum, Pooling};
+pub use crate::noise_spectrum::NoiseSpectrum;
+pub use crate::pooling::{NoiseModel, Pooling};

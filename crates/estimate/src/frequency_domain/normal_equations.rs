@@ -8,6 +8,7 @@ use mechid_model::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 
 use super::cholesky::Cholesky;
+use super::ends;
 use crate::Unknowns;
 use crate::triangular::TriangularFactor;
 
@@ -21,7 +22,8 @@ const LINES: usize = 256;
 pub(super) struct Layout {
     dof: usize,
     unknowns: usize,
-    /// Columns of [M C K] that are unknown in at least one equation.
+    /// Columns of [M C K] that are unknown in at least one equation; beyond them those of the ends of open
+    /// records.
     columns: Vec<(Matrix, usize)>,
     equations: Vec<Equation>,
 }
@@ -72,23 +74,34 @@ pub(super) struct Factors {
 }
 
 impl Layout {
-    pub(super) fn new(unknowns: &Unknowns) -> Self {
-        let free = unknowns.free();
+    pub(super) fn new(unknowns: &Unknowns, open_records: usize) -> Self {
+        let (n, free) = (unknowns.dof(), unknowns.free());
+        let ends: Vec<(Matrix, usize)> = (0..open_records)
+            .flat_map(|record| Matrix::ALL.map(|matrix| (matrix, n + record)))
+            .collect();
         let mut columns: Vec<_> = free.iter().map(|p| (p.matrix(), p.column())).collect();
+        columns.extend(&ends);
         columns.sort_unstable_by_key(|(matrix, column)| (*matrix as usize, *column));
         columns.dedup();
         let equation = |row: usize| {
-            let own = free.iter().enumerate().filter(move |(_, p)| p.row() == row);
+            let of_row = free.iter().enumerate().filter(move |(_, p)| p.row() == row);
             let place = |column: &(Matrix, usize)| {
                 columns.iter().position(|c| c == column).expect("a column of some equation")
             };
-            let (places, columns) =
-                own.map(|(at, p)| (at, place(&(p.matrix(), p.column())))).unzip();
+            let of_row = of_row.map(|(at, p)| (at, place(&(p.matrix(), p.column()))));
+            let of_ends = ends.iter().map(|column| {
+                let at = ends::place(n, column.1 - n, column.0, row);
+                (free.len() + at, place(column))
+            });
+            let mut both: Vec<(usize, usize)> = of_row.chain(of_ends).collect();
+            // In the order of all columns, which an equation with all of them shares.
+            both.sort_unstable_by_key(|(_, column)| *column);
+            let (places, columns) = both.into_iter().unzip();
             Equation { row, places, columns }
         };
         let equations: Vec<Equation> =
-            (0..unknowns.dof()).map(equation).filter(|e| !e.places.is_empty()).collect();
-        Self { dof: unknowns.dof(), unknowns: free.len(), columns, equations }
+            (0..n).map(equation).filter(|e| !e.places.is_empty()).collect();
+        Self { dof: n, unknowns: free.len() + n * ends.len(), columns, equations }
     }
 
     pub(super) fn columns(&self) -> &[(Matrix, usize)] {
@@ -131,7 +144,7 @@ impl Layout {
     fn orthonormalise(&self, factors: &mut Factors) -> Option<DMatrix<f64>> {
         let lines = factors.weights.nrows() / 2;
         let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
-        let power = diagonal.fold(DVector::zeros(2 * lines), |sum, own| sum + own);
+        let power = diagonal.fold(DVector::zeros(2 * lines), |sum, part| sum + part);
         let mut weighted = factors.regressors.transpose();
         for mut column in weighted.column_iter_mut() {
             for (at, value) in column.iter_mut().enumerate() {
@@ -275,10 +288,10 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
             (projected[(at, at - 1)], projected[(at - 1, at)]) = (norm, norm);
         }
         next.unscale_mut(norm);
-        let own = next.clone();
-        next = product(&own);
-        projected[(at, at)] = own.dot(&next);
-        basis.push(own);
+        let direction = next.clone();
+        next = product(&direction);
+        projected[(at, at)] = direction.dot(&next);
+        basis.push(direction);
         for _ in 0..2 {
             for vector in &basis {
                 let along = vector.dot(&next);
@@ -307,11 +320,11 @@ impl Coordinates {
         let all = (regressors * weighted) * 2.0;
         let mut projected = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
-            let own = all.column(block.row);
+            let column = all.column(block.row);
             let mut to = projected.rows_mut(start, block.places.len());
             match &block.basis {
-                None => to.copy_from(&own),
-                Some(basis) => to.copy_from(&basis.tr_mul(&own)),
+                None => to.copy_from(&column),
+                Some(basis) => to.copy_from(&basis.tr_mul(&column)),
             }
         }
         projected.component_div_assign(&self.scale);
@@ -329,13 +342,15 @@ impl Coordinates {
         let mut unknowns = coordinates.clone();
         for (block, start) in self.starts() {
             let len = block.places.len();
-            let mut own = coordinates.rows(start, len).into_owned();
-            for (mut row, scale) in own.row_iter_mut().zip(self.scale.rows(start, len).iter()) {
+            let mut block_rows = coordinates.rows(start, len).into_owned();
+            for (mut row, scale) in
+                block_rows.row_iter_mut().zip(self.scale.rows(start, len).iter())
+            {
                 row.unscale_mut(*scale);
             }
-            let solved = block.triangle.solve_upper_triangular_mut(&mut own);
+            let solved = block.triangle.solve_upper_triangular_mut(&mut block_rows);
             debug_assert!(solved, "independent regressors");
-            for (at, row) in block.places.iter().zip(own.row_iter()) {
+            for (at, row) in block.places.iter().zip(block_rows.row_iter()) {
                 unknowns.row_mut(*at).copy_from(&row);
             }
         }
@@ -346,9 +361,9 @@ impl Coordinates {
     pub(super) fn of(&self, unknowns: &DVector<f64>) -> DVector<f64> {
         let mut coordinates = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
-            let own = block.places.iter().map(|at| unknowns[*at]);
-            let own = DVector::from_iterator(block.places.len(), own);
-            coordinates.rows_mut(start, own.len()).copy_from(&(&*block.triangle * own));
+            let values = block.places.iter().map(|at| unknowns[*at]);
+            let values = DVector::from_iterator(block.places.len(), values);
+            coordinates.rows_mut(start, values.len()).copy_from(&(&*block.triangle * values));
         }
         coordinates.component_mul_assign(&self.scale);
         coordinates
@@ -359,8 +374,8 @@ impl Coordinates {
         let mut unknowns = DVector::zeros(self.scale.len());
         let scaled = coordinates.component_mul(&self.scale);
         for (block, start) in self.starts() {
-            let own = block.triangle.tr_mul(&scaled.rows(start, block.places.len()));
-            block.places.iter().zip(own.iter()).for_each(|(at, value)| unknowns[*at] = *value);
+            let values = block.triangle.tr_mul(&scaled.rows(start, block.places.len()));
+            block.places.iter().zip(values.iter()).for_each(|(at, value)| unknowns[*at] = *value);
         }
         unknowns
     }

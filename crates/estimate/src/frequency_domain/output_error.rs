@@ -3,47 +3,18 @@
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::ends;
 use super::misfit::Misfit;
-use super::multi_start::{Found, Plausible, search};
+use super::multi_start::search;
+use super::output_error_fit::{
+    OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare, uncertain_weights,
+};
 use super::residual_noise::with_residual_noise;
 use super::search::SumOfSquares;
 use super::starts::Starts;
-use super::weight_uncertainty::WeightUncertainty;
-use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, equation_error};
-use crate::estimate::Findings;
+use super::{FrequencyData, NoiseSpectrum, Pooling, equation_error};
 use crate::least_squares::size;
 use crate::{Estimate, EstimateError, Unknowns};
-
-/// An [`Estimate`] by maximum likelihood, with what its search tells.
-#[derive(Debug, Clone, PartialEq)]
-pub struct OutputErrorFit {
-    /// M̂, Ĉ, K̂ with the covariance that the Fisher information gives.
-    pub estimate: Estimate,
-    /// Weighted residual power over its expectation: 1 within a few √(2/degrees of freedom)
-    /// if the model is right and the noise is as stated; much more if the machine is not
-    /// what the model says (nonlinear, more degrees of freedom). 1 by construction where the
-    /// noise is estimated from the residual.
-    pub misfit_ratio: f64,
-    /// Twice the negative logarithm of the likelihood, up to a constant and allowing for sampled
-    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits of
-    /// the same data differ by is a [`likelihood_ratio`].
-    ///
-    /// [`likelihood_ratio`]: super::likelihood_ratio()
-    pub deviance: Option<f64>,
-    /// Gauss–Newton steps from the best start to the minimum.
-    pub steps: usize,
-    /// Number of searches, each from another start.
-    pub searches: usize,
-    /// Number of searches that ended at this minimum; of two or more it is the global one as far as
-    /// searches can tell.
-    pub agreeing: usize,
-    /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
-    /// periods, or one from the residual; none where the noise is known beforehand.
-    pub noise: Vec<NoiseModel>,
-}
-
-/// Standard deviations by which the misfit ratio of a right model may differ from 1.
-const PLAUSIBLE: f64 = 6.0;
 
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
 ///
@@ -143,101 +114,13 @@ fn with_known_noise(
     let scale = Scale {
         level: 1.0,
         inflation,
-        weights: WeightUncertainty::of(data, unknowns, &found.minimum.theta, noise),
+        weights: uncertain_weights(data, unknowns, &found.minimum.theta, noise),
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: found.minimum.cost / expected,
         deviance: Some(found.minimum.cost / inflation),
         noise: noise.models().to_vec(),
     };
     finish(data, unknowns, &mut misfit, &found, scale)
-}
-
-/// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
-pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
-    let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
-    Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
-}
-
-/// How the covariance follows from the Fisher information.
-pub(super) struct Scale {
-    /// Power of the noise over that of the weights.
-    pub(super) level: f64,
-    /// By which the covariance is larger for weights that are uncertain, where nothing better is known.
-    pub(super) inflation: f64,
-    pub(super) weights: Option<WeightUncertainty>,
-    pub(super) degrees_of_freedom: usize,
-    pub(super) misfit_ratio: f64,
-    pub(super) deviance: Option<f64>,
-    pub(super) noise: Vec<NoiseModel>,
-}
-
-pub(super) fn finish(
-    data: &FrequencyData,
-    unknowns: &Unknowns,
-    misfit: &mut Misfit<'_>,
-    found: &Found,
-    scale: Scale,
-) -> Result<OutputErrorFit, EstimateError> {
-    let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
-    let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
-    let (covariance, degrees_of_freedom) = match scale.weights {
-        None => (covariance * scale.inflation, scale.degrees_of_freedom),
-        Some(weights) => {
-            let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
-            (covariance + weights.excess, fewest.max(1.0) as usize)
-        }
-    };
-    let errors = misfit.errors();
-    let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
-    let residual_nrmse = errors
-        .column_iter()
-        .zip(data.displacement().column_iter())
-        .map(|(e, x)| nrmse((e.norm(), x.norm())))
-        .collect();
-    let estimate = Estimate::new(Findings {
-        unknowns: unknowns.clone(),
-        values: found.minimum.theta.iter().copied().collect(),
-        covariance: covariance * scale.level,
-        degrees_of_freedom,
-        residual_nrmse,
-        condition,
-        undetermined: Vec::new(),
-    })?;
-    Ok(OutputErrorFit {
-        estimate,
-        misfit_ratio: scale.misfit_ratio,
-        deviance: scale.deviance,
-        steps: found.minimum.steps,
-        searches: found.searches,
-        agreeing: found.agreeing,
-        noise: scale.noise,
-    })
-}
-
-/// Real equations less unknowns.
-pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
-    (2 * data.dof() * data.len()).saturating_sub(unknowns.free().len())
-}
-
-/// Covariance over the inverse of the Fisher information computed with sampled weights.
-///
-/// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and
-/// true covariance S: E[W] = ν/(ν−n)·S⁻¹, E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹, so that the
-/// covariance of the estimate is E[WSW]/E[W]² times the best one, and ν²/((ν−n)²−1) times the
-/// one computed.
-///
-/// # Errors
-/// [`EstimateError::TooFewAverages`] where it does not exist.
-pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
-    if nu.is_infinite() {
-        return Ok(1.0);
-    }
-    let n = channels as f64;
-    if nu <= n + 1.0 {
-        let (got, needed) = (nu as usize + 1, channels + 3);
-        return Err(EstimateError::TooFewAverages { got, needed });
-    }
-    Ok(nu * nu / ((nu - n) * (nu - n) - 1.0))
 }
 
 /// What an estimate leaves of the displacement, rows × n, in units of the stated noise: independent
@@ -249,7 +132,8 @@ pub(crate) fn in_units_of_noise(
 ) -> Option<DMatrix<Complex<f64>>> {
     let theta: DVector<f64> = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
     let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;
-    misfit.try_at(&theta)?;
+    let all = theta.len() + ends::count(data);
+    misfit.try_at(&theta.resize_vertically(all, 0.0))?;
     misfit.accept();
     Some(misfit.white())
 }

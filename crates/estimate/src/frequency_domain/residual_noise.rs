@@ -5,12 +5,12 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::misfit::Misfit;
 use super::multi_start::{Found, search};
-use super::output_error::{
-    OutputErrorFit, Scale, finish, plausible, sampled_weight_inflation, spare,
+use super::output_error_fit::{
+    OutputErrorFit, Scale, finish, parts, plausible, sampled_weight_inflation, spare,
+    uncertain_weights,
 };
 use super::search::SumOfSquares;
 use super::starts::Starts;
-use super::weight_uncertainty::WeightUncertainty;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, Whitened};
 use crate::{EstimateError, Unknowns};
 
@@ -66,7 +66,7 @@ pub(super) fn with_residual_noise(
     let scale = Scale {
         level,
         inflation,
-        weights: WeightUncertainty::of(data, unknowns, &fit.minimum.theta, &noise),
+        weights: uncertain_weights(data, unknowns, &fit.minimum.theta, &noise),
         degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,
@@ -173,9 +173,10 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
     if 2 * n * rows * unknowns.free().len() > SENSITIVITIES {
         return None;
     }
-    let theta: &DVector<f64> = &fit.fit.minimum.theta;
+    let (entries, tau) = parts(data, &fit.fit.minimum.theta);
+    let (data, entries) = (data.with_load_of_ends(tau), DVector::from_column_slice(entries));
     let covariance = |row: usize| fit.noise.covariance(row).clone();
-    let mut sensitivity = Whitened::of(data, unknowns, theta, covariance)?.sensitivity;
+    let mut sensitivity = Whitened::of(&data, unknowns, &entries, covariance)?.sensitivity;
     for mut column in sensitivity.column_iter_mut() {
         let length = column.norm();
         if length > 0.0 {

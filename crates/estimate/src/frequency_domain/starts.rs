@@ -1,10 +1,13 @@
 //! Starts of the search for the maximum of the likelihood: linear estimates of the equation of
 //! motion, with weights and corrections for noise.
 
+use std::borrow::Cow;
+
 use mechid_model::linear_algebra::hermitian_eigen;
 use mechid_model::{Matrix, Parameter, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::ends;
 use super::equation_error::weighted_equation_errors;
 use super::misfit::powers;
 use super::{FrequencyData, NoiseSpectrum};
@@ -19,7 +22,10 @@ const ROUNDS: usize = 4;
 
 /// Linear estimates from spectra, each equation of motion by itself.
 pub(super) struct Starts<'a> {
-    data: &'a FrequencyData,
+    /// Of open records those under a window that leaves little of their ends.
+    data: Cow<'a, FrequencyData>,
+    /// Number of unknown loads of these ends, which start at zero.
+    ends: usize,
     unknowns: &'a Unknowns,
     noise: &'a NoiseSpectrum,
     equations: Vec<Equation>,
@@ -29,7 +35,7 @@ pub(super) struct Starts<'a> {
 /// The unknowns of one equation of motion and their places among all.
 struct Equation {
     row: usize,
-    own: Vec<(usize, Parameter)>,
+    parameters: Vec<(usize, Parameter)>,
 }
 
 /// How noise on the regressors is treated.
@@ -52,11 +58,16 @@ impl<'a> Starts<'a> {
     ) -> Self {
         let free = unknowns.free();
         let equation = |row| {
-            let own = free.iter().copied().enumerate().filter(|(_, p)| p.row() == row);
-            Equation { row, own: own.collect() }
+            let parameters = free.iter().copied().enumerate().filter(|(_, p)| p.row() == row);
+            Equation { row, parameters: parameters.collect() }
         };
-        let equations = (0..unknowns.dof()).map(equation).filter(|e| !e.own.is_empty()).collect();
-        Self { data, unknowns, noise, equations, nominal: None }
+        let equations =
+            (0..unknowns.dof()).map(equation).filter(|e| !e.parameters.is_empty()).collect();
+        let under = match ends::count(data) {
+            0 => Cow::Borrowed(data),
+            _ => Cow::Owned(data.under_hann_window()),
+        };
+        Self { data: under, ends: ends::count(data), unknowns, noise, equations, nominal: None }
     }
 
     /// The same, with the entries of a machine expected to be near.
@@ -80,11 +91,16 @@ impl<'a> Starts<'a> {
         let reweighted = |kind| powers[..2].iter().flatten().map(move |s| self.reweighted(kind, s));
         let total: Vec<_> = reweighted(Kind::Total).flatten().collect();
         let ordinary = reweighted(Kind::Ordinary);
-        let weighted = weighted_equation_errors(self.data, self.unknowns);
+        let weighted = weighted_equation_errors(&self.data, self.unknowns);
         let single = self.estimate(Kind::Total, &self.powers(0)).into_iter();
         let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
         let single = single.chain(weighted.map(|found| values(&found)));
-        std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start])).collect()
+        let all = std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start]));
+        let with_ends = |start: DVector<f64>| {
+            let len = start.len() + self.ends;
+            start.resize_vertically(len, 0.0)
+        };
+        all.map(|family| family.into_iter().map(with_ends).collect()).collect()
     }
 
     /// The estimates of every round of weighting, from `start` on.
@@ -130,7 +146,7 @@ impl<'a> Starts<'a> {
     }
 
     fn estimate(&self, kind: Kind, weights: &Weights) -> Option<DVector<f64>> {
-        let mut theta = DVector::zeros(self.equations.iter().map(|e| e.own.len()).sum());
+        let mut theta = DVector::zeros(self.equations.iter().map(|e| e.parameters.len()).sum());
         for equation in &self.equations {
             let weights: Vec<f64> = weights.column(equation.row).iter().copied().collect();
             let mut triangle = self.triangle(equation, &weights)?;
@@ -139,7 +155,7 @@ impl<'a> Starts<'a> {
                 triangle.column_iter().map(|c| c.norm()).map(|l| if l > 0.0 { l } else { 1.0 }),
             );
             triangle.column_iter_mut().zip(scale.iter()).for_each(|(mut c, s)| c.unscale_mut(*s));
-            let last = equation.own.len();
+            let last = equation.parameters.len();
             let values = match kind {
                 Kind::Ordinary => triangle
                     .view((0, 0), (last, last))
@@ -152,7 +168,7 @@ impl<'a> Starts<'a> {
                     total_least_squares(&triangle, &noise)?
                 }
             };
-            for (at, (place, _)) in equation.own.iter().enumerate() {
+            for (at, (place, _)) in equation.parameters.iter().enumerate() {
                 theta[*place] = values[at] * (scale[last] / scale[at]);
             }
         }
@@ -161,7 +177,7 @@ impl<'a> Starts<'a> {
 
     /// R of the weighted regressors and, last, the force less what known entries account for.
     fn triangle(&self, equation: &Equation, weights: &[f64]) -> Option<DMatrix<f64>> {
-        let (lines, last) = (self.data.len(), equation.own.len());
+        let (lines, last) = (self.data.len(), equation.parameters.len());
         let (x, force) = (self.data.displacement(), self.data.force());
         let mut rows = DMatrix::zeros(2 * lines, last + 1);
         for (line, &omega) in self.data.omega().iter().enumerate() {
@@ -170,7 +186,7 @@ impl<'a> Starts<'a> {
                 let z = z * weights[line];
                 (rows[(line, column)], rows[(lines + line, column)]) = (z.re, z.im);
             };
-            for (at, (_, p)) in equation.own.iter().enumerate() {
+            for (at, (_, p)) in equation.parameters.iter().enumerate() {
                 put(at, powers[p.matrix() as usize] * x[(line, p.column())]);
             }
             let mut target = force[(line, equation.row)];
@@ -185,13 +201,13 @@ impl<'a> Starts<'a> {
 
     /// E of the Gram matrix of the columns of [`Starts::triangle`] that noise alone would have.
     fn noise_gram(&self, equation: &Equation, weights: &[f64]) -> DMatrix<f64> {
-        let (n, last) = (self.data.dof(), equation.own.len());
+        let (n, last) = (self.data.dof(), equation.parameters.len());
         let mut gram = DMatrix::zeros(last + 1, last + 1);
         // How the noise of displacements and forces enters each column.
         let mut enters: Vec<Vec<(usize, Complex<f64>)>> = vec![Vec::new(); last + 1];
         for (line, &omega) in self.data.omega().iter().enumerate() {
             let powers = powers(omega).map(|power| power * weights[line]);
-            for (at, (_, p)) in equation.own.iter().enumerate() {
+            for (at, (_, p)) in equation.parameters.iter().enumerate() {
                 enters[at] = vec![(p.column(), powers[p.matrix() as usize])];
             }
             let known = self.known(equation.row).map(|(m, c, v)| (c, -powers[m as usize] * v));

@@ -58,13 +58,13 @@ impl WeightUncertainty {
                 let rows: Vec<usize> = (0..part.basis.nrows())
                     .flat_map(|line| [0, 1].map(|p| 2 * (n * (first + line) + channel) + p))
                     .collect();
-                let own = q.select_rows(&rows);
+                let sensitivity = q.select_rows(&rows);
                 for term in part.basis.column_iter() {
-                    let mut weighted = own.clone();
+                    let mut weighted = sensitivity.clone();
                     for (at, mut row) in weighted.row_iter_mut().enumerate() {
                         row *= term[at / 2];
                     }
-                    let p = own.tr_mul(&weighted);
+                    let p = sensitivity.tr_mul(&weighted);
                     excess += (weighted.tr_mul(&weighted) - &p * &p) / part.nu;
                     for (spread, c) in spread.iter_mut().zip(root.row_iter()) {
                         *spread += (c * &p).dot(&c).powi(2) / part.nu;

@@ -103,9 +103,9 @@ impl BlockScores {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);
         for (_, gram) in &self.blocks {
-            let own = (inverse * gram * inverse).diagonal();
-            squares += own.component_mul(&own);
-            sums += own;
+            let variances = (inverse * gram * inverse).diagonal();
+            squares += variances.component_mul(&variances);
+            sums += variances;
         }
         let of = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
         let least = sums.iter().zip(squares.iter()).map(of).fold(f64::INFINITY, f64::min);

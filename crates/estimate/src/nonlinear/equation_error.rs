@@ -148,15 +148,15 @@ fn nrmse(
     residuals: &[DMatrix<Complex<f64>>],
 ) -> Vec<f64> {
     let of = |dof: usize| {
-        let (mut left, mut all) = (0.0, 0.0);
+        let (mut unexplained, mut all) = (0.0, 0.0);
         for (columns, residual) in columns.iter().zip(residuals) {
             for row in 0..equations.rows.len() {
                 let unit = equations.unit[(row, dof)];
-                left += (residual[(row, dof)] * unit).norm_sqr();
+                unexplained += (residual[(row, dof)] * unit).norm_sqr();
                 all += (columns.force[(row, dof)] * unit).norm_sqr();
             }
         }
-        if all > 0.0 { (left / all).sqrt() } else { 0.0 }
+        if all > 0.0 { (unexplained / all).sqrt() } else { 0.0 }
     };
     (0..equations.data.dof()).map(of).collect()
 }
@@ -190,8 +190,8 @@ impl Fit {
             .enumerate()
             .map(|(at, ((name, unit), value))| {
                 let standard_error = covariance[(at, at)].sqrt();
-                let found = Uncertain { value, standard_error, degrees_of_freedom: freedom };
-                NamedParameter { name, unit, found }
+                let estimate = Uncertain { value, standard_error, degrees_of_freedom: freedom };
+                NamedParameter { name, unit, estimate }
             })
             .collect();
         Ok(NonlinearEstimate {
@@ -253,9 +253,9 @@ impl Fit {
                         let one = |row: usize| values[(row, dof)] * weights[(row, dof)];
                         time(&(0..equations.rows.len()).map(one).collect::<Vec<_>>())
                     };
-                    let own = equations.weighted(columns, weights, dof);
+                    let columns_of_dof = equations.weighted(columns, weights, dof);
                     let mut regressors: Vec<_> =
-                        own.map(|(at, values)| (at, time(&values))).collect();
+                        columns_of_dof.map(|(at, values)| (at, time(&values))).collect();
                     let more = slopes.iter().enumerate();
                     regressors.extend(more.map(|(at, d)| (equations.count() + at, weigh(d))));
                     InTime { regressors, residual: weigh(residual) }
@@ -317,16 +317,20 @@ fn unexplained(
     residuals: &[DMatrix<Complex<f64>>],
 ) -> Vec<f64> {
     let n = equations.data.dof();
-    let (mut left, mut all) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
+    let (mut unexplained, mut all) = (DVector::<f64>::zeros(n), DVector::<f64>::zeros(n));
     let system = linear.system();
     for row in (0..equations.rows.len()).filter(|row| equations.rows[*row] > 0) {
         let receptance = system.as_ref().ok().and_then(|s| s.receptance(equations.omega(row)).ok());
         let Some(receptance) = receptance else { return vec![f64::NAN; n] };
         for (columns, residual) in columns.iter().zip(residuals) {
             let made = &receptance * residual.row(row).transpose();
-            left += made.map(|z| z.norm_sqr());
+            unexplained += made.map(|z| z.norm_sqr());
             all += columns.displacement.row(row).transpose().map(|z| z.norm_sqr());
         }
     }
-    left.iter().zip(all.iter()).map(|(e, x)| if *x > 0.0 { (e / x).sqrt() } else { 0.0 }).collect()
+    unexplained
+        .iter()
+        .zip(all.iter())
+        .map(|(e, x)| if *x > 0.0 { (e / x).sqrt() } else { 0.0 })
+        .collect()
 }

@@ -28,7 +28,7 @@ pub(super) struct Equations<'a> {
     /// Lines of the rows; line 0 is the first if a term is a constant force.
     pub(super) rows: Vec<usize>,
     /// Of each equation the coefficients and their places among the parameters.
-    own: Vec<Vec<(usize, Coefficient)>>,
+    coefficients: Vec<Vec<(usize, Coefficient)>>,
     /// Factor of each row and equation that makes all of one variance under white noise, 0 where the
     /// equation does not hold: rows × degrees of freedom.
     pub(super) unit: DMatrix<f64>,
@@ -62,8 +62,8 @@ impl<'a> Equations<'a> {
             0 => 0.0,
             _ => 1.0,
         });
-        let own = (0..data.dof()).map(|dof| own(&free, terms, dof)).collect();
-        Ok(Self { data, unknowns, free, terms: terms.len(), rows, own, unit })
+        let coefficients = (0..data.dof()).map(|dof| coefficients(&free, terms, dof)).collect();
+        Ok(Self { data, unknowns, free, terms: terms.len(), rows, coefficients, unit })
     }
 
     /// Number of coefficients: free entries, then terms.
@@ -123,7 +123,7 @@ impl<'a> Equations<'a> {
     ) -> Vec<DMatrix<Complex<f64>>> {
         let residual = |columns: &Columns| {
             DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, dof| {
-                let model = self.own[dof].iter().map(|(at, coefficient)| {
+                let model = self.coefficients[dof].iter().map(|(at, coefficient)| {
                     self.entry(columns, row, *coefficient) * coefficients[*at]
                 });
                 self.target(columns, row, dof) - model.sum::<Complex<f64>>()
@@ -162,14 +162,14 @@ impl<'a> Equations<'a> {
             let len = CHUNK.min(self.rows.len() - start);
             let mut regressors = DMatrix::zeros(2 * len * n, self.count());
             let mut targets = DMatrix::zeros(2 * len * n, 1 + extra.len());
-            for (dof, own) in self.own.iter().enumerate() {
+            for (dof, coefficients) in self.coefficients.iter().enumerate() {
                 for row in 0..len {
                     let (line, place) = (start + row, 2 * (dof * len + row));
                     let weight = weights[(line, dof)];
                     if weight == 0.0 {
                         continue;
                     }
-                    for (at, coefficient) in own {
+                    for (at, coefficient) in coefficients {
                         let value = self.entry(columns, line, *coefficient) * weight;
                         (regressors[(place, *at)], regressors[(place + 1, *at)]) =
                             (value.re, value.im);
@@ -194,7 +194,7 @@ impl<'a> Equations<'a> {
         weights: &'b DMatrix<f64>,
         dof: usize,
     ) -> impl Iterator<Item = (usize, Vec<Complex<f64>>)> + 'b {
-        self.own[dof].iter().map(move |(at, coefficient)| {
+        self.coefficients[dof].iter().map(move |(at, coefficient)| {
             let value = |row| self.entry(columns, row, *coefficient) * weights[(row, dof)];
             (*at, (0..self.rows.len()).map(value).collect())
         })
@@ -202,7 +202,7 @@ impl<'a> Equations<'a> {
 
     /// Whether a coefficient stands in the equation of this degree of freedom.
     pub(super) fn concerns(&self, dof: usize) -> bool {
-        !self.own[dof].is_empty()
+        !self.coefficients[dof].is_empty()
     }
 
     /// An error for an equation with neither force nor known entry, which fixes ratios only.
@@ -219,7 +219,7 @@ impl<'a> Equations<'a> {
     }
 }
 
-fn own(free: &[Parameter], terms: &Terms, dof: usize) -> Vec<(usize, Coefficient)> {
+fn coefficients(free: &[Parameter], terms: &Terms, dof: usize) -> Vec<(usize, Coefficient)> {
     let entries = free.iter().enumerate().filter(|(_, parameter)| parameter.row() == dof);
     let entries = entries.map(|(at, parameter)| (at, Coefficient::Entry(*parameter)));
     let forces = terms.iter().enumerate().filter_map(|(at, term)| {

@@ -17,7 +17,7 @@ pub struct NamedParameter {
     /// SI unit.
     pub unit: String,
     /// Value and standard error, in this unit.
-    pub found: Uncertain,
+    pub estimate: Uncertain,
 }
 
 /// Origin of the standard errors.
@@ -190,7 +190,7 @@ impl fmt::Display for NamedParameter {
     /// `k3 = 3.951e0 ± 1.7e-3 N/m³`, the number after ± being one standard error.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (name, unit, Uncertain { value, standard_error, .. }) =
-            (&self.name, &self.unit, self.found);
+            (&self.name, &self.unit, self.estimate);
         write!(f, "{name} = {value:.6e} ± {standard_error:.1e} {unit}")
     }
 }

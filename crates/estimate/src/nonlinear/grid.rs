@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use mechid_signal::transform::{self, ComplexToReal, RealToComplex};
 use nalgebra::Complex;
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 /// A period on `samples` instants, of which the lines below `lines` are used; scaled as in
 /// [`mechid_signal::spectrum`].
@@ -18,9 +18,7 @@ pub(super) struct Grid {
 impl Grid {
     /// For lines 0 to `lines` − 1, all of them below half of `samples`.
     pub(super) fn new(lines: usize, samples: usize) -> Self {
-        let mut planner = RealFftPlanner::new();
-        let (forward, inverse) =
-            (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
+        let (forward, inverse) = (transform::forward(samples), transform::inverse(samples));
         Self { lines, samples, forward, inverse }
     }
 

@@ -87,19 +87,19 @@ pub fn output_error(
     let mut theta = theta;
     // The size of what is left of several channels is known after the first search.
     for round in 0..2 {
-        let found = minimise(&mut problem, theta)
+        let minimum = minimise(&mut problem, theta)
             .ok_or(EstimateError::NotConverged { searches: 1, steps })
-            .and_then(|found| match found.converged {
-                true => Ok(found),
-                false => Err(EstimateError::NotConverged { searches: 1, steps: found.steps }),
+            .and_then(|minimum| match minimum.converged {
+                true => Ok(minimum),
+                false => Err(EstimateError::NotConverged { searches: 1, steps: minimum.steps }),
             })?;
-        steps += found.steps;
-        theta = found.theta;
+        steps += minimum.steps;
+        theta = minimum.theta;
         problem.residual(&theta, &mut residual);
         if n == 1 || round == 1 {
             break;
         }
-        problem.levels = problem.left();
+        problem.levels = problem.residual_rms();
     }
     problem.finish(&theta, start, steps)
 }
@@ -182,9 +182,9 @@ impl<'a> Problem<'a> {
     }
 
     /// Size of what is left of each channel where the residual was last evaluated.
-    fn left(&self) -> Vec<f64> {
-        let left = |dof: usize| self.rms(|at, record| self.gap(at, record, dof));
-        (0..self.dof()).map(left).collect()
+    fn residual_rms(&self) -> Vec<f64> {
+        let residual_rms = |dof: usize| self.rms(|at, record| self.gap(at, record, dof));
+        (0..self.dof()).map(residual_rms).collect()
     }
 
     fn gap(&self, at: usize, record: &Prepared, dof: usize) -> DVector<f64> {
@@ -227,8 +227,12 @@ impl<'a> Problem<'a> {
         let linear = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
         let mut terms = Vec::new();
         for term in self.terms {
-            let (own, others) = rest.split_at(term.law().constants().len());
-            terms.push(if own.is_empty() { term.clone() } else { term.with_constants(own)? });
+            let (constants, others) = rest.split_at(term.law().constants().len());
+            terms.push(if constants.is_empty() {
+                term.clone()
+            } else {
+                term.with_constants(constants)?
+            });
             rest = others;
         }
         NonlinearSystem::new(linear, Terms::new(terms).ok()?, coefficients.to_vec()).ok()
@@ -265,7 +269,7 @@ impl<'a> Problem<'a> {
         let inverse = self.inverse(theta.len())?;
         let (covariance, standard_errors, freedom) = self.covariance(theta, &inverse);
         let covariance = covariance.view((0, 0), (shared, shared)).into_owned();
-        let rmse = self.left();
+        let rmse = self.residual_rms();
         let around_mean = |dof: usize| {
             self.rms(|_, record| {
                 let column = record.response.column(dof);
@@ -293,8 +297,8 @@ impl<'a> Problem<'a> {
         let parameters = entries.chain(terms).chain(constants).enumerate().map(|(at, named)| {
             let (name, unit) = named;
             let (value, standard_error) = (theta[at], covariance[(at, at)].sqrt());
-            let found = Uncertain { value, standard_error, degrees_of_freedom: freedom };
-            NamedParameter { name, unit, found }
+            let estimate = Uncertain { value, standard_error, degrees_of_freedom: freedom };
+            NamedParameter { name, unit, estimate }
         });
         let starts = (0..self.records.len()).map(|at| self.initial(theta, at).ok_or(wrong.clone()));
         Ok(NonlinearFit {
@@ -412,8 +416,10 @@ impl SumOfSquares for Problem<'_> {
             let len = course.state.nrows();
             for dof in 0..n {
                 for (d, derivative) in course.derivatives.iter().enumerate() {
-                    let own = derivative.column(order * n + dof) / -self.levels[dof];
-                    jacobian.view_mut((at, self.place(number, d)), (len, 1)).copy_from(&own);
+                    let sensitivity = derivative.column(order * n + dof) / -self.levels[dof];
+                    jacobian
+                        .view_mut((at, self.place(number, d)), (len, 1))
+                        .copy_from(&sensitivity);
                 }
                 at += len;
             }

@@ -118,8 +118,8 @@ pub fn fitted_start(
     let theta = DVector::from_iterator(2 * n, state);
     let mut problem =
         Start { system, directions: &directions, fine: &fine, measured, course: None };
-    let found = minimise(&mut problem, theta).filter(|found| found.converged);
-    initial(&found.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.theta)
+    let minimum = minimise(&mut problem, theta).filter(|minimum| minimum.converged);
+    initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.theta)
 }
 
 /// Measured less predicted response as a function of the start.

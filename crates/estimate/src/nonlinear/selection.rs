@@ -49,7 +49,7 @@ pub struct SelectionStep {
     /// the squared misfit of experiments held out over the number of equations.
     pub score: f64,
     /// Part of the weighted force, a ratio, that is left with it.
-    pub left: f64,
+    pub unexplained: f64,
 }
 
 /// Level of the test on experiments held out.
@@ -121,8 +121,8 @@ pub fn select_terms(
             && (criterion == Criterion::HeldOut || {
                 let options = EquationErrorOptions { weighting, ..Default::default() };
                 let fit = equation_error(data, unknowns, &longer, &options)?;
-                let found = fit.parameter(term.name())?.found;
-                let [low, high] = found.interval(1.0 - ZERO / candidates.len() as f64)?;
+                let estimate = fit.parameter(term.name())?.estimate;
+                let [low, high] = estimate.interval(1.0 - ZERO / candidates.len() as f64)?;
                 low > 0.0 || high < 0.0
             });
         if !worth {
@@ -159,11 +159,11 @@ impl Judge {
         let coefficients = self.fit(chosen, &everything)?;
         let on = |at: usize, coefficients: &[f64]| {
             let r = self.triangles[at].triangle();
-            let mut left = r.column(r.ncols() - 1).into_owned();
+            let mut residual = r.column(r.ncols() - 1).into_owned();
             for (column, coefficient) in chosen.iter().zip(coefficients) {
-                left.axpy(-coefficient, &r.column(*column), 1.0);
+                residual.axpy(-coefficient, &r.column(*column), 1.0);
             }
-            left.norm_squared()
+            residual.norm_squared()
         };
         let fitted = everything.iter().map(|at| on(*at, &coefficients)).sum();
         let all = everything.iter().map(|at| on(*at, &vec![0.0; chosen.len()])).sum();
@@ -214,7 +214,7 @@ impl Judge {
             Criterion::Information => self.information(misfit, parameters),
             Criterion::HeldOut => misfit.held_out.iter().sum::<f64>() / self.equations as f64,
         };
-        let left = if misfit.all > 0.0 { (misfit.fitted / misfit.all).sqrt() } else { 0.0 };
-        SelectionStep { added, score, left }
+        let unexplained = if misfit.all > 0.0 { (misfit.fitted / misfit.all).sqrt() } else { 0.0 };
+        SelectionStep { added, score, unexplained }
     }
 }

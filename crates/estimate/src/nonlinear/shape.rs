@@ -91,9 +91,13 @@ impl Shape {
         };
         let mut terms = Vec::new();
         for term in &self.terms {
-            let own = if self.free.laws { term.law().constants().len() } else { 0 };
-            let own: Vec<f64> = (0..own).map(|_| next()).collect::<Option<_>>()?;
-            terms.push(if own.is_empty() { term.clone() } else { term.with_constants(&own)? });
+            let count = if self.free.laws { term.law().constants().len() } else { 0 };
+            let constants: Vec<f64> = (0..count).map(|_| next()).collect::<Option<_>>()?;
+            terms.push(if constants.is_empty() {
+                term.clone()
+            } else {
+                term.with_constants(&constants)?
+            });
         }
         let mut channels = self.channels;
         if self.free.delay {
@@ -157,11 +161,11 @@ pub(super) fn fit_shape(
 ) -> Result<Shape, EstimateError> {
     let start = DVector::from_iterator(shape.count(), shape.values());
     let mut projected = Projected { equations, shape: &shape, weights, at: None };
-    let found = minimise(&mut projected, start)
+    let minimum = minimise(&mut projected, start)
         .ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
-    let steps = found.steps;
-    if let Some(found) = shape.with(found.theta.as_slice()).filter(|_| found.converged) {
-        return Ok(found);
+    let steps = minimum.steps;
+    if let Some(fitted) = shape.with(minimum.theta.as_slice()).filter(|_| minimum.converged) {
+        return Ok(fitted);
     }
     let unseen = unseen(&mut projected, &shape);
     if unseen.is_empty() {
@@ -249,12 +253,12 @@ impl SumOfSquares for Projected<'_> {
             let share: Vec<f64> = solution.coefficients.column(1 + at).iter().copied().collect();
             let model = self.equations.residuals(columns, &share);
             // Target less residual is what these coefficients make.
-            let left: Vec<_> = slopes
+            let changes: Vec<_> = slopes
                 .iter()
                 .zip(target.iter().zip(&model))
                 .map(|(slopes, (all, rest))| (all - rest) - &slopes[at])
                 .collect();
-            self.write(&left, column.as_mut_slice());
+            self.write(&changes, column.as_mut_slice());
         }
     }
 }

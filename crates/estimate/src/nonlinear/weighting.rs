@@ -69,8 +69,8 @@ impl Weights {
         let first = usize::from(equations.rows.first() == Some(&0));
         let lines = rows - first;
         let flat = DMatrix::from_element(rows, n, 1.0);
-        let mut found = (levelled(&power, &flat, first), Weighting::WhiteForce);
-        let mut least = minus_log(&power, &found.0, first, residuals.len());
+        let mut best = (levelled(&power, &flat, first), Weighting::WhiteForce);
+        let mut least = minus_log(&power, &best.0, first, residuals.len());
         let half = half_width(lines);
         for kind in [Weighting::Response, Weighting::SmoothSpectrum] {
             if wanted != kind && wanted != Weighting::Automatic {
@@ -89,23 +89,23 @@ impl Weights {
             };
             let score = minus_log(&power, &variance, first, residuals.len()) + extra;
             if wanted == kind || score < least {
-                (found, least) = ((variance, kind), score);
+                (best, least) = ((variance, kind), score);
             }
         }
-        let of_rows = equations.unit.zip_map(&found.0, |unit, v| unit / v.sqrt());
-        Self { of_rows, kind: found.1 }
+        let of_rows = equations.unit.zip_map(&best.0, |unit, v| unit / v.sqrt());
+        Self { of_rows, kind: best.1 }
     }
 }
 
 /// Variances in proportion to given ones that have the mean power of each equation.
 fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMatrix<f64> {
     let lines = power.nrows() - first;
-    let mut found = variance.clone();
-    for (mut column, power) in found.column_iter_mut().zip(power.column_iter()) {
+    let mut scaled = variance.clone();
+    for (mut column, power) in scaled.column_iter_mut().zip(power.column_iter()) {
         let ratios = power.rows(first, lines).component_div(&column.rows(first, lines));
         column *= ratios.mean().max(f64::MIN_POSITIVE);
     }
-    found
+    scaled
 }
 
 /// Variance of a force in each equation whose response is equally large on all rows; `None` if the
@@ -126,8 +126,8 @@ fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatri
 /// Moving averages over the lines; the mean, where it counts, takes that of the first lines.
 fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
     let rows = power.nrows();
-    let mut found = power.clone();
-    for (column, mut to) in power.column_iter().zip(found.column_iter_mut()) {
+    let mut smooth = power.clone();
+    for (column, mut to) in power.column_iter().zip(smooth.column_iter_mut()) {
         let mut sums = vec![0.0; rows + 1];
         for row in first..rows {
             sums[row + 1] = sums[row] + column[row];
@@ -140,7 +140,7 @@ fn smooth(power: &DMatrix<f64>, first: usize, half: usize) -> DMatrix<f64> {
             to[row] = ((sums[high] - sums[low]) / (high - low) as f64).max(floor);
         }
     }
-    found
+    smooth
 }
 
 /// Minus the logarithm of the likelihood that the residuals of `experiments` have under these

@@ -72,8 +72,8 @@ pub fn missing_force(
             Matrix::Damping => v.column(parameter.column()).into_owned(),
             Matrix::Stiffness => x.column(parameter.column()).into_owned(),
         };
-        let own = estimate.unknowns().free().into_iter().filter(|p| p.row() == equation);
-        let columns: Vec<DVector<f64>> = own.map(|parameter| of(&parameter)).collect();
+        let parameters = estimate.unknowns().free().into_iter().filter(|p| p.row() == equation);
+        let columns: Vec<DVector<f64>> = parameters.map(|parameter| of(&parameter)).collect();
         if !columns.is_empty() {
             let left = remainder(DMatrix::from_columns(&columns), missing.column(equation).into())?;
             missing.set_column(equation, &left);

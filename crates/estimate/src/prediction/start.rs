@@ -108,16 +108,16 @@ impl StartFit {
         for ((kind, record, c), (factor, size)) in
             all.zip(self.channels.iter_mut().zip(&mut self.sizes))
         {
-            let own = record.channel(c);
+            let measured = record.channel(c);
             let column = |at: usize| responses[at].quantity(kind).channel(c);
             let rows = DMatrix::from_fn(len - seen, 2 * n + 1, |k, at| match at {
-                gap if gap == 2 * n => own[seen + k] - column(gap)[seen + k],
+                gap if gap == 2 * n => measured[seen + k] - column(gap)[seen + k],
                 free => column(free)[seen + k],
             });
             if !factor.push(&[rows.as_view()]) {
                 return Err(EstimateError::Overflow);
             }
-            *size += own[seen..].iter().map(|x| x * x).sum::<f64>();
+            *size += measured[seen..].iter().map(|x| x * x).sum::<f64>();
         }
         Ok(())
     }

@@ -31,9 +31,9 @@ impl Continuous {
         let logarithm = match discretisation {
             Discretisation::Euler => scaled,
             Discretisation::ZeroOrderHold | Discretisation::FirstOrderHold => {
-                let own = scaled.columns(0, states).into_owned();
+                let logarithm = scaled.columns(0, states).into_owned();
                 let input = scaled.columns(states, scaled.ncols() - states).into_owned();
-                let generator = Generator::new(&own, &input)?;
+                let generator = Generator::new(&logarithm, &input)?;
                 let value = generator.value.clone();
                 this.generator = Some(generator);
                 value

@@ -256,8 +256,8 @@ impl Fitted<'_> {
         let mut found = Vec::new();
         for direction in &self.regression.solution.undetermined {
             for equation in 0..self.rows.dof() {
-                let own = free.iter().filter(|p| p.row() == equation);
-                let terms: Vec<_> = own
+                let parameters = free.iter().filter(|p| p.row() == equation);
+                let terms: Vec<_> = parameters
                     .filter(|p| direction.involved[place(p)])
                     .map(|p| (*p, direction.combination[place(p)]))
                     .collect();

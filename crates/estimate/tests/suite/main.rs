@@ -19,6 +19,7 @@ mod noise_colour;
 mod nonlinear_exact;
 mod nonlinear_silverbox;
 mod nonlinear_study;
+mod open_record;
 mod refined;
 mod response_checks;
 mod search_start;

@@ -97,7 +97,7 @@ fn coefficients_of_a_prescribed_response_come_out() {
     for weighting in [Weighting::WhiteForce, Weighting::Response, Weighting::SmoothSpectrum] {
         let options = EquationErrorOptions { weighting, ..EquationErrorOptions::default() };
         let found = fitted(&all, terms, &options).unwrap();
-        let values: Vec<f64> = found.parameters().iter().map(|p| p.found.value).collect();
+        let values: Vec<f64> = found.parameters().iter().map(|p| p.estimate.value).collect();
         let expected = [vec![2.0, 5.0, 900.0], truth.clone()].concat();
         for (value, expected) in values.iter().zip(&expected) {
             // Rounding of sums of some hundred lines, of forces a thousand times the smallest term.
@@ -128,7 +128,7 @@ fn velocity_and_acceleration_will_do_for_odd_terms() {
     ] {
         let options = EquationErrorOptions::default();
         let found = fitted(&data(&force, record, measured), "k3: x^3", &options).unwrap();
-        let value = found.parameter("k3").unwrap().found.value;
+        let value = found.parameter("k3").unwrap().estimate.value;
         assert!((value / 80.0 - 1.0).abs() < 1e-8, "{value}");
     }
 }
@@ -177,7 +177,7 @@ fn phase_delay_and_bend_are_found_by_variable_projection() {
         ("p3", 1.2),
         ("p5", 2.5),
     ] {
-        let value = found.parameter(name).unwrap().found.value;
+        let value = found.parameter(name).unwrap().estimate.value;
         // The derivatives by differences, and where the search calls itself settled.
         assert!((value / expected - 1.0).abs() < 1e-5, "{name} = {value}");
     }
@@ -216,7 +216,7 @@ fn a_prescribed_response_is_predicted_and_fitted() {
     };
     let fit = output_error(&[record], ResponseQuantity::Displacement, &begin.unwrap()).unwrap();
     for (value, expected) in [("kc", 120.0), ("cq", 3.0), ("k11", 900.0), ("m22", 1.0)]
-        .map(|(name, expected)| (fit.estimate.parameter(name).unwrap().found.value, expected))
+        .map(|(name, expected)| (fit.estimate.parameter(name).unwrap().estimate.value, expected))
     {
         assert!((value / expected - 1.0).abs() < 1e-3, "{value} for {expected}");
     }

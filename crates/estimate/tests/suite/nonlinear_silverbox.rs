@@ -136,7 +136,7 @@ fn standard_errors_are_those_of_the_six_realisations() {
     let each: Vec<_> = (1..=6).map(|q| fit(&realised(&record, &[q]), terms, options)).collect();
     for (at, parameter) in each[0].parameters().iter().enumerate() {
         let of = |f: &dyn Fn(&mechid_estimate::Uncertain) -> f64| {
-            each.iter().map(|e| f(&e.parameters()[at].found)).sum::<f64>() / 6.0
+            each.iter().map(|e| f(&e.parameters()[at].estimate)).sum::<f64>() / 6.0
         };
         let mean = of(&|found| found.value);
         let scatter = (of(&|found| (found.value - mean).powi(2)) * 6.0 / 5.0).sqrt();

@@ -83,7 +83,7 @@ fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64
     truth
         .iter()
         .map(|(name, truth)| {
-            let all: Vec<_> = found.iter().map(|f| f.parameter(name).unwrap().found).collect();
+            let all: Vec<_> = found.iter().map(|f| f.parameter(name).unwrap().estimate).collect();
             let mean = all.iter().map(|p| p.value).sum::<f64>() / runs;
             let square = all.iter().map(|p| (p.value - mean).powi(2)).sum::<f64>();
             let deviation = (square / (runs - 1.0)).sqrt();

@@ -29,11 +29,11 @@ pub(crate) fn read(
 ) -> Result<FrequencyResponses, IoError> {
     let mut lines = Lines::new(bytes);
     match functions(file, &mut lines, Budget::new(limits)) {
-        Ok(found) if found.functions.is_empty() => Err(IoError::Empty {
+        Ok(responses) if responses.functions.is_empty() => Err(IoError::Empty {
             file: file.into(),
             found: "it has no dataset 58 with a frequency response function",
         }),
-        Ok(found) => Ok(found),
+        Ok(responses) => Ok(responses),
         Err(fault) => {
             let at = Place::Line(lines.number_at(fault.at));
             Err(fault.error(file, at))
@@ -46,7 +46,7 @@ fn functions(
     lines: &mut Lines<'_>,
     mut budget: Budget,
 ) -> Result<FrequencyResponses, Fault> {
-    let mut found = FrequencyResponses { file: file.into(), ..FrequencyResponses::default() };
+    let mut responses = FrequencyResponses { file: file.into(), ..FrequencyResponses::default() };
     let (mut stated, mut others) = (None, 0_usize);
     while let Some(mark) = lines.next() {
         if mark.text.trim_ascii().is_empty() {
@@ -60,7 +60,7 @@ fn functions(
             58 => {
                 let (header, values) = dataset(lines, &id, &mut budget)?;
                 match header.function {
-                    4 | 6 => add(&mut found, &id, &header, &values)?,
+                    4 | 6 => add(&mut responses, &id, &header, &values)?,
                     _ => others += 1,
                 }
             }
@@ -70,19 +70,19 @@ fn functions(
         skip_to_end(lines)?;
     }
     if others > 0 {
-        found.remarks.push(format!(
+        responses.remarks.push(format!(
             "left out: datasets 58 that are neither a frequency response nor a coherence ({others})"
         ));
     }
     if let Some(units) = stated {
-        to_si(&mut found, &units);
+        to_si(&mut responses, &units);
     }
-    Ok(found)
+    Ok(responses)
 }
 
 /// Adds a frequency response or a coherence.
 fn add(
-    found: &mut FrequencyResponses,
+    responses: &mut FrequencyResponses,
     id: &Line<'_>,
     header: &Header,
     values: &[f64],
@@ -108,12 +108,12 @@ fn add(
     if let Some(at) = numbers.iter().position(|z| !z.is_finite()) {
         return Err(id.fault(format!("value {} of the function is not finite", at + 1)));
     }
-    same_frequencies(found, id, frequency_hz)?;
+    same_frequencies(responses, id, frequency_hz)?;
     let response = header.response.clone();
     if header.function == 6 {
         let values = numbers.iter().map(|z| z.re).collect();
         let reference = header.reference.clone();
-        found.coherence.push(CoherenceFunction { response, reference, values });
+        responses.coherence.push(CoherenceFunction { response, reference, values });
         return Ok(());
     }
     if !header.is_complex {
@@ -135,7 +135,7 @@ fn add(
         _ => None,
     };
     let (values, standard_error) = (numbers, None);
-    found.functions.push(ResponseFunction {
+    responses.functions.push(ResponseFunction {
         response,
         reference,
         quantity,
@@ -147,19 +147,19 @@ fn add(
 
 /// Takes the frequencies of the first function, and asks the others for the same.
 fn same_frequencies(
-    found: &mut FrequencyResponses,
+    responses: &mut FrequencyResponses,
     id: &Line<'_>,
     frequency_hz: Vec<f64>,
 ) -> Result<(), Fault> {
-    if found.frequency_hz.is_empty() {
-        found.frequency_hz = frequency_hz;
+    if responses.frequency_hz.is_empty() {
+        responses.frequency_hz = frequency_hz;
         return Ok(());
     }
-    let (len, got) = (found.frequency_hz.len(), frequency_hz.len());
+    let (len, got) = (responses.frequency_hz.len(), frequency_hz.len());
     if len != got {
         return Err(id.fault(format!("{got} frequencies where the first function has {len}")));
     }
-    let pairs = found.frequency_hz.iter().zip(&frequency_hz);
+    let pairs = responses.frequency_hz.iter().zip(&frequency_hz);
     match pairs.into_iter().find(|(a, b)| (*a - *b).abs() > SAME_FREQUENCY * a.abs().max(b.abs())) {
         None => Ok(()),
         Some((first, other)) => {
@@ -169,16 +169,16 @@ fn same_frequencies(
 }
 
 /// Divides lengths and multiplies forces by the factors of the file.
-fn to_si(found: &mut FrequencyResponses, units: &Units) {
+fn to_si(responses: &mut FrequencyResponses, units: &Units) {
     let factor = units.force / units.length;
     if !(factor.is_finite() && factor > 0.0) || factor == 1.0 {
         return;
     }
-    for function in &mut found.functions {
+    for function in &mut responses.functions {
         function.values.iter_mut().for_each(|z| *z *= factor);
     }
     let Units { code, name, .. } = units;
-    found.remarks.push(format!(
+    responses.remarks.push(format!(
         "the file states its units (code {code} {name}): responses were multiplied by {factor} to \
          get SI units"
     ));

@@ -133,7 +133,7 @@ impl Parser {
     fn single(&mut self) -> Result<(char, usize), String> {
         let letter = match self.peek() {
             Some(c @ ('x' | 'v')) => c,
-            found => return Err(format!("expected x or v, found {}", shown(found))),
+            next => return Err(format!("expected x or v, found {}", shown(next))),
         };
         self.at += 1;
         if !self.peek().is_some_and(|c| c.is_ascii_digit()) {
@@ -182,22 +182,22 @@ impl Parser {
     }
 
     fn take(&mut self, expected: char) -> bool {
-        let found = self.peek() == Some(expected);
-        self.at += usize::from(found);
-        found
+        let matches = self.peek() == Some(expected);
+        self.at += usize::from(matches);
+        matches
     }
 
     fn expect(&mut self, expected: char) -> Result<(), String> {
-        let found = self.peek();
+        let next = self.peek();
         match self.take(expected) {
             true => Ok(()),
-            false => Err(format!("expected {expected}, found {}", shown(found))),
+            false => Err(format!("expected {expected}, found {}", shown(next))),
         }
     }
 }
 
-fn shown(found: Option<char>) -> String {
-    found.map_or_else(|| "the end".to_owned(), String::from)
+fn shown(character: Option<char>) -> String {
+    character.map_or_else(|| "the end".to_owned(), String::from)
 }
 
 #[cfg(test)]

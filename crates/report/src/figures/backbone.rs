@@ -1,6 +1,6 @@
 //! Frequency of the modes of a nonlinear machine over their amplitude.
 
-use mechid_analysis::identify::summary::CONFIDENCE;
+use mechid_analysis::identify::rows::CONFIDENCE;
 use mechid_analysis::modal::BackboneRow;
 use mechid_analysis::text::compact;
 use mechid_plot::{Axis, Curve, Figure, Panel};
@@ -9,16 +9,16 @@ use mechid_plot::{Axis, Curve, Figure, Panel};
 pub fn figure(file: &str, rows: &[BackboneRow]) -> Figure {
     let modes = rows.last().map_or(0, |row| row.mode);
     let panels = (1..=modes).map(|mode| {
-        let own: Vec<&BackboneRow> = rows.iter().filter(|row| row.mode == mode).collect();
-        let amplitude: Vec<f64> = own.iter().map(|row| row.amplitude).collect();
+        let of_mode: Vec<&BackboneRow> = rows.iter().filter(|row| row.mode == mode).collect();
+        let amplitude: Vec<f64> = of_mode.iter().map(|row| row.amplitude).collect();
         let of = |value: &dyn Fn(&BackboneRow) -> f64| -> Vec<f64> {
-            own.iter().map(|row| value(row)).collect()
+            of_mode.iter().map(|row| value(row)).collect()
         };
         let mut panel = Panel::new(
             Axis::linear("Amplitude of the fundamental", "m"),
             Axis::linear(format!("Frequency of mode {mode}"), "Hz"),
         );
-        if own.iter().all(|row| row.frequency_hz.interval.is_some()) {
+        if of_mode.iter().all(|row| row.frequency_hz.interval.is_some()) {
             let bound = |end: usize| {
                 of(&|row| row.frequency_hz.interval.map_or(row.frequency_hz.value, |i| i[end]))
             };

@@ -16,11 +16,11 @@ const ENTRIES: [&str; 4] = ["xx", "xy", "yx", "yy"];
 
 /// Re H over ω² and Im H over ω, direct and cross-coupled: measured line by line with 95 % intervals,
 /// and as fitted.
-pub fn dynamic_stiffness(found: &BearingSummary) -> Figure {
+pub fn dynamic_stiffness(bearing: &BearingSummary) -> Figure {
     let omega: Vec<f64> =
-        found.dynamic_stiffness.iter().map(|line| TAU * line.frequency_hz).collect();
+        bearing.dynamic_stiffness.iter().map(|line| TAU * line.frequency_hz).collect();
     let coefficient = |kind: usize, entry: usize| {
-        found.coefficients.get(4 * kind + entry).map_or(0.0, |row| row.estimate.value)
+        bearing.coefficients.get(4 * kind + entry).map_or(0.0, |row| row.estimate.value)
     };
     let mut panels = Vec::new();
     for (is_real, x_name, x_unit, y_name) in
@@ -31,7 +31,7 @@ pub fn dynamic_stiffness(found: &BearingSummary) -> Figure {
             let mut panel =
                 Panel::new(Axis::linear(x_name, x_unit), Axis::linear(y_name, "MN/m")).title(title);
             for (slot, entry) in entries.into_iter().enumerate() {
-                let lines = || found.dynamic_stiffness.iter();
+                let lines = || bearing.dynamic_stiffness.iter();
                 let y: Vec<f64> = lines()
                     .map(|line| if is_real { line.real[entry] } else { line.imaginary[entry] } / MEGA)
                     .collect();
@@ -68,7 +68,7 @@ pub fn dynamic_stiffness(found: &BearingSummary) -> Figure {
             panels.push(panel);
         }
     }
-    let title = format!("Dynamic stiffness: {}", found.tests.join(", "));
+    let title = format!("Dynamic stiffness: {}", bearing.tests.join(", "));
     panels.into_iter().fold(Figure::new(title).columns(2), Figure::panel)
 }
 

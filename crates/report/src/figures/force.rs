@@ -5,8 +5,9 @@ use mechid_analysis::reconstruct::numbered;
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 
 /// Every sought force against time, with twice its standard error, above its spectrum.
-pub fn figure(found: &Reconstructed) -> Figure {
-    let (summary, force, sought) = (found.summary(), found.force(), found.forced());
+pub fn figure(reconstructed: &Reconstructed) -> Figure {
+    let (summary, force, sought) =
+        (reconstructed.summary(), reconstructed.force(), reconstructed.forced());
     let (record, spectrum) = (force.record(), force.spectrum());
     let times: Vec<f64> = record.sampling().times().collect();
     let frequencies: Vec<f64> = (0..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();

@@ -26,7 +26,7 @@ pub fn motion(title: &str, compared: &Compared) -> Figure {
         };
         let (x, model) =
             (&measured.channel(channel)[..shown], &predicted.channel(channel)[..shown]);
-        let left: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
+        let residual: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
         let axis = || Axis::linear("Time", "s");
         figure = figure
             .panel(
@@ -36,7 +36,7 @@ pub fn motion(title: &str, compared: &Compared) -> Figure {
             )
             .panel(
                 Panel::new(axis(), Axis::linear(format!("Residual{number}"), unit))
-                    .curve(Curve::line("", &time, &left)),
+                    .curve(Curve::line("", &time, &residual)),
             );
     }
     figure.share_x()

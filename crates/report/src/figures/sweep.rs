@@ -6,8 +6,8 @@ use mechid_plot::{Axis, Figure};
 
 /// Returns the error over the settings.
 pub fn figure(swept: &SweepSummary) -> Figure {
-    let found = || swept.points.iter().filter_map(|p| Some((p.setting, 100.0 * p.error?)));
-    let (x, y): (Vec<f64>, Vec<f64>) = found().unzip();
+    let points = || swept.points.iter().filter_map(|p| Some((p.setting, 100.0 * p.error?)));
+    let (x, y): (Vec<f64>, Vec<f64>) = points().unzip();
     let (name, unit) = swept.setting.label();
     let error = match swept.has_reference() {
         true => "Worst error",

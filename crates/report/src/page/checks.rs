@@ -7,8 +7,14 @@ use super::Contents;
 
 /// Checks before or after the fit, with their verdicts.
 pub fn list(contents: &Contents<'_>, when: When) -> Markup {
-    let checks: Vec<&CheckRow> =
-        contents.review.found.summary().checks.iter().filter(|check| check.when == when).collect();
+    let checks: Vec<&CheckRow> = contents
+        .review
+        .identified
+        .summary()
+        .checks
+        .iter()
+        .filter(|check| check.when == when)
+        .collect();
     html! {
         @if !checks.is_empty() {
             ul.checks {

@@ -84,10 +84,10 @@ fn history(
 }
 
 /// A thin line over the thick one that it should hide.
-fn overlay(t: &[f64], measured: &[f64], name: &str, own: &[f64]) -> [Curve; 2] {
+fn overlay(t: &[f64], measured: &[f64], name: &str, modelled: &[f64]) -> [Curve; 2] {
     [
         Curve::line("measured", t, measured).color(Color::GREY).width(2.6),
-        Curve::line(name, t, own).color(Color::BLUE).width(1.1).dash(Dash::Solid),
+        Curve::line(name, t, modelled).color(Color::BLUE).width(1.1).dash(Dash::Solid),
     ]
 }
 
@@ -126,8 +126,8 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
 ///
 /// # Errors
 /// [`ReportError::NothingToDraw`].
-pub fn receptance(found: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
-    let figure = picture::receptance("", &measured.data, &found.system()?)?;
+pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
+    let figure = picture::receptance("", &measured.data, &identified.system()?)?;
     let origin = &measured.origin;
     let caption = format!(
         "Receptance, motion over force: that of the identified machine, and that of the record, {origin}."
@@ -185,12 +185,12 @@ fn over_time(
     for c in 0..measured.channels() {
         let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), unit);
         let time = || Axis::linear("Time in the window", "s");
-        let (x, own) = (measured.channel(c), modelled.channel(c));
-        let left: Vec<f64> = x.iter().zip(own).map(|(x, own)| x - own).collect();
+        let (x, model) = (measured.channel(c), modelled.channel(c));
+        let residual: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
         let both = Panel::new(time(), axis(label))
-            .curves(overlay(&t, x, "modelled", own))
+            .curves(overlay(&t, x, "modelled", model))
             .legend(Legend::Above);
-        let rest = Curve::line("", &t, &left).color(Color::VERMILION).width(1.0);
+        let rest = Curve::line("", &t, &residual).color(Color::VERMILION).width(1.0);
         figure = figure.panel(both).panel(Panel::new(time(), axis("Residual")).curve(rest));
     }
     drawn(id, figure, caption)
@@ -203,8 +203,8 @@ pub fn residual_spectrum(
 ) -> Result<Drawn, ReportError> {
     let compared = residual.mean.as_ref().unwrap_or(&residual.compared[0]);
     let motion = &compared.measured;
-    let left = Record::new(motion.sampling(), motion.data() - compared.predicted.data())?;
-    let (motion, left) = (Spectrum::of(motion), Spectrum::of(&left));
+    let residual = Record::new(motion.sampling(), motion.data() - compared.predicted.data())?;
+    let (motion, residual) = (Spectrum::of(motion), Spectrum::of(&residual));
     let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
     let (_, unit) = symbol(compared.kind);
@@ -217,7 +217,7 @@ pub fn residual_spectrum(
         };
         let axis = Axis::log10(numbered("Amplitude", c, motion.channels()), unit);
         let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), axis).legend(Legend::Above);
-        for (name, spectrum, slot) in [("measured", &motion, 0), ("residual", &left, 1)] {
+        for (name, spectrum, slot) in [("measured", &motion, 0), ("residual", &residual, 1)] {
             let (hz, amplitude) = points(spectrum);
             if !hz.is_empty() {
                 panel = panel.curve(Curve::points(name, &hz, &amplitude).slot(slot));
@@ -239,11 +239,14 @@ pub fn residual_spectrum(
 }
 
 /// Correlation of the residual with itself and with the forces.
-pub fn correlations(part: &RecordReview<'_>, found: &[Correlations]) -> Result<Drawn, ReportError> {
-    let dofs = found.len();
+pub fn correlations(
+    part: &RecordReview<'_>,
+    correlations: &[Correlations],
+) -> Result<Drawn, ReportError> {
+    let dofs = correlations.len();
     let mut figure = Figure::new("");
     let (mut widest, mut of_lines) = (0, false);
-    for (c, channel) in found.iter().enumerate() {
+    for (c, channel) in correlations.iter().enumerate() {
         let panel = |x: Axis, name: &str, at: &[f64], coefficients: &[f64], bound: f64| {
             Panel::new(x, Axis::linear(numbered(name, c, dofs), ""))
                 .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
@@ -300,19 +303,19 @@ pub fn force(
     part: &RecordReview<'_>,
     reconstruction: &Reconstruction,
 ) -> Result<Drawn, ReportError> {
-    let (found, measured) = (reconstruction.found.record(), &reconstruction.measured);
+    let (force, measured) = (reconstruction.force.record(), &reconstruction.measured);
     let t = times(measured);
     let mut figure = Figure::new("").share_x();
     for &c in &reconstruction.forced {
-        let (own, truth) = (found.channel(c), measured.channel(c));
+        let (reconstructed, truth) = (force.channel(c), measured.channel(c));
         let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), "N");
         let time = || Axis::linear("Time in the window", "s");
         let both = Panel::new(time(), axis("Force"))
-            .curves(overlay(&t, truth, "found from the motion", own))
+            .curves(overlay(&t, truth, "found from the motion", reconstructed))
             .legend(Legend::Above);
-        let apart: Vec<f64> = own.iter().zip(truth).map(|(f, m)| f - m).collect();
+        let apart: Vec<f64> = reconstructed.iter().zip(truth).map(|(f, m)| f - m).collect();
         let mut below = Panel::new(time(), axis("Difference"));
-        if let Some(error) = reconstruction.found.standard_error() {
+        if let Some(error) = reconstruction.force.standard_error() {
             let upper: Vec<f64> = error.channel(c).iter().map(|e| 2.0 * e).collect();
             let lower: Vec<f64> = upper.iter().map(|e| -e).collect();
             below = below

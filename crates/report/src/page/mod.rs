@@ -54,9 +54,9 @@ struct Contents<'a> {
 /// # Errors
 /// [`ReportError::Analysis`] if a record cannot be read again or the force cannot be reconstructed,
 /// [`ReportError::Plot`].
-pub fn page(found: &Identified, settings: &PageSettings) -> Result<String, ReportError> {
-    let review = Review::of(found, settings.reconstruct_force)?;
-    let name = PathBuf::from(&found.summary().file);
+pub fn page(identified: &Identified, settings: &PageSettings) -> Result<String, ReportError> {
+    let review = Review::of(identified, settings.reconstruct_force)?;
+    let name = PathBuf::from(&identified.summary().file);
     let name = name.file_name().unwrap_or_default().to_string_lossy();
     html(&Contents {
         title: settings.title.clone().unwrap_or_else(|| format!("Identification of {name}")),
@@ -164,7 +164,7 @@ pub(crate) fn figure(drawn: &Drawn) -> Markup {
 }
 
 fn heading(contents: &Contents<'_>) -> Markup {
-    let report = contents.review.found.summary();
+    let report = contents.review.identified.summary();
     let modes = report.modes.iter().take(4).enumerate();
     html! {
         header {

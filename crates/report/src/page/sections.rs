@@ -2,7 +2,8 @@
 
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::When;
-use mechid_analysis::identify::summary::{IdentificationSummary, Uncertain};
+use mechid_analysis::identify::rows::Uncertain;
+use mechid_analysis::identify::summary::IdentificationSummary;
 use mechid_analysis::identify::validation::Share;
 use mechid_analysis::review::channels::Channel;
 use mechid_analysis::review::excitation::{DROP_DB, Excitation};
@@ -85,7 +86,7 @@ fn facts(contents: &Contents<'_>, part: &RecordReview<'_>) -> Vec<Vec<String>> {
         pair("Sample rate", format!("{} Hz", compact(rate, 8))),
         pair("Duration", format!("{} s", compact(samples as f64 / rate, 6))),
     ];
-    if let Some((lines, _)) = &contents.review.found.fitted().frequency {
+    if let Some((lines, _)) = &contents.review.identified.fitted().frequency {
         let len = lines.sampling().len();
         facts.push(match part.lines {
             Some(_) => pair(
@@ -164,7 +165,7 @@ fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
 
 /// Parameters and modes.
 pub fn machine(contents: &Contents<'_>) -> Markup {
-    let report = contents.review.found.summary();
+    let report = contents.review.identified.summary();
     let interval = format!("{} % interval", compact(100.0 * report.confidence, 3));
     let header = |what| [what, "value", "standard error", &interval, "unit"];
     let parameters =
@@ -182,12 +183,12 @@ pub fn machine(contents: &Contents<'_>) -> Markup {
             (Table { caption: "Modes", header: &header("mode"), numbers_from: 1, rows: modes }.html())
             (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
         }
-        @for remark in &contents.review.found.fitted().remarks { p.note { "How it was done: " (remark) "." } }
+        @for remark in &contents.review.identified.fitted().remarks { p.note { "How it was done: " (remark) "." } }
     }
 }
 
 fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
-    let report: &IdentificationSummary = contents.review.found.summary();
+    let report: &IdentificationSummary = contents.review.identified.summary();
     let fit = &report.fit;
     let mut rows = vec![pair("Estimator", report.estimator)];
     if let Some(lines) = &report.lines {
@@ -200,7 +201,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
     if let Some(part) = fit.unexplained_motion {
         rows.push(pair("ResponseQuantity the linear model leaves unexplained", percent(part)));
     }
-    if let Some(misfit) = &contents.review.found.fitted().misfit {
+    if let Some(misfit) = &contents.review.identified.fitted().misfit {
         let what = format!("Power of the residual over what {} explains", misfit.noise);
         rows.push(pair(&what, significant(misfit.ratio, 4)));
     }
@@ -215,7 +216,7 @@ pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let several = "on every line several forces act, so the record shows no single one";
     let receptance = match &contents.review.receptance {
         Err(reason) => Err(reason.as_str()),
-        Ok(measured) => match figures::receptance(contents.review.found, measured) {
+        Ok(measured) => match figures::receptance(contents.review.identified, measured) {
             Err(ReportError::NoReceptance) => Err(several),
             drawn => Ok(drawn?),
         },
@@ -245,7 +246,7 @@ pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         p { "The residual is the measured motion less the one that the identified machine has under the measured force." }
         (records)
         (checks::list(contents, When::After))
-        @if contents.review.found.summary().checks.iter().any(|check| check.when == When::After) {
+        @if contents.review.identified.summary().checks.iter().any(|check| check.when == When::After) {
             p.note {
                 "p is the share of experiments with nothing but noise left that look as bad, adjusted for the \
                  number of tests: below 0.01 it is a warning. In noise 5 % of the stems lie outside the bounds."
@@ -264,14 +265,14 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
     for compared in &residual.compared {
         let channels = compared.measured.channels();
         for channel in 0..channels {
-            let (size, left) = sizes(compared, channel);
+            let (size, rest) = sizes(compared, channel);
             let number = if channels > 1 { format!(" {}", channel + 1) } else { String::new() };
             rows.push(vec![
                 format!("{}{number}", compared.kind),
                 figures::symbol(compared.kind).1.into(),
                 significant(size, 4),
-                significant(left, 4),
-                or_dash((size > 0.0).then(|| percent(left / size))),
+                significant(rest, 4),
+                or_dash((size > 0.0).then(|| percent(rest / size))),
             ]);
         }
     }
@@ -283,9 +284,9 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
 
 /// A record that was not fitted.
 pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError> {
-    let found = contents.review.found;
+    let identified = contents.review.identified;
     let (Some(validation), Some(source), Some(first)) = (
-        &found.summary().validation,
+        &identified.summary().validation,
         contents.review.validated(),
         contents.review.validation.first(),
     ) else {
@@ -320,7 +321,7 @@ pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportE
         return Ok(None);
     }
     let records = of_each(contents, |part| match &part.reconstruction {
-        Some(found) => reconstruction_of(part, found),
+        Some(reconstruction) => reconstruction_of(part, reconstruction),
         None => Ok(html! {}),
     })?;
     Ok(Some(html! {
@@ -334,32 +335,32 @@ pub fn reconstruction(contents: &Contents<'_>) -> Result<Option<Markup>, ReportE
 
 fn reconstruction_of(
     part: &RecordReview<'_>,
-    found: &Reconstruction,
+    reconstruction: &Reconstruction,
 ) -> Result<Markup, ReportError> {
-    let drawn = figures::force(part, found)?;
+    let drawn = figures::force(part, reconstruction)?;
     let rms = |record: &mechid_signal::Record, dof: usize| {
         significant(mechid_signal::measures::rms(record.channel(dof)), 4)
     };
     let row = |&dof: &usize| {
         vec![
             (dof + 1).to_string(),
-            rms(&found.measured, dof),
-            rms(found.found.record(), dof),
+            rms(&reconstruction.measured, dof),
+            rms(reconstruction.force.record(), dof),
             or_dash(
-                found
-                    .found
+                reconstruction
+                    .force
                     .standard_error()
                     .map(|error| significant(mechid_signal::measures::rms(error.channel(dof)), 2)),
             ),
-            or_dash(found.errors[dof].map(percent)),
+            or_dash(reconstruction.errors[dof].map(percent)),
         ]
     };
-    let rows = found.forced.iter().map(row).collect();
+    let rows = reconstruction.forced.iter().map(row).collect();
     let header =
         ["force", "measured, RMS (N)", "found, RMS (N)", "standard error (N)", "difference"];
     let lines = if part.lines.is_some() { ", on the lines of the fit" } else { "" };
     Ok(html! {
-        p { "Found from the measured motion with the identified machine: " (found.method) (lines) "." }
+        p { "Found from the measured motion with the identified machine: " (reconstruction.method) (lines) "." }
         (Table { caption: &part.of_period("Force found and force measured"), header: &header, numbers_from: 1, rows }.html())
         div.figures { (figure(&drawn)) }
     })

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use nalgebra::{Complex, DMatrix, DVector};
-use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 use crate::Multisine;
 use crate::phases::gcd;
+use crate::transform::{self, ComplexToReal, RealToComplex};
 
 /// The norm for given lines and amplitudes, of unit RMS.
 pub(super) struct PNorm {
@@ -26,8 +26,7 @@ impl PNorm {
         let amplitudes = multisine.amplitudes().iter().map(|a| a / rms).collect();
         let last = lines[lines.len() - 1];
         let len = (2 * (last + 1) * oversampling).next_power_of_two();
-        let mut planner = RealFftPlanner::new();
-        let (forward, inverse) = (planner.plan_fft_forward(len), planner.plan_fft_inverse(len));
+        let (forward, inverse) = (transform::forward(len), transform::inverse(len));
         Self { lines, amplitudes, forward, inverse }
     }
 

@@ -9,6 +9,7 @@ use mechid_signal::{Sampling, noise};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::cholesky::Cholesky;
+use super::ends::{self, Ends};
 use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
 use super::search::SumOfSquares;
 use super::{FrequencyData, NoiseSpectrum};
@@ -46,7 +47,8 @@ pub(super) struct Misfit<'a> {
     unknowns: &'a Unknowns,
     layout: Layout,
     noise: Noise<'a>,
-    /// n × rows, so that the forces of one row are contiguous.
+    /// n × rows, so that the forces of one row are contiguous; less the load of the ends of open records at
+    /// the parameters last tried.
     force: ComplexMatrix,
     displacement: ComplexMatrix,
     /// All rows at the parameters last accepted, and at those last tried.
@@ -75,7 +77,7 @@ impl<'a> Misfit<'a> {
         Ok(Self {
             data,
             unknowns,
-            layout: Layout::new(unknowns),
+            layout: Layout::new(unknowns, data.ends().ncols()),
             noise,
             force: data.force().transpose(),
             displacement: data.displacement().transpose(),
@@ -102,7 +104,15 @@ impl<'a> Misfit<'a> {
     }
 
     fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
-        let matrices = self.unknowns.assemble(theta.as_slice());
+        let (entries, tau) = theta.as_slice().split_at(theta.len() - ends::count(self.data));
+        let matrices = self.unknowns.assemble(entries);
+        if !tau.is_empty() {
+            let ends = Ends::new(self.data, tau);
+            for (at, mut force) in self.force.column_iter_mut().enumerate() {
+                force.iter_mut().zip(self.data.force().row(at).iter()).for_each(|(to, f)| *to = *f);
+                ends.take_off(at, force.as_mut_slice());
+            }
+        }
         let mut cost = 0.0;
         for (at, row) in self.tried.iter_mut().enumerate() {
             let (force, displacement) = (self.force.column(at), self.displacement.column(at));
@@ -133,7 +143,11 @@ impl<'a> Misfit<'a> {
         for (at, row) in self.rows.iter().enumerate() {
             let powers = powers(self.data.omega()[at]);
             for (to, (matrix, column)) in columns.iter().enumerate() {
-                let z = powers[*matrix as usize] * displacement(at, *column);
+                let x = match column.checked_sub(n) {
+                    None => displacement(at, *column),
+                    Some(record) => self.data.ends()[(at, record)],
+                };
+                let z = powers[*matrix as usize] * x;
                 (regressors[(to, at)], regressors[(to, lines + at)]) = (z.re, z.im);
             }
             let white = row.white_receptance();
@@ -202,15 +216,18 @@ impl SumOfSquares for Misfit<'_> {
     /// r″ = −2 W dD G dD X̂ along dD, the change of the dynamic stiffness; that of the spread, with
     /// a noisy force, is left out.
     fn curvature(&self, coordinates: &Coordinates, step: &DVector<f64>) -> DVector<f64> {
-        let zero = self.unknowns.assemble(&vec![0.0; step.len()]);
-        let ends = self.unknowns.assemble(step.as_slice());
-        let [m, c, k] = [0, 1, 2].map(|at| &ends[at] - &zero[at]);
+        let (entries, tau) = step.as_slice().split_at(step.len() - ends::count(self.data));
+        let zero = self.unknowns.assemble(&vec![0.0; entries.len()]);
+        let moved = self.unknowns.assemble(entries);
+        let [m, c, k] = [0, 1, 2].map(|at| &moved[at] - &zero[at]);
+        let ends = Ends::new(self.data, tau);
         let mut residuals = DMatrix::zeros(2 * self.rows.len(), self.data.dof());
         for (at, row) in self.rows.iter().enumerate() {
             let omega = self.data.omega()[at];
             let change =
                 k.zip_zip_map(&c, &m, |k, c, m| Complex::new(k - omega * omega * m, omega * c));
-            let second = &change * (row.receptance() * (&change * row.likely_displacement()));
+            let load = &change * row.likely_displacement() + ends.load(at);
+            let second = &change * (row.receptance() * load);
             let white = row.white_receptance() * second * Complex::from(-2.0);
             self.write_weighted(at, &white, &mut residuals);
         }

@@ -43,6 +43,16 @@ fn unknowns() -> [(Unknowns, DVector<f64>); 2] {
     [(all.clone().fix(Matrix::Mass, 0, 1, 0.1).unwrap(), fewer.into()), (all, theta.into())]
 }
 
+/// The same, of periods and of an open record with loads of its ends.
+fn cases() -> Vec<(FrequencyData, Unknowns, DVector<f64>)> {
+    let all = unknowns().into_iter().flat_map(|(unknowns, theta)| {
+        let loads: Vec<f64> = (0..6).map(|at| 0.1 * (2.3 * f64::from(at)).sin()).collect();
+        let with_loads: Vec<f64> = theta.iter().chain(&loads).copied().collect();
+        [(data(), unknowns.clone(), theta), (data().of_open_record(), unknowns, with_loads.into())]
+    });
+    all.collect()
+}
+
 fn cost(misfit: &mut Misfit<'_>, theta: &DVector<f64>) -> f64 {
     let cost = misfit.try_at(theta).unwrap();
     misfit.accept();
@@ -65,9 +75,8 @@ fn transformation(coordinates: &Coordinates, unknowns: usize) -> DMatrix<f64> {
 
 #[test]
 fn the_gradient_is_that_of_the_sum_of_squares() {
-    for (unknowns, theta) in unknowns() {
+    for (data, unknowns, theta) in cases() {
         for noise in [noise(), noise().with_exact_force()] {
-            let data = data();
             let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
             cost(&mut misfit, &theta);
             let equations = misfit.normal_equations().unwrap();
@@ -91,8 +100,7 @@ fn the_gradient_is_that_of_the_sum_of_squares() {
 #[test]
 fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
     let noise = noise().with_exact_force();
-    for (unknowns, theta) in unknowns() {
-        let data = data();
+    for (data, unknowns, theta) in cases() {
         let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
         let columns: Vec<_> = (0..theta.len())
             .map(|at| {
@@ -129,8 +137,7 @@ fn the_gram_matrix_and_its_inverse_are_those_of_the_jacobian() {
 #[test]
 fn the_curvature_is_the_second_derivative_along_a_step() {
     let noise = noise().with_exact_force();
-    for (unknowns, theta) in unknowns() {
-        let data = data();
+    for (data, unknowns, theta) in cases() {
         let mut misfit = Misfit::new(&data, &unknowns, &noise).unwrap();
         let step = DVector::from_fn(theta.len(), |at, _| (1.7 * at as f64).cos());
         let mut near = |along: f64| residuals(&mut misfit, &(&theta + &step * along));

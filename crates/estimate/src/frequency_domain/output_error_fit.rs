@@ -1,0 +1,204 @@
+//! The result of maximum likelihood, made of the minimum that its search found.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::ends::{self, Ends};
+use super::misfit::Misfit;
+use super::multi_start::{Found, Plausible};
+use super::search::SumOfSquares;
+use super::weight_uncertainty::WeightUncertainty;
+use super::{FrequencyData, NoiseModel, NoiseSpectrum};
+use crate::estimate::Findings;
+use crate::{Estimate, EstimateError, Unknowns};
+
+/// Standard deviations by which the misfit ratio of a right model may differ from 1.
+const PLAUSIBLE: f64 = 6.0;
+
+/// An [`Estimate`] by maximum likelihood, with what its search tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputErrorFit {
+    /// M̂, Ĉ, K̂ with the covariance that the Fisher information gives.
+    pub estimate: Estimate,
+    /// Weighted residual power over its expectation: 1 within a few √(2/degrees of freedom)
+    /// if the model is right and the noise is as stated; much more if the machine is not
+    /// what the model says (nonlinear, more degrees of freedom). 1 by construction where the
+    /// noise is estimated from the residual.
+    pub misfit_ratio: f64,
+    /// Twice the negative logarithm of the likelihood, up to a constant and allowing for sampled
+    /// weights, a pure number; `None` where the noise is estimated from the residual. What two fits of
+    /// the same data differ by is a [`likelihood_ratio`].
+    ///
+    /// [`likelihood_ratio`]: super::likelihood_ratio()
+    pub deviance: Option<f64>,
+    /// Gauss–Newton steps from the best start to the minimum.
+    pub steps: usize,
+    /// Number of searches, each from another start.
+    pub searches: usize,
+    /// Number of searches that ended at this minimum; of two or more it is the global one as far as
+    /// searches can tell.
+    pub agreeing: usize,
+    /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
+    /// periods, or one from the residual; none where the noise is known beforehand.
+    pub noise: Vec<NoiseModel>,
+    /// What the ends of open records add, `None` where all rows belong to periods.
+    pub ends: Option<EndLoads>,
+}
+
+/// Loads of the ends of open records, as [`FrequencyData::of_open_record`] describes them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EndLoads {
+    tau: Vec<f64>,
+    /// τᵀ Cov(τ)⁻¹ τ: its χ² distribution has as many degrees of freedom as there are loads, if the records
+    /// are periods.
+    pub statistic: f64,
+    /// Power of the loads on the lines over that of the forces, a ratio.
+    pub share: f64,
+}
+
+impl EndLoads {
+    /// Number of unknown loads.
+    #[allow(clippy::len_without_is_empty, reason = "never empty")]
+    pub fn len(&self) -> usize {
+        self.tau.len()
+    }
+
+    /// The data that were fitted with these loads taken off the force (N): as if each record were a period.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if the data have another number of open records or degrees of freedom.
+    pub fn taken_off(&self, data: &FrequencyData) -> Result<FrequencyData, EstimateError> {
+        crate::least_squares::size("loads of open ends", ends::count(data), self.tau.len())?;
+        Ok(data.with_load_of_ends(&self.tau))
+    }
+
+    fn of(data: &FrequencyData, tau: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
+        if tau.is_empty() {
+            return None;
+        }
+        let scale = covariance.diagonal().map(f64::sqrt);
+        let scaled = DMatrix::from_fn(tau.len(), tau.len(), |i, j| {
+            covariance[(i, j)] / (scale[i] * scale[j])
+        });
+        let in_errors = DVector::from_fn(tau.len(), |at, _| tau[at] / scale[at]);
+        let statistic =
+            scaled.cholesky().map_or(f64::INFINITY, |f| in_errors.dot(&f.solve(&in_errors)));
+        let loads = Ends::new(data, tau);
+        let load: f64 = (0..data.len()).map(|row| loads.load(row).norm_squared()).sum();
+        let share = load / data.force().norm_squared();
+        Some(Self { tau: tau.to_vec(), statistic, share })
+    }
+}
+
+/// A sum of squares of `spare` numbers, weighted by a variance of `known` degrees of freedom.
+pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausible {
+    let spread = (2.0 / spare.max(1.0) + 2.0 / known.max(1.0)).sqrt();
+    Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
+}
+
+/// How the covariance follows from the Fisher information.
+pub(super) struct Scale {
+    /// Power of the noise over that of the weights.
+    pub(super) level: f64,
+    /// By which the covariance is larger for weights that are uncertain, where nothing better is known.
+    pub(super) inflation: f64,
+    pub(super) weights: Option<WeightUncertainty>,
+    pub(super) degrees_of_freedom: usize,
+    pub(super) misfit_ratio: f64,
+    pub(super) deviance: Option<f64>,
+    pub(super) noise: Vec<NoiseModel>,
+}
+
+pub(super) fn finish(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    misfit: &mut Misfit<'_>,
+    found: &Found,
+    scale: Scale,
+) -> Result<OutputErrorFit, EstimateError> {
+    let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
+    let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
+    let (entries, tau) = parts(data, &found.minimum.theta);
+    let of_ends = covariance.view((entries.len(), entries.len()), (tau.len(), tau.len()));
+    let ends = EndLoads::of(data, tau, of_ends * scale.level);
+    let covariance = covariance.view((0, 0), (entries.len(), entries.len())).into_owned();
+    let (covariance, degrees_of_freedom) = match scale.weights {
+        None => (covariance * scale.inflation, scale.degrees_of_freedom),
+        Some(weights) => {
+            let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
+            (covariance + weights.excess, fewest.max(1.0) as usize)
+        }
+    };
+    let errors = misfit.errors();
+    let nrmse = |(e, x): (f64, f64)| if e == 0.0 { 0.0 } else { e / x };
+    let residual_nrmse = errors
+        .column_iter()
+        .zip(data.displacement().column_iter())
+        .map(|(e, x)| nrmse((e.norm(), x.norm())))
+        .collect();
+    let estimate = Estimate::new(Findings {
+        unknowns: unknowns.clone(),
+        values: entries.to_vec(),
+        covariance: covariance * scale.level,
+        degrees_of_freedom,
+        residual_nrmse,
+        condition,
+        undetermined: Vec::new(),
+    })?;
+    Ok(OutputErrorFit {
+        estimate,
+        misfit_ratio: scale.misfit_ratio,
+        deviance: scale.deviance,
+        steps: found.minimum.steps,
+        searches: found.searches,
+        agreeing: found.agreeing,
+        noise: scale.noise,
+        ends,
+    })
+}
+
+/// What is known of weights that were estimated, the loads of open ends taken as known.
+pub(super) fn uncertain_weights(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    theta: &DVector<f64>,
+    noise: &NoiseSpectrum,
+) -> Option<WeightUncertainty> {
+    let (entries, tau) = parts(data, theta);
+    let entries = DVector::from_column_slice(entries);
+    match tau {
+        [] => WeightUncertainty::of(data, unknowns, &entries, noise),
+        _ => WeightUncertainty::of(&data.with_load_of_ends(tau), unknowns, &entries, noise),
+    }
+}
+
+/// The free entries of M, C and K among the parameters of a search, and the loads of open ends.
+pub(super) fn parts<'a>(data: &FrequencyData, theta: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
+    theta.as_slice().split_at(theta.len() - ends::count(data))
+}
+
+/// Real equations less unknowns.
+pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
+    let unknowns = unknowns.free().len() + ends::count(data);
+    (2 * data.dof() * data.len()).saturating_sub(unknowns)
+}
+
+/// Covariance over the inverse of the Fisher information computed with sampled weights.
+///
+/// For weights W = Ŝ⁻¹ with a sample covariance Ŝ of n channels and ν degrees of freedom, and
+/// true covariance S: E[W] = ν/(ν−n)·S⁻¹, E[W S W] = ν³/((ν−n)((ν−n)²−1))·S⁻¹, so that the
+/// covariance of the estimate is E[WSW]/E[W]² times the best one, and ν²/((ν−n)²−1) times the
+/// one computed.
+///
+/// # Errors
+/// [`EstimateError::TooFewAverages`] where it does not exist.
+pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
+    if nu.is_infinite() {
+        return Ok(1.0);
+    }
+    let n = channels as f64;
+    if nu <= n + 1.0 {
+        let (got, needed) = (nu as usize + 1, channels + 3);
+        return Err(EstimateError::TooFewAverages { got, needed });
+    }
+    Ok(nu * nu / ((nu - n) * (nu - n) - 1.0))
+}
