@@ -204,7 +204,11 @@ fn output_error_takes_noise_on_the_response() {
     let x = noise::add_white(&x, noise::NoiseLevel::FractionOfRms(0.01), 3).unwrap();
     let test = test_of(&force, &x).period(PERIOD).unwrap();
     let likely = Identify {
-        fit: Fit::Spectra { method: Some(Method::MaximumLikelihood), noise: Pooling::default() },
+        fit: Fit::Spectra {
+            method: Some(Method::MaximumLikelihood),
+            noise: Pooling::default(),
+            extent: None,
+        },
         ..how()
     };
     let found = identify(&[test], &likely).unwrap();
@@ -237,7 +241,11 @@ fn what_nonlinear_terms_cannot_be_fitted_to_is_refused() {
     let test = test_of(&force, &x).period(PERIOD).unwrap();
     for fit in [
         Fit::Samples(SampleFit::default()),
-        Fit::Spectra { method: Some(Method::Instrumental), noise: Pooling::default() },
+        Fit::Spectra {
+            method: Some(Method::Instrumental),
+            noise: Pooling::default(),
+            extent: None,
+        },
     ] {
         let error = identify(std::slice::from_ref(&test), &Identify { fit, ..how() }).unwrap_err();
         assert!(matches!(error, AnalysisError::Setting { setting: "nonlinear", .. }), "{error}");

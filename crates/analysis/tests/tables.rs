@@ -82,7 +82,11 @@ fn a_record_and_its_table_agree() {
     let responses = [(ResponseQuantity::Displacement, &x)];
     let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
     // Line by line, as the coherence weighs.
-    let fit = Fit::Spectra { method: Some(Method::MaximumLikelihood), noise: Pooling::PerLine };
+    let fit = Fit::Spectra {
+        method: Some(Method::MaximumLikelihood),
+        noise: Pooling::PerLine,
+        extent: None,
+    };
     let how = Identify { fit, ..Identify::default() };
     let of_record = identify(std::slice::from_ref(&test), &how).unwrap();
     let table = frf(&test, &FrfSettings::default()).unwrap();

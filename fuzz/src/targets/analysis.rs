@@ -133,7 +133,11 @@ fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
             segments: segmentation(d),
             method: method(d),
         }),
-        _ => Fit::Spectra { method: method(d), noise: pooling(d) },
+        _ => Fit::Spectra {
+            method: method(d),
+            noise: pooling(d),
+            extent: if d.one_in(3) { Some(d.extent()) } else { None },
+        },
     };
     let mut how = Identify { fit, ..Identify::default() };
     if d.one_in(3) {

@@ -47,6 +47,8 @@ pub struct Fitted {
     pub misfit: Option<Misfit>,
     /// Noise spectra that were estimated: one of each record, or one from the residual.
     pub noise: Vec<NoiseModel>,
+    /// `true` of windows that are no periods, whose ends were fitted, too.
+    pub open: bool,
     /// Remarks on how the fit was done.
     pub remarks: Vec<String>,
 }

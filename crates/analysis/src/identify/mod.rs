@@ -5,6 +5,7 @@
 //! | `options` | settings, as values |
 //! | `lines`, `left_out`, `mass` | spectral lines to use and to leave out; known masses |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
+//! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `tables` | frequency responses that were measured elsewhere |
 //! | `nonlinear` | whole periods with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
@@ -21,6 +22,7 @@ pub mod left_out;
 pub mod lines;
 pub mod mass;
 pub mod nonlinear;
+mod open_records;
 pub mod options;
 pub mod prediction;
 mod responses;
@@ -37,6 +39,7 @@ use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::SecondOrderSystem;
+use mechid_signal::Extent;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
@@ -81,7 +84,10 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         }
     }
     let unknowns = how.mass.unknowns(dofs)?;
-    let fitted = how.fitted(&records, &unknowns).map_err(|error| explained(error, &records))?;
+    let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
+    let fitted = how
+        .fitted(&records, &unknowns, period_given)
+        .map_err(|error| explained(error, &records))?;
     let summary = IdentificationSummary::new(&records, &fitted, how)?;
     Ok(Identified {
         measurements: measurements.to_vec(),
@@ -109,16 +115,22 @@ impl Identify {
     pub(crate) fn hold(&self) -> Hold {
         match &self.fit {
             Fit::Spectra { .. } if self.nonlinear.is_some() => Hold::Whole,
+            Fit::Spectra { extent: Some(Extent::Open), .. } => Hold::Whole,
             Fit::Spectra { .. } => Hold::Periods,
             Fit::Responses(how) => how.segments.hold(),
             Fit::Samples(how) => how.hold(),
         }
     }
 
-    fn fitted(&self, records: &[Windowed], unknowns: &Unknowns) -> Result<Fitted, AnalysisError> {
+    fn fitted(
+        &self,
+        records: &[Windowed],
+        unknowns: &Unknowns,
+        period_given: bool,
+    ) -> Result<Fitted, AnalysisError> {
         let lines = LineRule { choice: &self.lines, without: &self.without };
         if let Some(how) = &self.nonlinear {
-            let Fit::Spectra { method, noise } = &self.fit else {
+            let Fit::Spectra { method, noise, extent } = &self.fit else {
                 let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
                            and `from_frf` out";
                 return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
@@ -127,11 +139,38 @@ impl Identify {
                 let why = "fits with nonlinear terms have weights of their own: leave it out";
                 return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
             }
+            if *extent == Some(Extent::Open) {
+                let why = "nonlinear terms are fitted to whole periods";
+                return Err(AnalysisError::Setting { setting: "extent", why: why.into() });
+            }
             return nonlinear::fit(records, unknowns, lines, *method, how);
         }
         match &self.fit {
-            Fit::Spectra { method, noise } => {
-                spectra::fit(records, unknowns, lines, *method, *noise)
+            Fit::Spectra { method, noise, extent } => {
+                let likelihood = matches!(method, None | Some(Method::MaximumLikelihood));
+                let wrong =
+                    |why: &str| AnalysisError::Setting { setting: "extent", why: why.into() };
+                match extent {
+                    Some(Extent::Open) if period_given => {
+                        Err(wrong("an open record has no `period`: leave one of them out"))
+                    }
+                    Some(Extent::Open) if !likelihood => {
+                        Err(wrong("the ends of open records take `method` maximum-likelihood"))
+                    }
+                    Some(Extent::Open) => {
+                        Ok(open_records::fit(records, unknowns, lines, *noise)?.fitted)
+                    }
+                    None if likelihood
+                        && !period_given
+                        && open_records::suit(records, unknowns) =>
+                    {
+                        match open_records::fit(records, unknowns, lines, *noise) {
+                            Ok(open) if open.ends_show => Ok(open.fitted),
+                            _ => spectra::fit(records, unknowns, lines, *method, *noise),
+                        }
+                    }
+                    _ => spectra::fit(records, unknowns, lines, *method, *noise),
+                }
             }
             Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
             Fit::Samples(how) => how.fit(records, unknowns),

@@ -144,6 +144,7 @@ pub(super) fn fit(
         prediction: Prediction::Steady,
         misfit: None,
         noise: Vec::new(),
+        open: false,
         remarks,
         estimate: estimated.linear().clone(),
         nonlinear: Some(WithTerms { estimate: estimated, distortion: seen }),

@@ -56,6 +56,10 @@ pub enum Fit {
         /// the scatter of the periods or, of one period, from the residual.
         #[serde(default)]
         noise: Pooling,
+        /// Extent of the window, for maximum likelihood: of an open record the loads of its ends are found
+        /// with the machine. `None`: whole periods where a period is given; otherwise open if the ends show.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        extent: Option<Extent>,
     },
     /// Frequency responses, averaged over segments.
     Responses(ResponseFit),
@@ -65,7 +69,7 @@ pub enum Fit {
 
 impl Default for Fit {
     fn default() -> Self {
-        Fit::Spectra { method: None, noise: Pooling::Automatic }
+        Fit::Spectra { method: None, noise: Pooling::Automatic, extent: None }
     }
 }
 
@@ -250,7 +254,7 @@ impl fmt::Display for Derivatives {
 impl Identify {
     /// Fits spectral lines of whole periods.
     pub fn spectra(method: Method) -> Self {
-        let fit = Fit::Spectra { method: Some(method), noise: Pooling::Automatic };
+        let fit = Fit::Spectra { method: Some(method), noise: Pooling::Automatic, extent: None };
         Self { fit, ..Self::default() }
     }
 
@@ -344,7 +348,11 @@ mod tests {
             Identify::default(),
             Identify::spectra(Method::Instrumental).lines("odd".parse().unwrap()),
             Identify {
-                fit: Fit::Spectra { method: None, noise: Pooling::Neighbours(3) },
+                fit: Fit::Spectra {
+                    method: None,
+                    noise: Pooling::Neighbours(3),
+                    extent: Some(Extent::Open),
+                },
                 ..Identify::default()
             },
             Identify::responses(Estimator::Hv, Segmentation::default()),

@@ -4,7 +4,7 @@ use mechid_estimate::checks::{
     Finding, after_response_fit, before_spectral_fit, claimed_period, coherence, delay_of_lines,
     linearity,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, equation_error, output_error};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
@@ -70,6 +70,7 @@ pub fn fit(
         },
         misfit,
         noise: Vec::new(),
+        open: false,
         remarks: one_motion_of(&records[0].held),
         estimate,
         nonlinear: None,
@@ -112,20 +113,20 @@ fn looked_at(
     let mut checks = Vec::from_iter(late);
     checks.extend(after_response_fit(&r.frf, &r.driven, estimate, fitted)?);
     if !periodic {
-        checks.extend(of_linearity(held, r, estimate)?);
+        checks.extend(of_linearity(held, &r.lines, estimate)?);
     }
     Ok(checks)
 }
 
 /// Between the first and the last line fitted; nothing of a free machine, which has no displacement to
 /// take powers of.
-fn of_linearity(
+pub(super) fn of_linearity(
     measured: &Block,
-    responses: &Responses,
+    lines: &Lines,
     estimate: &Estimate,
 ) -> Result<Option<Finding>, AnalysisError> {
     let (motion, kind) = measured.response();
-    let used = LinesUsed::of(&responses.lines);
+    let used = LinesUsed::of(lines);
     match linearity(estimate, &measured.force, motion, kind, [used.first_hz, used.last_hz]) {
         Err(EstimateError::Model(_)) => Ok(None),
         looked => Ok(Some(looked?)),

@@ -74,6 +74,7 @@ pub(super) fn fit(
         prediction: Prediction::Steady,
         misfit,
         noise: models,
+        open: false,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
         estimate,
@@ -193,7 +194,7 @@ fn with_noise(periods: &RepeatedPeriods, noise: Pooling) -> Result<FrequencyData
 }
 
 /// Returns the remark on weights from `periods` periods or more, whose noise shows or not.
-fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
+pub(super) fn of_noise(periods: usize, shows: bool, models: &[NoiseModel]) -> String {
     let mut distinct: Vec<String> = models.iter().map(NoiseModel::to_string).collect();
     distinct.dedup();
     let model = distinct.join("; ");

@@ -47,7 +47,9 @@ impl Receptance {
     /// # Errors
     /// If the records show none.
     pub fn of(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
-        if let Some((_, data)) = &identified.fitted().frequency {
+        // One window without averages shows little of a random response.
+        let fitted = identified.fitted();
+        if let Some((_, data)) = fitted.frequency.as_ref().filter(|_| !fitted.open) {
             let origin = match identified.fitted().prediction {
                 Prediction::Steady => "measured on the lines used",
                 Prediction::Sampled { .. } => "averaged over segments, on the lines used",

@@ -46,6 +46,11 @@ pub struct FitArgs {
     /// N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
     noise: Option<Pooling>,
+    /// Extent of the window: of open records the unknown loads of their ends are fitted with the machine
+    /// [default: period with --period; otherwise period unless the ends show, and in the time domain open
+    /// but for spectral derivatives]
+    #[arg(long, value_name = "EXTENT", value_enum)]
+    extent: Option<ExtentChoice>,
     /// Assumption on the force between samples, in the time domain [default: the equation of motion
     /// at the samples if there is an acceleration, else linear]
     #[arg(long, value_name = "ASSUMPTION", value_enum)]
@@ -141,9 +146,6 @@ impl NonlinearArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Time domain")]
 struct TimeArgs {
-    /// Extent of the window [default: open, or period with spectral derivatives]
-    #[arg(long, value_name = "EXTENT", value_enum)]
-    extent: Option<ExtentChoice>,
     /// How to find the velocity and the acceleration where only the displacement was measured, or
     /// only the acceleration: by the spectrum of whole periods, or by a polynomial of an ORDER
     /// through a sliding WINDOW of samples (odd)
@@ -261,13 +263,9 @@ impl SegmentArgs {
 impl TimeArgs {
     /// Returns the first of these options that was given.
     fn given(&self) -> Option<&'static str> {
-        [
-            (self.extent.is_some(), "--extent"),
-            (self.derivatives.is_some(), "--derivatives"),
-            (self.refine.is_some(), "--refine"),
-        ]
-        .into_iter()
-        .find_map(|(given, name)| given.then_some(name))
+        [(self.derivatives.is_some(), "--derivatives"), (self.refine.is_some(), "--refine")]
+            .into_iter()
+            .find_map(|(given, name)| given.then_some(name))
     }
 }
 
@@ -344,7 +342,7 @@ impl FitArgs {
         let fit = match (self.domain, self.from_frf) {
             (Domain::Time, _) => Fit::Samples(SampleFit {
                 between_samples: self.between_samples.map(Into::into),
-                extent: self.time.extent.map(Into::into),
+                extent: self.extent.map(Into::into),
                 derivatives: self.time.derivatives,
                 refine: self.time.refine.zip(self.time.interpolation).map(
                     |(factor, interpolation)| Refinement {
@@ -359,7 +357,8 @@ impl FitArgs {
                 method,
             }),
             (Domain::Frequency, None) => {
-                Fit::Spectra { method, noise: self.noise.unwrap_or_default() }
+                let (noise, extent) = (self.noise.unwrap_or_default(), self.extent);
+                Fit::Spectra { method, noise, extent: extent.map(Into::into) }
             }
         };
         Identify {
@@ -388,10 +387,12 @@ impl FitArgs {
         };
         let alone =
             (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
-        let of_periods = (self.from_frf.is_some() && self.noise.is_some()).then_some("--noise");
+        let of_spectra = [(self.noise.is_some(), "--noise"), (self.extent.is_some(), "--extent")];
+        let of_spectra =
+            of_spectra.into_iter().find(|(given, _)| *given && self.from_frf.is_some());
         let alone = alone.map(|o| (o, "belongs to --from-frf"));
-        let of_periods = of_periods.map(|o| (o, "belongs to whole periods, without --from-frf"));
-        match misplaced.map(|o| (o, why)).or(alone).or(of_periods) {
+        let of_spectra = of_spectra.map(|(_, o)| (o, "belongs to fits without --from-frf"));
+        match misplaced.map(|o| (o, why)).or(alone).or(of_spectra) {
             Some((option, why)) => Err(CliError::MisplacedOption { option, why }),
             None => Ok(()),
         }

@@ -22,7 +22,8 @@ pub struct FrequencyData {
     displacement: DMatrix<Complex<f64>>,
     measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
-    /// Displacement that reads 1 in the quantity measured, rows × open records, on the rows of each.
+    /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
+    /// on the rows of others.
     ends: DMatrix<Complex<f64>>,
 }
 
@@ -175,27 +176,33 @@ impl FrequencyData {
     /// The same data as those of a record that is no period: begins and ends in motion that differs.
     ///
     /// The difference acts on the lines like a force. For displacements it is M(iω Δx + Δv) + C Δx over the
-    /// duration; it is short of what lies above half the sampling rate, so one more power of ω is left free:
+    /// duration, and the samples fold what it has above half their rate back into the band, which the higher
+    /// powers of s = iω describe:
     ///
     /// ```text
-    /// (K + iωC − ω²M) X + (τ₀ + τ₁ iω − τ₂ ω²) Z = F
+    /// (K + s C + s² M) X + (τ₀ + τ₁ s + … + τ₅ s⁵) Z = F
     /// ```
     ///
-    /// with unknown real τ, of every degree of freedom, and Z = 1, 1/(iω) or −1/ω² as displacement, velocity
-    /// or acceleration was measured. [`output_error`](super::output_error()) finds them with the machine;
-    /// the rows are to be all lines of a band, for it is on neighbouring lines that the two differ.
+    /// with unknown real τ, of every degree of freedom, and Z = 1, 1/s or 1/s² as displacement, velocity or
+    /// acceleration was measured. [`output_error`](super::output_error()) finds them with the machine; the
+    /// rows are to be all lines of a band, for it is on neighbouring lines that the two differ, and not much
+    /// more than 0.4 of the sampling rate.
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on arbitrary
     /// excitations (transient terms of a plant) and on continuous-time models of band-limited signals.
     #[must_use]
     pub fn of_open_record(mut self) -> Self {
-        let unit = |omega: &f64| self.measured.per_displacement(*omega).inv();
-        self.ends = DMatrix::from_iterator(self.len(), 1, self.omega.iter().map(unit));
+        self.ends = DMatrix::from_fn(self.len(), 2, |row, column| {
+            let omega = self.omega[row];
+            let unit = self.measured.per_displacement(omega).inv();
+            if column == 0 { unit } else { unit * Complex::new(0.0, omega).powu(3) }
+        });
         self
     }
 
-    /// Displacement that reads 1 in the quantity measured, rows × open records; zero on the rows of others.
+    /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
+    /// on the rows of others.
     pub(crate) fn ends(&self) -> &DMatrix<Complex<f64>> {
         &self.ends
     }

@@ -6,8 +6,8 @@ use nalgebra::{Complex, DVector};
 use super::FrequencyData;
 use super::misfit::powers;
 
-/// Unknown loads τ of the ends of open records: record by record, power by power in the order of the
-/// matrices, one of each degree of freedom.
+/// Unknown loads τ of the ends of open records: column by column of [`FrequencyData::ends`], power by
+/// power in the order of the matrices, one of each degree of freedom.
 pub(super) struct Ends<'a> {
     data: &'a FrequencyData,
     tau: &'a [f64],
@@ -21,15 +21,15 @@ impl<'a> Ends<'a> {
         Self { data, tau }
     }
 
-    /// Subtracts (τ₀ + τ₁ iω − τ₂ ω²) Z of a row from forces, in N.
+    /// Subtracts (τ₀ + τ₁ s + …) Z of a row from forces, in N.
     pub(super) fn take_off(&self, row: usize, force: &mut [Complex<f64>]) {
         let n = self.data.dof();
         let powers = powers(self.data.omega()[row]);
-        for (record, z) in self.data.ends().row(row).iter().enumerate() {
+        for (column, z) in self.data.ends().row(row).iter().enumerate() {
             for matrix in Matrix::ALL {
                 let z = z * powers[matrix as usize];
                 for (dof, force) in force.iter_mut().enumerate() {
-                    *force -= z * self.tau[place(n, record, matrix, dof)];
+                    *force -= z * self.tau[place(n, column, matrix, dof)];
                 }
             }
         }
@@ -49,6 +49,6 @@ pub(super) fn count(data: &FrequencyData) -> usize {
 }
 
 /// Place of a load among all.
-pub(super) fn place(n: usize, record: usize, matrix: Matrix, dof: usize) -> usize {
-    (Matrix::ALL.len() * record + matrix as usize) * n + dof
+pub(super) fn place(n: usize, column: usize, matrix: Matrix, dof: usize) -> usize {
+    (Matrix::ALL.len() * column + matrix as usize) * n + dof
 }

@@ -74,10 +74,10 @@ pub(super) struct Factors {
 }
 
 impl Layout {
-    pub(super) fn new(unknowns: &Unknowns, open_records: usize) -> Self {
+    pub(super) fn new(unknowns: &Unknowns, columns_of_ends: usize) -> Self {
         let (n, free) = (unknowns.dof(), unknowns.free());
-        let ends: Vec<(Matrix, usize)> = (0..open_records)
-            .flat_map(|record| Matrix::ALL.map(|matrix| (matrix, n + record)))
+        let ends: Vec<(Matrix, usize)> = (0..columns_of_ends)
+            .flat_map(|column| Matrix::ALL.map(|matrix| (matrix, n + column)))
             .collect();
         let mut columns: Vec<_> = free.iter().map(|p| (p.matrix(), p.column())).collect();
         columns.extend(&ends);

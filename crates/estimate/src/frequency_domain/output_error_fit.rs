@@ -1,6 +1,7 @@
 //! The result of maximum likelihood, made of the minimum that its search found.
 
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::ends::{self, Ends};
 use super::misfit::Misfit;
@@ -62,13 +63,29 @@ impl EndLoads {
         self.tau.len()
     }
 
-    /// The data that were fitted with these loads taken off the force (N): as if each record were a period.
+    /// Probability that periods show loads like these: the tail of the χ² distribution beyond the statistic.
+    pub fn p_value(&self) -> f64 {
+        let chi_squared = ChiSquared::new(self.tau.len() as f64);
+        chi_squared.map_or(f64::NAN, |chi_squared| chi_squared.sf(self.statistic))
+    }
+
+    /// The records that were fitted, each with its loads taken off the force (N): as if it were a period.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the data have another number of open records or degrees of freedom.
-    pub fn taken_off(&self, data: &FrequencyData) -> Result<FrequencyData, EstimateError> {
-        crate::least_squares::size("loads of open ends", ends::count(data), self.tau.len())?;
-        Ok(data.with_load_of_ends(&self.tau))
+    /// [`EstimateError::Size`] if there are more or fewer open records or degrees of freedom.
+    pub fn taken_off(
+        &self,
+        records: &[FrequencyData],
+    ) -> Result<Vec<FrequencyData>, EstimateError> {
+        let all = records.iter().map(ends::count).sum();
+        crate::least_squares::size("loads of open ends", all, self.tau.len())?;
+        let mut rest = &self.tau[..];
+        let closed = records.iter().map(|record| {
+            let (tau, others) = rest.split_at(ends::count(record));
+            rest = others;
+            record.with_load_of_ends(tau)
+        });
+        Ok(closed.collect())
     }
 
     fn of(data: &FrequencyData, tau: &[f64], covariance: DMatrix<f64>) -> Option<Self> {

@@ -111,30 +111,30 @@ fn judge(rig: &Rig, runs: u64) -> ([f64; 2], Vec<f64>) {
     ([worst, all], ratios)
 }
 
-/// Of 200 intervals of 95 % fewer than 90 % hold with a probability of 0.002, of 100 fewer than 88 %; standard
-/// deviations of 200 scatter by 5 %.
+/// Of 120 intervals of 95 % fewer than 88 % hold with a probability of 0.001, of 60 fewer than 85 %; standard
+/// deviations of 60 scatter by 9 %.
 #[test]
 fn intervals_hold_whatever_the_damping_and_the_quantity() {
     let of = |damping_ratio, kind, runs, least: f64| {
         let ([worst, _], ratios) = judge(&Rig::one(damping_ratio, kind), runs);
         assert!(worst >= least, "{damping_ratio} {kind}: {worst}");
         assert!(
-            ratios.iter().all(|r| (0.8..1.2).contains(r)),
+            ratios.iter().all(|r| (0.75..1.3).contains(r)),
             "{damping_ratio} {kind}: {ratios:?}"
         );
     };
-    of(0.001, ResponseQuantity::Displacement, 200, 0.90);
-    of(0.1, ResponseQuantity::Displacement, 100, 0.88);
+    of(0.001, ResponseQuantity::Displacement, 120, 0.88);
+    of(0.1, ResponseQuantity::Displacement, 60, 0.85);
     for kind in [ResponseQuantity::Velocity, ResponseQuantity::Acceleration] {
-        of(0.01, kind, 100, 0.88);
+        of(0.01, kind, 60, 0.85);
     }
 }
 
 #[test]
 fn intervals_hold_with_two_forces_at_a_time() {
-    let ([worst, all], ratios) = judge(&Rig::two(), 60);
-    assert!(worst >= 0.83 && all >= 0.92, "{worst} {all}");
-    assert!(ratios.iter().all(|r| (0.7..1.35).contains(r)), "{ratios:?}");
+    let ([worst, all], ratios) = judge(&Rig::two(), 40);
+    assert!(worst >= 0.8 && all >= 0.92, "{worst} {all}");
+    assert!(ratios.iter().all(|r| (0.65..1.4).contains(r)), "{ratios:?}");
 }
 
 /// Of 0.1 % damping the response dies out over 6,400 samples: the ends are most of what it leaves.
@@ -160,7 +160,7 @@ fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     let rig = Rig::two();
     let record = |seed: u64, len: usize| {
         let [force, response] = rig.exact(seed).map(|all| all.window(400, len).unwrap());
-        let band = lines::band(force.sampling(), 3.0, 120.0);
+        let band = lines::band(force.sampling(), 3.0, 190.0);
         FrequencyData::from_records(&force, &response, rig.kind, band).unwrap().of_open_record()
     };
     let records = [record(1, 1500), record(2, 1100)];
@@ -169,15 +169,17 @@ fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
     for p in fit.estimate.parameters() {
         let matrix = rig.system.matrix(p.parameter.matrix());
         let error = (p.value - matrix[(p.parameter.row(), p.parameter.column())]).abs();
-        assert!(error < 1e-3 * matrix.amax(), "{}: {error:e}", p.parameter);
+        assert!(error < 1e-4 * matrix.amax(), "{}: {error:e}", p.parameter);
     }
-    // Two records, three powers, two degrees of freedom.
+    // Two records, six powers, two degrees of freedom.
     let ends = fit.ends.unwrap();
-    assert_eq!(ends.len(), 12);
-    assert!(ends.statistic > 1e6 && ends.share > 1e-4, "{ends:?}");
+    assert_eq!(ends.len(), 24);
+    assert!(ends.p_value() < 1e-12 && ends.share > 1e-4, "{ends:?}");
     // With these loads the rows are those of periods.
-    let closed = ends.taken_off(&data).unwrap();
-    let again = output_error(&closed, &Unknowns::unknown_mass(2).unwrap()).unwrap();
+    let closed = ends.taken_off(&records).unwrap();
+    let again =
+        output_error(&closed[0].and(&closed[1]).unwrap(), &Unknowns::unknown_mass(2).unwrap())
+            .unwrap();
     let gap = (again.estimate.stiffness() - fit.estimate.stiffness()).amax();
     assert!(again.ends.is_none() && gap < 1e-5 * rig.system.stiffness().amax(), "{gap:e}");
 }

@@ -138,7 +138,9 @@ def identify(
     between_samples : {"euler", "held", "linear"}, optional
         Assumption on the force between samples, in the time domain.
     extent : {"open", "period"}, optional
-        Extent of the window, in the time domain.
+        Extent of the window. Of open records the unknown loads of their ends are fitted with the
+        machine; without, the window is a period where `period` is given, and otherwise unless the ends
+        show (in the time domain it is open).
     derivatives : str, optional
         How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
     refine, interpolation : optional
@@ -696,9 +698,9 @@ def _fit(
     refine: int | None,
     interpolation: str | None,
 ) -> dict[str, Any]:
+    saved_extent = {"period": "whole_period"}.get(extent or "", extent)
     of_time = {
         "between_samples": between_samples,
-        "extent": extent,
         "derivatives": derivatives,
         "refine": refine,
         "interpolation": interpolation,
@@ -710,7 +712,7 @@ def _fit(
         return {
             "domain": "samples",
             "between_samples": between_samples,
-            "extent": {"period": "whole_period"}.get(extent or "", extent),
+            "extent": saved_extent,
             "derivatives": _derivatives(derivatives),
             "refine": None
             if refine is None
@@ -720,14 +722,14 @@ def _fit(
         raise ValueError(f"`domain` is frequency or time, got {domain!r}")
     _refuse(of_time, "belongs to domain='time'")
     if from_frf is not None:
-        _refuse({"noise": noise}, "belongs to whole periods, without `from_frf`")
+        _refuse({"noise": noise, "extent": extent}, "belongs to fits without `from_frf`")
         return {
             "domain": "responses",
             "estimator": from_frf,
             "segments": segments,
             "method": method,
         }
-    return {"domain": "spectra", "method": method, "noise": noise or "auto"}
+    return {"domain": "spectra", "method": method, "noise": noise or "auto", "extent": saved_extent}
 
 
 def _refuse(options: dict[str, Any], why: str) -> None:

@@ -145,7 +145,7 @@ impl<'a> Misfit<'a> {
             for (to, (matrix, column)) in columns.iter().enumerate() {
                 let x = match column.checked_sub(n) {
                     None => displacement(at, *column),
-                    Some(record) => self.data.ends()[(at, record)],
+                    Some(column) => self.data.ends()[(at, column)],
                 };
                 let z = powers[*matrix as usize] * x;
                 (regressors[(to, at)], regressors[(to, lines + at)]) = (z.re, z.im);

@@ -1,0 +1,138 @@
+//! Fits of the spectral lines of records that are no periods, such as those of random tests.
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::checks::{
+    AfterSpectralFit, after_spectral_fit, before_spectral_fit, delay_of_lines, fitted_band,
+};
+use mechid_estimate::frequency_domain::{
+    EndLoads, FrequencyData, Lines, Pooling, output_error_pooling,
+};
+use mechid_model::Discretisation;
+use mechid_signal::Extent;
+
+use super::fitted::{Fitted, Residual};
+use super::left_out::LineRule;
+use super::lines::LineChoice;
+use super::prediction::Prediction;
+use super::responses::of_linearity;
+use super::spectra::{of_noise, one_motion_of};
+use crate::AnalysisError;
+use crate::measurement::{Block, Windowed};
+
+/// Probability with which the ends of a period look as if they showed.
+const LEVEL: f64 = 1e-3;
+/// Power of the ends over that of the force below which they are rounding.
+const ROUNDING: f64 = 1e-20;
+
+/// Most lines and unknown parameters for which a record is tried as an open one without being asked to: it takes
+/// seconds.
+const LINES: usize = 1 << 17;
+const PARAMETERS: usize = 100;
+
+/// Sampling rate over the highest frequency that an anti-aliasing filter passes, and up to which the lines of an
+/// open record are used where no others are asked for.
+///
+/// # Source
+/// The custom of analysers; what the ends of a record fold back grows beyond.
+const RATE_OVER_BAND: f64 = 2.56;
+
+/// A fit of open records, and whether their ends show at all.
+pub(super) struct OpenFit {
+    pub(super) fitted: Fitted,
+    pub(super) ends_show: bool,
+}
+
+/// Returns whether the records are short enough to be tried.
+pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
+    let whole = records.iter().all(|record| record.held.held_to().is_none());
+    let lines: usize = records.iter().map(|record| record.held.force.len() / 2).sum();
+    whole && lines <= LINES && unknowns.free().len() <= PARAMETERS
+}
+
+/// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
+/// record.
+pub(super) fn fit(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    rule: LineRule<'_>,
+    noise: Pooling,
+) -> Result<OpenFit, AnalysisError> {
+    let mut spectra = Vec::new();
+    for Windowed { held, .. } in records {
+        let lines = Lines::new(held.force.sampling(), band(held, rule)?)?;
+        let (motion, kind) = held.response();
+        let data = FrequencyData::read(&lines, &held.force, motion, kind)?.of_open_record();
+        spectra.push((data, lines));
+    }
+    let (data, lines): (Vec<FrequencyData>, Vec<Lines>) = spectra.into_iter().unzip();
+    let all = joined(&data)?;
+    let fit = output_error_pooling(&all, unknowns, noise)?;
+    fit.estimate.system()?;
+    let closed = match &fit.ends {
+        Some(ends) => ends.taken_off(&data)?,
+        None => data,
+    };
+    let mut after = Vec::new();
+    for ((Windowed { held, .. }, data), lines) in records.iter().zip(&closed).zip(&lines) {
+        let mut checks = Vec::from_iter(fitted_band(&fit.estimate, lines)?);
+        checks.extend(delay_of_lines(data, lines.sampling().dt(), unknowns));
+        checks.extend(of_linearity(held, lines, &fit.estimate)?);
+        after.push(checks);
+    }
+    let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&closed, &fit.estimate)?;
+    let remark =
+        "the windows are no periods: the loads of their ends were fitted with the machine, on all \
+                  lines of the band"
+            .to_owned();
+    let remarks = one_motion_of(&records[0].held).into_iter();
+    let all = joined(&closed)?;
+    let fitted = Fitted {
+        domain: "frequency",
+        estimator: "maximum likelihood on open records, in the frequency domain",
+        least_squares: false,
+        equations: 2 * all.len(),
+        before_all: before_spectral_fit(&all, unknowns)?,
+        frequency: lines.into_iter().next().map(|lines| (lines, all)),
+        before: vec![Vec::new(); records.len()],
+        after,
+        after_all: Vec::from_iter(bias),
+        residuals: residuals.into_iter().map(Residual::Lines).collect(),
+        prediction: Prediction::Sampled {
+            discretisation: Discretisation::FirstOrderHold,
+            extent: Extent::Open,
+        },
+        misfit: None,
+        remarks: remarks.chain([remark, of_noise(1, false, &fit.noise)]).collect(),
+        noise: fit.noise,
+        open: true,
+        nonlinear: None,
+        estimate: fit.estimate,
+    };
+    Ok(OpenFit { fitted, ends_show: fit.ends.as_ref().is_some_and(show) })
+}
+
+fn show(ends: &EndLoads) -> bool {
+    ends.p_value() < LEVEL && ends.share > ROUNDING
+}
+
+/// All lines between the first and the last that the rule chooses: the ends show in how neighbouring lines differ.
+fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
+    let chosen = rule.lines(&held.force, held.force.len())?;
+    let (Some(&first), Some(&last)) = (chosen.first(), chosen.last()) else { return Ok(chosen) };
+    let last = match rule.choice {
+        LineChoice::Lines(_) => return Ok(chosen),
+        LineChoice::Band(_) => last,
+        LineChoice::Driven => {
+            last.min((held.force.len() as f64 / RATE_OVER_BAND) as usize).max(first)
+        }
+    };
+    rule.without.keep((first..=last).collect(), held.force.sampling())
+}
+
+fn joined(records: &[FrequencyData]) -> Result<FrequencyData, AnalysisError> {
+    let mut all = records[0].clone();
+    for record in &records[1..] {
+        all = all.and(record)?;
+    }
+    Ok(all)
+}
