@@ -4,7 +4,7 @@
 use mechid::analysis::bearing::Coefficients;
 use mechid::analysis::{IdentifiedBearing, IdentifyBearing};
 use mechid::bearing::{Conditions, ShortBearing, ShortFilm};
-use mechid::integrate::{ForceFunction, NonlinearSystem, RungeKutta4, periodic_orbit};
+use mechid::integrate::{ForceFunction, RungeKutta4, SystemWithForces, periodic_orbit};
 use mechid::model::{InitialState, OilFilm, SecondOrderSystem};
 use mechid::signal::{Multisine, Phases, Record, Sampling, noise};
 use mechid::{Acceleration, BearingData, Displacement, Measurement, identify_bearing};
@@ -41,7 +41,7 @@ fn orbit(along: usize, amplitude: f64) -> [Record; 3] {
         let force = film.force([x[0], x[1]], [v[0], v[1]]).map_or([f64::NAN; 2], |at| at.force);
         (g[0], g[1]) = (-force[0] - LOAD, -force[1]);
     });
-    let system = NonlinearSystem::new(&housing).with(carried).unwrap();
+    let system = SystemWithForces::new(&housing).with(carried).unwrap();
     let lines = (2..=25).collect::<Vec<usize>>();
     let shaken = Multisine::flat(lines, amplitude, Phases::Schroeder).unwrap();
     let shaken = shaken.sample(sampling()).unwrap();

@@ -5,52 +5,37 @@ use mechid_analysis::{
     AnalysisError, Identified, Identify, Measurement, ResponseQuantity, identify,
 };
 use mechid_estimate::frequency_domain::Pooling;
-use mechid_model::{Sdof, SecondOrderSystem};
-use mechid_problems::exact_harmonic_periodic;
-use mechid_signal::{Extent, NoiseLevel, Record, Sampling, Spectrum, noise};
-use nalgebra::Complex;
+use mechid_model::Sdof;
+use mechid_problems::RandomTest;
+use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
 use rayon::prelude::*;
 
 const SAMPLES: usize = 2048;
 const KIND: ResponseQuantity = ResponseQuantity::Displacement;
 
 /// 10 kg at 25 Hz with a damping ratio of 0.01, sampled at 500 Hz.
-fn oscillator() -> SecondOrderSystem {
+fn rig() -> RandomTest {
     let omega = 25.0 * std::f64::consts::TAU;
-    Sdof::new(10.0, 0.02 * 10.0 * omega, 10.0 * omega * omega).unwrap().system()
-}
-
-/// A random force of `len` samples, a period of it, with lines up to 175 Hz.
-fn random_force(len: usize, seed: u64) -> Record {
-    let white = noise::white(Sampling::new(0.002, len).unwrap(), 1, 100.0, seed).unwrap();
-    let mut lines = Spectrum::of(&white).lines().clone();
-    let last = len * 35 / 100;
-    lines[0] = Complex::from(0.0);
-    lines.rows_mut(last, lines.nrows() - last).fill(Complex::from(0.0));
-    Spectrum::from_lines(white.sampling(), lines).unwrap().to_record().unwrap()
-}
-
-fn steady(force: &Record) -> Record {
-    exact_harmonic_periodic(&oscillator(), force).unwrap().displacement().clone()
+    let system = Sdof::new(10.0, 0.02 * 10.0 * omega, 10.0 * omega * omega).unwrap().system();
+    let sampling = Sampling::new(0.002, SAMPLES).unwrap();
+    RandomTest { system, sampling, quantity: KIND, force: 100.0 }
 }
 
 /// A measurement with noise of 1 % on the response.
-fn measured(force: &Record, response: &Record, seed: u64) -> Measurement {
-    let noisy = noise::add_white(response, NoiseLevel::FractionOfRms(0.01), seed).unwrap();
-    Measurement::from_records(force, &[(KIND, &noisy)]).unwrap()
+fn measured([force, response]: [Record; 2], seed: u64) -> Measurement {
+    let noisy = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), seed + 100_000);
+    Measurement::from_records(&force, &[(KIND, &noisy.unwrap())]).unwrap()
 }
 
 fn random_test(seed: u64) -> Measurement {
-    let force = random_force(4 * SAMPLES, seed);
-    let [force, response] = [&force, &steady(&force)].map(|all| all.window(977, SAMPLES).unwrap());
-    measured(&force, &response, seed + 100_000)
+    measured(rig().measure(seed).unwrap(), seed)
 }
 
 fn holds(identified: &Identified, name: &str) -> bool {
     let truth = match name {
-        "m" => oscillator().mass()[(0, 0)],
-        "c" => oscillator().damping()[(0, 0)],
-        _ => oscillator().stiffness()[(0, 0)],
+        "m" => rig().system.mass()[(0, 0)],
+        "c" => rig().system.damping()[(0, 0)],
+        _ => rig().system.stiffness()[(0, 0)],
     };
     let [low, high] = identified.estimate().parameter(name).unwrap().interval(0.95).unwrap();
     (low..=high).contains(&truth)
@@ -99,8 +84,7 @@ fn several_records_have_ends_of_their_own() {
 #[test]
 fn a_period_stays_one() {
     let open = |seed: u64| {
-        let force = random_force(SAMPLES, seed);
-        let test = measured(&force, &steady(&force), seed + 100_000);
+        let test = measured(rig().period(seed).unwrap(), seed);
         let how = Identify::spectra(Method::MaximumLikelihood);
         is_open(&identify(&[test], &how).unwrap())
     };

@@ -35,7 +35,7 @@
 //!
 //! A [`Scheme`] is a value: the parameters and conventions a user chooses. [`Scheme::prepare`]
 //! does once what depends on the system and the step and gives a [`Stepper`], whose steps do
-//! not allocate; a [`System`] is dense or sparse, and a [`NonlinearSystem`] has forces besides. [`integrate()`] and [`integrate_periodic`] run
+//! not allocate; a [`System`] is dense or sparse, and a [`SystemWithForces`] has forces besides. [`integrate()`] and [`integrate_periodic`] run
 //! it over a sampled force, [`integrate_function`] and [`integrate_periodic_function`] over a function
 //! of time, [`integrate_selected`] between some degrees of freedom of many. [`spectral_radius`],
 //! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
@@ -63,6 +63,7 @@ mod scheme;
 mod sparse;
 mod stability;
 mod system;
+mod term;
 mod transition;
 mod wilson_theta;
 
@@ -77,12 +78,13 @@ pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
 pub use houbolt::{Houbolt, HouboltStart};
 pub use matrix_exponential::MatrixExponential;
 pub use newmark::Newmark;
-pub use nonlinear::{ForceFunction, NonlinearForce, NonlinearSystem, Tangents};
+pub use nonlinear::{ForceFunction, NonlinearForce, SystemWithForces, Tangents};
 pub use orbit::{PeriodicOrbit, periodic_orbit};
 pub use periodic::{integrate_periodic, integrate_periodic_function};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};
 pub use stability::{critical_step, spectral_radius};
 pub use system::{Matrices, System};
+pub use term::TermForces;
 pub use transition::Transition;
 pub use wilson_theta::{WilsonLoad, WilsonTheta};

@@ -41,7 +41,7 @@ pub struct Tangents {
 /// checked of the linear part alone.
 ///
 /// ```
-/// use mechid_integrate::{Connection, Newmark, NonlinearSystem, integrate};
+/// use mechid_integrate::{Connection, Newmark, SystemWithForces, integrate};
 /// use mechid_model::{InitialState, Sdof};
 /// use mechid_signal::{Record, Sampling};
 /// use nalgebra::dvector;
@@ -49,7 +49,7 @@ pub struct Tangents {
 /// // Duffing's oscillator, ẍ + x + x³ = 0, let go at 1 m: its period is 4.7680 s, not 2π s.
 /// let linear = Sdof::new(1.0, 0.0, 1.0)?.system();
 /// let hardening = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0])?;
-/// let duffing = NonlinearSystem::new(&linear).with(hardening)?;
+/// let duffing = SystemWithForces::new(&linear).with(hardening)?;
 /// let none = Record::from_channel(Sampling::new(4.768 / 400.0, 401)?, vec![0.0; 401])?;
 /// let start = InitialState::new(dvector![1.0], dvector![0.0])?;
 /// let response = integrate(&Newmark::AVERAGE_ACCELERATION, &duffing, &none, &start)?;
@@ -57,12 +57,12 @@ pub struct Tangents {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug, Clone)]
-pub struct NonlinearSystem<'a> {
+pub struct SystemWithForces<'a> {
     linear: Matrices<'a>,
     forces: Vec<Arc<dyn NonlinearForce>>,
 }
 
-impl<'a> NonlinearSystem<'a> {
+impl<'a> SystemWithForces<'a> {
     /// The linear part, without forces as yet.
     pub fn new(linear: &'a dyn System) -> Self {
         Self { linear: linear.matrices(), forces: linear.nonlinear_forces().to_vec() }
@@ -88,7 +88,7 @@ impl<'a> NonlinearSystem<'a> {
     }
 }
 
-impl System for NonlinearSystem<'_> {
+impl System for SystemWithForces<'_> {
     fn matrices(&self) -> Matrices<'_> {
         self.linear
     }

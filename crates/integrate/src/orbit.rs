@@ -64,14 +64,14 @@ impl PeriodicOrbit {
 /// the response directly.
 ///
 /// ```
-/// use mechid_integrate::{Connection, Newmark, NonlinearSystem, periodic_orbit};
+/// use mechid_integrate::{Connection, Newmark, SystemWithForces, periodic_orbit};
 /// use mechid_model::{InitialState, Sdof};
 /// use mechid_signal::{Record, Sampling};
 ///
 /// // ẍ + 0.1 ẋ + x + x³ = F; F is such that x = cos 2t is a response.
 /// let linear = Sdof::new(1.0, 0.1, 1.0)?.system();
 /// let hardening = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0])?;
-/// let system = NonlinearSystem::new(&linear).with(hardening)?;
+/// let system = SystemWithForces::new(&linear).with(hardening)?;
 /// let sampling = Sampling::new(std::f64::consts::PI / 400.0, 400)?;
 /// let force = |k: usize| {
 ///     let (s, c) = (2.0 * sampling.time(k)).sin_cos();

@@ -54,7 +54,7 @@ fn a_step_of_a_large_system_allocates_nothing() {
             g[1] = -g[0];
         });
         let gap = Connection::to_ground(2).gap(0.05, 3e3).unwrap();
-        let nonlinear = NonlinearSystem::new(&linear).with(film).unwrap().with(gap).unwrap();
+        let nonlinear = SystemWithForces::new(&linear).with(film).unwrap().with(gap).unwrap();
         for (system, scheme) in schemes()
             .iter()
             .flat_map(|s| [&linear as &dyn System, &nonlinear].map(|system| (system, s)))

@@ -5,22 +5,24 @@ use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_exper
 use mechid_integrate::{
     AllowUnstable, AlphaAcceleration, Bathe, CentralDifference, CentralDifferenceStart, Convention,
     GeneralisedAlpha, Houbolt, HouboltStart, IntegrateError, MatrixExponential, Newmark,
-    RungeKutta4, SampledForce, Scheme, SubStepForce, WilsonLoad, WilsonTheta, integrate,
-    integrate_periodic,
+    RungeKutta4, SampledForce, Scheme, SubStepForce, SystemWithForces, TermForces, WilsonLoad,
+    WilsonTheta, integrate, integrate_periodic, periodic_orbit,
 };
 use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, IoError, Level, LoadBeyond,
     MiddleLoad, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
-use mechid_model::{ModelError, Response, SecondOrderSystem};
+use mechid_model::{InitialState, ModelError, NonlinearSystem, Response, SecondOrderSystem};
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
 /// Result of [`simulate`]: the true response and the measured record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
-    /// The machine.
+    /// The machine; of a nonlinear one, the linear part.
     pub system: SecondOrderSystem,
+    /// The machine with its nonlinear terms; `None` of a linear one.
+    pub nonlinear: Option<NonlinearSystem>,
     /// Scheme that computed the response, with its parameters.
     pub scheme: String,
     /// The scheme's conventions in force.
@@ -54,7 +56,7 @@ pub struct Simulation {
 /// # Errors
 /// [`SimulateError`]: what is wrong with the description, or a response that does not exist.
 pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
-    let system = experiment.system()?;
+    let machine = Described::of(experiment)?;
     let period = experiment.force()?;
     let force = repeated(&period, experiment.periods)?;
     let scheme = scheme(experiment)?;
@@ -62,17 +64,17 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         None if experiment.response != ResponseKind::Periodic => {
             return Err(SimulateError::ExactFromRest);
         }
-        None => exact_periodic(&system, &period)?,
+        None => machine.exact_periodic(&period)?,
         Some(scheme) => {
             let within = scheme.inner_instant();
             let middle = within.map(|part| experiment.force_within_steps(part)).transpose()?;
             match experiment.response {
                 ResponseKind::Periodic => {
-                    stepped(experiment, &**scheme, &system, &period, middle.as_ref())?
+                    stepped(experiment, &**scheme, &machine, &period, middle.as_ref())?
                 }
                 ResponseKind::FromRest | ResponseKind::From(_) => {
                     let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
-                    stepped(experiment, &**scheme, &system, &force, middle.as_ref())?
+                    stepped(experiment, &**scheme, &machine, &force, middle.as_ref())?
                 }
             }
         }
@@ -97,7 +99,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
             .as_ref()
             .map_or("exact: through the receptance, line by line".into(), |s| s.name()),
         conventions: scheme.map_or_else(Vec::new, |s| s.conventions()),
-        system,
+        system: machine.linear,
+        nonlinear: machine.nonlinear,
         force,
         response,
         measured_force,
@@ -112,21 +115,56 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
 /// As [`simulate`]; [`IntegrateError::MidStepMissing`] if the scheme asks for the exact force between
 /// the samples.
 pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
-    let system = experiment.system()?;
+    let machine = Described::of(experiment)?;
     let Some(scheme) = scheme(experiment)? else {
         return match experiment.response {
-            ResponseKind::Periodic => Ok(exact_periodic(&system, force)?),
+            ResponseKind::Periodic => machine.exact_periodic(force),
             ResponseKind::FromRest | ResponseKind::From(_) => Err(SimulateError::ExactFromRest),
         };
     };
-    stepped(experiment, &*scheme, &system, force, None)
+    stepped(experiment, &*scheme, &machine, force, None)
 }
+
+/// The machine of an experiment.
+struct Described {
+    linear: SecondOrderSystem,
+    nonlinear: Option<NonlinearSystem>,
+}
+
+impl Described {
+    fn of(experiment: &Experiment) -> Result<Self, SimulateError> {
+        let nonlinear = experiment.nonlinear_system()?.filter(|system| !system.terms().is_empty());
+        Ok(Self { linear: experiment.system()?, nonlinear })
+    }
+
+    fn exact_periodic(&self, force: &Record) -> Result<Response, SimulateError> {
+        match &self.nonlinear {
+            None => Ok(exact_periodic(&self.linear, force)?),
+            Some(_) => Err(SimulateError::ExactNonlinear),
+        }
+    }
+
+    /// M, C and K with the forces of the terms.
+    fn with_forces(&self) -> Result<SystemWithForces<'_>, SimulateError> {
+        let system = SystemWithForces::new(&self.linear);
+        match &self.nonlinear {
+            None => Ok(system),
+            Some(nonlinear) => {
+                let forces = TermForces::new(nonlinear.terms(), nonlinear.coefficients())?;
+                Ok(system.with(forces)?)
+            }
+        }
+    }
+}
+
+/// Periods of the force from rest after which a steady state of a nonlinear machine is searched for.
+const SETTLING: usize = 50;
 
 /// Steps through one force record, or through the period that repeats.
 fn stepped(
     experiment: &Experiment,
     scheme: &dyn Scheme,
-    system: &SecondOrderSystem,
+    machine: &Described,
     force: &Record,
     middle: Option<&Record>,
 ) -> Result<Response, SimulateError> {
@@ -137,9 +175,16 @@ fn stepped(
         ResponseKind::Periodic if has_given_start(experiment) => {
             Err(SimulateError::GivenStartPeriodic)
         }
-        ResponseKind::Periodic => Ok(integrate_periodic(scheme, system, force)?),
+        ResponseKind::Periodic => match &machine.nonlinear {
+            None => Ok(integrate_periodic(scheme, &machine.linear, force)?),
+            Some(nonlinear) => {
+                let (system, rest) = (machine.with_forces()?, InitialState::rest(nonlinear.dof()));
+                let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)?;
+                Ok(orbit.response().clone())
+            }
+        },
         ResponseKind::FromRest | ResponseKind::From(_) => {
-            Ok(integrate(scheme, system, force, &experiment.initial_state()?)?)
+            Ok(integrate(scheme, &machine.with_forces()?, force, &experiment.initial_state()?)?)
         }
     }
 }
@@ -166,6 +211,12 @@ pub enum SimulateError {
          starts from rest or from a given motion"
     )]
     ExactFromRest,
+    /// The exact scheme is that of linear machines.
+    #[error(
+        "the scheme \"exact\" is for linear machines: choose another one for nonlinear terms, such as \
+         newmark or runge-kutta-4, and steps that are short against the fastest motion"
+    )]
+    ExactNonlinear,
     /// A periodic response has no start.
     #[error(
         "a periodic response has no start: give displacements for Houbolt's first steps only with a \
@@ -330,6 +381,8 @@ pub fn sweep(
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::{FRAC_1_PI, FRAC_PI_2};
+
     use super::*;
 
     /// Largest displacement error against the receptance, relative, for a scheme as JSON.
@@ -345,6 +398,44 @@ mod tests {
         let (truth, found) =
             (truth.displacement().data(), simulation.response.displacement().data());
         (found - truth).amax() / truth.amax()
+    }
+
+    /// Judge: ẍ + 0.1 ẋ + x + x³ = F with F such that x = cos 2t.
+    #[test]
+    fn a_nonlinear_machine_goes_round_its_orbit() {
+        let simulated = |scheme: &str, response: &str| {
+            let text = format!(
+                r#"{{ "system": {{ "mass": 1, "damping": 0.1, "stiffness": 1 }},
+                     "nonlinear": {{ "terms": "k3: x1^3", "coefficients": [1] }},
+                     "sampling": {{ "samples": 400, "rate_hz": {} }},
+                     "excitation": [
+                       {{ "kind": "harmonic", "amplitude": -2.25, "frequency_hz": {hz} }},
+                       {{ "kind": "harmonic", "amplitude": 0.2, "frequency_hz": {hz}, "phase_rad": {quarter} }},
+                       {{ "kind": "harmonic", "amplitude": 0.25, "frequency_hz": {} }}],
+                     "scheme": {scheme}, "response": {response} }}"#,
+                400.0 * FRAC_1_PI,
+                3.0 * FRAC_1_PI,
+                hz = FRAC_1_PI,
+                quarter = FRAC_PI_2,
+            );
+            simulate(&Experiment::parse("test.json", &text).unwrap())
+        };
+        let error = |simulation: &Simulation| {
+            let x = simulation.response.displacement();
+            let each = x.sampling().times().zip(x.channel(0));
+            each.map(|(t, x)| (x - (2.0 * t).cos()).abs()).fold(0.0, f64::max)
+        };
+        let start = r#"{ "from": { "displacement": 1 } }"#;
+        for response in [r#""periodic""#, start] {
+            let newmark = simulated(r#"{ "name": "newmark" }"#, response).unwrap();
+            assert!(error(&newmark) < 1e-3, "{response}: {:e}", error(&newmark));
+            let fourth = r#"{ "name": "runge-kutta-4", "load": "exact" }"#;
+            let fourth = simulated(fourth, response).unwrap();
+            assert!(error(&fourth) < 1e-7, "{response}: {:e}", error(&fourth));
+            assert_eq!(fourth.nonlinear.unwrap().coefficients(), [1.0]);
+        }
+        let exact = simulated(r#"{ "name": "exact" }"#, r#""periodic""#);
+        assert!(matches!(exact, Err(SimulateError::ExactNonlinear)));
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub mod exact;
 pub mod machines;
 mod named;
 mod random;
+mod random_test;
 pub mod rig;
 mod transition;
 
@@ -31,3 +32,4 @@ pub use exact::{
 };
 pub use named::{dissertation_bearing, dissertation_sdof, steffen_rade};
 pub use random::random_stable;
+pub use random_test::RandomTest;

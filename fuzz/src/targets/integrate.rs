@@ -2,8 +2,8 @@
 
 use mechid_integrate::{
     AllowUnstable, Bathe, CentralDifference, Connection, GeneralisedAlpha, Houbolt,
-    MatrixExponential, Newmark, NonlinearElement, NonlinearSystem, RungeKutta4, Scheme,
-    SelectedDofs, WilsonTheta, accuracy, critical_step, integrate, integrate_function,
+    MatrixExponential, Newmark, NonlinearElement, RungeKutta4, Scheme, SelectedDofs,
+    SystemWithForces, WilsonTheta, accuracy, critical_step, integrate, integrate_function,
     integrate_periodic, integrate_selected, periodic_orbit, spectral_radius,
 };
 use mechid_model::{Response, ResponseQuantity, StateTransition};
@@ -40,7 +40,7 @@ pub fn calls(bytes: &[u8]) -> Result<(), String> {
         }
         _ => {
             let Some(element) = element(d)? else { return Ok(()) };
-            let Some(system) = passed(NonlinearSystem::new(&system).with(element))? else {
+            let Some(system) = passed(SystemWithForces::new(&system).with(element))? else {
                 return Ok(());
             };
             motion(integrate(scheme, &system, &force, &start))?;

@@ -11,10 +11,11 @@ use crate::outcome::{Files, Outcome};
 /// Find mass, damping and stiffness from a measured force and response
 ///
 /// In the frequency domain (the default) the window must hold whole periods of a periodic
-/// excitation, and one kind of motion is enough; the periods are averaged. A random excitation is
-/// cut into segments with --from-frf. In the time domain any record will do: displacement, velocity
-/// and acceleration for the equation of motion itself, or displacement and velocity with an
-/// assumption on the force between the samples; what was not measured, --derivatives finds.
+/// excitation, and one kind of motion is enough; the periods are averaged. Of a random excitation,
+/// or any record that is no period, the ends are fitted with the machine. In the time domain any
+/// record will do: displacement, velocity and acceleration for the equation of motion itself, or
+/// displacement and velocity with an assumption on the force between the samples; what was not
+/// measured, --derivatives finds.
 ///
 /// With --frf-table the files are frequency responses measured elsewhere.
 ///

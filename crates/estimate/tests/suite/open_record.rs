@@ -6,91 +6,55 @@ use std::f64::consts::TAU;
 use mechid_estimate::frequency_domain::{FrequencyData, OutputErrorFit, output_error};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
-use mechid_problems::exact_harmonic_periodic;
-use mechid_signal::{NoiseLevel, Record, Sampling, Spectrum, lines, noise};
-use nalgebra::{Complex, dmatrix};
+use mechid_problems::RandomTest;
+use mechid_signal::{NoiseLevel, Sampling, lines, noise};
+use nalgebra::dmatrix;
 use rayon::prelude::*;
 
-/// Samples of a record, and of the period that it is cut out of.
 const SAMPLES: usize = 2048;
-const PERIOD: usize = 4 * SAMPLES;
 /// Noise over the response, in the RMS.
 const LEVEL: f64 = 0.01;
 
-/// The force has its lines up to this part of the sampling rate.
-const BAND: f64 = 0.35;
-
-struct Rig {
-    system: SecondOrderSystem,
-    /// Duration of a sample, in s.
-    dt: f64,
-    kind: ResponseQuantity,
+/// 10 kg with a natural frequency of a twentieth of the sampling rate.
+fn one(damping_ratio: f64, quantity: ResponseQuantity) -> RandomTest {
+    let omega = TAU * 25.0;
+    let oscillator =
+        Sdof::new(10.0, 2.0 * damping_ratio * 10.0 * omega, 10.0 * omega * omega).unwrap();
+    test(oscillator.system(), quantity)
 }
 
-impl Rig {
-    /// 10 kg with a natural frequency of a twentieth of the sampling rate.
-    fn one(damping_ratio: f64, kind: ResponseQuantity) -> Self {
-        let omega = TAU * 25.0;
-        let oscillator =
-            Sdof::new(10.0, 2.0 * damping_ratio * 10.0 * omega, 10.0 * omega * omega).unwrap();
-        Self { system: oscillator.system(), dt: 0.002, kind }
-    }
-
-    /// Two masses, two forces, nothing symmetric but the masses.
-    fn two() -> Self {
-        let mass = dmatrix![10.0, 0.0; 0.0, 8.0];
-        let damping = dmatrix![30.0, -8.0; -12.0, 25.0];
-        let stiffness = dmatrix![2.5e5, -0.9e5; -1.1e5, 3.0e5];
-        let system = SecondOrderSystem::new(mass, damping, stiffness).unwrap();
-        Self { system, dt: 0.002, kind: ResponseQuantity::Displacement }
-    }
-
-    /// Force and response over the period of this seed.
-    fn exact(&self, seed: u64) -> [Record; 2] {
-        let (n, period) = (self.system.dof(), Sampling::new(self.dt, PERIOD).unwrap());
-        let force = band_limited(&noise::white(period, n, 100.0, seed).unwrap());
-        let steady = exact_harmonic_periodic(&self.system, &force).unwrap();
-        let response = match self.kind {
-            ResponseQuantity::Displacement => steady.displacement(),
-            ResponseQuantity::Velocity => steady.velocity(),
-            ResponseQuantity::Acceleration => steady.acceleration(),
-        };
-        [force, response.clone()]
-    }
-
-    /// Force and noisy response in some window of it.
-    fn measure(&self, seed: u64) -> [Record; 2] {
-        let [force, response] = self.exact(seed).map(|all| all.window(977, SAMPLES).unwrap());
-        let level = NoiseLevel::FractionOfRms(LEVEL);
-        [force, noise::add_white(&response, level, seed + 100_000).unwrap()]
-    }
-
-    fn data(&self, seed: u64) -> FrequencyData {
-        let [force, response] = self.measure(seed);
-        let band = lines::band(force.sampling(), 3.0, 120.0);
-        FrequencyData::from_records(&force, &response, self.kind, band).unwrap()
-    }
-
-    fn fit(&self, seed: u64) -> Result<OutputErrorFit, EstimateError> {
-        let unknowns = Unknowns::unknown_mass(self.system.dof())?;
-        output_error(&self.data(seed).of_open_record(), &unknowns)
-    }
+/// Two masses, two forces, nothing symmetric but the masses.
+fn two() -> RandomTest {
+    let mass = dmatrix![10.0, 0.0; 0.0, 8.0];
+    let damping = dmatrix![30.0, -8.0; -12.0, 25.0];
+    let stiffness = dmatrix![2.5e5, -0.9e5; -1.1e5, 3.0e5];
+    let system = SecondOrderSystem::new(mass, damping, stiffness).unwrap();
+    test(system, ResponseQuantity::Displacement)
 }
 
-/// Without mean and without lines above the band.
-fn band_limited(white: &Record) -> Record {
-    let mut lines = Spectrum::of(white).lines().clone();
-    let last = (BAND * white.len() as f64) as usize;
-    lines.row_mut(0).fill(Complex::from(0.0));
-    lines.rows_mut(last, lines.nrows() - last).fill(Complex::from(0.0));
-    let spectrum = Spectrum::from_lines(white.sampling(), lines).unwrap();
-    spectrum.to_record().unwrap()
+fn test(system: SecondOrderSystem, quantity: ResponseQuantity) -> RandomTest {
+    let sampling = Sampling::new(0.002, SAMPLES).unwrap();
+    RandomTest { system, sampling, quantity, force: 100.0 }
+}
+
+/// Spectra of a noisy record on the lines up to 120 of 250 Hz.
+fn data(rig: &RandomTest, seed: u64) -> FrequencyData {
+    let [force, response] = rig.measure(seed).unwrap();
+    let level = NoiseLevel::FractionOfRms(LEVEL);
+    let response = noise::add_white(&response, level, seed + 100_000).unwrap();
+    let band = lines::band(force.sampling(), 3.0, 120.0);
+    FrequencyData::from_records(&force, &response, rig.quantity, band).unwrap()
+}
+
+fn fit(rig: &RandomTest, seed: u64) -> Result<OutputErrorFit, EstimateError> {
+    let unknowns = Unknowns::unknown_mass(rig.system.dof())?;
+    output_error(&data(rig, seed).of_open_record(), &unknowns)
 }
 
 /// Share of 95 % intervals that hold, worst and all together, over some runs; and the RMS error of each
 /// parameter over its mean standard error.
-fn judge(rig: &Rig, runs: u64) -> ([f64; 2], Vec<f64>) {
-    let fits: Vec<_> = (0..runs).into_par_iter().map(|seed| rig.fit(seed).unwrap()).collect();
+fn judge(rig: &RandomTest, runs: u64) -> ([f64; 2], Vec<f64>) {
+    let fits: Vec<_> = (0..runs).into_par_iter().map(|seed| fit(rig, seed).unwrap()).collect();
     let free = Unknowns::unknown_mass(rig.system.dof()).unwrap().free();
     let (mut worst, mut all, mut ratios) = (1.0f64, 0.0, Vec::new());
     for (at, entry) in free.iter().enumerate() {
@@ -116,7 +80,7 @@ fn judge(rig: &Rig, runs: u64) -> ([f64; 2], Vec<f64>) {
 #[test]
 fn intervals_hold_whatever_the_damping_and_the_quantity() {
     let of = |damping_ratio, kind, runs, least: f64| {
-        let ([worst, _], ratios) = judge(&Rig::one(damping_ratio, kind), runs);
+        let ([worst, _], ratios) = judge(&one(damping_ratio, kind), runs);
         assert!(worst >= least, "{damping_ratio} {kind}: {worst}");
         assert!(
             ratios.iter().all(|r| (0.75..1.3).contains(r)),
@@ -132,7 +96,7 @@ fn intervals_hold_whatever_the_damping_and_the_quantity() {
 
 #[test]
 fn intervals_hold_with_two_forces_at_a_time() {
-    let ([worst, all], ratios) = judge(&Rig::two(), 40);
+    let ([worst, all], ratios) = judge(&two(), 40);
     assert!(worst >= 0.8 && all >= 0.92, "{worst} {all}");
     assert!(ratios.iter().all(|r| (0.65..1.4).contains(r)), "{ratios:?}");
 }
@@ -140,7 +104,7 @@ fn intervals_hold_with_two_forces_at_a_time() {
 /// Of 0.1 % damping the response dies out over 6,400 samples: the ends are most of what it leaves.
 #[test]
 fn a_record_taken_as_a_period_misleads() {
-    let rig = Rig::one(0.001, ResponseQuantity::Displacement);
+    let rig = one(0.001, ResponseQuantity::Displacement);
     let (truth, unknowns) = (rig.system.damping()[(0, 0)], Unknowns::unknown_mass(1).unwrap());
     let error = |data: &FrequencyData| {
         output_error(data, &unknowns).unwrap().estimate.damping()[(0, 0)] / truth - 1.0
@@ -148,7 +112,7 @@ fn a_record_taken_as_a_period_misleads() {
     let rms =
         |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let all = |of: &(dyn Fn(FrequencyData) -> FrequencyData + Sync)| -> f64 {
-        rms((0..20).into_par_iter().map(|seed| error(&of(rig.data(seed)))).collect())
+        rms((0..20).into_par_iter().map(|seed| error(&of(data(&rig, seed)))).collect())
     };
     let (period, open) = (all(&|data| data), all(&FrequencyData::of_open_record));
     assert!(period > 20.0 * open, "{period} {open}");
@@ -157,11 +121,11 @@ fn a_record_taken_as_a_period_misleads() {
 /// What the loads of the ends do not describe is folded back from above half the sampling rate.
 #[test]
 fn records_without_noise_are_fitted_but_for_aliases_of_their_ends() {
-    let rig = Rig::two();
+    let rig = two();
     let record = |seed: u64, len: usize| {
-        let [force, response] = rig.exact(seed).map(|all| all.window(400, len).unwrap());
+        let [force, response] = rig.period(seed).unwrap().map(|all| all.window(400, len).unwrap());
         let band = lines::band(force.sampling(), 3.0, 190.0);
-        FrequencyData::from_records(&force, &response, rig.kind, band).unwrap().of_open_record()
+        FrequencyData::from_records(&force, &response, rig.quantity, band).unwrap().of_open_record()
     };
     let records = [record(1, 1500), record(2, 1100)];
     let data = records[0].and(&records[1]).unwrap();

@@ -216,7 +216,7 @@ fn nonlinear() {
     let one = |v: f64| DMatrix::from_element(1, 1, v);
     let linear = SecondOrderSystem::new(one(1.0), one(0.2), one(400.0)).expect("regular");
     let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1e5]).expect("finite");
-    let duffing = NonlinearSystem::new(&linear).with(cubic).expect("inside");
+    let duffing = SystemWithForces::new(&linear).with(cubic).expect("inside");
     let steps = if is_tried_only() { 100 } else { 200_000 };
     let (force_1, rest) = (force(steps), InitialState::rest(1));
     println!("\nns per step, linear and with nonlinear forces");
@@ -241,7 +241,7 @@ fn nonlinear() {
         g[0] = stiff * (x[0] + 0.5 * x[1]) + 2.0 * v[0] / gap;
         g[1] = stiff * (x[1] - 0.5 * x[0]) + 2.0 * v[1] / gap;
     });
-    let floating = NonlinearSystem::new(&shaft).with(film).expect("inside");
+    let floating = SystemWithForces::new(&shaft).with(film).expect("inside");
     let dofs = SelectedDofs { forced: &[100], observed: &[4, 6] };
     let steps = if is_tried_only() { 10 } else { 20_000 };
     let [plain, hard] =

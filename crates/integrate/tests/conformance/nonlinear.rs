@@ -84,7 +84,7 @@ fn the_elliptic_functions_are_right() {
 fn duffings_oscillator_converges_with_the_order_of_each_scheme() {
     let linear = oscillator(1.0, 0.0, 1.0);
     let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
-    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let end = 3.0;
     let truth = duffing(1.0, 3.0, 1.2, end);
     for scheme in nonlinear_schemes() {
@@ -123,7 +123,7 @@ fn a_chosen_response_is_met_with_local_forces_in_many_degrees_of_freedom() {
         g[0] = 20.0 * x[0] * x[1] * (3.0 * t).sin();
         g[1] = 5.0 * v[0] * v[1] + 2.0 * t.cos();
     });
-    let system = NonlinearSystem::new(&linear)
+    let system = SystemWithForces::new(&linear)
         .with(on.spring(&[40.0, -30.0, 200.0]).unwrap())
         .unwrap()
         .with(on.damper(&[2.0, 0.0, 1.5]).unwrap())
@@ -201,11 +201,11 @@ fn reduction_and_tangents_do_not_change_the_response() {
         g[20] = law(x[20] - x[4]);
         g[4] = -g[20];
     });
-    let systems: [(&str, NonlinearSystem<'_>); 4] = [
-        ("element", NonlinearSystem::new(&sparse).with(element()).unwrap()),
-        ("dense", NonlinearSystem::new(&dense).with(element()).unwrap()),
-        ("function", NonlinearSystem::new(&sparse).with(function).unwrap()),
-        ("wide", NonlinearSystem::new(&dense).with(wide).unwrap()),
+    let systems: [(&str, SystemWithForces<'_>); 4] = [
+        ("element", SystemWithForces::new(&sparse).with(element()).unwrap()),
+        ("dense", SystemWithForces::new(&dense).with(element()).unwrap()),
+        ("function", SystemWithForces::new(&sparse).with(function).unwrap()),
+        ("wide", SystemWithForces::new(&dense).with(wide).unwrap()),
     ];
     let force = force(Sampling::new(5e-3, 200).unwrap(), n);
     for scheme in nonlinear_schemes() {
@@ -233,7 +233,7 @@ fn a_linear_spring_is_a_part_of_the_stiffness() {
     let soft = Sdof::new(2.0, 0.3, 50.0).unwrap().system();
     let stiff = Sdof::new(2.0, 0.5, 80.0).unwrap().system();
     let on = Connection::to_ground(0);
-    let system = NonlinearSystem::new(&soft)
+    let system = SystemWithForces::new(&soft)
         .with(on.spring(&[30.0]).unwrap())
         .unwrap()
         .with(on.damper(&[0.2]).unwrap())
@@ -256,7 +256,7 @@ fn a_mass_between_stops_comes_back_in_time() {
     let (clearance, stiffness, speed) = (0.1, 400.0, 2.0);
     let free = oscillator(1.0, 0.0, 0.0);
     let stops = Connection::to_ground(0).gap(clearance, stiffness).unwrap();
-    let system = NonlinearSystem::new(&free).with(stops).unwrap();
+    let system = SystemWithForces::new(&free).with(stops).unwrap();
     let period = 4.0 * clearance / speed + 2.0 * std::f64::consts::PI / f64::sqrt(stiffness);
     let steps = 4000;
     for scheme in nonlinear_schemes().iter().filter(|s| !is_at_rest(s.as_ref())) {
@@ -280,8 +280,8 @@ fn friction_and_drag_slow_a_mass_as_they_should() {
     let free = oscillator(2.0, 0.0, 0.0);
     let on = Connection::to_ground(0);
     let (limit, width, speed, end) = (0.8, 0.2, 1.5, 4.0);
-    let rubbed = NonlinearSystem::new(&free).with(on.friction(limit, width).unwrap()).unwrap();
-    let dragged = NonlinearSystem::new(&free).with(on.damper(&[0.0, 0.6]).unwrap()).unwrap();
+    let rubbed = SystemWithForces::new(&free).with(on.friction(limit, width).unwrap()).unwrap();
+    let dragged = SystemWithForces::new(&free).with(on.damper(&[0.0, 0.6]).unwrap()).unwrap();
     let rubbing = width * ((speed / width).sinh() * (-limit * end / (2.0 * width)).exp()).asinh();
     let dragging = 1.0 / (1.0 / speed + 0.6 * end / 2.0);
     for scheme in nonlinear_schemes().iter().filter(|s| !is_at_rest(s.as_ref())) {
@@ -301,7 +301,7 @@ fn friction_and_drag_slow_a_mass_as_they_should() {
 fn the_energy_of_duffings_oscillator_does_not_drift() {
     let linear = oscillator(1.0, 0.0, 1.0);
     let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 3.0]).unwrap();
-    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     // The period of amplitude 1.2 is about 2.9 s; 500 of them.
     let worst = |scheme: &dyn Scheme, dt: f64| {
         let steps = (1450.0 / dt) as usize;
@@ -333,11 +333,11 @@ fn what_newtons_method_cannot_solve_is_an_error() {
     let sticking = ForceFunction::new(vec![0], |_, _, v, g| g[0] = 50.0 * v[0].signum());
     let not_a_number = ForceFunction::new(vec![0], |t, _, _, g| g[0] = (0.25 - t).sqrt());
     let force = force(Sampling::new(0.01, 100).unwrap(), 1);
-    let of = |scheme: &dyn Scheme, system: &NonlinearSystem<'_>| {
+    let of = |scheme: &dyn Scheme, system: &SystemWithForces<'_>| {
         integrate(scheme, system, &force, &InitialState::rest(1))
     };
-    let sticking = NonlinearSystem::new(&free).with(sticking).unwrap();
-    let not_a_number = NonlinearSystem::new(&free).with(not_a_number).unwrap();
+    let sticking = SystemWithForces::new(&free).with(sticking).unwrap();
+    let not_a_number = SystemWithForces::new(&free).with(not_a_number).unwrap();
     for scheme in nonlinear_schemes() {
         let (scheme, name) = (scheme.as_ref(), scheme.name());
         let refused = of(scheme, &not_a_number).err();
@@ -358,17 +358,17 @@ fn what_newtons_method_cannot_solve_is_an_error() {
 fn what_is_for_linear_systems_refuses_others() {
     let linear = oscillator(1.0, 0.1, 1.0);
     let on = Connection::to_ground(0);
-    let system = NonlinearSystem::new(&linear).with(on.spring(&[1.0]).unwrap()).unwrap();
+    let system = SystemWithForces::new(&linear).with(on.spring(&[1.0]).unwrap()).unwrap();
     let refused = MatrixExponential::LINEAR.prepare(&system, 0.1).err();
     assert!(matches!(refused, Some(IntegrateError::LinearOnly { .. })));
     let force = still(0.1, 8, 1);
     let refused = integrate_periodic(&Newmark::AVERAGE_ACCELERATION, &system, &force);
     assert!(matches!(refused, Err(IntegrateError::LinearOnly { .. })));
     let outside = Connection::between(0, 1).spring(&[1.0]).unwrap();
-    let refused = NonlinearSystem::new(&linear).with(outside).err();
+    let refused = SystemWithForces::new(&linear).with(outside).err();
     assert_eq!(refused, Some(IntegrateError::DofOutside { index: 1, dof: 1 }));
     let twice = Connection::between(0, 0).spring(&[1.0]).unwrap();
-    let refused = NonlinearSystem::new(&linear).with(twice).err();
+    let refused = SystemWithForces::new(&linear).with(twice).err();
     assert_eq!(refused, Some(IntegrateError::ForcedTwice { index: 0 }));
     // Stability is checked of the linear part.
     let step = CentralDifference::default().prepare(&system, 2.1).err();

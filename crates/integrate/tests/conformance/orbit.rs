@@ -31,7 +31,7 @@ fn a_chosen_response_is_an_orbit_with_the_multipliers_of_its_damping() {
     let (c, omega) = (0.4, 2.0);
     let linear = oscillator(1.0, c, 1.0);
     let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0]).unwrap();
-    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let product = (-c * TAU / omega).exp();
     for scheme in schemes().iter().filter(|s| s.name() != "matrix exponential") {
         let (scheme, name) = (scheme.as_ref(), scheme.name());
@@ -90,7 +90,7 @@ fn the_three_orbits_of_a_folded_resonance_are_found() {
     assert_eq!(amplitudes.len(), 3, "{amplitudes:?}");
     let linear = oscillator(1.0, c, 1.0);
     let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, k3]).unwrap();
-    let system = NonlinearSystem::new(&linear).with(cubic).unwrap();
+    let system = SystemWithForces::new(&linear).with(cubic).unwrap();
     let force = one_period(omega, 200, |t| f * (omega * t).cos());
     for (k, a) in amplitudes.into_iter().enumerate() {
         // x = A cos(ωt − φ) with the phase that the balance leaves.
@@ -140,7 +140,7 @@ fn orbits_that_are_not_isolated_or_not_there_are_refused() {
     assert!(matches!(refused, Err(IntegrateError::NoPeriodicState { .. })), "{refused:?}");
     // A constant force that nothing balances.
     let pushed = ForceFunction::new(vec![0], |_, _, v, g| g[0] = -1.0 + 0.1 * v[0].tanh());
-    let pushed = NonlinearSystem::new(&free).with(pushed).unwrap();
+    let pushed = SystemWithForces::new(&free).with(pushed).unwrap();
     let refused = of(&pushed);
     let none = matches!(
         refused,

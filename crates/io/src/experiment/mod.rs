@@ -7,7 +7,7 @@ mod scheme;
 
 use std::path::Path;
 
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::{InitialState, NonlinearSystem, SecondOrderSystem};
 use mechid_signal::{Record, Sampling, message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
@@ -19,7 +19,7 @@ pub use self::scheme::{
     FirstDisplacements, FirstSteps, HeldOrLinear, LoadBeyond, MiddleLoad, ReturnedAcceleration,
     SchemeChoice, SubStepLoad,
 };
-use crate::system::SystemDescription;
+use crate::system::{NonlinearDescription, SystemDescription};
 use crate::{IoError, escaped, json};
 
 /// A simulated experiment. An unknown field in the file is an error.
@@ -44,6 +44,8 @@ pub struct Experiment {
     #[serde(skip)]
     file: String,
     system: SystemDescription,
+    #[serde(default)]
+    nonlinear: Option<NonlinearDescription>,
     sampling: SamplingDescription,
     #[serde(deserialize_with = "excitation::one_or_more")]
     excitation: Vec<Excitation>,
@@ -121,6 +123,18 @@ impl Experiment {
     /// they make no system.
     pub fn system(&self) -> Result<SecondOrderSystem, IoError> {
         self.system.system(&self.file)
+    }
+
+    /// The system with its nonlinear terms, if it has any.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::system`], and [`IoError::Model`] if the terms do not belong to the system.
+    pub fn nonlinear_system(&self) -> Result<Option<NonlinearSystem>, IoError> {
+        let Some(NonlinearDescription { terms, coefficients, .. }) = &self.nonlinear else {
+            return Ok(None);
+        };
+        let system = NonlinearSystem::new(self.system()?, terms.clone(), coefficients.clone());
+        system.map(Some).map_err(|source| IoError::Model { file: self.file.clone(), source })
     }
 
     /// One period of the force: samples × degrees of freedom, in N.

@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::Simulation;
 use mechid::io::{CsvFile, Experiment, ResponseKind, SystemMatrices};
+use mechid::model::{Term, Terms};
 use mechid::signal::{Record, message};
 use serde::Serialize;
 
@@ -21,6 +22,9 @@ use mechid::analysis::text::{compact, significant, text_table};
 ///
 ///   system      mass, damping, stiffness (numbers, or matrices as lists of rows), or mass,
 ///               natural_frequency_hz, damping_ratio
+///
+///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and their coefficients, a list;
+///               as identify --json prints them
 ///
 ///   sampling    samples in one period, rate_hz
 ///
@@ -86,6 +90,14 @@ struct Report {
     modes: Vec<Mode>,
     channels: Vec<Channel>,
     system: SystemMatrices,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    nonlinear: Option<Nonlinear>,
+}
+
+#[derive(Debug, Serialize)]
+struct Nonlinear {
+    terms: Terms,
+    coefficients: Vec<f64>,
 }
 
 #[derive(Debug, Serialize)]
@@ -162,6 +174,10 @@ impl SimulateArgs {
                 .collect(),
             channels,
             system: SystemMatrices::from(&simulation.system),
+            nonlinear: simulation.nonlinear.as_ref().map(|system| Nonlinear {
+                terms: system.terms().clone(),
+                coefficients: system.coefficients().to_vec(),
+            }),
         })
     }
 }
@@ -207,6 +223,12 @@ impl Channel {
     }
 }
 
+impl Nonlinear {
+    fn each(&self) -> impl Iterator<Item = (&Term, &f64)> {
+        self.terms.iter().zip(&self.coefficients)
+    }
+}
+
 impl Report {
     fn text(&self) -> String {
         let kind = match self.response {
@@ -225,8 +247,16 @@ impl Report {
         for Convention { what, choice } in &self.conventions {
             text += &format!("  {what}: {choice}\n");
         }
+        for (term, coefficient) in self.nonlinear.iter().flat_map(Nonlinear::each) {
+            let value = significant(*coefficient, 6);
+            text += &format!("nonlinear term {term}, {} = {value} {}\n", term.name(), term.unit());
+        }
         let header = |cells: [&str; 3]| cells.map(String::from).to_vec();
-        let mut rows = vec![header(["mode", "natural frequency (Hz)", "damping ratio"])];
+        let mode = match self.nonlinear {
+            Some(_) => "mode of small amplitude",
+            None => "mode",
+        };
+        let mut rows = vec![header([mode, "natural frequency (Hz)", "damping ratio"])];
         for (number, mode) in (1..).zip(&self.modes) {
             let cells = [mode.natural_frequency_hz, mode.damping_ratio];
             let mut row = vec![format!("{number}")];

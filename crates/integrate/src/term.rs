@@ -1,0 +1,91 @@
+//! The terms of an identified system as a force of the schemes.
+
+use mechid_model::{Coordinate, ModelError, Term, Terms};
+
+use crate::nonlinear::{NonlinearForce, Tangents};
+
+/// Nonlinear springs and dampers as they are identified: θ f(q, q̇) of every term.
+///
+/// ```
+/// use mechid_integrate::{NonlinearForce, TermForces};
+///
+/// // Between degrees of freedom 1 and 2: 5 (x1 − x2)³.
+/// let spring = TermForces::new(&"k3: (x1-x2)^3".parse()?, &[5.0])?;
+/// let mut g = [0.0; 2];
+/// spring.force(0.0, &[3.0, 1.0], &[0.0; 2], &mut g);
+/// assert_eq!((spring.dofs(), g), (&[0, 1][..], [40.0, -40.0]));
+/// # Ok::<(), mechid_model::ModelError>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct TermForces {
+    /// Degrees of freedom that the terms act on, counted from 0, rising.
+    dofs: Vec<usize>,
+    /// Each term with its coefficient and the places of its coordinate among them.
+    terms: Vec<(Term, f64, Coordinate)>,
+}
+
+impl TermForces {
+    /// Terms with their coefficients, one for each, in its unit.
+    ///
+    /// # Errors
+    /// [`ModelError::Coefficients`] unless there is one finite coefficient for each.
+    pub fn new(terms: &Terms, coefficients: &[f64]) -> Result<Self, ModelError> {
+        if coefficients.len() != terms.len() || coefficients.iter().any(|c| !c.is_finite()) {
+            let (got, terms) = (coefficients.len(), terms.len());
+            return Err(ModelError::Coefficients { got, terms });
+        }
+        let mut dofs: Vec<usize> = terms.iter().flat_map(|term| ends(term.coordinate())).collect();
+        dofs.sort_unstable();
+        dofs.dedup();
+        let place = |dof: usize| dofs.binary_search(&dof).expect("an end of a term");
+        let local = |coordinate: Coordinate| match coordinate {
+            Coordinate::Dof(i) => Coordinate::Dof(place(i)),
+            Coordinate::Difference(i, j) => Coordinate::Difference(place(i), place(j)),
+        };
+        let terms = terms.iter().zip(coefficients);
+        let terms = terms.map(|(term, c)| (term.clone(), *c, local(term.coordinate()))).collect();
+        Ok(Self { dofs, terms })
+    }
+}
+
+/// The degrees of freedom of a coordinate.
+fn ends(coordinate: Coordinate) -> Vec<usize> {
+    match coordinate {
+        Coordinate::Dof(i) => vec![i],
+        Coordinate::Difference(i, j) => vec![i, j],
+    }
+}
+
+impl NonlinearForce for TermForces {
+    fn dofs(&self) -> &[usize] {
+        &self.dofs
+    }
+
+    fn force(&self, _time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
+        g.fill(0.0);
+        for (term, coefficient, at) in &self.terms {
+            let value = coefficient * term.law().value(at.of(x), at.of(v));
+            for (place, g) in g.iter_mut().enumerate() {
+                *g += at.sign(place) * value;
+            }
+        }
+    }
+
+    fn tangents(&self, _time: f64, x: &[f64], v: &[f64], tangents: &mut Tangents) -> bool {
+        tangents.stiffness.fill(0.0);
+        tangents.damping.fill(0.0);
+        for (term, coefficient, at) in &self.terms {
+            let slopes = term.law().slopes(at.of(x), at.of(v));
+            let both = [&mut tangents.stiffness, &mut tangents.damping];
+            for (tangent, slope) in both.into_iter().zip(slopes) {
+                for ((row, column), entry) in (0..self.dofs.len())
+                    .flat_map(|c| (0..self.dofs.len()).map(move |r| (r, c)))
+                    .zip(tangent.iter_mut())
+                {
+                    *entry += at.sign(row) * at.sign(column) * coefficient * slope;
+                }
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,63 @@
+//! A random test whose response is known in closed form.
+
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_signal::{Record, Sampling, Spectrum, noise};
+use nalgebra::Complex;
+
+use crate::{ProblemError, exact_harmonic_periodic};
+
+/// A window cut out of the steady state under a Gaussian random force of a period four times as long.
+///
+/// The force has its lines up to [`RandomTest::BAND`] of the sampling rate, as behind an anti-aliasing filter,
+/// and the response is exact at each of them; the window begins and ends in motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RandomTest {
+    /// The machine, driven at every degree of freedom by forces of its own.
+    pub system: SecondOrderSystem,
+    /// Time axis of the window.
+    pub sampling: Sampling,
+    /// Quantity of the response.
+    pub quantity: ResponseQuantity,
+    /// Standard deviation of each force before the band is cut out, in N.
+    pub force: f64,
+}
+
+impl RandomTest {
+    /// Highest frequency of the force, as part of the sampling rate.
+    pub const BAND: f64 = 0.35;
+    /// Length of the period over that of the window.
+    const LONGER: usize = 4;
+
+    /// The forces (N) and the responses in one window, samples × degrees of freedom; other ones for every seed.
+    ///
+    /// # Errors
+    /// [`ProblemError`] if the system has no receptance at a line.
+    pub fn measure(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
+        let samples = self.sampling.len();
+        let [force, response] = self.period(seed)?;
+        // Anywhere but at the ends of the period, where both would close.
+        let first = samples / 2 + 1;
+        Ok([force.window(first, samples)?, response.window(first, samples)?])
+    }
+
+    /// The same over the whole period.
+    ///
+    /// # Errors
+    /// As [`RandomTest::measure`].
+    pub fn period(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
+        let period = self.sampling.with_len(Self::LONGER * self.sampling.len())?;
+        let white = noise::white(period, self.system.dof(), self.force, seed)?;
+        let mut lines = Spectrum::of(&white).lines().clone();
+        let last = (Self::BAND * period.len() as f64) as usize;
+        lines.row_mut(0).fill(Complex::from(0.0));
+        lines.rows_mut(last, lines.nrows() - last).fill(Complex::from(0.0));
+        let force = Spectrum::from_lines(period, lines)?.to_record()?;
+        let steady = exact_harmonic_periodic(&self.system, &force)?;
+        let response = match self.quantity {
+            ResponseQuantity::Displacement => steady.displacement(),
+            ResponseQuantity::Velocity => steady.velocity(),
+            ResponseQuantity::Acceleration => steady.acceleration(),
+        };
+        Ok([force, response.clone()])
+    }
+}
