@@ -32,6 +32,9 @@ impl RandomTest {
     ///
     /// # Errors
     /// [`ProblemError`] if the system has no receptance at a line.
+    ///
+    /// # Source
+    /// Ours.
     pub fn measure(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
         let samples = self.sampling.len();
         let [force, response] = self.period(seed)?;
@@ -44,6 +47,9 @@ impl RandomTest {
     ///
     /// # Errors
     /// As [`RandomTest::measure`].
+    ///
+    /// # Source
+    /// Ours: the response is that of [`exact_harmonic_periodic`].
     pub fn period(&self, seed: u64) -> Result<[Record; 2], ProblemError> {
         let period = self.sampling.with_len(Self::LONGER * self.sampling.len())?;
         let white = noise::white(period, self.system.dof(), self.force, seed)?;

@@ -281,7 +281,8 @@ fn a_whole_period_closes() {
             assert!(drawn.contains(part), "no {part}");
         }
     }
-    refused(folder, &format!("{common} --extent period"), &["--extent belongs to --domain time"]);
+    let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
+    refused(folder, &segments, &["--extent belongs to fits without --from-frf"]);
     let lines = "--domain time --lines odd --plot a.svg";
     refused(folder, &format!("{common} {lines}"), &["--lines belongs to --domain frequency"]);
 }

@@ -41,7 +41,7 @@ pub struct OutputErrorFit {
     /// Noise spectra by which it was weighted where they were estimated: one of each experiment from its
     /// periods, or one from the residual; none where the noise is known beforehand.
     pub noise: Vec<NoiseModel>,
-    /// What the ends of open records add, `None` where all rows belong to periods.
+    /// Loads of the ends of open records, `None` where all rows belong to periods.
     pub ends: Option<EndLoads>,
 }
 

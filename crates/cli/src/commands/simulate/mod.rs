@@ -23,8 +23,8 @@ use mechid::analysis::text::{compact, significant, text_table};
 ///   system      mass, damping, stiffness (numbers, or matrices as lists of rows), or mass,
 ///               natural_frequency_hz, damping_ratio
 ///
-///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and their coefficients, a list;
-///               as identify --json prints them
+///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and coefficients, a
+///               list, as identify --json prints them
 ///
 ///   sampling    samples in one period, rate_hz
 ///

@@ -3,7 +3,7 @@
 //! 4 and 8 periods.
 //!
 //! ```sh
-//! cargo run --release -p mechid-estimate --example noise_study -- 500 auto
+//! cargo run --release -p mechid-estimate --example coloured_noise_study -- 500 auto
 //! ```
 //!
 //! The arguments are the number of experiments, the noise model (`auto`, `white`, `smooth`, `neighbours:N` or
