@@ -7,7 +7,7 @@ pub mod summary;
 use std::fmt;
 use std::path::Path;
 
-use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis};
+use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis, escaped};
 use mechid_signal::{self as signal, message};
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -94,6 +94,23 @@ impl Serialize for Inspected {
     }
 }
 
+/// Returns the source of a time axis.
+fn source_of(table: &Table, time: &TimeAxis<'_>) -> String {
+    match time {
+        TimeAxis::RateHz(_) => "the sample rate given".into(),
+        TimeAxis::Column(name) => {
+            let label = table.find(name).map(|column| table.label(column));
+            format!("column {}", label.unwrap_or_else(|_| escaped(name).to_string()))
+        }
+        TimeAxis::OfFile => match table.stated_rate() {
+            Some((name, value)) => {
+                format!("{} = {} of the file", escaped(name), message::number(*value))
+            }
+            None => "of the file".into(),
+        },
+    }
+}
+
 /// An inspection before it is done.
 struct Inspection<'a> {
     reading: &'a Reading,
@@ -123,7 +140,9 @@ impl Inspection<'_> {
             0 => None,
             len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
         };
-        let mut summary = RecordSummary::begin(table, samples, window, dt, left_out, self.how);
+        let sampling = dt.zip(time.map(|time| source_of(table, &time)));
+        let mut summary =
+            RecordSummary::begin(table, samples, window, sampling, left_out, self.how);
         summary.remarks.extend(of_file);
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
             doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)

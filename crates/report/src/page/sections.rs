@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::When;
-use mechid_analysis::identify::summary::{IdentificationSummary, Uncertain};
+use mechid_analysis::identify::summary::{IdentificationSummary, ModeRow, Uncertain};
 use mechid_analysis::identify::validation::Share;
 use mechid_analysis::review::channels::Channel;
 use mechid_analysis::review::excitation::{DROP_DB, Excitation};
@@ -169,13 +169,8 @@ pub fn machine(contents: &Contents<'_>) -> Markup {
     let header = |what| [what, "value", "standard error", &interval, "unit"];
     let parameters =
         report.parameters.iter().map(|p| uncertain(p.name.clone(), &p.estimate, p.unit)).collect();
-    let mut modes = Vec::new();
-    for (number, mode) in (1..).zip(&report.modes) {
-        let name = |what: &str| format!("{number} {what}");
-        modes.push(uncertain(name("natural frequency"), &mode.natural_frequency_hz, "Hz"));
-        modes.push(uncertain(name("damped frequency"), &mode.damped_frequency_hz, "Hz"));
-        modes.push(uncertain(name("damping ratio"), &mode.damping_ratio, "–"));
-    }
+    let modes = ModeRow::quantities(&report.modes, true).into_iter();
+    let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
     html! {
         div.tables {
             (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
