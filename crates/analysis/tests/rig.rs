@@ -1,7 +1,9 @@
 //! Records as real rigs make them: one shaker at a time, and disturbances with lines of their own.
 
 use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
-use mechid_analysis::{Identified, Identify, Measurement, ResponseQuantity, identify};
+use mechid_analysis::{
+    FrfSettings, Identified, Identify, Measurement, ResponseQuantity, frf, identify,
+};
 use mechid_estimate::checks::{Concentration, Finding};
 use mechid_model::{Response, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
@@ -201,4 +203,47 @@ fn lines_of_a_disturbance_are_left_out() {
         assert!(!found.checks().iter().any(|check| check.is_conspicuous()), "{found}");
         assert!(error(&found.system().unwrap()) < 0.01, "{found}");
     }
+}
+
+/// Judge: (K − ω²M + iωC)⁻¹. Two shakers with every second line each, 1 % of noise in all channels: each
+/// response is given on the lines of its force alone, and there it is the machine's.
+#[test]
+fn responses_to_interleaved_forces_are_those_on_their_own_lines() {
+    let period = Sampling::new(0.008, PERIOD).unwrap();
+    let system = chain(2, Support::Held, 0.02, 3);
+    let shaker = |first: usize| {
+        let lines = (first..=70).step_by(2);
+        Multisine::flat(lines, 10.0, Phases::Random { seed: 4 }).unwrap().sample(period).unwrap()
+    };
+    let [one, two] = [shaker(1), shaker(2)];
+    let force = Record::from_channels(period, &[one.channel(0), two.channel(0)]).unwrap();
+    let motion = exact_harmonic_periodic(&system, &force).unwrap();
+    let noisy = |record: &Record, seed| {
+        let all = record.repeated(8).unwrap();
+        noise::add_white(&all, NoiseLevel::FractionOfRms(0.01), seed).unwrap()
+    };
+    let (force, x) = (noisy(&force, 1), noisy(motion.displacement(), 2));
+    let responses = [(ResponseQuantity::Displacement, &x)];
+    let measured = Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap();
+    let table = frf(&measured, &FrfSettings::default()).unwrap();
+    assert_eq!((table.frequency_hz.len(), table.responses.len()), (70, 4));
+    for response in &table.responses {
+        let values = response.real.iter().zip(&response.imaginary).zip(&response.standard_error);
+        let mut given = Vec::new();
+        for (at, ((re, im), error)) in values.enumerate() {
+            if re.is_nan() {
+                continue;
+            }
+            given.push(at + 1);
+            let omega = std::f64::consts::TAU * table.frequency_hz[at];
+            let truth =
+                system.receptance(omega).unwrap()[(response.motion - 1, response.force - 1)];
+            let off = (re - truth.re).hypot(im - truth.im);
+            assert!(off < 6.0 * error + 0.01 * truth.norm(), "{off} {error}, line {}", at + 1);
+        }
+        let own: Vec<usize> = (response.force..=70).step_by(2).collect();
+        assert_eq!(given, own);
+    }
+    assert!(table.csv().lines().nth(1).unwrap().contains(",,,"));
+    assert!(table.to_responses(&[]).is_err());
 }

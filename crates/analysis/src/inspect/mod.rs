@@ -94,21 +94,10 @@ impl Serialize for Inspected {
     }
 }
 
-/// Returns the source of a time axis.
-fn source_of(table: &Table, time: &TimeAxis<'_>) -> String {
-    match time {
-        TimeAxis::RateHz(_) => "the sample rate given".into(),
-        TimeAxis::Column(name) => {
-            let label = table.find(name).map(|column| table.label(column));
-            format!("column {}", label.unwrap_or_else(|_| escaped(name).to_string()))
-        }
-        TimeAxis::OfFile => match table.stated_rate() {
-            Some((name, value)) => {
-                format!("{} = {} of the file", escaped(name), message::number(*value))
-            }
-            None => "of the file".into(),
-        },
-    }
+/// Returns the number in the file, if it is one, that states a time axis.
+fn stated_by(table: &Table, time: &TimeAxis<'_>) -> Option<String> {
+    let (name, value) = table.stated_rate().filter(|_| *time == TimeAxis::OfFile)?;
+    Some(format!("{} = {}", escaped(name), message::number(*value)))
 }
 
 /// An inspection before it is done.
@@ -140,7 +129,7 @@ impl Inspection<'_> {
             0 => None,
             len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
         };
-        let sampling = dt.zip(time.map(|time| source_of(table, &time)));
+        let sampling = dt.zip(time.map(|time| stated_by(table, &time)));
         let mut summary =
             RecordSummary::begin(table, samples, window, sampling, left_out, self.how);
         summary.remarks.extend(of_file);

@@ -207,13 +207,9 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
 
 /// The frequency response, and the motion in time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let several = "on every line several forces act, so the record shows no single one";
     let receptance = match &contents.review.receptance {
         Err(reason) => Err(reason.as_str()),
-        Ok(measured) => match figures::receptance(contents.review.found, measured) {
-            Err(ReportError::NoReceptance) => Err(several),
-            drawn => Ok(drawn?),
-        },
+        Ok(measured) => Ok(figures::receptance(contents.review.found, measured)?),
     };
     let mut fits = Vec::new();
     for part in &contents.review.records {
