@@ -121,7 +121,7 @@ impl IdentificationSummary {
             confidence: CONFIDENCE,
             parameters: parameters(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
-            modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
+            modes: ModeRow::all(&estimate.modes()?, false)?,
             fit: FitRow {
                 nrmse: match fitted.is_weighted() {
                     true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
@@ -163,6 +163,9 @@ impl IdentificationSummary {
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         let mut misfits = self.checks.iter().filter(|check| check.subject == Subject::Misfit);
+        // A growth within its standard errors is no warning of the checks.
+        let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);
+        doubts.extend(growing.filter(|check| !check.is_conspicuous()).map(CheckRow::sentence));
         // Of a residual that is noise the checks tell.
         let is_noise = misfits.next().is_some_and(|check| !check.is_conspicuous())
             && misfits.all(|check| !check.is_conspicuous());
@@ -212,12 +215,14 @@ impl IdentificationSummary {
     /// Returns the title of a figure: the record and its modes.
     pub fn title(&self) -> String {
         let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
-        let modes: Vec<String> = self
-            .modes
-            .iter()
-            .map(|mode| {
+        let once = self.modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at));
+        let modes: Vec<String> = once
+            .map(|(_, mode)| {
                 let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
-                format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
+                match mode.is_rigid_body {
+                    true => "rigid-body mode".into(),
+                    false => format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3)),
+                }
             })
             .collect();
         format!("{name}: {}", modes.join("; "))
