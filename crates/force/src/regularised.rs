@@ -89,8 +89,7 @@ pub fn regularised(
     let force = found.force;
     let rest = measured.exceeds(forced).then(|| match unknowns {
         ForceUnknowns::Samples(start) => {
-            let start = (*start, &scale[..]);
-            Rest::of_open(system, measured, forced, force.record(), start, level)
+            Rest::of_open(system, measured, forced, force.record(), *start, &scale, level)
         }
         _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
     });

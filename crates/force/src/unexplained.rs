@@ -109,7 +109,8 @@ impl Rest {
         measured: &Measurement,
         forced: &[usize],
         force: &Record,
-        (start, scale): (Start, &[f64]),
+        start: Start,
+        scale: &[f64],
         level: Option<&[f64]>,
     ) -> Result<Self, ForceError> {
         let machine = Machine::new(system, measured, forced, scale)?;

@@ -100,7 +100,7 @@ impl FrfTable {
         }
         let coherence = (0..n).map(|motion| Coherence::of(averaged, motion)).collect();
         let omega = averaged.frf.omega().to_vec();
-        Self::of(measured, averaged, how, (omega, responses, coherence))
+        Self::of(measured, averaged, how, omega, responses, coherence)
     }
 
     /// Of forces each of which has lines of its own.
@@ -128,7 +128,7 @@ impl FrfTable {
         });
         let coherence = coherence.collect();
         let omega = places.iter().map(|(omega, ..)| *omega).collect();
-        let mut table = Self::of(measured, &parts[0], how, (omega, responses, coherence));
+        let mut table = Self::of(measured, &parts[0], how, omega, responses, coherence);
         table.remarks.push(
             "every force has lines of its own: the responses to it are those on its lines alone"
                 .into(),
@@ -140,7 +140,9 @@ impl FrfTable {
         measured: &Block,
         averaged: &Responses,
         how: &FrfSettings,
-        (omega, responses, coherence): (Vec<f64>, Vec<Response>, Vec<Coherence>),
+        omega: Vec<f64>,
+        responses: Vec<Response>,
+        coherence: Vec<Coherence>,
     ) -> Self {
         let kind = averaged.frf.measured();
         Self {

@@ -48,7 +48,7 @@ pub fn fit(
             checks.extend(claimed_period(&held.force, held.period));
         }
         before.push(checks);
-        after.push(looked_at(held, r, unknowns, &estimate, (data.len(), periodic))?);
+        after.push(looked_at(held, r, unknowns, &estimate, data.len(), periodic)?);
     }
     Ok(Fitted {
         domain: "frequency",
@@ -105,7 +105,8 @@ fn looked_at(
     r: &Responses,
     unknowns: &Unknowns,
     estimate: &Estimate,
-    (rows, periodic): (usize, bool),
+    rows: usize,
+    periodic: bool,
 ) -> Result<Vec<Finding>, AnalysisError> {
     let late = delay_of_lines(&r.frf.data(&r.driven)?, held.force.sampling().dt(), unknowns);
     let share = (r.driven.len() * r.lines.as_slice().len()) as f64 / rows as f64;

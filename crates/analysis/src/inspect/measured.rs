@@ -73,7 +73,8 @@ pub fn measured(
     file: &RecordFile,
     shown: &[Shown],
     window: Span,
-    (dt, period): (Option<f64>, Option<usize>),
+    dt: Option<f64>,
+    period: Option<usize>,
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
     // A text is read once for all columns; of what is held, one copy at a time is enough.
     let at_once = if file.is_whole() { 1 } else { shown.len() };

@@ -141,7 +141,7 @@ impl Inspection<'_> {
             summary.remarks.extend(window.looked_at(table.file()));
             summary.remarks.extend(self.choose_drawn(table, &mut shown));
             let period = self.window.period;
-            (summary.channels, drawn) = measured(&file, &shown, window, (dt, period))?;
+            (summary.channels, drawn) = measured(&file, &shown, window, dt, period)?;
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
