@@ -445,7 +445,7 @@ pub fn sweep(
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::{FRAC_1_PI, FRAC_PI_2};
+    use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI};
 
     use super::*;
 
@@ -473,13 +473,14 @@ mod tests {
                      "nonlinear": {{ "terms": "k3: x1^3", "coefficients": [1] }},
                      "sampling": {{ "samples": 400, "rate_hz": {} }},
                      "excitation": [
-                       {{ "kind": "harmonic", "amplitude": -2.25, "frequency_hz": {hz} }},
+                       {{ "kind": "harmonic", "amplitude": 2.25, "frequency_hz": {hz}, "phase_rad": {half} }},
                        {{ "kind": "harmonic", "amplitude": 0.2, "frequency_hz": {hz}, "phase_rad": {quarter} }},
                        {{ "kind": "harmonic", "amplitude": 0.25, "frequency_hz": {} }}],
                      "scheme": {scheme}, "response": {response} }}"#,
                 400.0 * FRAC_1_PI,
                 3.0 * FRAC_1_PI,
                 hz = FRAC_1_PI,
+                half = PI,
                 quarter = FRAC_PI_2,
             );
             simulate(&Experiment::parse("test.json", &text).unwrap())
