@@ -80,7 +80,9 @@ pub(crate) enum Axis {
     /// Uniform, in s.
     Even { start: f64, step: f64 },
     /// Uniform from 0 s, with a step in s that a number beside the columns states by its name.
-    Stated { step: f64 },
+    Stated { step: f64, scalar: usize },
+    /// Two such numbers contradict each other.
+    Contradiction { scalars: [usize; 2], steps: [f64; 2] },
     /// In the column with this index.
     Column(usize),
 }

@@ -134,14 +134,14 @@ pub enum IoError {
         available: String,
     },
     /// Several columns bear the name asked for.
-    #[error("{}", Message(format_args!("{file} has several columns \"{wanted}\"; choose one by its number: its columns are {available}")))]
+    #[error("{}", Message(format_args!("{file} has several columns \"{wanted}\"; choose one by its number: {candidates}")))]
     AmbiguousColumn {
         /// The file.
         file: String,
         /// Name or number asked for.
         wanted: String,
-        /// Numbers and names of the columns there are.
-        available: String,
+        /// Numbers and names of the columns of that name.
+        candidates: String,
     },
     /// One column was asked for twice.
     #[error("{}", Message(format_args!("column {column} of {file} is used twice, as \"{first}\" and as \"{second}\"; its columns are {available}")))]
@@ -306,6 +306,26 @@ pub enum IoError {
         own_hz: f64,
         /// The rate given, in Hz.
         rate_hz: f64,
+    },
+    /// Two numbers in a file state different sampling rates.
+    #[error("{}", Message(format_args!("{file} states two sample rates: {first} = {first_value}, which is {first_hz} Hz, and {second} = {second_value}, which is {second_hz} Hz; give the right one as `sample_rate`",
+        first_value = message::number(*first_value), second_value = message::number(*second_value),
+        first_hz = message::number(*first_hz), second_hz = message::number(*second_hz))))]
+    StatedRates {
+        /// The file.
+        file: String,
+        /// Name of one number.
+        first: String,
+        /// Its value, in Hz or s.
+        first_value: f64,
+        /// Rate that it states, in Hz.
+        first_hz: f64,
+        /// Name of the other number.
+        second: String,
+        /// Its value, in Hz or s.
+        second_value: f64,
+        /// Rate that it states, in Hz.
+        second_hz: f64,
     },
     /// The sampling rate is not usable.
     #[error("{}", Message(format_args!("the sample rate must be a positive finite number of Hz, got {rate_hz}",

@@ -7,7 +7,7 @@ pub mod summary;
 use std::fmt;
 use std::path::Path;
 
-use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis};
+use mechid_io::{Inventory, IoError, RecordFile, Table, TimeAxis, escaped};
 use mechid_signal::{self as signal, message};
 use serde::{Deserialize, Serialize, Serializer};
 
@@ -94,6 +94,12 @@ impl Serialize for Inspected {
     }
 }
 
+/// Returns the number in the file, if it is one, that states a time axis.
+fn stated_by(table: &Table, time: &TimeAxis<'_>) -> Option<String> {
+    let (name, value) = table.stated_rate().filter(|_| *time == TimeAxis::OfFile)?;
+    Some(format!("{} = {}", escaped(name), message::number(*value)))
+}
+
 /// An inspection before it is done.
 struct Inspection<'a> {
     reading: &'a Reading,
@@ -123,7 +129,9 @@ impl Inspection<'_> {
             0 => None,
             len => Some(Span::of(self.window.span(table.file(), len)?, &file)),
         };
-        let mut summary = RecordSummary::begin(table, samples, window, dt, left_out, self.how);
+        let sampling = dt.zip(time.map(|time| stated_by(table, &time)));
+        let mut summary =
+            RecordSummary::begin(table, samples, window, sampling, left_out, self.how);
         summary.remarks.extend(of_file);
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
             doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)

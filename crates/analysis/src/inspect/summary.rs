@@ -56,6 +56,9 @@ pub struct SamplingRow {
     pub step_s: f64,
     /// Length, in s.
     pub duration_s: f64,
+    /// Number in the file that states the rate or the step, such as `Fs = 25600`; `None` if the time axis
+    /// comes from elsewhere.
+    pub stated_by: Option<String>,
 }
 
 /// A single number in the file.
@@ -74,8 +77,8 @@ impl WindowRow {
 }
 
 impl SamplingRow {
-    fn of(dt: f64, len: usize) -> Self {
-        Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt }
+    fn of(dt: f64, len: usize, stated_by: Option<String>) -> Self {
+        Self { rate_hz: 1.0 / dt, step_s: dt, duration_s: len as f64 * dt, stated_by }
     }
 }
 
@@ -85,7 +88,7 @@ impl RecordSummary {
         table: &Table,
         samples: usize,
         window: Option<Span>,
-        dt: Option<f64>,
+        sampling: Option<(f64, Option<String>)>,
         left_out: Vec<String>,
         settings: &InspectSettings,
     ) -> Self {
@@ -96,7 +99,9 @@ impl RecordSummary {
             columns: table.width(),
             samples,
             window: window.map(|window| WindowRow::of(window.start, window.len)),
-            sampling: dt.zip(window).map(|(dt, window)| SamplingRow::of(dt, window.len)),
+            sampling: sampling
+                .zip(window)
+                .map(|((dt, stated_by), window)| SamplingRow::of(dt, window.len, stated_by)),
             channels: Vec::new(),
             scalars: scalars
                 .map(|(name, value)| Scalar { name: name.clone(), value: *value })
@@ -120,10 +125,13 @@ impl RecordSummary {
         }
         text += &match &self.sampling {
             Some(s) => format!(
-                "\n{} Hz, a step of {} s, {} s long\n",
+                "\n{} Hz, a step of {} s, {} s long{}\n",
                 compact(s.rate_hz, 8),
                 compact(s.step_s, 6),
-                compact(s.duration_s, 6)
+                compact(s.duration_s, 6),
+                s.stated_by.as_ref().map_or(String::new(), |number| format!(
+                    "; by {number} of the file, no time column"
+                ))
             ),
             None => "\nno time axis: give --time or --sample-rate\n".into(),
         };

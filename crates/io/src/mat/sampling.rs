@@ -37,20 +37,22 @@ const SAME_STEP: f64 = 1e-5;
 
 /// Gives every column the rate that is stated beside it, or beside the struct that holds it.
 pub(super) fn with_stated_rates(mut contents: Contents) -> Contents {
-    let stated: Vec<(&str, f64)> = contents
-        .scalars
-        .iter()
-        .filter_map(|(name, value)| Some((enclosing(name), step(name, *value)?)))
+    let stated: Vec<(usize, &str, f64)> = (0..)
+        .zip(&contents.scalars)
+        .filter_map(|(at, (name, value))| Some((at, enclosing(name), step(name, *value)?)))
         .collect();
     for column in &mut contents.columns {
         let mut within = Some(enclosing(&column.name));
         while let Some(place) = within {
-            let mut steps = stated.iter().filter(|(at, _)| *at == place).map(|(_, step)| *step);
-            if let Some(first) = steps.next() {
-                // Two that contradict each other state nothing.
-                if steps.all(|step| (step - first).abs() <= SAME_STEP * first) {
-                    column.axis = Axis::Stated { step: first };
-                }
+            let mut here = stated.iter().filter(|(_, at, _)| *at == place);
+            if let Some((scalar, _, step)) = here.next() {
+                let other = here.find(|(_, _, other)| (other - step).abs() > SAME_STEP * step);
+                column.axis = match other {
+                    None => Axis::Stated { step: *step, scalar: *scalar },
+                    Some((second, _, other)) => {
+                        Axis::Contradiction { scalars: [*scalar, *second], steps: [*step, *other] }
+                    }
+                };
                 break;
             }
             within = (!place.is_empty()).then(|| enclosing(place));

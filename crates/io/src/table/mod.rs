@@ -246,9 +246,19 @@ impl Table {
     pub fn has_time_axis(&self) -> bool {
         self.contents.columns.iter().any(|column| match column.axis {
             Axis::Unknown => false,
-            Axis::Stated { .. } => self.time_column().is_none(),
+            Axis::Stated { .. } | Axis::Contradiction { .. } => self.time_column().is_none(),
             Axis::Even { .. } | Axis::Column(_) => true,
         })
+    }
+
+    /// Name and value of the number beside the columns (`Fs`, `dt`) that states their sampling rate, where
+    /// [`TimeAxis::OfFile`] is taken from one.
+    pub fn stated_rate(&self) -> Option<&(String, f64)> {
+        let stated = self.contents.columns.iter().find_map(|column| match column.axis {
+            Axis::Stated { scalar, .. } => Some(scalar),
+            _ => None,
+        });
+        stated.filter(|_| self.time_column().is_none()).map(|at| &self.contents.scalars[at])
     }
 
     /// The first column named `time` or `t`, in any case, with a unit (`time_ms`, `Time [s]`) or without.
@@ -280,7 +290,11 @@ impl Table {
     /// List of the columns, for a message: `1 "time", 2 "force"`; of the first ones if there are very
     /// many.
     pub fn available(&self) -> String {
-        let mut columns = self.filled_columns();
+        self.list(self.filled_columns())
+    }
+
+    /// List of columns by their indices, of the first ones if there are very many.
+    fn list(&self, mut columns: impl Iterator<Item = usize>) -> String {
         let mut list: Vec<String> =
             columns.by_ref().take(MOST_LISTED).map(|c| self.label(c)).collect();
         let others = columns.count();
@@ -309,13 +323,13 @@ impl Table {
         }
         let only = |is_named: &dyn Fn(&str) -> bool| {
             let mut named = (0..width).filter(|c| is_named(&self.names[*c]));
-            let first = named.next();
+            let Some(first) = named.next() else { return Ok(None) };
             match named.next() {
-                None => Ok(first),
-                Some(_) => Err(IoError::AmbiguousColumn {
+                None => Ok(Some(first)),
+                Some(second) => Err(IoError::AmbiguousColumn {
                     file: self.file.clone(),
                     wanted: wanted.into(),
-                    available: self.available(),
+                    candidates: self.list([first, second].into_iter().chain(named)),
                 }),
             }
         };

@@ -1,7 +1,15 @@
 //! Instants that were rounded to the digits with which they are printed.
 
-/// Part of a step that the rounding may be: beyond it a missing sample could pass for rounding.
-const COARSEST: f64 = 1.0 / 3.0;
+/// Rounding over the step from which on instants are too coarse: a missing sample could pass for
+/// rounding.
+const COARSEST: f64 = 1.0;
+
+/// Part of a step by which instants may miss equally spaced ones beyond their rounding.
+const SLACK: f64 = 0.01;
+
+/// Number of corners of a hull beyond which the instants lie on a curve: those of rounded ones grow with
+/// the third root of their number.
+const MOST_CORNERS: usize = 1 << 16;
 
 /// Digits of a double, beyond which no decimal rounding shows.
 const DOUBLE_DIGITS: i32 = 17;
@@ -12,9 +20,10 @@ const BEGINNING: usize = 1024;
 /// A test whether instants, taken one by one, are equally spaced but for rounding.
 ///
 /// The unit of the last digit is taken from the numbers themselves: the largest numbers of decimal
-/// places and of significant digits seen. Each instant leaves an interval for the step of a straight
-/// line through the first one; the instants are equally spaced as long as these intervals have a step
-/// in common.
+/// places and of significant digits seen. Each instant was somewhere within half a unit of what is
+/// printed; the instants are equally spaced as long as a straight line passes through all of these
+/// intervals. There is one if the concave envelope of their lower ends lies below the convex envelope of
+/// their upper ends, which takes one pass and few corners.
 #[derive(Debug)]
 pub(super) struct PrintedInstants {
     count: usize,
@@ -25,28 +34,82 @@ pub(super) struct PrintedInstants {
     digits: i32,
     /// Whether all are single precision.
     is_single: bool,
-    /// Rounding unit of the first instant, and of those within a decade.
-    first_unit: f64,
+    /// Rounding unit of the instants within a decade.
     decade: Decade,
     beginning: Vec<f64>,
-    /// Steps that fit the instants behind the beginning.
-    steps: Interval,
+    /// Intervals of the instants behind the beginning.
+    intervals: Intervals,
 }
 
-/// Steps between two bounds.
-#[derive(Debug, Clone, Copy)]
-struct Interval {
-    shortest: f64,
-    longest: f64,
+/// Intervals through which a straight line is to pass, by their number.
+#[derive(Debug, Clone, Default)]
+struct Intervals {
+    /// Corners of the concave envelope of the lower ends.
+    lower_ends: Vec<Corner>,
+    /// Corners of the convex envelope of the upper ends, with the opposite sign.
+    upper_ends: Vec<Corner>,
+    /// More corners than rounding makes.
+    is_curved: bool,
 }
 
-impl Interval {
-    /// Keeps the steps that take an instant to where it is, to within `rounding`.
-    fn meet(&mut self, elapsed: f64, rounding: f64, steps: usize) {
-        let per_step = (steps as f64).recip();
-        self.shortest = self.shortest.max((elapsed - rounding) * per_step);
-        self.longest = self.longest.min((elapsed + rounding) * per_step);
+/// A corner of an envelope: number of the interval, and end.
+type Corner = (f64, f64);
+
+impl Intervals {
+    /// Adds the interval behind all others.
+    fn push(&mut self, number: f64, middle: f64, half: f64) {
+        if self.is_curved {
+            return;
+        }
+        add_corner(&mut self.lower_ends, (number, middle - half));
+        add_corner(&mut self.upper_ends, (number, -(middle + half)));
+        if self.lower_ends.len().max(self.upper_ends.len()) > MOST_CORNERS {
+            *self = Self { is_curved: true, ..Self::default() };
+        }
     }
+
+    /// Adds the intervals of `others`, which are behind all of these.
+    fn append(&mut self, others: &Self) {
+        self.is_curved |= others.is_curved;
+        others.lower_ends.iter().for_each(|corner| add_corner(&mut self.lower_ends, *corner));
+        others.upper_ends.iter().for_each(|corner| add_corner(&mut self.upper_ends, *corner));
+    }
+
+    /// Returns how much all intervals must grow in all for a line to pass through them; zero or less if
+    /// one does.
+    fn overlap(&self) -> f64 {
+        if self.is_curved {
+            return f64::INFINITY;
+        }
+        // The sum of two concave functions is largest at a corner of either.
+        let at_corners = |corners: &[Corner], others: &[Corner]| {
+            let mut from = 0;
+            let mut largest = f64::NEG_INFINITY;
+            for (number, end) in corners {
+                while from + 2 < others.len() && others[from + 1].0 < *number {
+                    from += 1;
+                }
+                let (a, b) = (others[from], others[(from + 1).min(others.len() - 1)]);
+                let part = if b.0 > a.0 { (number - a.0) / (b.0 - a.0) } else { 0.0 };
+                largest = largest.max(end + a.1 + part * (b.1 - a.1));
+            }
+            largest
+        };
+        let (lower, upper) = (&self.lower_ends, &self.upper_ends);
+        at_corners(lower, upper).max(at_corners(upper, lower))
+    }
+}
+
+/// Adds a point behind all corners of a concave envelope.
+fn add_corner(corners: &mut Vec<Corner>, point: Corner) {
+    while let [.., a, b] = corners[..] {
+        // The middle one is below the chord of the others.
+        if (b.1 - a.1) * (point.0 - a.0) > (point.1 - a.1) * (b.0 - a.0) {
+            break;
+        }
+        corners.pop();
+    }
+    corners.push(point);
 }
 
 /// The rounding unit of numbers between two powers of ten.
@@ -71,10 +134,9 @@ impl Default for PrintedInstants {
             decimals: 0,
             digits: 1,
             is_single: true,
-            first_unit: 1.0,
             decade: Decade::NONE,
             beginning: Vec::new(),
-            steps: Interval { shortest: 0.0, longest: f64::INFINITY },
+            intervals: Intervals::default(),
         }
     }
 }
@@ -93,35 +155,36 @@ impl PrintedInstants {
             self.digits = self.digits.max(digits);
             self.decade = Decade::NONE;
             unit = self.unit(time);
-            self.first_unit = decimal_unit(self.first, self.decimals, self.digits);
         }
         if self.count < BEGINNING {
             self.beginning.push(time);
         } else {
-            self.steps.meet(time - self.first, self.rounding(time, unit), self.count);
+            let half = self.rounding(time, unit);
+            self.intervals.push(self.count as f64, time - self.first, half);
         }
         self.last = time;
         self.count += 1;
     }
 
-    /// Whether the instants are equally spaced but for rounding that is small against the step.
+    /// Whether the instants are equally spaced but for rounding by less than the step.
     pub fn are_uniform(&self) -> bool {
-        let mut steps = self.steps;
-        for (k, time) in self.beginning.iter().enumerate().skip(1) {
+        let mut intervals = Intervals::default();
+        for (k, time) in self.beginning.iter().enumerate() {
             let unit = decimal_unit(*time, self.decimals, self.digits);
-            steps.meet(time - self.first, self.rounding(*time, unit), k);
+            intervals.push(k as f64, time - self.first, self.rounding(*time, unit));
         }
+        intervals.append(&self.intervals);
+        let step = (self.last - self.first) / self.count.saturating_sub(1) as f64;
         let unit = decimal_unit(self.last, self.decimals, self.digits);
-        steps.longest.is_finite()
-            && steps.shortest <= steps.longest
-            && self.coarser(self.last, unit) <= COARSEST * steps.longest
+        step > 0.0
+            && step.is_finite()
+            && self.coarser(self.last, unit) < COARSEST * step
+            && intervals.overlap() <= SLACK * step
     }
 
-    /// Largest distance of an instant from the line: the first one and itself are rounded by half a
-    /// unit at most.
+    /// Largest distance of a printed instant from the one that was rounded.
     fn rounding(&self, time: f64, unit: f64) -> f64 {
-        let units = self.coarser(self.first, self.first_unit) + self.coarser(time, unit);
-        0.5 * units + f64::EPSILON * time.abs()
+        0.5 * self.coarser(time, unit) + f64::EPSILON * (time.abs() + self.first.abs())
     }
 
     /// The unit of an instant, or that of single precision if it is larger.
@@ -194,7 +257,7 @@ mod tests {
     #[test]
     fn rounded_instants_are_uniform() {
         for (rate, decimals) in
-            [(25_600.0, 5), (25_600.0, 6), (51_200.0, 6), (48_000.0, 6), (3.0, 2), (1024.0, 4)]
+            [(25_600.0, 5), (51_200.0, 5), (96_000.0, 5), (51_200.0, 6), (48_000.0, 6), (3.0, 2)]
         {
             assert!(
                 uniform(read(rate, 300_000, |t| format!("{t:.decimals$}"))),
@@ -207,6 +270,40 @@ mod tests {
         assert!(uniform(read(25_600.0, 300_000, |t| format!("{t:.6e}"))));
         // Single precision.
         assert!(uniform((0..300_000).map(|k| f64::from((f64::from(k) / 25_600.0) as f32))));
+    }
+
+    /// Instants at a rate in Hz from a random start, each off by noise, in steps.
+    fn printed_with_jitter(rate: f64, decimals: usize, jitter: f64, seed: u64) -> Vec<f64> {
+        let sampling = mechid_signal::Sampling::from_rate_hz(rate, 4096).unwrap();
+        let off = mechid_signal::noise::white(sampling, 1, jitter.max(1e-12), seed).unwrap();
+        let start = (seed as f64 * 0.618_034).fract();
+        let time = |(k, off): (usize, &f64)| start + (k as f64 + off) / rate;
+        let print = |t: f64| format!("{t:.decimals$}").parse().unwrap();
+        off.channel(0).iter().enumerate().map(time).map(print).collect()
+    }
+
+    /// Counted over 100 seeded records each: none of the rounded ones is refused, none of those with
+    /// genuine jitter or a sample missing is taken for rounding.
+    #[test]
+    fn rounding_is_told_from_jitter_and_from_a_gap() {
+        for (rate, decimals) in [(51_200.0, 5), (25_600.0, 6), (96_000.0, 5)] {
+            let accepted = |jitter: f64, lost: Option<usize>| {
+                let one = |seed: &u64| {
+                    let mut times = printed_with_jitter(rate, decimals, jitter, *seed);
+                    lost.map(|sample| times.remove(sample));
+                    uniform(times)
+                };
+                (0..100).filter(one).count()
+            };
+            assert_eq!(accepted(0.0, None), 100, "{rate} {decimals}");
+            for jitter in [0.02, 0.05, 0.2] {
+                assert_eq!(accepted(jitter, None), 0, "{rate} {decimals} jitter {jitter}");
+            }
+            // Near the ends coarse rounding leaves room for one.
+            for lost in [64, 100, 2048, 4000] {
+                assert_eq!(accepted(0.0, Some(lost)), 0, "{rate} {decimals} without {lost}");
+            }
+        }
     }
 
     #[test]

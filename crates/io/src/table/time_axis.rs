@@ -123,7 +123,20 @@ fn own_instants(table: &Table, column: usize) -> Result<Option<Instants>, IoErro
     Ok(match table.axis(column) {
         Axis::Unknown => None,
         Axis::Even { start, step } => Some(Instants { start, step }),
-        Axis::Stated { step } => Some(Instants { start: 0.0, step }),
+        Axis::Stated { step, .. } => Some(Instants { start: 0.0, step }),
+        Axis::Contradiction { scalars, steps } => {
+            let [(first, first_value), (second, second_value)] =
+                scalars.map(|at| table.scalars()[at].clone());
+            return Err(IoError::StatedRates {
+                file: table.file().into(),
+                first,
+                first_value,
+                first_hz: 1.0 / steps[0],
+                second,
+                second_value,
+                second_hz: 1.0 / steps[1],
+            });
+        }
         Axis::Column(times) => {
             let times = table.values(times)?;
             Some(Instants { start: times[0], step: uniform_step(table, times, 1.0)? })
@@ -138,7 +151,7 @@ fn same(a: f64, b: f64) -> bool {
 /// An error if the file gives a column another rate. What only the name of a number states may be
 /// overruled.
 fn check_rate(table: &Table, column: usize, rate_hz: f64) -> Result<(), IoError> {
-    if matches!(table.axis(column), Axis::Stated { .. }) {
+    if matches!(table.axis(column), Axis::Stated { .. } | Axis::Contradiction { .. }) {
         return Ok(());
     }
     match own_instants(table, column)? {

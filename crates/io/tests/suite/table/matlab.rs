@@ -157,15 +157,20 @@ fn a_rate_stated_by_its_name_is_the_time_axis() {
     {
         let table = of(&[(name, &[value]), x]);
         assert!(table.has_time_axis(), "{name}");
+        assert_eq!(table.stated_rate(), Some(&(name.to_owned(), value)));
         let record = table.record(&TimeAxis::OfFile, &["x"]).unwrap();
         assert_eq!((record.sampling().dt(), record.len()), (0.25, 3), "{name}");
         // Who gives another rate knows why.
         let other = table.record(&TimeAxis::RateHz(8.0), &["x"]).unwrap();
         assert_eq!(other.sampling().dt(), 0.125);
     }
-    // The same twice; a contradiction, nonsense, another number, and a column of instants.
+    // The same twice; a contradiction; nonsense, another number, and a column of instants.
     assert!(of(&[("Fs", &[4.0]), ("dt", &[0.25]), x]).has_time_axis());
-    for numbers in [("Fs", 5.0, "dt", 0.25), ("Fs", 0.0, "g", 9.8), ("Fs", -4.0, "f0", 4.0)] {
+    let table = of(&[("Fs", &[5.0]), ("dt", &[0.25]), x]);
+    let told = table.record(&TimeAxis::OfFile, &["x"]).unwrap_err().to_string();
+    assert!(told.contains("Fs = 5, which is 5 Hz, and dt = 0.25, which is 4 Hz"), "{told}");
+    assert_eq!(table.record(&TimeAxis::RateHz(4.0), &["x"]).unwrap().sampling().dt(), 0.25);
+    for numbers in [("Fs", 0.0, "g", 9.8), ("Fs", -4.0, "f0", 4.0)] {
         let (a, b) = ([numbers.1], [numbers.3]);
         let table = of(&[(numbers.0, &a), (numbers.2, &b), x]);
         assert!(!table.has_time_axis(), "{numbers:?}");

@@ -99,6 +99,10 @@ fn a_column_is_found_by_its_name_before_the_unit() {
     // A name wins over a number, before its unit too.
     assert_eq!((t.find("2").unwrap(), t.find("3").unwrap()), (6, 2));
     let t = table("F [N],F (kN)\n0,1\n");
+    assert_eq!(
+        table("Fx,Fy [N],Fy_kN\n0,1,2\n").find("Fy").unwrap_err().to_string(),
+        "a.csv has several columns \"Fy\"; choose one by its number: 2 \"Fy [N]\", 3 \"Fy_kN\""
+    );
     assert!(matches!(t.find("F"), Err(IoError::AmbiguousColumn { .. })));
     assert!(matches!(table("[N],x\n0,1\n").find(""), Err(IoError::MissingColumn { .. })));
 }
