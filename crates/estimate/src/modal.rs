@@ -1,7 +1,9 @@
 //! Natural frequencies, damping ratios and mode shapes of an identified machine, with what the
 //! uncertainty of its matrices makes of them.
 
-use mechid_model::{Matrix, Mode, Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_model::{
+    EIGENVALUE_ROUNDING, Matrix, Mode, Parameter, SecondOrderSystem, UncertainSystem,
+};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::estimate::student_interval;
@@ -34,15 +36,44 @@ impl Uncertain {
 pub struct IdentifiedMode {
     /// Eigenvalue and shape of the identified matrices, the shape's largest entry being 1.
     pub mode: Mode,
+    /// Re λ, in 1/s: rate at which the free response grows, negative where it decays. Of a mode that does
+    /// not oscillate it is the eigenvalue.
+    pub growth_rate: Uncertain,
     /// Im λ / 2π, in Hz; 0 for a mode that does not oscillate.
     pub damped_frequency_hz: Uncertain,
-    /// |λ| / 2π, in Hz.
+    /// |λ| / 2π, of an overdamped pair √(λ₁ λ₂) / 2π, in Hz.
     pub natural_frequency_hz: Uncertain,
-    /// −Re λ / |λ|.
+    /// −Re λ / |λ|, of an overdamped pair −(λ₁ + λ₂) / (2 √(λ₁ λ₂)).
     pub damping_ratio: Uncertain,
+    /// Square of the natural frequency, |λ|² or, of a pair of real eigenvalues, λ₁ λ₂, in rad²/s². Unlike
+    /// the frequency it is smooth in the matrices where it is zero.
+    pub squared_frequency: Uncertain,
+    /// Index of the other mode of a pair of real eigenvalues; `None` for a mode that oscillates, and where
+    /// no shape tells which real eigenvalues belong together.
+    pub partner: Option<usize>,
+    /// `true` for a motion without restoring force: the 95 % interval of `squared_frequency` contains
+    /// zero, or the eigenvalue is zero to rounding.
+    pub is_rigid_body: bool,
     /// Standard errors of the real and the imaginary part of every entry of the shape; those
     /// of the entry that is 1 by definition are 0.
     pub shape_standard_error: DVector<Complex<f64>>,
+}
+
+impl IdentifiedMode {
+    /// The confidence interval of the natural frequency, in Hz, at `level` (0.95 for 95 %); of a rigid-body
+    /// mode from zero to the square root of the upper limit of the squared frequency.
+    ///
+    /// # Errors
+    /// [`EstimateError::Level`] unless 0 < level < 1.
+    pub fn natural_frequency_interval_hz(&self, level: f64) -> Result<[f64; 2], EstimateError> {
+        match self.is_rigid_body {
+            true => {
+                let [_, high] = self.squared_frequency.interval(level)?;
+                Ok([0.0, high.max(0.0).sqrt() / std::f64::consts::TAU])
+            }
+            false => self.natural_frequency_hz.interval(level),
+        }
+    }
 }
 
 impl Estimate {
@@ -105,11 +136,43 @@ fn modes(
     degrees_of_freedom: usize,
 ) -> Result<Vec<IdentifiedMode>, EstimateError> {
     let spread = Spread { covariance, degrees_of_freedom };
-    let identify = |mode: Mode| {
-        let sensitivity = Sensitivity::of(&mode, system, parameters);
-        spread.propagate(mode, &sensitivity)
+    let modes = system.modes()?;
+    let partners = partners(&modes);
+    let sensitivities: Vec<Sensitivity> =
+        modes.iter().map(|mode| Sensitivity::of(mode, system, parameters)).collect();
+    let largest = modes.iter().map(Mode::natural_frequency).fold(0.0, f64::max);
+    let identify = |(at, partner): (usize, &Option<usize>)| {
+        let partner = partner.map(|other| (other, &modes[other], &sensitivities[other]));
+        spread.propagate(&modes[at], &sensitivities[at], partner, EIGENVALUE_ROUNDING * largest)
     };
-    Ok(system.modes()?.into_iter().map(identify).collect())
+    Ok(partners.iter().enumerate().map(identify).collect())
+}
+
+/// Least modal assurance criterion of real eigenvalues that belong together where there are several pairs.
+const SAME_SHAPE: f64 = 0.9;
+
+/// Level of the interval by which a mode is one of a rigid body.
+const RIGID_BODY_LEVEL: f64 = 0.95;
+
+/// Pairs the real eigenvalues of overdamped modes: the only two there are, otherwise those whose shapes
+/// agree best, as proportional damping makes them do exactly.
+fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
+    let mut partners = vec![None; modes.len()];
+    let real: Vec<usize> = (0..modes.len()).filter(|at| !modes[*at].oscillates()).collect();
+    let likeness = |i: usize, j: usize| {
+        let (p, q) = (modes[i].shape(), modes[j].shape());
+        p.dotc(q).norm_sqr() / (p.norm_squared() * q.norm_squared())
+    };
+    let pairs = real.iter().enumerate().flat_map(|(at, i)| real[at + 1..].iter().map(|j| (*i, *j)));
+    let mut pairs: Vec<(f64, usize, usize)> = pairs.map(|(i, j)| (likeness(i, j), i, j)).collect();
+    pairs.sort_by(|a, b| b.0.total_cmp(&a.0));
+    for (likeness, i, j) in pairs {
+        let alike = real.len() == 2 || likeness >= SAME_SHAPE;
+        if alike && partners[i].is_none() && partners[j].is_none() {
+            (partners[i], partners[j]) = (Some(j), Some(i));
+        }
+    }
+    partners
 }
 
 /// What is known of the scatter of the parameters.
@@ -119,32 +182,75 @@ struct Spread<'a> {
 }
 
 impl Spread<'_> {
-    fn propagate(&self, mode: Mode, sensitivity: &Sensitivity) -> IdentifiedMode {
-        let (lambda, size) = (mode.eigenvalue(), mode.natural_frequency());
+    /// An eigenvalue up to `rounding` (rad/s) is zero.
+    fn propagate(
+        &self,
+        mode: &Mode,
+        sensitivity: &Sensitivity,
+        partner: Option<(usize, &Mode, &Sensitivity)>,
+        rounding: f64,
+    ) -> IdentifiedMode {
+        let (lambda, own) = (mode.eigenvalue(), &sensitivity.eigenvalue);
         let tau = std::f64::consts::TAU;
-        let growth = sensitivity.eigenvalue.map(|d| (lambda.conj() * d).re / size);
-        let damping = sensitivity
-            .eigenvalue
-            .zip_map(&growth, |d, growth| (-d.re - mode.damping_ratio() * growth) / size);
-        let uncertain = |value: f64, gradient: DVector<f64>| Uncertain {
-            value,
-            standard_error: self.deviation(&gradient),
-            degrees_of_freedom: self.degrees_of_freedom,
+        // The mode that oscillates has its conjugate for a partner, the real one without any itself.
+        let (other, of_other) = match partner {
+            Some((_, mode, sensitivity)) => (mode.eigenvalue(), sensitivity.eigenvalue.clone()),
+            None => (lambda.conj(), own.map(|d| d.conj())),
+        };
+        let sum_slope = own.zip_map(&of_other, |d, e| (d + e).re);
+        let (square, square_slope) =
+            ((lambda * other).re, own.zip_map(&of_other, |d, e| (d * other + e * lambda).re));
+        let squared_frequency = self.uncertain(square, &square_slope);
+        // Real eigenvalues of opposite sign are no oscillator.
+        let (size, ratio) = match square > 0.0 {
+            true => (square.sqrt(), -0.5 * (lambda + other).re / square.sqrt()),
+            false => (mode.natural_frequency(), mode.damping_ratio()),
+        };
+        let (growth, damping) = match square > 0.0 {
+            true => {
+                let growth = square_slope / (2.0 * size);
+                let damping = sum_slope.zip_map(&growth, |s, g| (-0.5 * s - ratio * g) / size);
+                (growth, damping)
+            }
+            // The modulus of a real eigenvalue; its damping ratio is ±1 whatever the matrices.
+            false => (own.map(|d| d.re * lambda.re.signum()), DVector::zeros(own.len())),
+        };
+        let is_rigid_body = lambda.norm() <= rounding
+            || squared_frequency.standard_error.is_finite()
+                && squared_frequency
+                    .interval(RIGID_BODY_LEVEL)
+                    .is_ok_and(|[low, high]| high.is_finite() && low <= 0.0 && 0.0 <= high)
+                && squared_frequency.standard_error > 0.0;
+        let natural_frequency_hz = match is_rigid_body {
+            true => Uncertain {
+                value: square.max(0.0).sqrt() / tau,
+                standard_error: squared_frequency.standard_error.sqrt() / tau,
+                degrees_of_freedom: self.degrees_of_freedom,
+            },
+            false => self.uncertain(size / tau, &(growth / tau)),
         };
         let shape = sensitivity.shape.row_iter().map(|row| {
             let row = row.transpose();
             Complex::new(self.deviation(&row.map(|d| d.re)), self.deviation(&row.map(|d| d.im)))
         });
         IdentifiedMode {
-            damped_frequency_hz: uncertain(
-                mode.damped_frequency_hz(),
-                sensitivity.eigenvalue.map(|d| d.im / tau),
-            ),
-            natural_frequency_hz: uncertain(size / tau, growth / tau),
-            damping_ratio: uncertain(mode.damping_ratio(), damping),
+            growth_rate: self.uncertain(lambda.re, &own.map(|d| d.re)),
+            damped_frequency_hz: self
+                .uncertain(mode.damped_frequency_hz(), &own.map(|d| d.im / tau)),
+            natural_frequency_hz,
+            damping_ratio: self.uncertain(ratio, &damping),
+            squared_frequency,
+            partner: partner.map(|(at, ..)| at),
+            is_rigid_body,
             shape_standard_error: DVector::from_iterator(mode.shape().len(), shape),
-            mode,
+            mode: mode.clone(),
         }
+    }
+
+    fn uncertain(&self, value: f64, gradient: &DVector<f64>) -> Uncertain {
+        let (standard_error, degrees_of_freedom) =
+            (self.deviation(gradient), self.degrees_of_freedom);
+        Uncertain { value, standard_error, degrees_of_freedom }
     }
 
     /// √(gᵀ Σ g).

@@ -12,7 +12,7 @@ use mechid_io::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, IoError, Level, LoadBeyond,
     MiddleLoad, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
-use mechid_model::{ModelError, Response, SecondOrderSystem};
+use mechid_model::{Instability, ModelError, Response, SecondOrderSystem};
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
@@ -33,6 +33,8 @@ pub struct Simulation {
     pub measured_force: Record,
     /// The response with its noise.
     pub measured_response: Response,
+    /// The fastest growing free response of an unstable machine.
+    pub instability: Option<Instability>,
 }
 
 /// Runs an experiment.
@@ -55,6 +57,8 @@ pub struct Simulation {
 /// [`SimulateError`]: what is wrong with the description, or a response that does not exist.
 pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let system = experiment.system()?;
+    let instability = system.instability()?;
+    refuse_unstable_periodic(experiment, instability)?;
     let period = experiment.force()?;
     let force = repeated(&period, experiment.periods)?;
     let scheme = scheme(experiment)?;
@@ -72,7 +76,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
                 }
                 ResponseKind::FromRest | ResponseKind::From(_) => {
                     let middle = middle.map(|m| repeated(&m, experiment.periods)).transpose()?;
-                    stepped(experiment, &**scheme, &system, &force, middle.as_ref())?
+                    stepped(experiment, &**scheme, &system, &force, middle.as_ref())
+                        .map_err(|error| error.of_unstable(instability))?
                 }
             }
         }
@@ -102,7 +107,21 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         response,
         measured_force,
         measured_response,
+        instability,
     })
+}
+
+/// A steady state of an unstable machine solves its equations, but no run reaches it.
+fn refuse_unstable_periodic(
+    experiment: &Experiment,
+    instability: Option<Instability>,
+) -> Result<(), SimulateError> {
+    match (instability, &experiment.response) {
+        (Some(instability), ResponseKind::Periodic) => {
+            Err(SimulateError::UnstablePeriodic { instability })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Computes the response of a described machine to `force` (samples × degrees of freedom, in N) in the
@@ -113,6 +132,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
 /// the samples.
 pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
     let system = experiment.system()?;
+    let instability = system.instability()?;
+    refuse_unstable_periodic(experiment, instability)?;
     let Some(scheme) = scheme(experiment)? else {
         return match experiment.response {
             ResponseKind::Periodic => Ok(exact_periodic(&system, force)?),
@@ -120,6 +141,7 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
         };
     };
     stepped(experiment, &*scheme, &system, force, None)
+        .map_err(|error| error.of_unstable(instability))
 }
 
 /// Steps through one force record, or through the period that repeats.
@@ -172,10 +194,42 @@ pub enum SimulateError {
          response from rest or from a given motion"
     )]
     GivenStartPeriodic,
+    /// An unstable machine reaches no steady state.
+    #[error(
+        "the machine is unstable, {instability}: it reaches no periodic response; choose \
+         \"response\": \"from-rest\" and a record of a few doublings"
+    )]
+    UnstablePeriodic {
+        /// The growing free response.
+        instability: Instability,
+    },
+    /// The response of an unstable machine overflows.
+    #[error("the machine is unstable, {instability}: {error}; choose a shorter record")]
+    UnstableOverflow {
+        /// The growing free response.
+        instability: Instability,
+        /// Place of the overflow.
+        #[source]
+        error: IntegrateError,
+    },
+}
+
+impl SimulateError {
+    /// Adds the reason to the overflow of a run.
+    fn of_unstable(self, instability: Option<Instability>) -> Self {
+        match (self, instability) {
+            (Self::Integrate(error @ IntegrateError::Overflow { .. }), Some(instability)) => {
+                Self::UnstableOverflow { instability, error }
+            }
+            (error, _) => error,
+        }
+    }
 }
 
 /// The response that repeats with a force which is band-limited between its samples, line by line
 /// X_n = (K − ω²M + iωC)⁻¹ F_n: exact to rounding, no time step involved.
+///
+/// Of an unstable system it solves the equations, but no run reaches it: [`simulate`] refuses it.
 ///
 /// Lines without force have no response; that spares DC for a system free to drift.
 ///
@@ -355,6 +409,30 @@ mod tests {
         assert!((order(exact) - 4.0).abs() < 0.2, "{}", order(exact));
         assert!((order(linear) - 2.0).abs() < 0.2, "{}", order(linear));
     }
+    fn unstable(response: &str, samples: usize) -> Result<Simulation, SimulateError> {
+        let text = format!(
+            r#"{{ "system": {{ "mass": 2, "damping": -0.4, "stiffness": 800 }},
+                 "sampling": {{ "samples": {samples}, "rate_hz": 100 }},
+                 "excitation": [{{ "lines": "1:5", "amplitude": 5 }}],
+                 "scheme": {{ "name": "newmark" }}, "response": "{response}" }}"#
+        );
+        simulate(&Experiment::parse("test.json", &text).unwrap())
+    }
+
+    /// Judge: −c / 2m = 0.1 1/s.
+    #[test]
+    fn an_unstable_machine_has_no_periodic_response_and_is_told() {
+        let refused = unstable("periodic", 64).unwrap_err();
+        let SimulateError::UnstablePeriodic { instability } = refused else { panic!("{refused}") };
+        assert!((instability.growth_rate() - 0.1).abs() < 1e-12);
+        let found = unstable("from-rest", 64).unwrap().instability.unwrap();
+        assert!((found.doubling_time() - 2f64.ln() / 0.1).abs() < 1e-9, "{found}");
+        // e^(0.1 t) exceeds 1e308 at 7090 s.
+        let refused = unstable("from-rest", 1 << 20).unwrap_err();
+        assert!(matches!(refused, SimulateError::UnstableOverflow { .. }), "{refused}");
+        assert!(refused.to_string().contains("doubles every 6.931 s"), "{refused}");
+    }
+
     fn simulated(scheme: &str, response: &str) -> Result<Simulation, SimulateError> {
         let text = format!(
             r#"{{ "system": {{ "mass": 2, "damping": 0, "stiffness": 8 }},

@@ -26,6 +26,7 @@
 //! | a system | [`SecondOrderSystem::new`], [`Sdof`], [`JournalBearing`] |
 //! | a system of many degrees of freedom | [`SparseSystem`] |
 //! | eigenvalues, damping ratios, mode shapes | [`SecondOrderSystem::modes`] |
+//! | the free response that grows | [`SecondOrderSystem::instability`] |
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact response of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
@@ -65,7 +66,7 @@ pub use discretisation::Discretisation;
 pub use error::ModelError;
 pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
-pub use modes::Mode;
+pub use modes::{EIGENVALUE_ROUNDING, Instability, Mode};
 pub use nonlinear::{
     BackbonePoint, Constant, Coordinate, Law, NonlinearParameter, NonlinearSystem, Power,
     QuadraticDamping, SaturatingDamping, Term, Terms, UncertainNonlinearSystem,

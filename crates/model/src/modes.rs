@@ -1,5 +1,6 @@
 //! Eigenvalues and complex mode shapes of a system with any damping.
 
+use mechid_signal::message;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -9,6 +10,10 @@ use crate::{ModelError, RealSchur, SecondOrderSystem};
 /// Eigenvalues closer than this, relative to their modulus, count as one repeated eigenvalue:
 /// about √ε, what rounding makes of a defective pair.
 const REPEATED: f64 = 1e-7;
+
+/// Modulus of an eigenvalue over the largest that rounding makes of a double zero, such as that of a free
+/// machine: about √ε (pure number).
+pub const EIGENVALUE_ROUNDING: f64 = 1e-7;
 
 /// A mode x(t) = φ exp(λt): an eigenvalue λ and its shape φ.
 ///
@@ -60,6 +65,60 @@ impl Mode {
     }
 }
 
+/// A growing free response exp(λt), Re λ > 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instability {
+    eigenvalue: Complex<f64>,
+}
+
+impl Instability {
+    /// λ, in rad/s, with Im λ ≥ 0.
+    pub fn eigenvalue(&self) -> Complex<f64> {
+        self.eigenvalue
+    }
+
+    /// Re λ, in 1/s.
+    pub fn growth_rate(&self) -> f64 {
+        self.eigenvalue.re
+    }
+
+    /// Frequency Im λ / 2π, in Hz; 0 for a growth without oscillation.
+    pub fn frequency_hz(&self) -> f64 {
+        self.eigenvalue.im / std::f64::consts::TAU
+    }
+
+    /// Time in which the amplitude doubles, ln 2 / Re λ, in s.
+    pub fn doubling_time(&self) -> f64 {
+        std::f64::consts::LN_2 / self.eigenvalue.re
+    }
+}
+
+impl std::fmt::Display for Instability {
+    /// `pole 0.1 ± 6.28i rad/s: the free response at 1 Hz grows at 0.1 1/s and doubles every 6.93 s`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let number = |value: f64| format!("{}", message::number(rounded(value)));
+        write!(f, "pole {}", number(self.eigenvalue.re))?;
+        if self.eigenvalue.im > 0.0 {
+            write!(f, " ± {}i", number(self.eigenvalue.im))?;
+        }
+        f.write_str(" rad/s: the free response ")?;
+        if self.eigenvalue.im > 0.0 {
+            write!(f, "at {} Hz ", number(self.frequency_hz()))?;
+        }
+        write!(
+            f,
+            "grows at {} 1/s and doubles every {} s",
+            number(self.growth_rate()),
+            number(self.doubling_time())
+        )
+    }
+}
+
+/// A positive number to four significant digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
 impl SecondOrderSystem {
     /// A of the first-order form ż = A z + [0; M⁻¹] F with z = [x; ẋ], 2n×2n.
     ///
@@ -102,6 +161,21 @@ impl SecondOrderSystem {
             p.norm().total_cmp(&q.norm()).then(p.re.total_cmp(&q.re)).then(q.im.total_cmp(&p.im))
         });
         Ok(eigenvalues)
+    }
+
+    /// The fastest growing free response; `None` of a system all of whose free responses decay or persist.
+    ///
+    /// Growth within [`EIGENVALUE_ROUNDING`] of zero is rounding.
+    ///
+    /// # Errors
+    /// As [`eigenvalues`](Self::eigenvalues).
+    pub fn instability(&self) -> Result<Option<Instability>, ModelError> {
+        let eigenvalues = self.eigenvalues()?;
+        let largest = eigenvalues.iter().map(|l| l.norm()).fold(0.0, f64::max);
+        let fastest = eigenvalues.into_iter().max_by(|p, q| p.re.total_cmp(&q.re));
+        let unstable = fastest.filter(|l| l.re > EIGENVALUE_ROUNDING * largest);
+        // Of a conjugate pair either may come last.
+        Ok(unstable.map(|l| Instability { eigenvalue: Complex::new(l.re, l.im.abs()) }))
     }
 
     /// The modes by rising natural frequency: one for each conjugate pair, one for each real eigenvalue.
@@ -256,6 +330,36 @@ mod tests {
             assert!(matches!(refused, Err(ModelError::StateMatrixOverflow { .. })), "{refused:?}");
         }
         assert!(system(dmatrix![1e-10], dmatrix![0.0], dmatrix![1e100]).modes().is_ok());
+    }
+
+    /// Judge: λ = −c/2m ± i√(k/m − c²/4m²) of one degree of freedom.
+    #[test]
+    fn the_growing_response_is_that_of_the_closed_form() {
+        let found = system(dmatrix![2.0], dmatrix![-0.4], dmatrix![800.0]).instability().unwrap();
+        let found = found.expect("negative damping");
+        let omega = (400.0f64 - 0.01).sqrt();
+        assert!((found.eigenvalue() - Complex::new(0.1, omega)).norm() < 1e-12);
+        assert!((found.doubling_time() - 2f64.ln() / 0.1).abs() < 1e-9);
+        assert_eq!(
+            found.to_string(),
+            "pole 0.1 ± 20i rad/s: the free response at 3.183 Hz grows at 0.1 1/s and doubles every \
+             6.931 s"
+        );
+        // A negative stiffness: λ² = 4.
+        let found = system(dmatrix![1.0], dmatrix![0.0], dmatrix![-4.0]).instability().unwrap();
+        assert_eq!(found.unwrap().frequency_hz(), 0.0);
+        assert!((found.unwrap().growth_rate() - 2.0).abs() < 1e-12);
+        for stable in [
+            system(dmatrix![1.0], dmatrix![0.0], dmatrix![4.0]),
+            system(dmatrix![1.0], dmatrix![0.0], dmatrix![0.0]),
+            system(
+                DMatrix::identity(2, 2),
+                DMatrix::zeros(2, 2),
+                dmatrix![100.0, -100.0; -100.0, 100.0],
+            ),
+        ] {
+            assert_eq!(stable.instability().unwrap(), None);
+        }
     }
 
     #[test]

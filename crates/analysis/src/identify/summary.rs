@@ -7,7 +7,7 @@ use mechid_estimate::checks::Subject;
 use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::{ParameterCovariance, SystemMatrices};
-use mechid_model::Parameter;
+use mechid_model::{EIGENVALUE_ROUNDING, Parameter};
 use mechid_signal::message;
 use serde::Serialize;
 
@@ -139,17 +139,28 @@ pub struct ParameterRow {
     pub estimate: Uncertain,
 }
 
-/// One mode of the identified system.
-#[derive(Debug, Serialize)]
+/// One mode of a system.
+#[derive(Debug, Clone, Serialize)]
 pub struct ModeRow {
     /// `true` if the mode is underdamped.
     pub oscillates: bool,
-    /// Natural frequency, in Hz.
+    /// `true` for a motion without restoring force: zero lies in the interval of its natural frequency.
+    pub is_rigid_body: bool,
+    /// Natural frequency, in Hz; of an overdamped pair that of both.
     pub natural_frequency_hz: Uncertain,
     /// Damped frequency, in Hz.
     pub damped_frequency_hz: Uncertain,
-    /// Damping ratio.
+    /// Damping ratio, a pure number; of an overdamped pair that of both, above 1.
     pub damping_ratio: Uncertain,
+    /// Eigenvalue of a mode that does not oscillate, in 1/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pole: Option<Uncertain>,
+    /// Number, from 1, of the other mode of an overdamped pair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub partner: Option<usize>,
+    /// Rate at which the free response of an unstable mode grows, in 1/s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub growth_rate: Option<Uncertain>,
 }
 
 /// Quality of a fit.
@@ -197,7 +208,7 @@ impl IdentificationSummary {
             confidence: CONFIDENCE,
             parameters: parameters(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
-            modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
+            modes: ModeRow::all(&estimate.modes()?, false)?,
             fit: FitRow {
                 nrmse: match fitted.is_weighted() {
                     true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
@@ -239,6 +250,9 @@ impl IdentificationSummary {
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
         let mut misfits = self.checks.iter().filter(|check| check.subject == Subject::Misfit);
+        // A growth within its standard errors is no warning of the checks.
+        let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);
+        doubts.extend(growing.filter(|check| !check.is_conspicuous()).map(CheckRow::sentence));
         // Of a residual that is noise the checks tell.
         let is_noise = misfits.next().is_some_and(|check| !check.is_conspicuous())
             && misfits.all(|check| !check.is_conspicuous());
@@ -288,12 +302,14 @@ impl IdentificationSummary {
     /// Returns the title of a figure: the record and its modes.
     pub fn title(&self) -> String {
         let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
-        let modes: Vec<String> = self
-            .modes
-            .iter()
-            .map(|mode| {
+        let once = self.modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at));
+        let modes: Vec<String> = once
+            .map(|(_, mode)| {
                 let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
-                format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3))
+                match mode.is_rigid_body {
+                    true => "rigid-body mode".into(),
+                    false => format!("{} Hz, ζ = {}", significant(hz, 4), significant(ratio, 3)),
+                }
             })
             .collect();
         format!("{name}: {}", modes.join("; "))
@@ -370,17 +386,18 @@ pub(crate) fn header(what: &str) -> Vec<String> {
 /// Returns natural frequency and damping ratio of every mode as a table.
 pub(super) fn mode_table(what: &str, modes: &[ModeRow]) -> String {
     let mut rows = vec![header(what)];
-    for (number, mode) in (1..).zip(modes) {
-        let mut add = |name: String, value: &Uncertain, unit: &str| {
-            let mut row = vec![name];
-            row.extend(value.cells());
-            row.push(unit.into());
-            rows.push(row);
-        };
-        add(format!("{number} natural frequency"), &mode.natural_frequency_hz, "Hz");
-        add(format!("{number} damping ratio"), &mode.damping_ratio, "–");
-    }
+    rows.extend(mode_cells(modes, false));
     text_table(&rows)
+}
+
+/// Returns the rows of a table of modes.
+pub(crate) fn mode_cells(modes: &[ModeRow], damped: bool) -> impl Iterator<Item = Vec<String>> {
+    ModeRow::quantities(modes, damped).into_iter().map(|(name, value, unit)| {
+        let mut row = vec![name];
+        row.extend(value.cells());
+        row.push(unit.into());
+        row
+    })
 }
 
 impl ParameterRow {
@@ -430,14 +447,75 @@ impl WindowRow {
 }
 
 impl ModeRow {
-    /// Returns frequencies and damping of an identified mode.
-    pub(crate) fn of(found: &IdentifiedMode) -> Result<Self, AnalysisError> {
+    /// Returns frequencies and damping of the modes of an identified system, or of one that is exactly
+    /// `known`.
+    pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
+        let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
+        let rounding = EIGENVALUE_ROUNDING * largest;
+        modes.iter().map(|found| Self::of(found, known, rounding)).collect()
+    }
+
+    /// Growth rates up to `rounding` (1/s) are those of rounding.
+    fn of(found: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
+        let uncertain = |value: &estimate::Uncertain| match known {
+            true => Ok(Uncertain::known(value.value)),
+            false => Uncertain::of(value),
+        };
+        let grows = !found.is_rigid_body && found.growth_rate.value > rounding;
+        // Real eigenvalues of opposite sign have no natural frequency in common.
+        let shared = found.is_rigid_body || found.squared_frequency.value > 0.0;
+        let rate = uncertain(&found.growth_rate)?;
+        let frequency = &found.natural_frequency_hz;
         Ok(Self {
             oscillates: found.mode.oscillates(),
-            natural_frequency_hz: Uncertain::of(&found.natural_frequency_hz)?,
-            damped_frequency_hz: Uncertain::of(&found.damped_frequency_hz)?,
-            damping_ratio: Uncertain::of(&found.damping_ratio)?,
+            is_rigid_body: found.is_rigid_body,
+            natural_frequency_hz: match known {
+                true => Uncertain::known(frequency.value),
+                false => {
+                    let interval = found.natural_frequency_interval_hz(CONFIDENCE)?;
+                    Uncertain::new(frequency.value, frequency.standard_error, interval)
+                }
+            },
+            damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
+            damping_ratio: uncertain(&found.damping_ratio)?,
+            pole: (!found.mode.oscillates()).then_some(rate),
+            partner: found.partner.filter(|_| shared).map(|at| at + 1),
+            growth_rate: grows.then_some(rate),
         })
+    }
+
+    /// Returns whether the mode at an index, from 0, belongs to a pair that an earlier one begins.
+    fn is_told_before(&self, at: usize) -> bool {
+        self.partner.is_some_and(|number| number <= at)
+    }
+
+    /// Returns what there is to tell of modes, with name and unit: natural frequency, damped frequency if
+    /// asked for, damping ratio; the poles of those that do not oscillate, of an overdamped pair together.
+    pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
+        let mut all = Vec::new();
+        for (at, mode) in modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at)) {
+            let own = (at + 1, mode.pole);
+            let other = mode.partner.map(|number| (number, modes[number - 1].pole));
+            let numbers = [Some(own), other].into_iter().flatten();
+            for (number, pole) in numbers.clone() {
+                all.extend(pole.map(|pole| (format!("{number} real pole"), pole, "1/s")));
+            }
+            let name: Vec<String> = numbers.map(|(number, _)| number.to_string()).collect();
+            let mut add = |what: &str, value: Uncertain, unit| {
+                all.push((format!("{} {what}", name.join(", ")), value, unit));
+            };
+            if mode.is_rigid_body {
+                add("rigid-body mode, frequency", mode.natural_frequency_hz, "Hz");
+            } else if mode.oscillates || mode.partner.is_some() {
+                add("natural frequency", mode.natural_frequency_hz, "Hz");
+                // A mode that does not oscillate has no damped frequency to speak of.
+                if damped && mode.oscillates {
+                    add("damped frequency", mode.damped_frequency_hz, "Hz");
+                }
+                add("damping ratio", mode.damping_ratio, "–");
+            }
+        }
+        all
     }
 }
 

@@ -103,7 +103,7 @@ pub fn identify_responses(
         },
         confidence: CONFIDENCE,
         parameters: parameters(estimate)?,
-        modes: estimate.modes()?.iter().map(ModeRow::of).collect::<Result<_, _>>()?,
+        modes: ModeRow::all(&estimate.modes()?, false)?,
         fit: FitRow {
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
             unexplained_motion: unexplained_motion(&data, &system)?,

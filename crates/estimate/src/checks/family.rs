@@ -3,10 +3,10 @@
 use super::finding::{Finding, PValue, Reference};
 
 /// Adjusts the p-values of all tests made on one fit for their number; the comparison of the parameters with
-/// those of maximum likelihood apart from the tests of data and residual.
+/// those of maximum likelihood, and the test for growth, apart from the tests of data and residual.
 ///
-/// If nothing but noise speaks against the fit, the probability that any finding of either group becomes a
-/// warning is at most [`SIGNIFICANCE`](super::thresholds::SIGNIFICANCE), twice that for both together,
+/// If nothing but noise speaks against the fit, the probability that any finding of a group becomes a
+/// warning is at most [`SIGNIFICANCE`](super::thresholds::SIGNIFICANCE), three times that for all together,
 /// however the tests depend on one another.
 ///
 /// # Source
@@ -17,6 +17,11 @@ pub fn adjust_p_values<'a>(findings: impl IntoIterator<Item = &'a mut Finding>) 
     };
     let (bias, others): (Vec<&mut Finding>, Vec<&mut Finding>) =
         findings.into_iter().partition(of_parameters);
+    // It is made of an estimate that grows only, and for all its modes at once.
+    let others = others
+        .into_iter()
+        .filter(|f| !matches!(f, Finding::Instability { .. }))
+        .collect::<Vec<_>>();
     for group in [bias, others] {
         adjust_together(group.into_iter().filter_map(Finding::p_value_mut).collect());
     }
@@ -40,7 +45,7 @@ mod tests {
 
     fn misfit(raw: f64) -> Finding {
         let (p_value, source) = (PValue::of(raw), NoiseSource::Periods);
-        Finding::Misfit { ratio: 1.0, p_value, source }
+        Finding::Misfit { ratio: 1.0, p_value, source, concentration: None }
     }
 
     /// The example of R's `p.adjust(c(0.01, 0.04, 0.03, 0.005), "holm")`: 0.03, 0.06, 0.06, 0.02.

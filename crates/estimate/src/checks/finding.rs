@@ -170,6 +170,21 @@ pub enum Finding {
         /// The other estimator.
         reference: Reference,
     },
+    /// A free response of the identified system grows.
+    Instability {
+        /// The mode, by rising natural frequency.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        mode: usize,
+        /// Damped frequency of the mode, in Hz; 0 for a growth without oscillation.
+        frequency_hz: f64,
+        /// Real part of its eigenvalue, in 1/s.
+        growth_rate: f64,
+        /// Standard error of the growth rate, in 1/s.
+        standard_error: f64,
+        /// Probability that noise alone makes the estimate of a system that does not grow do so as much.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+    },
     /// Residual power against the power of the noise.
     Misfit {
         /// Residual power over its expectation for noise alone (pure number).
@@ -180,6 +195,9 @@ pub enum Finding {
         p_value: PValue,
         /// Source of the noise power.
         source: NoiseSource,
+        /// The few lines that hold the power beyond the noise; `None` where it is no such lines.
+        #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+        concentration: Option<Concentration>,
     },
     /// Correlation of a residual with the square or the cube of a displacement as a force.
     Linearity {
@@ -215,6 +233,16 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         test: CorrelationTest,
     },
+}
+
+/// Few lines that hold most of a misfit.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Concentration {
+    /// Their frequencies, in Hz, rising.
+    pub frequencies_hz: Vec<f64>,
+    /// Fraction of the residual power beyond the noise that goes with them.
+    pub share: f64,
 }
 
 /// Probability that noise alone gives a statistic at least as large as the one found.
@@ -442,6 +470,7 @@ impl Finding {
             Finding::PowerFlow { .. } => Subject::Power,
             Finding::Delay { .. } => Subject::Delay,
             Finding::Bias { .. } => Subject::Bias,
+            Finding::Instability { .. } => Subject::Instability,
             Finding::Misfit { .. } => Subject::Misfit,
             Finding::Linearity { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
@@ -515,7 +544,9 @@ impl Finding {
             Finding::Spike { ratio, .. } => ratio,
             Finding::Kinematics { gain, .. } => gain,
             Finding::Delay { samples, .. } => samples,
-            Finding::Bias { p_value, .. } | Finding::Linearity { p_value, .. } => p_value.adjusted,
+            Finding::Bias { p_value, .. }
+            | Finding::Instability { p_value, .. }
+            | Finding::Linearity { p_value, .. } => p_value.adjusted,
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 test.p_value.adjusted
             }
@@ -526,6 +557,7 @@ impl Finding {
     pub fn p_value(&self) -> Option<PValue> {
         match self {
             Finding::Bias { p_value, .. }
+            | Finding::Instability { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. } => Some(*p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
@@ -539,6 +571,7 @@ impl Finding {
     pub(super) fn p_value_mut(&mut self) -> Option<&mut PValue> {
         match self {
             Finding::Bias { p_value, .. }
+            | Finding::Instability { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. } => Some(p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {

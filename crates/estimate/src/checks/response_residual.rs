@@ -74,7 +74,7 @@ struct Expected {
 impl Expected {
     fn misfit(&self, power: f64, source: NoiseSource) -> Finding {
         let p_value = PValue::of(share_above_of(power, self.mean, 0.5 * self.variance));
-        Finding::Misfit { ratio: power / self.mean, p_value, source }
+        Finding::Misfit { ratio: power / self.mean, p_value, source, concentration: None }
     }
 }
 

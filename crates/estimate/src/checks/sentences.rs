@@ -5,8 +5,8 @@ use std::fmt::{self, Display, Formatter};
 use mechid_signal::message;
 
 use super::finding::{
-    Channel, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue, PeriodFault,
-    Power, Quantity, Reference, Residual,
+    Channel, Concentration, CorrelationTest, Finding, ModeLimit, NoiseSource, NoiseSpan, PValue,
+    PeriodFault, Power, Quantity, Reference, Residual,
 };
 use super::{Subject, Verdict};
 
@@ -148,8 +148,29 @@ impl Display for Finding {
                     )
                 }
             }
-            Finding::Misfit { ratio, p_value, source } => {
-                misfit(f, *ratio, p_value, *source, self.verdict())
+            Finding::Instability { mode, frequency_hz, growth_rate, standard_error, p_value } => {
+                let number = mode + 1;
+                let growth = [*growth_rate, *standard_error].map(three_digits).join(" ± ");
+                let frequency = three_digits(*frequency_hz);
+                if self.verdict() == Verdict::Good {
+                    write!(
+                        f,
+                        "mode {number} ({frequency} Hz) of the estimate grows at {growth} 1/s, no more \
+                         than the noise explains ({p_value}); its free response cannot be predicted"
+                    )
+                } else {
+                    let doubling = three_digits(std::f64::consts::LN_2 / growth_rate);
+                    write!(
+                        f,
+                        "mode {number} ({frequency} Hz) is unstable ({p_value}): its free response grows \
+                         at {growth} 1/s and doubles every {doubling} s. Possible causes: a machine that \
+                         feeds its own vibration (oil film, control), a channel of the wrong sign or with \
+                         a delay"
+                    )
+                }
+            }
+            Finding::Misfit { ratio, p_value, source, concentration } => {
+                misfit(f, *ratio, p_value, *source, (self.verdict(), concentration.as_ref()))
             }
             Finding::Linearity { power, dof, p_value } => {
                 linearity(f, *power, dof + 1, p_value, self.verdict())
@@ -303,10 +324,22 @@ fn misfit(
     ratio: f64,
     p_value: &PValue,
     source: NoiseSource,
-    verdict: Verdict,
+    (verdict, concentration): (Verdict, Option<&Concentration>),
 ) -> fmt::Result {
     let times = if ratio < 1e4 { format!("{ratio:.3}") } else { format!("{ratio:.1e}") };
     write!(f, "residual power is {times} × the noise power {source} ({p_value}): ")?;
+    if let (Some(few), true) = (concentration, verdict > Verdict::Good && ratio > 1.0) {
+        let hz: Vec<String> = few.frequencies_hz.iter().map(|hz| line_hz(*hz)).collect();
+        let hold = if hz.len() == 1 { "holds" } else { "hold" };
+        let share = (100.0 * few.share).floor();
+        return write!(
+            f,
+            "{} Hz {hold} {share} % of the misfit: run-out, mains or another disturbance? Leave out \
+             with `without_hz` {}",
+            listed(&hz),
+            hz.join(",")
+        );
+    }
     f.write_str(match verdict {
         Verdict::Good => "consistent with noise",
         _ if ratio < 1.0 => {
@@ -484,12 +517,31 @@ impl Display for Subject {
             Subject::Coherence => "coherence",
             Subject::Delay => "delay",
             Subject::Bias => "bias",
+            Subject::Instability => "instability",
             Subject::Misfit => "misfit",
             Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",
             Subject::CrossCorrelation => "cross-correlation",
         })
     }
+}
+
+/// Words as `a`, `a and b`, `a, b and c`.
+fn listed(words: &[String]) -> String {
+    match words {
+        [all @ .., last] if !all.is_empty() => format!("{} and {last}", all.join(", ")),
+        _ => words.concat(),
+    }
+}
+
+/// A number with enough digits to name a line.
+fn line_hz(value: f64) -> String {
+    message::number(format!("{value:.5e}").parse().unwrap_or(value)).to_string()
+}
+
+/// A number with three significant digits.
+fn three_digits(value: f64) -> String {
+    message::number(format!("{value:.2e}").parse().unwrap_or(value)).to_string()
 }
 
 /// A number with six significant digits.

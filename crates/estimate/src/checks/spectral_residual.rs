@@ -6,8 +6,9 @@ use mechid_model::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
+use super::concentration::{Part, concentration};
 use super::correlation::{Correlation, share_above_of};
-use super::finding::{Finding, NoiseSource, PValue, Reference, Residual};
+use super::finding::{Concentration, Finding, NoiseSource, PValue, Reference, Residual};
 use super::thresholds::{LAGS, ROUNDING};
 use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
 use crate::triangular::TriangularFactor;
@@ -135,6 +136,8 @@ pub struct SpectralResidual {
     /// Q of the covariance I − QQᵀ of the values.
     explained: DMatrix<f64>,
     rounding: bool,
+    /// Few lines that hold the misfit of all records.
+    concentration: Option<Concentration>,
 }
 
 impl WeightedFit {
@@ -180,8 +183,15 @@ impl WeightedFit {
             values: weighted.residual - &explained * &coefficients,
             explained,
             rounding: is_rounding(data, &levels),
+            concentration: None,
         });
-        Some(Self { records: residuals.collect(), step: small.then_some(step) })
+        let mut records: Vec<SpectralResidual> = residuals.collect();
+        let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
+        if parts.len() == records.len() {
+            let found = concentration(&parts);
+            records.iter_mut().for_each(|record| record.concentration = found.clone());
+        }
+        Some(Self { records, step: small.then_some(step) })
     }
 
     fn bias(&self, estimate: &Estimate) -> Option<Finding> {
@@ -313,6 +323,19 @@ impl SpectralResidual {
         findings
     }
 
+    /// What the search for disturbed lines takes; `None` if no noise is stated.
+    fn part(&self) -> Option<Part<'_>> {
+        let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
+        let (n, nu) = (self.data.dof() as f64, noise.degrees_of_freedom());
+        Some(Part {
+            omega: self.data.omega(),
+            dof: self.data.dof(),
+            values: &self.values,
+            explained: &self.explained,
+            unit: if nu > n + 1.0 && nu.is_finite() { nu / (nu - n) } else { 1.0 },
+        })
+    }
+
     /// Number of degrees of freedom, each with a channel of the residual and one of the force.
     pub fn dof(&self) -> usize {
         self.data.dof()
@@ -345,7 +368,10 @@ impl SpectralResidual {
         // Too little is no noise, either: then the periods differ by more than noise.
         let above = share_above_of(power, mean, 0.5 * variance);
         let p_value = PValue::of(2.0 * above.min(1.0 - above));
-        Some(Finding::Misfit { ratio: power / mean, p_value, source: NoiseSource::Periods })
+        let is_excess = p_value.is_significant() && power > mean;
+        let concentration = self.concentration.clone().filter(|_| is_excess);
+        let source = NoiseSource::Periods;
+        Some(Finding::Misfit { ratio: power / mean, p_value, source, concentration })
     }
 
     /// Places of the lines by rising frequency.

@@ -4,6 +4,12 @@
 /// all tests on a fit together once [`adjust_p_values`](super::adjust_p_values) has seen them.
 pub const SIGNIFICANCE: f64 = 0.01;
 
+/// Part of the residual power beyond the noise that few lines must hold to be named.
+pub const CONCENTRATED: f64 = 0.8;
+
+/// Maximum number of lines that a misfit names.
+pub const MOST_DISTURBED: usize = 8;
+
 /// Amplitude relative to that of the strongest line of a force, below which a line does not count as
 /// excited.
 pub const EXCITED_LINE: f64 = 1e-4;

@@ -85,6 +85,8 @@ struct Report {
     sample_rate_hz: f64,
     modes: Vec<Mode>,
     channels: Vec<Channel>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    instability: Option<Growth>,
     system: SystemMatrices,
 }
 
@@ -98,6 +100,16 @@ struct Convention {
 struct Mode {
     natural_frequency_hz: f64,
     damping_ratio: f64,
+}
+
+/// The fastest growing free response.
+#[derive(Debug, Serialize)]
+struct Growth {
+    /// Real and imaginary part, in rad/s.
+    pole: [f64; 2],
+    growth_rate: f64,
+    doubling_time_s: f64,
+    text: String,
 }
 
 #[derive(Debug, Serialize)]
@@ -161,6 +173,12 @@ impl SimulateArgs {
                 })
                 .collect(),
             channels,
+            instability: simulation.instability.as_ref().map(|found| Growth {
+                pole: [found.eigenvalue().re, found.eigenvalue().im],
+                growth_rate: found.growth_rate(),
+                doubling_time_s: found.doubling_time(),
+                text: found.to_string(),
+            }),
             system: SystemMatrices::from(&simulation.system),
         })
     }
@@ -241,6 +259,10 @@ impl Report {
             row.extend(cells);
             rows.push(row);
         }
-        text + &text_table(&rows)
+        text += &text_table(&rows);
+        if let Some(growth) = &self.instability {
+            text += &format!("\nwarning: the machine is unstable, {}\n", growth.text);
+        }
+        text
     }
 }

@@ -1,0 +1,115 @@
+//! Lines that hold the misfit of a fit of spectra.
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+
+use super::finding::Concentration;
+use super::thresholds::{CONCENTRATED, MOST_DISTURBED};
+
+/// Lines beside each one named, of which at most one is.
+const LINES_PER_DISTURBED: usize = 8;
+
+/// Relative difference of frequencies that are the same line of several records.
+const SAME_LINE: f64 = 1e-9;
+
+/// Weighted residual of one record.
+pub(super) struct Part<'a> {
+    /// Angular frequency of each line, in rad/s.
+    pub omega: &'a [f64],
+    /// Number of channels.
+    pub dof: usize,
+    /// Residuals: of each line the channels, of each channel real and imaginary part.
+    pub values: &'a DVector<f64>,
+    /// Q of their covariance I − QQᵀ, over all records together.
+    pub explained: &'a DMatrix<f64>,
+    /// Expected square of a residual.
+    pub unit: f64,
+}
+
+/// The residuals of one frequency: record and first row of each.
+struct Line {
+    omega: f64,
+    rows: Vec<(usize, usize)>,
+}
+
+/// Finds the few lines without which the misfit is gone; `None` unless [`MOST_DISTURBED`] lines at most,
+/// and an eighth of all, hold [`CONCENTRATED`] of the residual power beyond the noise.
+///
+/// The line that stands out most is left out of the linearised fit, and so on: what one of them does to
+/// the residual of all others goes with it.
+///
+/// # Source
+/// Cook & Weisberg, *Residuals and Influence in Regression* (1982), deletion of several cases.
+pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
+    let lines = lines(parts);
+    let parameters = parts.first()?.explained.ncols();
+    let power = |values: &[DVector<f64>]| -> f64 { values.iter().map(DVector::norm_squared).sum() };
+    let count: f64 = parts.iter().map(|part| part.values.len() as f64).sum();
+    let noise: f64 = parts.iter().map(|part| part.unit * part.values.len() as f64).sum();
+    let expected = |left: f64| noise / count * (left - parameters as f64);
+    let start: Vec<DVector<f64>> = parts.iter().map(|part| part.values.clone()).collect();
+    let excess = power(&start) - expected(count);
+    if excess <= 0.0 {
+        return None;
+    }
+    let (mut values, mut chosen): (_, Vec<usize>) = (start.clone(), Vec::new());
+    // I − Q_Sᵀ Q_S and Q_Sᵀ e_S of the lines left out.
+    let mut information = DMatrix::identity(parameters, parameters);
+    let mut moved = DVector::zeros(parameters);
+    let (mut left, mut share) = (count, 0.0);
+    for _ in 0..MOST_DISTURBED.min(lines.len() / LINES_PER_DISTURBED) {
+        let of_line = |line: &Line| -> f64 {
+            let each = line.rows.iter().map(|(record, row)| {
+                values[*record].rows(*row, 2 * parts[*record].dof).norm_squared()
+            });
+            each.sum()
+        };
+        let others = (0..lines.len()).filter(|at| !chosen.contains(at));
+        let (next, _) =
+            others.map(|at| (at, of_line(&lines[at]))).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        chosen.push(next);
+        for (record, row) in &lines[next].rows {
+            let rows = 2 * parts[*record].dof;
+            let q = parts[*record].explained.rows(*row, rows);
+            information -= q.tr_mul(&q);
+            moved += q.tr_mul(&start[*record].rows(*row, rows));
+            left -= rows as f64;
+        }
+        values.clone_from(&start);
+        if parameters > 0 {
+            let step = information.clone().lu().solve(&moved)?;
+            for (part, values) in parts.iter().zip(&mut values) {
+                *values += part.explained * &step;
+            }
+        }
+        for (record, row) in chosen.iter().flat_map(|at| &lines[*at].rows) {
+            values[*record].rows_mut(*row, 2 * parts[*record].dof).fill(0.0);
+        }
+        share = 1.0 - ((power(&values) - expected(left)) / excess).max(0.0);
+        if share >= 0.99 {
+            break;
+        }
+    }
+    let mut frequencies_hz: Vec<f64> = chosen.iter().map(|at| lines[*at].omega / TAU).collect();
+    frequencies_hz.sort_by(f64::total_cmp);
+    (share >= CONCENTRATED).then_some(Concentration { frequencies_hz, share })
+}
+
+/// The lines of all records by rising frequency.
+fn lines(parts: &[Part<'_>]) -> Vec<Line> {
+    let all = parts.iter().enumerate().flat_map(|(record, part)| {
+        let line = move |(at, omega): (usize, &f64)| (*omega, record, 2 * part.dof * at);
+        part.omega.iter().enumerate().map(line)
+    });
+    let mut all: Vec<(f64, usize, usize)> = all.collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut lines: Vec<Line> = Vec::new();
+    for (omega, record, row) in all {
+        match lines.last_mut() {
+            Some(last) if omega - last.omega <= SAME_LINE * omega => last.rows.push((record, row)),
+            _ => lines.push(Line { omega, rows: vec![(record, row)] }),
+        }
+    }
+    lines
+}
