@@ -4,11 +4,6 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum ReportError {
-    /// The records show no receptance.
-    #[error(
-        "nothing to plot: several forces act on every line, so the record shows no single receptance"
-    )]
-    NoReceptance,
     /// A record without numbers but those of time.
     #[error("{file}: nothing to plot: no column other than time holds numbers")]
     NoColumnToDraw {

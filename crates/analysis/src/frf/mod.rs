@@ -4,7 +4,7 @@ pub mod table;
 
 use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
-use mechid_signal::Record;
+use mechid_signal::{Record, Spectrum};
 use serde::{Deserialize, Serialize};
 
 pub use self::table::FrfTable;
@@ -38,8 +38,54 @@ pub struct FrfSettings {
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
     let recorded = measurement.hold(how.segments.hold())?;
     let lines = LineRule { choice: &how.lines, without: &how.without };
+    if let Some(parts) = interleaved(&recorded, how, lines)? {
+        return Ok(FrfTable::interleaved(&recorded.held, &parts, how));
+    }
     let found = Responses::of(&recorded, &how.segments, how.estimator, lines)?;
     Ok(FrfTable::new(&recorded.held, &found, how))
+}
+
+/// Amplitude of the other forces over that of the one that drives a line, below which they are idle there.
+const IDLE: f64 = 0.1;
+
+/// Frequency responses to each force on the lines that it alone drives; `None` unless several forces have
+/// every line of whole periods to themselves, in turn.
+fn interleaved(
+    recorded: &Windowed,
+    how: &FrfSettings,
+    rule: LineRule<'_>,
+) -> Result<Option<Vec<Responses>>, AnalysisError> {
+    let held = &recorded.held;
+    let segments = how.segments.segments(held.period)?;
+    let whole = held.force.len() >= held.period;
+    let Segments::Periods(period) = segments else { return Ok(None) };
+    if held.driven.len() < 2 || !whole {
+        return Ok(None);
+    }
+    let chosen = rule.lines(&held.force, period)?;
+    let spectrum = Spectrum::of(&held.force.period_mean(period)?);
+    let driver = |line: &usize| -> Option<usize> {
+        let amplitude = |dof: &usize| spectrum.line(*line, *dof).norm();
+        let by_size = |a: &&usize, b: &&usize| amplitude(a).total_cmp(&amplitude(b));
+        let own = *held.driven.iter().max_by(by_size)?;
+        let idle = |dof: &usize| *dof == own || amplitude(dof) <= IDLE * amplitude(&own);
+        held.driven.iter().all(idle).then_some(own)
+    };
+    let Some(drivers) = chosen.iter().map(driver).collect::<Option<Vec<usize>>>() else {
+        return Ok(None);
+    };
+    if !held.driven.iter().all(|dof| drivers.contains(dof)) {
+        return Ok(None);
+    }
+    let sampling = held.force.sampling().with_len(period)?;
+    let each = held.driven.iter().map(|dof| {
+        let own = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
+        let lines = Lines::new(sampling, own.map(|(line, _)| *line))?;
+        let average = average_of(recorded, &lines, segments, &[*dof])?;
+        let frf = average.frf(how.estimator.estimator())?;
+        Ok(Responses { frf, lines, driven: vec![*dof], segments })
+    });
+    each.collect::<Result<_, AnalysisError>>().map(Some)
 }
 
 /// Frequency response estimator: where the noise is.
@@ -195,7 +241,16 @@ pub(crate) fn average(
     lines: &Lines,
     segments: Segments,
 ) -> Result<FrfAverage, AnalysisError> {
-    let driven = &recorded.held.driven;
+    average_of(recorded, lines, segments, &recorded.held.driven)
+}
+
+/// As [`average`], from the forces on some degrees of freedom, counted from 0.
+fn average_of(
+    recorded: &Windowed,
+    lines: &Lines,
+    segments: Segments,
+    driven: &[usize],
+) -> Result<FrfAverage, AnalysisError> {
     let (motion, kind) = recorded.held.response();
     let channels = [driven.len(), motion.channels()];
     let mut average = FrfAverage::new(lines.clone(), channels, kind, segments)?;

@@ -66,7 +66,8 @@ pub struct Response {
     pub motion: usize,
     /// Degree of freedom that is driven, counted from 1.
     pub force: usize,
-    /// Real part, one value per frequency, in the unit of the table.
+    /// Real part, one value per frequency, in the unit of the table; as the other values not a number where
+    /// another force has the line to itself.
     pub real: Vec<f64>,
     /// Imaginary part, one value per frequency, in the unit of the table.
     pub imaginary: Vec<f64>,
@@ -90,18 +91,57 @@ pub struct Coherence {
 
 impl FrfTable {
     pub(super) fn new(measured: &Block, found: &Responses, how: &FrfSettings) -> Self {
-        let (frf, n) = (&found.frf, measured.force.channels());
+        let n = measured.force.channels();
         let mut responses = Vec::new();
         for motion in 0..n {
             for (input, dof) in found.driven.iter().enumerate() {
                 responses.push(Response::of(found, (motion, input), *dof));
             }
         }
-        let coherence = (0..n).map(|motion| Coherence {
-            motion: motion + 1,
-            values: frf.coherence().column(motion).iter().copied().collect(),
+        let coherence = (0..n).map(|motion| Coherence::of(found, motion)).collect();
+        let omega = found.frf.omega().to_vec();
+        Self::of(measured, found, how, (omega, responses, coherence))
+    }
+
+    /// Of forces each of which has lines of its own.
+    pub(super) fn interleaved(measured: &Block, parts: &[Responses], how: &FrfSettings) -> Self {
+        let n = measured.force.channels();
+        let all = parts.iter().enumerate().flat_map(|(part, found)| {
+            found.frf.omega().iter().enumerate().map(move |(at, omega)| (*omega, part, at))
         });
-        let kind = frf.measured();
+        let mut places: Vec<(f64, usize, usize)> = all.collect();
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut responses = Vec::new();
+        for motion in 0..n {
+            for (number, found) in parts.iter().enumerate() {
+                let own = places.iter().map(|(_, part, at)| (*part == number).then_some(*at));
+                let own: Vec<Option<usize>> = own.collect();
+                responses.push(Response::of(found, (motion, 0), found.driven[0]).spread(&own));
+            }
+        }
+        let coherence = (0..n).map(|motion| {
+            let each: Vec<Coherence> =
+                parts.iter().map(|found| Coherence::of(found, motion)).collect();
+            let values = places.iter().map(|(_, part, at)| each[*part].values[*at]).collect();
+            Coherence { motion: motion + 1, values }
+        });
+        let coherence = coherence.collect();
+        let omega = places.iter().map(|(omega, ..)| *omega).collect();
+        let mut table = Self::of(measured, &parts[0], how, (omega, responses, coherence));
+        table.remarks.push(
+            "every force has lines of its own: the responses to it are those on its lines alone"
+                .into(),
+        );
+        table
+    }
+
+    fn of(
+        measured: &Block,
+        found: &Responses,
+        how: &FrfSettings,
+        (omega, responses, coherence): (Vec<f64>, Vec<Response>, Vec<Coherence>),
+    ) -> Self {
+        let kind = found.frf.measured();
         Self {
             file: measured.file.clone(),
             first_sample: measured.first_sample,
@@ -115,9 +155,9 @@ impl FrfTable {
                 ResponseQuantity::Velocity => "m/(s·N)",
                 ResponseQuantity::Acceleration => "m/(s²·N)",
             },
-            frequency_hz: frf.omega().iter().map(|omega| omega / TAU).collect(),
+            frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
-            coherence: coherence.collect(),
+            coherence,
             remarks: measured.unit_remarks.clone(),
             analysis: how.clone(),
         }
@@ -174,9 +214,15 @@ impl FrfTable {
     /// the same number, and the direction is +X.
     ///
     /// # Errors
-    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom.
+    /// [`AnalysisError::Setting`] if there is not one point per degree of freedom, and if every force has
+    /// lines of its own.
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
+        if self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan()) {
+            let why = "every force has lines of its own, and this format has the same frequencies for all \
+                       functions: write a .csv file";
+            return Err(AnalysisError::Setting { setting: "output", why: why.into() });
+        }
         if !points.is_empty() && points.len() != dofs {
             let given = message::count(points.len(), "point");
             let why = format!("{given} for {}", message::count(dofs, "degree of freedom"));
@@ -213,7 +259,7 @@ impl FrfTable {
         })
     }
 
-    /// One row per frequency.
+    /// One row per frequency; fields are empty where another force has the line to itself.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
         for r in &self.responses {
@@ -226,11 +272,12 @@ impl FrfTable {
         for (at, hz) in self.frequency_hz.iter().enumerate() {
             let _ = write!(text, "\n{hz:?}");
             for r in &self.responses {
-                let _ = write!(
-                    text,
-                    ",{:?},{:?},{:?}",
-                    r.real[at], r.imaginary[at], r.standard_error[at]
-                );
+                for value in [r.real[at], r.imaginary[at], r.standard_error[at]] {
+                    let _ = match value.is_nan() {
+                        true => write!(text, ","),
+                        false => write!(text, ",{value:?}"),
+                    };
+                }
             }
             for c in &self.coherence {
                 let _ = write!(text, ",{:?}", c.values[at]);
@@ -263,10 +310,32 @@ impl Response {
         }
     }
 
+    /// Returns the values at other places; none where there is no index.
+    fn spread(self, places: &[Option<usize>]) -> Self {
+        let spread = |values: &[f64]| -> Vec<f64> {
+            places.iter().map(|at| at.map_or(f64::NAN, |at| values[at])).collect()
+        };
+        Self {
+            real: spread(&self.real),
+            imaginary: spread(&self.imaginary),
+            magnitude: spread(&self.magnitude),
+            phase_deg: spread(&self.phase_deg),
+            standard_error: spread(&self.standard_error),
+            ..self
+        }
+    }
+
     /// Returns index and value of the largest magnitude.
     fn peak(&self) -> (usize, f64) {
         let larger = |a: (usize, f64), b: (usize, f64)| if b.1 > a.1 { b } else { a };
         self.magnitude.iter().copied().enumerate().fold((0, 0.0), larger)
+    }
+}
+
+impl Coherence {
+    fn of(found: &Responses, motion: usize) -> Self {
+        let values = found.frf.coherence().column(motion).iter().copied().collect();
+        Self { motion: motion + 1, values }
     }
 }
 

@@ -672,7 +672,7 @@ class FrequencyResponses(Drawn):
             If there is no such pair.
         """
         row = self._row(motion, force)
-        return np.array(row["real"]) + 1j * np.array(row["imaginary"])
+        return np.array(row["real"], dtype=float) + 1j * np.array(row["imaginary"], dtype=float)
 
     def std_error(self, motion: int = 1, force: int = 1) -> NDArray[np.float64]:
         """Return the standard error of real part, imaginary part and magnitude alike.

@@ -16,6 +16,8 @@ use mechid_analysis::{
     FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
     Reconstructed, SweepSummary,
 };
+use mechid_estimate::frequency_domain::FrequencyData;
+use mechid_model::SecondOrderSystem;
 use mechid_plot::Figure;
 
 use crate::ReportError;
@@ -25,19 +27,30 @@ pub trait ToFigure {
     /// Returns the usual figure of the result.
     ///
     /// # Errors
-    /// [`ReportError::NoReceptance`], [`ReportError::NoColumnToDraw`] or
-    /// [`ReportError::NothingResonates`] if the result has nothing to draw,
+    /// [`ReportError::NoColumnToDraw`] or [`ReportError::NothingResonates`] if the result has nothing to draw,
     /// [`ReportError::Analysis`] if a curve cannot be computed.
     fn figure(&self) -> Result<Figure, ReportError>;
 }
 
+fn receptance_or_responses(
+    title: &str,
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+) -> Result<Figure, ReportError> {
+    match receptance::receptance(title, data, system)? {
+        Some(figure) => Ok(figure),
+        None => receptance::responses(&format!("{title}; {}", receptance::WHY), data, system),
+    }
+}
+
 impl ToFigure for Identified {
-    /// Draws measured and identified receptance; for a fit in the time domain measured and predicted
+    /// Draws measured and identified receptance, or, where no line separates the forces, the amplitudes of
+    /// the response, measured and predicted; for a fit in the time domain measured and predicted
     /// response of the first record.
     fn figure(&self) -> Result<Figure, ReportError> {
         let title = self.summary().title();
         match self.spectra() {
-            Some(data) => receptance::receptance(&title, data, &self.system()?),
+            Some(data) => receptance_or_responses(&title, data, &self.system()?),
             None => Ok(motion::motion(&title, &self.compared()?[0])),
         }
     }
@@ -47,7 +60,7 @@ impl ToFigure for IdentifiedResponses {
     /// Draws measured and identified receptance.
     fn figure(&self) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
-        receptance::receptance(&title, self.data(), &self.system()?)
+        receptance_or_responses(&title, self.data(), &self.system()?)
     }
 }
 

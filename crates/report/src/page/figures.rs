@@ -122,16 +122,30 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
     ])
 }
 
-/// Measured and identified receptance.
+/// Measured and identified receptance; where no line separates the forces, measured and predicted
+/// response.
 ///
 /// # Errors
 /// [`ReportError::NothingToDraw`].
 pub fn receptance(found: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
-    let figure = picture::receptance("", &measured.data, &found.system()?)?;
-    let origin = &measured.origin;
-    let caption = format!(
-        "Receptance, motion over force: that of the identified machine, and that of the record, {origin}."
-    );
+    let (system, origin) = (found.system()?, &measured.origin);
+    let (figure, caption) = match picture::receptance("", &measured.data, &system)? {
+        Some(figure) => {
+            let caption = format!(
+                "Receptance, motion over force: that of the identified machine, and that of the record, \
+                 {origin}."
+            );
+            (figure, caption)
+        }
+        None => {
+            let caption = format!(
+                "Amplitude of the response, {origin}, and predicted by the identified machine from the \
+                 forces; no receptance, for {}.",
+                picture::WHY
+            );
+            (picture::responses("", &measured.data, &system)?, caption)
+        }
+    };
     drawn("receptance".into(), figure, caption)
 }
 

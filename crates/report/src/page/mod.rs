@@ -10,6 +10,7 @@ use std::path::PathBuf;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use mechid_analysis::identify::Identified;
+use mechid_analysis::identify::summary::ModeRow;
 use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
@@ -163,19 +164,21 @@ pub(crate) fn figure(drawn: &Drawn) -> Markup {
     }
 }
 
+/// Number of frequencies and damping ratios in the heading.
+const SUMMARISED: usize = 8;
+
 fn heading(contents: &Contents<'_>) -> Markup {
     let report = contents.review.found.summary();
-    let modes = report.modes.iter().take(4).enumerate();
+    let modes = ModeRow::quantities(&report.modes, false).into_iter().take(SUMMARISED);
     html! {
         header {
             h1 { (contents.title) }
             p.subtitle { (files(contents)) " · " (report.estimator) }
             dl.summary {
-                @for (at, mode) in modes {
-                    @let [hz, hz_error, _] = mode.natural_frequency_hz.cells();
-                    @let [ratio, ratio_error, _] = mode.damping_ratio.cells();
-                    div { dt { "Mode " (at + 1) ", natural frequency" } dd { (hz) " Hz" small { "± " (hz_error) " Hz" } } }
-                    div { dt { "Mode " (at + 1) ", damping ratio" } dd { (ratio) small { "± " (ratio_error) } } }
+                @for (name, value, unit) in modes {
+                    @let [number, error, _] = value.cells();
+                    @let unit = if unit == "–" { String::new() } else { format!(" {unit}") };
+                    div { dt { "Mode " (name) } dd { (number) (unit) small { "± " (error) (unit) } } }
                 }
                 @if let Some(part) = report.fit.unexplained_motion {
                     div { dt { "ResponseQuantity left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }

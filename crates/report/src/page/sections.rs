@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 use mechid_analysis::identify::checks::When;
-use mechid_analysis::identify::summary::{IdentificationSummary, Uncertain};
+use mechid_analysis::identify::summary::{IdentificationSummary, ModeRow, Uncertain};
 use mechid_analysis::identify::validation::Share;
 use mechid_analysis::review::channels::Channel;
 use mechid_analysis::review::excitation::{DROP_DB, Excitation};
@@ -169,13 +169,8 @@ pub fn machine(contents: &Contents<'_>) -> Markup {
     let header = |what| [what, "value", "standard error", &interval, "unit"];
     let parameters =
         report.parameters.iter().map(|p| uncertain(p.name.clone(), &p.estimate, p.unit)).collect();
-    let mut modes = Vec::new();
-    for (number, mode) in (1..).zip(&report.modes) {
-        let name = |what: &str| format!("{number} {what}");
-        modes.push(uncertain(name("natural frequency"), &mode.natural_frequency_hz, "Hz"));
-        modes.push(uncertain(name("damped frequency"), &mode.damped_frequency_hz, "Hz"));
-        modes.push(uncertain(name("damping ratio"), &mode.damping_ratio, "–"));
-    }
+    let modes = ModeRow::quantities(&report.modes, true).into_iter();
+    let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
     html! {
         div.tables {
             (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
@@ -212,13 +207,9 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
 
 /// The frequency response, and the motion in time.
 pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let several = "on every line several forces act, so the record shows no single one";
     let receptance = match &contents.review.receptance {
         Err(reason) => Err(reason.as_str()),
-        Ok(measured) => match figures::receptance(contents.review.found, measured) {
-            Err(ReportError::NoReceptance) => Err(several),
-            drawn => Ok(drawn?),
-        },
+        Ok(measured) => Ok(figures::receptance(contents.review.found, measured)?),
     };
     let mut fits = Vec::new();
     for part in &contents.review.records {
