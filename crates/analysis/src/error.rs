@@ -398,3 +398,45 @@ pub enum AnalysisError {
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),
 }
+
+impl AnalysisError {
+    /// Returns which failure it is, such as `io.missing-column` or `analysis.window`: stable, for
+    /// programs. The first word is the crate of the innermost failure, the second its variant.
+    ///
+    /// ```
+    /// use mechid_analysis::{AnalysisError, Machine};
+    ///
+    /// assert_eq!(AnalysisError::NoRecord.code(), "analysis.no-record");
+    /// assert_eq!(Machine::read("no-such-file").unwrap_err().code(), "io.read");
+    /// ```
+    pub fn code(&self) -> String {
+        // As a derived `Debug` writes them: a variant that only passes another on has it in
+        // parentheses.
+        let written = format!("{self:?}");
+        let (mut rest, mut names) = (written.as_str(), vec!["Analysis"]);
+        loop {
+            let end = rest.find(|c: char| !c.is_ascii_alphanumeric()).unwrap_or(rest.len());
+            if !rest.starts_with(|c: char| c.is_ascii_uppercase()) {
+                break;
+            }
+            names.push(&rest[..end]);
+            match rest[end..].strip_prefix('(') {
+                Some(inner) => rest = inner,
+                None => break,
+            }
+        }
+        names[names.len() - 2..].iter().map(|name| kebab(name)).collect::<Vec<_>>().join(".")
+    }
+}
+
+/// Returns the name of a variant in lower case, its words joined by hyphens.
+fn kebab(name: &str) -> String {
+    let mut text = String::new();
+    for (at, letter) in name.char_indices() {
+        if letter.is_ascii_uppercase() && at > 0 {
+            text.push('-');
+        }
+        text.push(letter.to_ascii_lowercase());
+    }
+    text
+}

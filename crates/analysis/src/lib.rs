@@ -35,14 +35,18 @@
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
+//! | What are the machines behind these records? | [`SavedAnalysis::row`] | [`SavedAnalysis`] | [`ResultRow`] |
 //! | How does the machine vibrate? | [`ModalSummary::of`] | [`Machine`] | [`ModalSummary`] |
 //!
 //! Settings are plain structs with defaults, which `serde` saves and reads back; every result carries
 //! those it was made with, and prints itself with [`Display`](std::fmt::Display).
 
+pub mod batch;
 pub mod bearing;
 mod error;
 pub mod extremes;
+#[cfg(feature = "parquet")]
+pub mod fleet;
 pub mod frf;
 pub mod identify;
 pub mod inspect;
@@ -55,6 +59,7 @@ pub mod review;
 pub mod sweep;
 pub mod text;
 
+pub use batch::{ResultRow, SavedAnalysis};
 pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
 pub use error::AnalysisError;
 pub use frf::{FrfSettings, FrfTable, Segmentation, frf};

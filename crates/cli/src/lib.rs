@@ -4,7 +4,7 @@
 //! A subcommand is one file of `commands`: arguments become settings of an analysis, its result an
 //! `Outcome`. It neither prints nor gives a file its name: that happens in `outcome`, once everything
 //! has succeeded, so that a failure leaves nothing half written. Every failure ends with one message on
-//! the error stream and exit code 2.
+//! the error stream and exit code 2; a run over many records of which some failed with exit code 1.
 mod args;
 mod commands;
 mod error;
@@ -24,6 +24,9 @@ use crate::error::CliError;
 
 /// Exit code of every failure; the argument parser uses the same one.
 const FAILURE: u8 = 2;
+
+/// Exit code of a run over many records of which some have no result.
+const INCOMPLETE: u8 = 1;
 
 /// Exit code that a shell gives a program which a closed pipe has ended: 128 and SIGPIPE.
 const BROKEN_PIPE: u8 = 141;
@@ -50,7 +53,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     match outcome(&cli, arguments.get(1..).unwrap_or_default()) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(INCOMPLETE),
         // The reader has seen enough (`mechid … | head`).
         Err(CliError::Print(error)) if error.kind() == ErrorKind::BrokenPipe => {
             ExitCode::from(BROKEN_PIPE)
@@ -64,11 +68,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     }
 }
 
-fn outcome(cli: &Cli, words: &[OsString]) -> Result<(), CliError> {
+/// Runs the command and tells its outcome; returns whether all that was asked for has a result.
+fn outcome(cli: &Cli, words: &[OsString]) -> Result<bool, CliError> {
     cli.command.files().check()?;
     let outcome = match cli.command.waiting() {
         Some(message) => progress::watched(message, || cli.command.run(words))?,
         None => cli.command.run(words)?,
     };
-    outcome.deliver(cli.command.report(), options::spelled)
+    let is_complete = outcome.is_complete();
+    outcome.deliver(cli.command.report(), options::spelled)?;
+    Ok(is_complete)
 }

@@ -55,13 +55,22 @@ pub struct Outcome {
     files: Vec<OutputFile>,
     /// Files too long to be held, complete but for their names.
     begun: Vec<BegunFile>,
+    /// `true` if some of what was asked for has no result.
+    is_incomplete: bool,
 }
 
 impl Outcome {
     /// An outcome told as `text` to a person and as the fields of `report` to a program.
     pub fn new(text: String, report: &impl Serialize) -> Result<Self, CliError> {
         let json = serde_json::to_string_pretty(report)? + "\n";
-        Ok(Self { text, names_settings: true, json, files: Vec::new(), begun: Vec::new() })
+        Ok(Self {
+            text,
+            names_settings: true,
+            json,
+            files: Vec::new(),
+            begun: Vec::new(),
+            is_incomplete: false,
+        })
     }
 
     /// An outcome that is a text and nothing else.
@@ -72,7 +81,18 @@ impl Outcome {
             json: String::new(),
             files: Vec::new(),
             begun: Vec::new(),
+            is_incomplete: false,
         }
+    }
+
+    /// The same outcome, of which the exit code says that some of what was asked for has no result.
+    pub fn incomplete(self) -> Self {
+        Self { is_incomplete: true, ..self }
+    }
+
+    /// Returns whether all that was asked for has a result.
+    pub fn is_complete(&self) -> bool {
+        !self.is_incomplete
     }
 
     /// The same outcome with one more file to write.

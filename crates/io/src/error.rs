@@ -52,10 +52,18 @@ pub enum IoError {
     },
     /// The file is binary, but of no format known.
     #[error("{}", Message(format_args!("{file} is neither text nor of a format known here: MATLAB level 5 (save with -v7), \
-         universal file with datasets 58, or gzip around a record")))]
+         universal file with datasets 58, Parquet, or gzip around a record")))]
     UnknownFormat {
         /// The file.
         file: String,
+    },
+    /// The Parquet file is damaged, or written in a way that is not known here.
+    #[error("{}", Message(format_args!("{file} is damaged, or no Parquet file that can be read here: {what}")))]
+    Parquet {
+        /// The file.
+        file: String,
+        /// Cause.
+        what: String,
     },
     /// The file breaks its format.
     #[error("{}", Message(format_args!("{file}, {at}: {what}")))]

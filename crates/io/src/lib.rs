@@ -1,8 +1,8 @@
 //! Measured records and system descriptions, in and out of files.
 //!
 //! A [`Table`] reads delimited text in many dialects (quoted headers, trailing delimiters, columns
-//! that are empty below their first row, decimal commas), MATLAB and universal files. Its errors name
-//! file, line and column.
+//! that are empty below their first row, decimal commas), MATLAB and universal files and, with the feature
+//! `parquet`, Apache Parquet. Its errors name file, line and column.
 //!
 //! ```
 //! use mechid_io::{Table, TimeAxis};
@@ -22,13 +22,17 @@ mod csv_text;
 mod error;
 mod escape;
 mod experiment;
+mod folder;
 mod json;
 mod limits;
 mod line_spec;
 mod mat;
 mod output;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod responses;
 mod standard;
+mod stated_rates;
 mod system;
 mod table;
 mod uff;
@@ -42,12 +46,15 @@ pub use experiment::{
     Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level, LoadBeyond,
     MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
+pub use folder::{FileStamp, create_folder, files_of};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
 pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };
+#[cfg(feature = "parquet")]
+pub use parquet::{ParquetColumn, ParquetValues, read_parquet_metadata, write_parquet};
 pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};

@@ -61,8 +61,9 @@ pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, Ma
 pub use mechid_analysis::{
     BearingData, Channels, Detrend, FrfSettings, Identified, IdentifiedBearing,
     IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses, InspectSettings, Machine,
-    Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed, Segmentation, Window,
-    frf, identify, identify_bearing, identify_responses, inspect, predict, reconstruct,
+    Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed, ResultRow, SavedAnalysis,
+    Segmentation, Window, frf, identify, identify_bearing, identify_responses, inspect, predict,
+    reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -11,6 +11,7 @@
 mod answer;
 mod arrays;
 mod failure;
+mod fleet;
 mod identified;
 mod machine;
 mod measurement;
@@ -25,6 +26,8 @@ mod work;
 mod _mechid {
     #[pymodule_export]
     use super::answer::Answer;
+    #[pymodule_export]
+    use super::fleet::{fleet_begin, fleet_part, fleet_summary};
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]

@@ -10,7 +10,7 @@ import os
 from typing import Any
 
 import mechid
-from mechid import plotting
+from mechid import fleet, plotting
 
 from .conftest import ROOT
 
@@ -71,7 +71,9 @@ def page() -> str:
         for name, thing in vars(plotting).items()
         if inspect.isfunction(thing) and not name.startswith("_")
     ]
-    parts = [HEAD, "## Functions\n", *functions, "## Records and results\n", *kinds, "## Plots\n", *drawn]
+    many = [section(f"fleet.{name}", getattr(fleet, name)) for name in fleet.__all__]
+    parts = [HEAD, "## Functions\n", *functions, "## Records and results\n", *kinds, "## Plots\n", *drawn,
+             "## Many records\n", *many]
     return "\n".join(parts)
 
 

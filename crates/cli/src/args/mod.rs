@@ -44,13 +44,15 @@ fn plot_file(text: &str) -> Result<PathBuf, String> {
 #[allow(rustdoc::broken_intra_doc_links, reason = "brackets of a help text")]
 #[derive(Debug, Clone, Args)]
 pub struct RecordArgs {
-    /// The record: text with one row per sample, MATLAB .mat (up to -v7), or universal file (dataset
-    /// 58); also in gzip; - is standard input
+    /// The record: text with one row per sample, MATLAB .mat (up to -v7), universal file (dataset 58),
+    /// or Parquet; also in gzip; - is standard input
     ///
     /// The format is found by itself. Text: delimiter (comma, semicolon, tab, blanks) and header are
     /// found too; lines starting with # are left out. MATLAB: a vector is a column, of a matrix
     /// those called name[1], name[2] …, of a struct name.field. Universal file: a function of time
-    /// is a column called after its node and direction, such as 12+Z, and brings its time axis.
+    /// is a column called after its node and direction, such as 12+Z, and brings its time axis. Parquet:
+    /// instants are read as seconds from the first one on; units and sample_rate_hz may stand among the
+    /// keys of the file.
     #[arg(value_name = "RECORD")]
     pub record: PathBuf,
     /// Number of header lines to skip above the table

@@ -7,6 +7,7 @@
 
 mod bearing;
 mod completions;
+mod fleet;
 mod force;
 mod frf;
 mod identify;
@@ -35,10 +36,10 @@ use crate::outcome::{Files, Outcome};
     max_term_width = 100,
     after_help = "Numbers are in SI units. Columns are chosen by name or by number, counted from 1. Records are \
                   text\n(CSV and its relatives), MATLAB files up to -v7, universal files (dataset 58), \
-                  or any of them in gzip.\n\n\
+                  Parquet, or any of\nthem in gzip.\n\n\
                   A file called - is standard input where it is read, standard output where it is written; the\n\
                   report for people then goes to the error stream.\n\n\
-                  Exit codes:\n  0    success\n  2    every failure, wrong options included: one message on \
+                  Exit codes:\n  0    success\n  1    fleet: some of the records have no result\n  2    every failure, wrong options included: one message on \
                   the error stream, no file written\n  141  the reader of standard output has closed it"
 )]
 pub struct Cli {
@@ -50,6 +51,7 @@ pub struct Cli {
 pub enum Command {
     Bearing(bearing::BearingArgs),
     Completions(completions::CompletionsArgs),
+    Fleet(fleet::FleetArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
     Identify(identify::IdentifyArgs),
@@ -70,6 +72,7 @@ impl Command {
         match self {
             Command::Bearing(args) => args.run(),
             Command::Completions(args) => args.run(),
+            Command::Fleet(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
             Command::Identify(args) => args.run(),
@@ -89,6 +92,7 @@ impl Command {
         match self {
             Command::Bearing(args) => args.files(),
             Command::Completions(_) => Files::default(),
+            Command::Fleet(args) => args.files(),
             Command::Force(args) => args.files(),
             Command::Frf(args) => args.files(),
             Command::Identify(args) => args.files(),
@@ -106,7 +110,7 @@ impl Command {
     /// What to say while it computes, if that takes long; nothing if it says so itself, or must not.
     pub fn waiting(&self) -> Option<&'static str> {
         match self {
-            Command::Sweep(_) => None,
+            Command::Fleet(_) | Command::Sweep(_) => None,
             _ if self.report().quiet => None,
             Command::Multisine(_) => Some("designing the multisine"),
             Command::Simulate(_) => Some("simulating"),
@@ -121,6 +125,7 @@ impl Command {
         match self {
             Command::Bearing(args) => &args.report,
             Command::Completions(args) => &args.report,
+            Command::Fleet(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,
             Command::Identify(args) => &args.report,

@@ -102,7 +102,9 @@ impl Session {
             .output()
             .unwrap();
         self.code = output.status.code().ok_or("killed by a signal")?;
-        let text = if self.code == 0 { output.stdout } else { output.stderr };
+        // A run over many records reports even if some of them failed.
+        let reports = self.code == 0 || output.stderr.is_empty();
+        let text = if reports { output.stdout } else { output.stderr };
         String::from_utf8(text).map_err(|error| error.to_string())
     }
 }

@@ -1,6 +1,7 @@
 //! What every subcommand has in common: the records it takes, and how it talks.
 
 mod checks;
+mod fleet;
 mod forces;
 mod identification;
 mod info;

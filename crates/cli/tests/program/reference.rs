@@ -63,6 +63,8 @@ fn every_field_of_every_report_is_in_the_reference() {
     let identify = "identify machine.csv --force force --displacement displacement";
     let found = mechid(folder.path(), &format!("{identify} --period 256 --json"));
     fs::write(folder.path().join("found.json"), found).unwrap();
+    let analysis = r#"{"channels":{"force":["force"],"displacement":["displacement"]}}"#;
+    fs::write(folder.path().join("analysis.json"), analysis).unwrap();
     let nonlinear = format!("{identify} --period 256 --nonlinear k3:x1^3 --search delay");
     let found = mechid(folder.path(), &format!("{nonlinear} --json"));
     fs::write(folder.path().join("nonlinear.json"), found).unwrap();
@@ -74,6 +76,7 @@ fn every_field_of_every_report_is_in_the_reference() {
         nonlinear,
         format!("{identify} {time} --mass 25"),
         format!("{} --period 256 --output report.html", identify.replace("identify", "report")),
+        "fleet machine.csv --analysis analysis.json --output results".into(),
         "force machine.csv --system found.json --displacement displacement --period 256".into(),
         "force machine.csv --system machine.json --displacement displacement".into(),
         "frf machine.csv --force force --displacement displacement --period 256".into(),

@@ -9,7 +9,6 @@
 
 mod array;
 mod element;
-mod sampling;
 
 use std::io::Read as _;
 
@@ -21,6 +20,7 @@ use self::element::{COMPRESSED, Elements, Endian, MATRIX};
 use crate::IoError;
 use crate::contents::{Column, Contents, Fault, Place};
 use crate::limits::{Budget, Limit, Limits};
+use crate::stated_rates::with_stated_rates;
 
 /// Number of bytes before the first variable.
 const HEADER: usize = 128;
@@ -35,7 +35,7 @@ pub(crate) fn read(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents
         let at = Place::Byte(fault.at + 1);
         fault.error(file, at)
     })?;
-    let contents = sampling::with_stated_rates(contents);
+    let contents = with_stated_rates(contents);
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no vector of numbers" });
     }

@@ -98,7 +98,7 @@ impl Table {
     /// [`IoError::Empty`] without data, [`IoError::Ragged`] where the number of fields changes,
     /// [`IoError::AboveTable`] where that is because of text above the table,
     /// [`IoError::JsonRecord`], [`IoError::Gzip`], [`IoError::Malformed`] for a binary or
-    /// universal file that breaks its format, [`IoError::Hdf5`], [`IoError::UnknownFormat`],
+    /// universal file that breaks its format, [`IoError::Parquet`], [`IoError::Hdf5`], [`IoError::UnknownFormat`],
     /// [`IoError::TooLarge`] beyond the [`Limits`](crate::Limits).
     pub fn parse(file: impl Into<String>, bytes: &[u8]) -> Result<Self, IoError> {
         Self::parse_with(file, bytes, &ReadOptions::default())
@@ -144,11 +144,17 @@ impl Table {
                 text.finish(end.unwrap_or_default())?
             }
             Kind::Json => return Err(IoError::JsonRecord { file }),
-            Kind::Mat5 | Kind::Uff if options.skip_lines > 0 => {
+            Kind::Mat5 | Kind::Uff | Kind::Parquet if options.skip_lines > 0 => {
                 return Err(IoError::NothingToSkip { file });
             }
             Kind::Mat5 => mat::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
             Kind::Uff => uff::read(&file, &source.bytes(&options.limits)?, &options.limits)?,
+            #[cfg(feature = "parquet")]
+            Kind::Parquet => {
+                crate::parquet::read(&file, source.bytes(&options.limits)?, &options.limits)?
+            }
+            #[cfg(not(feature = "parquet"))]
+            Kind::Parquet => return Err(IoError::UnknownFormat { file }),
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };

@@ -4,6 +4,12 @@
 /// rounding.
 const COARSEST: f64 = 1.0;
 
+/// The same of fewer instants than [`FEW`], which could be rounded ones whatever they are.
+const COARSEST_OF_FEW: f64 = 0.5;
+
+/// Number of instants that tell rounding from uneven steps.
+const FEW: usize = 16;
+
 /// Part of a step by which instants may miss equally spaced ones beyond their rounding.
 const SLACK: f64 = 0.01;
 
@@ -176,9 +182,10 @@ impl PrintedInstants {
         intervals.append(&self.intervals);
         let step = (self.last - self.first) / self.count.saturating_sub(1) as f64;
         let unit = decimal_unit(self.last, self.decimals, self.digits);
+        let coarsest = if self.count < FEW { COARSEST_OF_FEW } else { COARSEST };
         step > 0.0
             && step.is_finite()
-            && self.coarser(self.last, unit) < COARSEST * step
+            && self.coarser(self.last, unit) < coarsest * step
             && intervals.overlap() <= SLACK * step
     }
 

@@ -41,6 +41,7 @@ pub(crate) enum Kind {
     /// HDF5, which MATLAB writes since version 7.3 on request.
     Hdf5,
     Uff,
+    Parquet,
     Unknown,
 }
 
@@ -87,6 +88,8 @@ impl<'a> Source<'a> {
             Kind::Mat5
         } else if head.starts_with(b"MATLAB 7.3 MAT-file") || head.starts_with(b"\x89HDF\r\n") {
             Kind::Hdf5
+        } else if is_parquet(head) {
+            Kind::Parquet
         } else if is_uff(head) {
             Kind::Uff
         } else if is_binary(head) {
@@ -142,6 +145,12 @@ fn is_binary(head: &[u8]) -> bool {
     let is_control = |b: &u8| *b < b' ' && !b.is_ascii_whitespace();
     text < head.len() && (text == 0 || head[..text].iter().any(is_control))
         || head[..text].contains(&0)
+}
+
+/// Whether the first bytes are those of Parquet, and not the name of a column in a text.
+fn is_parquet(head: &[u8]) -> bool {
+    let rest = head.strip_prefix(b"PAR1").and_then(<[u8]>::first);
+    rest.is_some_and(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
 }
 
 /// Whether a text begins as an object of JSON does, or a list of objects.

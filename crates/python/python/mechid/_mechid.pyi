@@ -15,6 +15,9 @@ __all__ = [
     "Predicted",
     "Reconstructed",
     "__version__",
+    "fleet_begin",
+    "fleet_part",
+    "fleet_summary",
     "frf",
     "identify",
     "inspect",
@@ -175,4 +178,7 @@ def multisine(
     search: tuple[int, int],
     level: tuple[str, float],
 ) -> _Sampled: ...
+def fleet_begin(analysis: str, folder: str) -> None: ...
+def fleet_part(records: Sequence[str], analysis: str, folder: str) -> str: ...
+def fleet_summary(parts: Sequence[str], folder: str, elapsed_s: float) -> tuple[str, str]: ...
 def program(arguments: Sequence[str]) -> int: ...

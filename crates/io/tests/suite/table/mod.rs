@@ -3,6 +3,8 @@
 mod dialects;
 mod matlab;
 mod packed;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod stretches;
 mod universal;
 

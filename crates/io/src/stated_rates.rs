@@ -36,7 +36,7 @@ const STEPS: [&str; 10] = [
 const SAME_STEP: f64 = 1e-5;
 
 /// Gives every column the rate that is stated beside it, or beside the struct that holds it.
-pub(super) fn with_stated_rates(mut contents: Contents) -> Contents {
+pub(crate) fn with_stated_rates(mut contents: Contents) -> Contents {
     let stated: Vec<(usize, &str, f64)> = (0..)
         .zip(&contents.scalars)
         .filter_map(|(at, (name, value))| Some((at, enclosing(name), step(name, *value)?)))

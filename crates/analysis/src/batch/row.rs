@@ -1,0 +1,198 @@
+//! The result of one record of many.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use mechid_estimate::checks::Verdict;
+use mechid_io::ParameterCovariance;
+use serde::Serialize;
+
+use super::settings::SavedAnalysis;
+use crate::identify::checks::CheckRow;
+use crate::identify::rows::{ModeRow, Uncertain, WindowRow};
+use crate::identify::summary::{FitRow, IdentificationSummary};
+use crate::{AnalysisError, Measurement, identify};
+
+/// Result of one record: a machine with its uncertainty and what speaks against it, or an error.
+///
+/// Where there is an error, lists are empty and the other numbers `None`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ResultRow {
+    /// Name of the record: its path, as it was given.
+    pub record: String,
+    /// Reason why there is no result.
+    pub error: Option<RowError>,
+    /// Estimator that was used.
+    pub estimator: Option<String>,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: Option<f64>,
+    /// First sample used, counted from 1.
+    pub first_sample: Option<usize>,
+    /// Last sample used, counted from 1.
+    pub last_sample: Option<usize>,
+    /// Entries of M, C and K, then the parameters of nonlinear terms.
+    pub parameters: Vec<ParameterCell>,
+    /// Covariance of the parameters that were estimated, in products of their SI units.
+    pub covariance: Option<ParameterCovariance>,
+    /// Modes, by rising frequency.
+    pub modes: Vec<ModeCell>,
+    /// RMS of the residual over the RMS of the quantity fitted, a ratio.
+    pub nrmse: Option<f64>,
+    /// Part of the response that the model leaves unexplained, a ratio of RMS values.
+    pub unexplained_motion: Option<f64>,
+    /// Power of the residual over the power that the noise explains, a ratio.
+    pub misfit_ratio: Option<f64>,
+    /// Condition number of the column-scaled regressor, a ratio.
+    pub condition_number: Option<f64>,
+    /// Every check, before the fit and after it.
+    pub findings: Vec<FindingRow>,
+    /// Sentences to read before using the numbers: the findings that are not good, then remarks.
+    pub warnings: Vec<String>,
+    /// Hash of the analysis, in hexadecimal digits.
+    pub analysis_hash: String,
+    /// Version of this crate.
+    pub version: &'static str,
+}
+
+/// Reason why a record has no result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct RowError {
+    /// Code of the failure, as [`AnalysisError::code`] names it; `internal` for a panic.
+    pub code: String,
+    /// The failure, in a sentence.
+    pub message: String,
+}
+
+/// One parameter of a row.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterCell {
+    /// Name, such as `k12`.
+    pub name: String,
+    /// SI unit.
+    pub unit: String,
+    /// Value, in its unit.
+    pub value: f64,
+    /// Standard error, in the same unit; `None` for a value that is known.
+    pub standard_error: Option<f64>,
+}
+
+/// One mode of a row.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ModeCell {
+    /// Natural frequency, in Hz.
+    pub natural_frequency_hz: f64,
+    /// Standard error of the natural frequency, in Hz.
+    pub natural_frequency_standard_error_hz: Option<f64>,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Standard error of the damping ratio.
+    pub damping_ratio_standard_error: Option<f64>,
+}
+
+/// One check of a row.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FindingRow {
+    /// Kind of the finding, such as `wrong_period`, as in the JSON of an identification.
+    pub code: String,
+    /// Good, doubtful or bad.
+    pub verdict: Verdict,
+    /// Number that decides the verdict, a ratio or a probability; `None` where it is infinite.
+    pub value: Option<f64>,
+}
+
+impl ResultRow {
+    pub(super) fn of(
+        record: &str,
+        analysis: &SavedAnalysis,
+        source: impl FnOnce() -> Result<Measurement, AnalysisError>,
+    ) -> Self {
+        let empty = Self {
+            record: record.into(),
+            error: None,
+            estimator: None,
+            sample_rate_hz: None,
+            first_sample: None,
+            last_sample: None,
+            parameters: Vec::new(),
+            covariance: None,
+            modes: Vec::new(),
+            nrmse: None,
+            unexplained_motion: None,
+            misfit_ratio: None,
+            condition_number: None,
+            findings: Vec::new(),
+            warnings: Vec::new(),
+            analysis_hash: analysis.hash(),
+            version: env!("CARGO_PKG_VERSION"),
+        };
+        let work = || {
+            analysis.check()?;
+            identify(&[source()?], &analysis.identify)
+        };
+        let error = match catch_unwind(AssertUnwindSafe(work)) {
+            Ok(Ok(found)) => return empty.with(found.summary()),
+            Ok(Err(error)) => RowError { code: error.code(), message: error.to_string() },
+            Err(panic) => RowError { code: "internal".into(), message: told(&*panic) },
+        };
+        Self { error: Some(error), ..empty }
+    }
+
+    fn with(self, found: &IdentificationSummary) -> Self {
+        let WindowRow { first_sample, last_sample, sample_rate_hz, .. } = found.window;
+        let FitRow { nrmse, unexplained_motion, misfit_ratio, condition_number, .. } = found.fit;
+        let of_terms = found.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
+        let entries =
+            found.parameters.iter().map(|p| ParameterCell::new(&p.name, p.unit, p.estimate));
+        let terms = of_terms.map(|p| ParameterCell::new(&p.name, &p.unit, p.estimate));
+        let conspicuous = found.checks.iter().filter(|check| check.is_conspicuous());
+        let remarks = found.remarks.iter().cloned();
+        Self {
+            estimator: Some(found.estimator.into()),
+            sample_rate_hz: Some(sample_rate_hz),
+            first_sample: Some(first_sample),
+            last_sample: Some(last_sample),
+            parameters: entries.chain(terms).collect(),
+            covariance: Some(found.covariance.clone()),
+            modes: found.modes.iter().map(ModeCell::of).collect(),
+            nrmse: Some(nrmse),
+            unexplained_motion,
+            misfit_ratio,
+            condition_number: Some(condition_number),
+            findings: found.checks.iter().map(FindingRow::of).collect(),
+            warnings: conspicuous.map(CheckRow::sentence).chain(remarks).collect(),
+            ..self
+        }
+    }
+}
+
+impl ParameterCell {
+    fn new(name: &str, unit: &str, estimate: Uncertain) -> Self {
+        let Uncertain { value, standard_error, .. } = estimate;
+        Self { name: name.into(), unit: unit.into(), value, standard_error }
+    }
+}
+
+impl ModeCell {
+    fn of(mode: &ModeRow) -> Self {
+        Self {
+            natural_frequency_hz: mode.natural_frequency_hz.value,
+            natural_frequency_standard_error_hz: mode.natural_frequency_hz.standard_error,
+            damping_ratio: mode.damping_ratio.value,
+            damping_ratio_standard_error: mode.damping_ratio.standard_error,
+        }
+    }
+}
+
+impl FindingRow {
+    fn of(check: &CheckRow) -> Self {
+        let written = serde_json::to_value(&check.finding).unwrap_or_default();
+        let code = written["kind"].as_str().unwrap_or_default().to_owned();
+        Self { code, verdict: check.verdict, value: check.value }
+    }
+}
+
+/// Returns what a panic says.
+fn told(panic: &(dyn std::any::Any + Send)) -> String {
+    let text = panic.downcast_ref::<String>().map(String::as_str);
+    let text = text.or(panic.downcast_ref::<&str>().copied());
+    format!("internal error, please report it: {}", text.unwrap_or("no reason is known"))
+}

@@ -1,0 +1,112 @@
+//! The settings of an identification together with all that says what a record holds.
+
+use std::path::Path;
+
+use mechid_io::read_json;
+use serde::{Deserialize, Serialize};
+use twox_hash::XxHash3_128;
+
+use super::row::ResultRow;
+use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
+use crate::{AnalysisError, Identify};
+
+/// An identification to be repeated on many records that have the same columns.
+///
+/// Everything but the record is in it, so that a record and this value make a result.
+///
+/// ```
+/// use mechid_analysis::{Channels, Measurement, ResponseQuantity, SavedAnalysis, Window};
+///
+/// let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/machine.csv");
+/// let analysis = SavedAnalysis {
+///     channels: Channels::new("force", ResponseQuantity::Displacement, "displacement"),
+///     window: Window { period: Some(256), ..Window::default() },
+///     ..SavedAnalysis::default()
+/// };
+/// let row = analysis.row("rig", || analysis.open(rig));
+/// assert_eq!(row.error, None);
+/// assert_eq!(row.parameters[0].name, "m");
+/// // What cannot be identified is a row, too.
+/// let row = analysis.row("lost", || analysis.open("lost.csv"));
+/// assert_eq!(row.error.unwrap().code, "io.read");
+/// # Ok::<(), mechid_analysis::AnalysisError>(())
+/// ```
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SavedAnalysis {
+    /// Columns of force and response.
+    pub channels: Channels,
+    /// Settings for reading the files.
+    pub reading: Reading,
+    /// Samples to use of each record.
+    pub window: Window,
+    /// Settings of the identification.
+    pub identify: Identify,
+}
+
+impl SavedAnalysis {
+    /// Reads an analysis from a JSON file (`-`: standard input) and checks it.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Io`] if it cannot be read or has a field that is wrong, and those of
+    /// [`SavedAnalysis::check`].
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
+        let read: Self = read_json(path)?;
+        read.check()?;
+        Ok(read)
+    }
+
+    /// Checks what no record could be identified with.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`], [`AnalysisError::ColumnCount`],
+    /// and [`AnalysisError::Setting`] for a window that is counted from 0 or has no samples.
+    pub fn check(&self) -> Result<(), AnalysisError> {
+        self.channels.check_pairs()?;
+        let Window { start, period, periods } = self.window;
+        for (setting, count) in [("start", Some(start)), ("period", period), ("periods", periods)] {
+            if count == Some(0) {
+                let why = "it is counted from 1".into();
+                return Err(AnalysisError::Setting { setting, why });
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens a record as the analysis reads it.
+    ///
+    /// # Errors
+    /// As [`Measurement::open_with`].
+    pub fn open(&self, path: impl AsRef<Path>) -> Result<Measurement, AnalysisError> {
+        let plan = RecordPlan {
+            path: path.as_ref().to_owned(),
+            channels: self.channels.clone(),
+            reading: self.reading.clone(),
+            window: self.window.clone(),
+        };
+        plan.open()
+    }
+
+    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a panic
+    /// included, is the error of the row; the same record and analysis always make the same row.
+    pub fn row(
+        &self,
+        record: &str,
+        source: impl FnOnce() -> Result<Measurement, AnalysisError>,
+    ) -> ResultRow {
+        ResultRow::of(record, self, source)
+    }
+
+    /// Returns a hash of all settings, in hexadecimal digits, which tells whether two rows come from
+    /// the same analysis.
+    pub fn hash(&self) -> String {
+        // Structs of numbers and texts with named fields always have a JSON form.
+        let json = serde_json::to_string(self).unwrap_or_default();
+        hash(json.as_bytes())
+    }
+}
+
+/// Returns the hash of some bytes in hexadecimal digits.
+pub(crate) fn hash(bytes: &[u8]) -> String {
+    format!("{:032x}", XxHash3_128::oneshot(bytes))
+}

@@ -1,0 +1,149 @@
+//! How many records, how fast, and which failed why.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use mechid_io::files_of;
+use mechid_signal::message;
+use serde::{Deserialize, Serialize};
+
+use super::part::PartDone;
+use crate::text::compact;
+use crate::{AnalysisError, ResultRow};
+
+/// Records that failed for one reason.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FailureCount {
+    /// Code of the failure, as [`AnalysisError::code`] names it.
+    pub code: String,
+    /// Number of records.
+    pub records: usize,
+    /// The first of them, by name.
+    pub record: String,
+    /// Failure of that record, in a sentence.
+    pub message: String,
+}
+
+/// Result of a run over many records.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FleetSummary {
+    /// Number of records, which is that of the rows.
+    pub records: usize,
+    /// Number of records without a result.
+    pub failed: usize,
+    /// Failures by their code, the most frequent first.
+    pub failures: Vec<FailureCount>,
+    /// Number of parts.
+    pub parts: usize,
+    /// Number of parts computed now; the others were there.
+    pub computed_parts: usize,
+    /// Number of records in the parts computed now.
+    pub computed_records: usize,
+    /// Number of parts in the folder that are of other records, of another version of these, or of
+    /// another analysis.
+    pub other_parts: usize,
+    /// Time of the run, in s.
+    pub elapsed_s: f64,
+}
+
+impl FailureCount {
+    /// Counts the failures of some rows.
+    pub(super) fn of(rows: &[ResultRow]) -> Vec<Self> {
+        let failed = rows.iter().filter_map(|row| {
+            let error = row.error.clone()?;
+            let (code, message, record) = (error.code, error.message, row.record.clone());
+            Some(Self { code, records: 1, record, message })
+        });
+        Self::merged(failed)
+    }
+
+    /// Adds up the counts of each reason, the most frequent first.
+    fn merged(counts: impl IntoIterator<Item = Self>) -> Vec<Self> {
+        let mut by_code: BTreeMap<String, Self> = BTreeMap::new();
+        for count in counts {
+            match by_code.get_mut(&count.code) {
+                None => drop(by_code.insert(count.code.clone(), count)),
+                Some(known) => {
+                    let records = known.records + count.records;
+                    if count.record < known.record {
+                        *known = count;
+                    }
+                    known.records = records;
+                }
+            }
+        }
+        let mut merged: Vec<Self> = by_code.into_values().collect();
+        merged.sort_by_key(|count| std::cmp::Reverse(count.records));
+        merged
+    }
+}
+
+impl FleetSummary {
+    /// Gathers the parts of a run that took `elapsed_s` seconds and wrote into `folder`.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Io`] if the folder cannot be listed.
+    pub fn of(parts: Vec<PartDone>, folder: &Path, elapsed_s: f64) -> Result<Self, AnalysisError> {
+        let ours: BTreeSet<&str> = parts.iter().map(|part| part.file_name.as_str()).collect();
+        let other = |path: &PathBuf| {
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            name.starts_with("part-") && name.ends_with(".parquet") && !ours.contains(name)
+        };
+        let other_parts = files_of(folder)?.iter().filter(|path| other(path)).count();
+        let computed = || parts.iter().filter(|part| part.computed);
+        let failures = FailureCount::merged(parts.iter().flat_map(|part| part.failures.clone()));
+        Ok(Self {
+            records: parts.iter().map(|part| part.records).sum(),
+            failed: failures.iter().map(|count| count.records).sum(),
+            parts: parts.len(),
+            computed_parts: computed().count(),
+            computed_records: computed().map(|part| part.records).sum(),
+            failures,
+            other_parts,
+            elapsed_s,
+        })
+    }
+}
+
+impl fmt::Display for FleetSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (records, parts) = (self.records, self.parts);
+        writeln!(
+            f,
+            "{} in {}: {} identified, {} failed",
+            message::count(records, "record"),
+            message::count(parts, "part"),
+            records - self.failed,
+            self.failed
+        )?;
+        for failure in &self.failures {
+            let FailureCount { code, records, record, message: why } = failure;
+            let count = message::count(*records, "record");
+            writeln!(f, "  {code}: {count}, such as {record} ({why})")?;
+        }
+        match self.computed_parts {
+            0 => writeln!(f, "all parts were there, nothing was computed")?,
+            computed => {
+                let rate = self.computed_records as f64 / self.elapsed_s;
+                writeln!(
+                    f,
+                    "computed {} in {} s ({} records/s); {} there before",
+                    message::count(self.computed_records, "record"),
+                    compact(self.elapsed_s, 3),
+                    compact(rate, 3),
+                    message::count(parts - computed, "part")
+                )?;
+            }
+        }
+        if self.other_parts > 0 {
+            writeln!(
+                f,
+                "note: the folder holds {} more, of other records or another analysis: a reader of \
+                 the whole folder takes them in, too",
+                message::count(self.other_parts, "part")
+            )?;
+        }
+        Ok(())
+    }
+}

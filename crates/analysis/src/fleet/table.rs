@@ -1,0 +1,81 @@
+//! Rows of results as columns.
+
+use mechid_io::{ParquetColumn, ParquetValues};
+
+use crate::ResultRow;
+use crate::batch::{FindingRow, ModeCell, ParameterCell};
+
+/// Returns the columns of the table of results: the same ones whatever the rows hold.
+pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
+    let text = |value: &dyn Fn(&ResultRow) -> Option<String>| {
+        ParquetValues::Text(rows.iter().map(value).collect())
+    };
+    let count = |value: &dyn Fn(&ResultRow) -> Option<usize>| {
+        let value = |row| value(row).and_then(|count| i64::try_from(count).ok());
+        ParquetValues::Count(rows.iter().map(value).collect())
+    };
+    let number = |value: &dyn Fn(&ResultRow) -> Option<f64>| {
+        ParquetValues::Number(rows.iter().map(value).collect())
+    };
+    let parameter_texts = |value: &dyn Fn(&ParameterCell) -> String| {
+        let list = |row: &ResultRow| row.parameters.iter().map(value).collect();
+        ParquetValues::Texts(rows.iter().map(list).collect())
+    };
+    let parameter_numbers = |value: &dyn Fn(&ParameterCell) -> Option<f64>| {
+        let list = |row: &ResultRow| row.parameters.iter().map(value).collect();
+        ParquetValues::Numbers(rows.iter().map(list).collect())
+    };
+    let modes = |value: &dyn Fn(&ModeCell) -> Option<f64>| {
+        let list = |row: &ResultRow| row.modes.iter().map(value).collect();
+        ParquetValues::Numbers(rows.iter().map(list).collect())
+    };
+    let findings = |value: &dyn Fn(&FindingRow) -> String| {
+        let list = |row: &ResultRow| row.findings.iter().map(value).collect();
+        ParquetValues::Texts(rows.iter().map(list).collect())
+    };
+    let covariance_parameters =
+        |row: &ResultRow| row.covariance.as_ref().map(|c| c.parameters.clone()).unwrap_or_default();
+    let covariance = |row: &ResultRow| {
+        let entries = row.covariance.iter().flat_map(|c| c.matrix.iter().flatten());
+        entries.map(|entry| Some(*entry)).collect()
+    };
+    let finding_values =
+        |row: &ResultRow| row.findings.iter().map(|finding| finding.value).collect();
+    let all = [
+        ("record", text(&|row| Some(row.record.clone()))),
+        ("error_code", text(&|row| row.error.as_ref().map(|error| error.code.clone()))),
+        ("error", text(&|row| row.error.as_ref().map(|error| error.message.clone()))),
+        ("estimator", text(&|row| row.estimator.clone())),
+        ("sample_rate_hz", number(&|row| row.sample_rate_hz)),
+        ("first_sample", count(&|row| row.first_sample)),
+        ("last_sample", count(&|row| row.last_sample)),
+        ("parameter", parameter_texts(&|p| p.name.clone())),
+        ("unit", parameter_texts(&|p| p.unit.clone())),
+        ("value", parameter_numbers(&|p| Some(p.value))),
+        ("standard_error", parameter_numbers(&|p| p.standard_error)),
+        (
+            "covariance_parameter",
+            ParquetValues::Texts(rows.iter().map(covariance_parameters).collect()),
+        ),
+        ("covariance", ParquetValues::Numbers(rows.iter().map(covariance).collect())),
+        ("degrees_of_freedom", count(&|row| row.covariance.as_ref().map(|c| c.degrees_of_freedom))),
+        ("natural_frequency_hz", modes(&|mode| Some(mode.natural_frequency_hz))),
+        (
+            "natural_frequency_standard_error_hz",
+            modes(&|mode| mode.natural_frequency_standard_error_hz),
+        ),
+        ("damping_ratio", modes(&|mode| Some(mode.damping_ratio))),
+        ("damping_ratio_standard_error", modes(&|mode| mode.damping_ratio_standard_error)),
+        ("nrmse", number(&|row| row.nrmse)),
+        ("unexplained_motion", number(&|row| row.unexplained_motion)),
+        ("misfit_ratio", number(&|row| row.misfit_ratio)),
+        ("condition_number", number(&|row| row.condition_number)),
+        ("finding", findings(&|finding| finding.code.clone())),
+        ("finding_verdict", findings(&|finding| finding.verdict.to_string())),
+        ("finding_value", ParquetValues::Numbers(rows.iter().map(finding_values).collect())),
+        ("warning", ParquetValues::Texts(rows.iter().map(|row| row.warnings.clone()).collect())),
+        ("analysis_hash", text(&|row| Some(row.analysis_hash.clone()))),
+        ("version", text(&|row| Some(row.version.into()))),
+    ];
+    all.into_iter().map(|(name, values)| ParquetColumn { name, values }).collect()
+}

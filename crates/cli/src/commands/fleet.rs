@@ -1,0 +1,84 @@
+//! `mechid fleet`: the machines behind many records.
+
+use std::num::NonZero;
+use std::path::PathBuf;
+use std::thread::available_parallelism;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use mechid::SavedAnalysis;
+use mechid::analysis::fleet::{Fleet, RECORDS_PER_PART};
+use mechid::io::files_of;
+
+use crate::args::{ReportArgs, at_least_one};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Identify many records by one saved analysis, into a folder of Parquet files
+///
+/// Every record becomes one row: parameters, standard errors, covariance, modes, findings, warnings,
+/// or the error of a record that cannot be identified. The records are divided into parts of so many
+/// records, by rising path; a part is one file of the folder, complete or not there. Run again, the
+/// command computes what is missing: the parts that were not finished, and those in which a record,
+/// the analysis or the version of the program is another one.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Exit code 1 says that all records were gone through and some have no result.
+
+Examples:
+  mechid fleet day-1/ day-2/ --analysis analysis.json --output results
+  mechid fleet a.csv b.mat c.parquet --analysis analysis.json --output results --workers 2 --json"
+)]
+pub struct FleetArgs {
+    /// The records, of any format; a folder stands for the files in it
+    #[arg(value_name = "RECORD", required = true)]
+    records: Vec<PathBuf>,
+    /// The analysis: channels, reading, window and identify, as JSON
+    #[arg(long, value_name = "ANALYSIS.json")]
+    analysis: PathBuf,
+    /// The folder of results; it is made if it is not there
+    #[arg(long, value_name = "FOLDER", help_heading = "Output")]
+    output: PathBuf,
+    /// Records worked on at a time [default: as many as there are processors]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
+    workers: Option<usize>,
+    /// Records in a part
+    #[arg(long, value_name = "COUNT", default_value_t = RECORDS_PER_PART,
+          value_parser = at_least_one)]
+    part_records: usize,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl FleetArgs {
+    /// Returns the files that the arguments name; the results have names of their own.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.analysis]).reads(&self.records)
+    }
+
+    /// Computes the parts that are missing, and tells what there is.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let analysis = SavedAnalysis::read(&self.analysis)?;
+        let mut records = Vec::new();
+        for record in &self.records {
+            records.extend(files_of(record)?);
+        }
+        let fleet = Fleet::new(analysis, &records, &self.output, self.part_records)?;
+        let workers =
+            self.workers.unwrap_or_else(|| available_parallelism().map_or(1, NonZero::get));
+        let bar = match self.report.quiet {
+            true => ProgressBar::hidden(),
+            // Hides itself where nobody watches.
+            false => ProgressBar::new(records.len() as u64),
+        };
+        let style = "{wide_bar} {pos} of {len} records, {elapsed}, {eta} left (Ctrl-C ends it)";
+        bar.set_style(
+            ProgressStyle::with_template(style).expect("the template is written correctly"),
+        );
+        let found = fleet.run(workers, &|part| bar.inc(part.records as u64));
+        bar.finish_and_clear();
+        let found = found?;
+        let outcome = Outcome::new(found.to_string(), &found)?;
+        Ok(if found.failed > 0 { outcome.incomplete() } else { outcome })
+    }
+}

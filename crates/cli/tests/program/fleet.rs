@@ -1,0 +1,48 @@
+//! Many records: the exit code, the folder, and what a second run does.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+fn program(folder: &Path, arguments: &str) -> std::process::Output {
+    let mut command = assert_cmd::Command::cargo_bin("mechid").unwrap();
+    command.current_dir(folder).args(arguments.split_whitespace()).output().unwrap()
+}
+
+#[test]
+fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() {
+    let home = tempfile::tempdir().unwrap();
+    let rig = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/machine.csv");
+    let rig = fs::read_to_string(rig).unwrap();
+    fs::create_dir(home.path().join("day")).unwrap();
+    for name in ["a.csv", "b.csv", "c.csv"] {
+        fs::write(home.path().join("day").join(name), format!("# {name}\n{rig}")).unwrap();
+    }
+    let analysis = r#"{"channels": {"force": ["force"], "displacement": ["displacement"]},
+        "window": {"period": 256}}"#;
+    fs::write(home.path().join("analysis.json"), analysis).unwrap();
+    let run = "fleet day --analysis analysis.json --output out/results --part-records 2 --json";
+    let first = program(home.path(), run);
+    assert_eq!(first.status.code(), Some(0), "{}", String::from_utf8_lossy(&first.stderr));
+    let report: Value = serde_json::from_slice(&first.stdout).unwrap();
+    assert_eq!((&report["records"], &report["failed"]), (&3.into(), &0.into()));
+    assert_eq!(fs::read_dir(home.path().join("out/results")).unwrap().count(), 2);
+
+    let again: Value = serde_json::from_slice(&program(home.path(), run).stdout).unwrap();
+    assert_eq!(again["computed_records"], 0);
+
+    fs::write(home.path().join("day/d.csv"), "").unwrap();
+    let failed = program(home.path(), run);
+    assert_eq!(failed.status.code(), Some(1), "{}", String::from_utf8_lossy(&failed.stderr));
+    let report: Value = serde_json::from_slice(&failed.stdout).unwrap();
+    assert_eq!(report["failures"][0]["code"], "io.empty");
+    // The part of a and b is that of before; the one of c has changed.
+    assert_eq!((&report["computed_parts"], &report["other_parts"]), (&1.into(), &1.into()));
+
+    // What is wrong with the analysis concerns no record.
+    fs::write(home.path().join("analysis.json"), "{}").unwrap();
+    let refused = program(home.path(), "fleet day --analysis analysis.json --output none");
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(!home.path().join("none").exists());
+}

@@ -1,0 +1,64 @@
+//! Folders of records and of results: what stands there, and how it was last changed.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::UNIX_EPOCH;
+
+use crate::IoError;
+use crate::standard::{input_name, output_name};
+
+/// Size and time of modification of a file, by which another version of it is told apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FileStamp {
+    /// Number of bytes.
+    pub bytes: u64,
+    /// Time of the last modification, in ns since the beginning of 1970; 0 where the system knows none.
+    pub modified_ns: u128,
+}
+
+impl FileStamp {
+    /// Looks at a file; `None` if there is none or it must not be looked at.
+    pub fn of(path: impl AsRef<Path>) -> Option<Self> {
+        let found = fs::metadata(path).ok()?;
+        let since = found.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        Some(Self {
+            bytes: found.len(),
+            modified_ns: since.map_or(0, |duration| duration.as_nanos()),
+        })
+    }
+}
+
+/// Creates a folder, with those above it, unless it exists.
+///
+/// # Errors
+/// [`IoError::Write`].
+pub fn create_folder(path: impl AsRef<Path>) -> Result<(), IoError> {
+    let path = path.as_ref();
+    fs::create_dir_all(path).map_err(|source| IoError::Write { file: output_name(path), source })
+}
+
+/// Lists the files of a folder by name, without hidden ones and without folders in it; of anything
+/// else than a folder, the path itself.
+///
+/// # Errors
+/// [`IoError::Read`] for a folder that cannot be read.
+pub fn files_of(path: impl AsRef<Path>) -> Result<Vec<PathBuf>, IoError> {
+    let path = path.as_ref();
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let listed = || -> io::Result<Vec<PathBuf>> {
+        let mut files = Vec::new();
+        for entry in fs::read_dir(path)? {
+            let entry = entry?;
+            let hidden = entry.file_name().as_encoded_bytes().starts_with(b".");
+            if !hidden && !entry.path().is_dir() {
+                files.push(entry.path());
+            }
+        }
+        files.sort();
+        Ok(files)
+    };
+    listed().map_err(|source| IoError::Read { file: input_name(path), source })
+}

@@ -1,0 +1,132 @@
+//! Parquet files of four programs, and tables of results.
+
+use std::fs;
+
+use mechid_io::{
+    IoError, Limit, Limits, ParquetColumn, ParquetValues, Quantity, ReadOptions, Table, TimeAxis,
+    read_parquet_metadata, write_parquet,
+};
+use mechid_model::ResponseQuantity;
+
+const SAMPLES: usize = 300;
+
+fn bytes(program: &str) -> Vec<u8> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data");
+    fs::read(format!("{folder}/{program}.parquet")).unwrap()
+}
+
+fn table(program: &str) -> Table {
+    Table::parse(program, &bytes(program)).unwrap()
+}
+
+/// The columns that `make_parquet.py` writes, to the last bit.
+fn written(name: &str) -> Vec<f64> {
+    let value = |k: i64| match name {
+        "time" => k as f64 / 128.0,
+        "force" => ((k * k) % 7 - 3) as f64 * 0.1,
+        "x" => f64::from((k as f64 * 0.3) as f32),
+        "count" => (k * 7 - 900) as f64,
+        "unsigned" => (k + 4_294_966_000) as f64,
+        "stamp" => k as f64 * 7_812_500.0 / 1e9,
+        _ => unreachable!("{name}"),
+    };
+    (0..SAMPLES as i64).map(value).collect()
+}
+
+#[test]
+fn files_of_four_programs_hold_the_same_numbers() {
+    for program in ["pyarrow", "pandas", "polars", "duckdb"] {
+        let table = table(program);
+        assert_eq!(table.format(), "Parquet");
+        assert_eq!(table.len(), SAMPLES);
+        for name in ["time", "force", "x", "count"] {
+            assert_eq!(table.column(name).unwrap(), written(name), "{program}: {name}");
+        }
+        let record = table.record(&TimeAxis::Column("time"), &["force", "x"]).unwrap();
+        assert_eq!(record.sampling().dt(), 1.0 / 128.0, "{program}");
+    }
+}
+
+#[test]
+fn keys_of_the_file_state_units_and_rate() {
+    for program in ["pyarrow", "pandas"] {
+        let table = table(program);
+        let unit = |name| table.to_si(table.find(name).unwrap(), Quantity::Force);
+        assert_eq!(unit("force").unwrap(), 1e-3, "{program}");
+        let x = table.find("x").unwrap();
+        let displacement = ResponseQuantity::Displacement.into();
+        assert_eq!(table.to_si(x, displacement).unwrap(), 1e-3, "{program}");
+    }
+    let table = table("pyarrow");
+    assert!(table.scalars().contains(&("sample_rate_hz".into(), 128.0)));
+    let sampling = table.sampling(&TimeAxis::OfFile, &["force"]).unwrap();
+    assert_eq!(sampling.dt(), 1.0 / 128.0);
+}
+
+#[test]
+fn columns_of_other_kinds_are_refused_where_they_are_used() {
+    let table = table("pyarrow");
+    assert_eq!(table.column("unsigned").unwrap(), written("unsigned"));
+    assert_eq!(table.column("stamp").unwrap(), written("stamp"));
+    let refused = |name: &str| table.column(name).unwrap_err().to_string();
+    assert!(refused("note").contains("it holds text"), "{}", refused("note"));
+    assert!(refused("list").contains("it holds lists"), "{}", refused("list"));
+    assert!(refused("holed").contains("sample 5"), "{}", refused("holed"));
+}
+
+#[test]
+fn damage_is_an_error_and_no_panic() {
+    let whole = bytes("pyarrow");
+    let cut = Table::parse("a", &whole[..whole.len() / 2]).unwrap_err();
+    assert!(matches!(cut, IoError::Parquet { .. }), "{cut}");
+    assert!(matches!(Table::parse("a", &whole[..6]), Err(IoError::Parquet { .. })));
+    for at in (0..whole.len()).step_by(97) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x55;
+        // Read or refused: a flipped bit of a number is not found.
+        let _ = Table::parse("a", &damaged);
+    }
+    // The name of a column in a text.
+    assert_eq!(Table::parse("a.csv", b"PAR1,PAR2\n1,2\n").unwrap().names(), ["PAR1", "PAR2"]);
+    let skipped = ReadOptions { skip_lines: 1, ..ReadOptions::default() };
+    let error = Table::parse_with("a", &whole, &skipped).unwrap_err();
+    assert!(matches!(error, IoError::NothingToSkip { .. }), "{error}");
+}
+
+#[test]
+fn columns_and_numbers_have_limits() {
+    let refused = |limits: Limits| {
+        let options = ReadOptions { skip_lines: 0, limits };
+        match Table::parse_with("a", &bytes("pyarrow"), &options) {
+            Err(IoError::TooLarge { limit, .. }) => limit,
+            other => panic!("{other:?}"),
+        }
+    };
+    assert_eq!(refused(Limits { columns: 3, ..Limits::DEFAULT }), Limit::Columns(3));
+    assert_eq!(refused(Limits { numbers: 1000, ..Limits::DEFAULT }), Limit::Numbers(1000));
+}
+
+#[test]
+fn a_table_of_results_is_read_back() {
+    let path = std::env::temp_dir().join(format!("mechid-io-{}.parquet", std::process::id()));
+    let column = |name, values| ParquetColumn { name, values };
+    let columns = [
+        column("record", ParquetValues::Text(vec![Some("a".into()), None])),
+        column("rows", ParquetValues::Count(vec![None, Some(-7)])),
+        column("value", ParquetValues::Number(vec![Some(0.1), Some(2.5)])),
+        column("names", ParquetValues::Texts(vec![vec![], vec!["m".into(), "c".into()]])),
+        column("errors", ParquetValues::Numbers(vec![vec![Some(1.0), None], vec![]])),
+    ];
+    write_parquet(&path, &columns, &[("mechid", "{}".into())]).unwrap();
+    assert!(read_parquet_metadata(&path).unwrap().contains(&("mechid".into(), "{}".into())));
+    let table = Table::read(&path).unwrap();
+    assert_eq!(table.column("value").unwrap(), [0.1, 2.5]);
+    assert!(table.column("rows").unwrap_err().to_string().contains("sample 1"));
+    let unequal = [
+        column("a", ParquetValues::Number(vec![Some(1.0)])),
+        column("b", ParquetValues::Number(vec![])),
+    ];
+    let error = write_parquet(&path, &unequal, &[]).unwrap_err();
+    assert!(matches!(error, IoError::Parquet { .. }), "{error}");
+    fs::remove_file(path).unwrap();
+}
