@@ -105,7 +105,7 @@ fn bearing_tests_need_two_directions() {
 fn duplicate_column_lists_those_there_are() {
     let twice = good().replacen("time,force,x", "time,x,x", 1);
     let arguments = "identify a.csv --force 2 --displacement x";
-    refused(&twice, arguments, &["several columns \"x\"", "1 \"time\", 2 \"x\", 3 \"x\""]);
+    refused(&twice, arguments, &["several columns \"x\"", "by its number: 2 \"x\", 3 \"x\""]);
     let parts = ["column 2 of a.csv is used twice, as \"force\" and as \"2\"", "3 \"x\""];
     refused(&good(), "identify a.csv --force force --displacement 2", &parts);
 }

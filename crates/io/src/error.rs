@@ -324,13 +324,13 @@ pub enum IoError {
         file: String,
         /// Name of one number.
         first: String,
-        /// Its value, in Hz or s.
+        /// Value of that number, in Hz or s.
         first_value: f64,
         /// Rate that it states, in Hz.
         first_hz: f64,
         /// Name of the other number.
         second: String,
-        /// Its value, in Hz or s.
+        /// Value of the other number, in Hz or s.
         second_value: f64,
         /// Rate that it states, in Hz.
         second_hz: f64,

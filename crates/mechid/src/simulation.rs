@@ -464,17 +464,17 @@ mod tests {
         (found - truth).amax() / truth.amax()
     }
 
-    /// Judge: ẍ + 0.1 ẋ + x + x³ = F with F such that x = cos 2t.
+    /// Judge: ẍ + 2 ẋ + x + x³ = F with F such that x = cos 2t, damped enough to be the only orbit.
     #[test]
     fn a_nonlinear_machine_goes_round_its_orbit() {
         let simulated = |scheme: &str, response: &str| {
             let text = format!(
-                r#"{{ "system": {{ "mass": 1, "damping": 0.1, "stiffness": 1 }},
+                r#"{{ "system": {{ "mass": 1, "damping": 2, "stiffness": 1 }},
                      "nonlinear": {{ "terms": "k3: x1^3", "coefficients": [1] }},
                      "sampling": {{ "samples": 400, "rate_hz": {} }},
                      "excitation": [
                        {{ "kind": "harmonic", "amplitude": 2.25, "frequency_hz": {hz}, "phase_rad": {half} }},
-                       {{ "kind": "harmonic", "amplitude": 0.2, "frequency_hz": {hz}, "phase_rad": {quarter} }},
+                       {{ "kind": "harmonic", "amplitude": 4, "frequency_hz": {hz}, "phase_rad": {quarter} }},
                        {{ "kind": "harmonic", "amplitude": 0.25, "frequency_hz": {} }}],
                      "scheme": {scheme}, "response": {response} }}"#,
                 400.0 * FRAC_1_PI,

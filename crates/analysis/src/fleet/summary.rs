@@ -1,4 +1,4 @@
-//! How many records, how fast, and which failed why.
+//! Summary of a run: number of records, speed, and failures with their reasons.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

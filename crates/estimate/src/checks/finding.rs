@@ -239,7 +239,7 @@ pub enum Finding {
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Concentration {
-    /// Their frequencies, in Hz, rising.
+    /// Frequencies of the lines, in Hz, a list of them rising.
     pub frequencies_hz: Vec<f64>,
     /// Fraction of the residual power beyond the noise that goes with them.
     pub share: f64,

@@ -31,11 +31,11 @@ pub enum ParquetValues {
     Text(Vec<Option<String>>),
     /// Whole numbers.
     Count(Vec<Option<i64>>),
-    /// Numbers.
+    /// Numbers, one per row, in the unit of the column.
     Number(Vec<Option<f64>>),
     /// Lists of texts.
     Texts(Vec<Vec<String>>),
-    /// Lists of numbers.
+    /// Lists of numbers, one list per row, in the unit of the column.
     Numbers(Vec<Vec<Option<f64>>>),
 }
 

@@ -40,6 +40,8 @@ pub(super) struct PrintedInstants {
     digits: i32,
     /// Whether all are single precision.
     is_single: bool,
+    /// Whether the distance of any from the first one overflows.
+    overflows: bool,
     /// Rounding unit of the instants within a decade.
     decade: Decade,
     beginning: Vec<f64>,
@@ -140,6 +142,7 @@ impl Default for PrintedInstants {
             decimals: 0,
             digits: 1,
             is_single: true,
+            overflows: false,
             decade: Decade::NONE,
             beginning: Vec::new(),
             intervals: Intervals::default(),
@@ -168,6 +171,7 @@ impl PrintedInstants {
             let half = self.rounding(time, unit);
             self.intervals.push(self.count as f64, time - self.first, half);
         }
+        self.overflows |= !(time - self.first).is_finite();
         self.last = time;
         self.count += 1;
     }
@@ -184,7 +188,7 @@ impl PrintedInstants {
         let unit = decimal_unit(self.last, self.decimals, self.digits);
         let coarsest = if self.count < FEW { COARSEST_OF_FEW } else { COARSEST };
         step > 0.0
-            && step.is_finite()
+            && !self.overflows
             && self.coarser(self.last, unit) < coarsest * step
             && intervals.overlap() <= SLACK * step
     }
