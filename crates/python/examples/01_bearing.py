@@ -11,7 +11,7 @@ import mechid
 
 MASS, FS, PERIOD, PERIODS = 14.8, 512.0, 1024, 8
 C = np.array([[2200.0, 900.0], [900.0, 3100.0]])
-K = np.array([[2.1e6, 1.4e6], [-2.3e6, 3.0e6]])
+K = np.array([[2.1e6, 1.4e6], [-0.6e6, 3.0e6]])
 rig = {
     "system": {
         "mass": [[MASS, 0.0], [0.0, MASS]],

@@ -117,7 +117,7 @@ def test_the_table_has_the_numbers_of_single_identifications(
     values = dict(zip(row["parameter"], row["value"], strict=True))
     errors = dict(zip(row["parameter"], row["standard_error"], strict=True))
     for name, parameter in found.parameters.items():
-        assert (values[name], errors[name]) == (parameter.value, parameter.standard_error)
+        assert (values[name], errors[name]) == (parameter.value, parameter.std_error)
     bad = {row["error_code"]: row for row in rows if row["error"] is not None}
     assert len(bad) == 3
     for code, row in bad.items():
