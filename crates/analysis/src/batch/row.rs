@@ -99,6 +99,18 @@ pub struct FindingRow {
     pub value: Option<f64>,
 }
 
+impl SavedAnalysis {
+    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a panic
+    /// included, is the error of the row; the same record and analysis always make the same row.
+    pub fn row(
+        &self,
+        record: &str,
+        source: impl FnOnce() -> Result<Measurement, AnalysisError>,
+    ) -> ResultRow {
+        ResultRow::of(record, self, source)
+    }
+}
+
 impl ResultRow {
     pub(super) fn of(
         record: &str,

@@ -6,7 +6,6 @@ use mechid_io::read_json;
 use serde::{Deserialize, Serialize};
 use twox_hash::XxHash3_128;
 
-use super::row::ResultRow;
 use crate::measurement::{Channels, Measurement, Reading, RecordPlan, Window};
 use crate::{AnalysisError, Identify};
 
@@ -85,16 +84,6 @@ impl SavedAnalysis {
             window: self.window.clone(),
         };
         plan.open()
-    }
-
-    /// Identifies the record that `source` opens, called `record` in the row. Whatever fails, a panic
-    /// included, is the error of the row; the same record and analysis always make the same row.
-    pub fn row(
-        &self,
-        record: &str,
-        source: impl FnOnce() -> Result<Measurement, AnalysisError>,
-    ) -> ResultRow {
-        ResultRow::of(record, self, source)
     }
 
     /// Returns a hash of all settings, in hexadecimal digits, which tells whether two rows come from

@@ -10,6 +10,7 @@
 //! file appears complete or not at all. Whoever computes a part, in whatever order and process, writes
 //! the same rows.
 
+mod failures;
 mod part;
 mod summary;
 mod table;
@@ -22,8 +23,9 @@ use std::time::Instant;
 use mechid_io::create_folder;
 use rayon::ThreadPoolBuilder;
 
+pub use self::failures::FailureCount;
 pub use self::part::{Part, PartDone};
-pub use self::summary::{FailureCount, FleetSummary};
+pub use self::summary::FleetSummary;
 use crate::{AnalysisError, SavedAnalysis};
 
 /// Number of records in a part unless it is said.

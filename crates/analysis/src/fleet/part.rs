@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mechid_io::{FileStamp, read_parquet_metadata, write_parquet};
 use serde::{Deserialize, Serialize};
 
-use super::summary::FailureCount;
+use super::failures::FailureCount;
 use super::table::columns;
 use crate::batch::settings::hash;
 use crate::{AnalysisError, ResultRow, SavedAnalysis};

@@ -1,29 +1,17 @@
 //! Summary of a run: number of records, speed, and failures with their reasons.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use mechid_io::files_of;
 use mechid_signal::message;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
+use super::failures::FailureCount;
 use super::part::PartDone;
+use crate::AnalysisError;
 use crate::text::compact;
-use crate::{AnalysisError, ResultRow};
-
-/// Records that failed for one reason.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FailureCount {
-    /// Code of the failure, as [`AnalysisError::code`] names it.
-    pub code: String,
-    /// Number of records.
-    pub records: usize,
-    /// The first of them, by name.
-    pub record: String,
-    /// Failure of that record, in a sentence.
-    pub message: String,
-}
 
 /// Result of a run over many records.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -45,38 +33,6 @@ pub struct FleetSummary {
     pub other_parts: usize,
     /// Time of the run, in s.
     pub elapsed_s: f64,
-}
-
-impl FailureCount {
-    /// Counts the failures of some rows.
-    pub(super) fn of(rows: &[ResultRow]) -> Vec<Self> {
-        let failed = rows.iter().filter_map(|row| {
-            let error = row.error.clone()?;
-            let (code, message, record) = (error.code, error.message, row.record.clone());
-            Some(Self { code, records: 1, record, message })
-        });
-        Self::merged(failed)
-    }
-
-    /// Adds up the counts of each reason, the most frequent first.
-    fn merged(counts: impl IntoIterator<Item = Self>) -> Vec<Self> {
-        let mut by_code: BTreeMap<String, Self> = BTreeMap::new();
-        for count in counts {
-            match by_code.get_mut(&count.code) {
-                None => drop(by_code.insert(count.code.clone(), count)),
-                Some(known) => {
-                    let records = known.records + count.records;
-                    if count.record < known.record {
-                        *known = count;
-                    }
-                    known.records = records;
-                }
-            }
-        }
-        let mut merged: Vec<Self> = by_code.into_values().collect();
-        merged.sort_by_key(|count| std::cmp::Reverse(count.records));
-        merged
-    }
 }
 
 impl FleetSummary {
