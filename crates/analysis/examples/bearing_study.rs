@@ -123,7 +123,7 @@ fn bound(rig: &BearingRig, periods: &[RigTest], count: usize) -> Vec<f64> {
     errors.chunks(4).rev().flatten().copied().collect()
 }
 
-/// What many tests of one film give.
+/// Results of many tests of one film.
 #[derive(Default)]
 struct Tally {
     tests: usize,

@@ -1,4 +1,4 @@
-//! How often the checks of an identification warn, on records that the model fits and on others.
+//! Study of how often the checks of an identification warn, on records that the model fits and on others.
 //!
 //! `cargo run --release -p mechid-analysis --example checks_study -- RUNS [NAME]` prints, for each kind of
 //! record, the percentage of `RUNS` seeded records with any warning and with a warning of each subject.
@@ -47,9 +47,9 @@ enum Truth {
 
 enum Machine {
     Linear(SecondOrderSystem),
-    /// With a second mass, not measured, whose spring has this damping (N·s/m).
+    /// Machine with a second mass, not measured, whose spring has this damping (N·s/m).
     Hidden(f64),
-    /// With a cubic spring that adds this fraction of the linear force, in the RMS.
+    /// Machine with a cubic spring that adds this fraction of the linear force, in the RMS.
     Cubic(f64),
     /// The response is late by this number of samples.
     Late(usize),

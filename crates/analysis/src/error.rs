@@ -1,6 +1,7 @@
 //! Errors between a record and the result.
 
 use mechid_estimate::EstimateError;
+use mechid_io::escaped;
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
@@ -40,6 +41,18 @@ pub enum AnalysisError {
         /// The record.
         file: String,
         /// Numbers and names of its columns.
+        available: String,
+    },
+    /// A file of many records does not hold the one asked for, or none is asked for.
+    #[error("{file} holds {} ({available}){}", message::count(*records, "record"), other(id.as_deref()))]
+    RecordId {
+        /// The file.
+        file: String,
+        /// The record asked for.
+        id: Option<String>,
+        /// Number of records in the file.
+        records: usize,
+        /// Some of its records.
         available: String,
     },
     /// An array in memory has no column of this name.
@@ -380,6 +393,14 @@ pub enum AnalysisError {
         "nothing to plot: several forces act on every line, so the record shows no single receptance"
     )]
     NoReceptance,
+    /// A record of a hammer test has no good hit.
+    #[error("no hit to use in {file}: {reasons}")]
+    NoHit {
+        /// The record.
+        file: String,
+        /// Reasons, hit by hit.
+        reasons: String,
+    },
     /// A setting cannot be understood.
     #[error("`{setting}`: {why}")]
     Setting {
@@ -430,6 +451,14 @@ impl AnalysisError {
 }
 
 /// Returns the name of a variant in lower case, its words joined by hyphens.
+/// Returns what is wrong with the choice of a record.
+fn other(id: Option<&str>) -> String {
+    match id {
+        Some(id) => format!(", none of which is {}", escaped(id)),
+        None => ": choose one with `record_id`".into(),
+    }
+}
+
 fn kebab(name: &str) -> String {
     let mut text = String::new();
     for (at, letter) in name.char_indices() {

@@ -9,21 +9,21 @@ const CELLS: usize = 4096;
 pub struct Extremes {
     cell: usize,
     samples: usize,
-    /// Of every cell the samples, counted from 0, with their values.
-    found: Vec<[(usize, f64); 2]>,
+    /// Samples of every cell, counted from 0, with their values.
+    extremes: Vec<[(usize, f64); 2]>,
 }
 
 impl Extremes {
     /// Creates the extremes, without a sample yet, of a window of `window` samples.
     pub(crate) fn of(window: usize) -> Self {
-        Self { cell: window.div_ceil(CELLS).max(1), samples: 0, found: Vec::new() }
+        Self { cell: window.div_ceil(CELLS).max(1), samples: 0, extremes: Vec::new() }
     }
 
     /// Takes the next samples.
     pub(crate) fn push(&mut self, values: &[f64]) {
         for point in (self.samples..).zip(values.iter().copied()) {
-            match self.found.get_mut(point.0 / self.cell) {
-                None => self.found.push([point; 2]),
+            match self.extremes.get_mut(point.0 / self.cell) {
+                None => self.extremes.push([point; 2]),
                 Some([least, _]) if point.1 < least.1 => *least = point,
                 Some([_, largest]) if point.1 > largest.1 => *largest = point,
                 Some(_) => {}
@@ -34,7 +34,7 @@ impl Extremes {
 
     /// Returns the numbers of samples, counted from 0, and their values, in the order of time.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.found.iter().flat_map(|cell| {
+        self.extremes.iter().flat_map(|cell| {
             let mut cell = *cell;
             cell.sort_by_key(|(sample, _)| *sample);
             let points = if cell[0].0 == cell[1].0 { 1 } else { 2 };

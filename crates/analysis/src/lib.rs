@@ -48,6 +48,7 @@ pub mod extremes;
 #[cfg(feature = "parquet")]
 pub mod fleet;
 pub mod frf;
+pub mod hits;
 pub mod identify;
 pub mod inspect;
 mod machine;
@@ -70,6 +71,7 @@ pub use inspect::{InspectSettings, Inspected, inspect};
 pub use machine::{Machine, NonlinearPart};
 pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Window};
 pub use mechid_model::ResponseQuantity;
+pub use mechid_signal::HitRule;
 pub use modal::ModalSummary;
 pub use predict::{Predict, Predicted, predict};
 pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};

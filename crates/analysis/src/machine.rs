@@ -102,14 +102,15 @@ impl Machine {
                 let of_channels = |name: &str| {
                     CHANNELS.contains(&name) && NonlinearParameter::named(name, &system).is_err()
                 };
-                let own = part_of(&covariance, |name| !of_channels(name));
-                let names = own.parameters.iter();
+                let of_machine = part_of(&covariance, |name| !of_channels(name));
+                let names = of_machine.parameters.iter();
                 let parameters = names.map(|parameter| {
                     NonlinearParameter::named(parameter, &system)
                         .map_err(|_| unknown_parameter(&name, parameter, &system))
                 });
                 let parameters = parameters.collect::<Result<_, AnalysisError>>()?;
-                let uncertain = UncertainNonlinearSystem::new(system, parameters, own.matrix())?;
+                let uncertain =
+                    UncertainNonlinearSystem::new(system, parameters, of_machine.matrix())?;
                 (Some(NonlinearPart { uncertain, ..part }), entries)
             }
         };

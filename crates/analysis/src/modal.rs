@@ -128,9 +128,9 @@ impl Machine {
 }
 
 impl ShapedMode {
-    fn of(row: ModeRow, found: &IdentifiedMode, known: bool) -> Self {
-        let eigenvalue = found.mode.eigenvalue();
-        let entries = found.mode.shape().iter().zip(found.shape_standard_error.iter());
+    fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
+        let eigenvalue = mode.mode.eigenvalue();
+        let entries = mode.mode.shape().iter().zip(mode.shape_standard_error.iter());
         Self {
             row,
             eigenvalue: [eigenvalue.re, eigenvalue.im],

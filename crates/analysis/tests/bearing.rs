@@ -3,13 +3,14 @@
 use std::f64::consts::TAU;
 
 use mechid_analysis::bearing::{BearingSize, BearingTable, Coefficients};
+use mechid_analysis::identify::LineChoice;
 use mechid_analysis::{
-    BearingData, IdentifiedBearing, IdentifyBearing, IdentifyResponses, Measurement,
-    ResponseQuantity, identify_bearing,
+    BearingData, FrfSettings, IdentifiedBearing, IdentifyBearing, Measurement, ResponseQuantity,
+    frf, identify_bearing,
 };
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_problems::rig::{BearingRig, RigTest, Shakers};
-use mechid_signal::Sampling;
+use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, Matrix2};
 
 const PERIOD: usize = 256;
@@ -160,15 +161,83 @@ fn tables_of_frequency_responses_give_the_same() {
     let rig = rig(3.0);
     let how = settings(&rig);
     let [d, a] = tables(&rig);
-    let usual = IdentifyResponses::default();
-    let data = BearingData::of_responses(&d, &a, &usual, &how).unwrap();
+    let tables = [d, a];
+    let data = BearingData::of_responses(&tables, &how).unwrap();
     let found = identify_bearing(&data, None, &how).unwrap();
     assert!(worst(&found, &rig.film) < 1e-9, "{found}");
     let left_out: Vec<f64> = found.summary().left_out_hz.iter().map(|hz| hz.round()).collect();
     assert_eq!(left_out, [48.0, 52.0, 100.0, 148.0, 152.0, 200.0]);
-    let one = IdentifyResponses { points: vec!["1".into()], ..usual };
-    let refused = BearingData::of_responses(&d, &a, &one, &how).unwrap_err().to_string();
-    assert!(refused.contains("choose two `points`"), "{refused}");
+    assert!(found.summary().remarks[0].contains("neither standard errors nor coherence"));
+    let refused = |tables: &[FrequencyResponses], how: &IdentifyBearing, words: &str| {
+        let told = BearingData::of_responses(tables, how).unwrap_err().to_string();
+        assert!(told.contains(words), "{told}");
+    };
+    let one = IdentifyBearing { points: vec!["1".into()], ..how.clone() };
+    refused(&tables, &one, "choose two `points`");
+    refused(
+        &tables[..1],
+        &how,
+        "a test has two tables, of displacement and of acceleration: there are 1",
+    );
+    refused(&[], &how, "no record");
+    let numbered =
+        IdentifyBearing { lines: "3:9".parse().map(LineChoice::Lines).unwrap(), ..how.clone() };
+    refused(&tables, &numbered, "`lines`: frequency responses have no numbered lines");
+    let still = IdentifyBearing { rotation_hz: Some(4.0), ..how };
+    refused(&tables, &still, "every frequency is a multiple of the rotation");
+}
+
+/// Results of `count` periods in x and as many in y, and of the tables of d/f and a/f made from them as
+/// `mechid frf` writes them.
+fn from_records_and_tables(rig: &BearingRig, count: usize, seed: u64) -> [IdentifiedBearing; 2] {
+    let mut tables = Vec::new();
+    let mut tests = Vec::new();
+    for (at, period) in (0..).zip(&periods(rig, 20.0)) {
+        let test = rig.measured(period, count, 10 * seed + at).unwrap();
+        tests.push(measurement(&test));
+        // The shaker at rest measures its noise, which no table is made of.
+        let mut force = test.force.data().clone();
+        force.fill_column(1 - at as usize, 0.0);
+        let force = Record::new(test.force.sampling(), force).unwrap();
+        for (quantity, response) in [
+            (ResponseQuantity::Displacement, &test.displacement),
+            (ResponseQuantity::Acceleration, &test.acceleration),
+        ] {
+            let one = Measurement::from_records(&force, &[(quantity, response)]).unwrap();
+            let table = frf(&one.period(PERIOD).unwrap(), &FrfSettings::default()).unwrap();
+            tables.push(FrequencyResponses::parse("h.csv", table.csv().as_bytes()).unwrap());
+        }
+    }
+    // Lines beside those of the rotation are not the same in a record and in a table of every second line.
+    let twelve = Coefficients::Twelve;
+    let how = IdentifyBearing { rotation_hz: None, coefficients: twelve, ..settings(rig) };
+    [BearingData::of_records(&tests, &how), BearingData::of_responses(&tables, &how)]
+        .map(|data| identify_bearing(&data.unwrap(), None, &how).unwrap())
+}
+
+/// Where the force is measured without noise and the weights are well known, a record and its tables are
+/// the same data. Noise on the force is common to both responses, which the tables do not tell.
+#[test]
+fn records_and_their_tables_agree() {
+    let rig = rig(3.0);
+    let exact_force = BearingRig { force_noise: 0.0, ..rig.clone() };
+    for (rig, count, runs, allowed) in [(exact_force, 256, 3, 0.1), (rig, 16, 30, 0.4)] {
+        let (mut inside, mut apart) = (0.0, 0.0_f64);
+        for seed in 0..runs {
+            let [of_records, of_tables] = from_records_and_tables(&rig, count, seed);
+            inside += share(&of_tables, &rig.film) / runs as f64;
+            let pairs = of_records.summary().coefficients.iter();
+            for (a, b) in pairs.zip(&of_tables.summary().coefficients) {
+                let (a, b) = (a.estimate, b.estimate);
+                let difference = (a.value - b.value) / a.standard_error.unwrap();
+                apart += difference.powi(2) / (12 * runs) as f64;
+            }
+        }
+        // In standard errors.
+        assert!(apart.sqrt() < allowed, "{}", apart.sqrt());
+        // Of 360 correlated intervals with standard errors from sixteen periods.
+        assert!(runs < 30 || (0.88..=0.985).contains(&inside), "{inside}");
+    }
 }
 
 /// Share of 95 % intervals that hold the true value.

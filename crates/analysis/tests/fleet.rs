@@ -6,11 +6,15 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mechid_analysis::fleet::{Fleet, FleetSummary};
+use mechid_analysis::batch::ParameterCell;
+use mechid_analysis::fleet::{Fleet, FleetSummary, TrendAxis, Trends, read_results};
 use mechid_analysis::identify::Method;
+use mechid_analysis::measurement::Reading;
 use mechid_analysis::{
     AnalysisError, Channels, Identify, ResponseQuantity, SavedAnalysis, Window, identify,
 };
+use mechid_io::{ParquetColumn, ParquetValues, Table, TimeAxis, write_parquet};
+use mechid_signal::{Sampling, noise};
 use tempfile::TempDir;
 
 /// The example record.
@@ -163,4 +167,138 @@ fn an_analysis_that_fits_no_record_is_refused_at_once() {
     let saved = serde_json::to_string(&analysis()).unwrap();
     assert_eq!(serde_json::from_str::<SavedAnalysis>(&saved).unwrap(), analysis());
     assert_ne!(analysis().hash(), SavedAnalysis::default().hash());
+}
+
+/// One file with records of the example record: complete, cut short, not finite in a sample, complete.
+fn one_file(home: &TempDir) -> PathBuf {
+    let rig = Table::read(RIG).unwrap();
+    let rig = rig.record(&TimeAxis::Column("time"), &["force", "displacement"]).unwrap();
+    let len = rig.len();
+    let lengths = [("monday", len), ("cut", 100), ("broken", len), ("friday", len)];
+    let ids = lengths.iter().flat_map(|(id, len)| vec![Some((*id).to_owned()); *len]);
+    let rows = |values: &[f64]| -> Vec<Option<f64>> {
+        lengths.iter().flat_map(|(_, len)| values[..*len].iter().map(|v| Some(*v))).collect()
+    };
+    let mut displacement = rows(rig.channel(1));
+    displacement[len + 100 + 7] = None;
+    let columns = [
+        ParquetColumn { name: "day", values: ParquetValues::Text(ids.collect()) },
+        ParquetColumn { name: "force", values: ParquetValues::Number(rows(rig.channel(0))) },
+        ParquetColumn { name: "displacement", values: ParquetValues::Number(displacement) },
+    ];
+    let path = home.path().join("week.parquet");
+    let rate = (rig.sampling().rate_hz()).to_string();
+    write_parquet(&path, &columns, &[("sample_rate_hz", rate)]).unwrap();
+    path
+}
+
+#[test]
+fn a_file_of_many_records_makes_a_row_for_each() {
+    let home = tempfile::tempdir().unwrap();
+    let path = one_file(&home);
+    let reading = Reading { record_column: Some("day".into()), ..Reading::default() };
+    let analysis = SavedAnalysis { reading, ..analysis() };
+    let folder = home.path().join("results");
+    let fleet = Fleet::new(analysis.clone(), std::slice::from_ref(&path), &folder, 3).unwrap();
+    let ids = |at: usize| -> Vec<String> {
+        let records = fleet.parts()[at].records().iter();
+        records.map(|record| record.rows.as_ref().unwrap().id.clone()).collect()
+    };
+    assert_eq!(
+        (ids(0), ids(1)),
+        (["monday", "cut", "broken"].map(String::from).into(), vec!["friday".into()])
+    );
+    let summary = fleet.run(2, &|_| ()).unwrap();
+    assert_eq!((summary.records, summary.failed, summary.parts), (4, 2, 2));
+    let failure = |code: &str| {
+        let mut all = summary.failures.iter();
+        all.find(|failure| failure.code == code).unwrap()
+    };
+    assert!(failure("io.not-finite").record.ends_with("week.parquet, record broken"));
+    assert!(failure("io.not-finite").message.contains("(record broken), sample 8"));
+    assert!(failure("analysis.window").message.contains("(record cut) has 100"));
+
+    // A record chosen alone gives the same numbers as in its part, and as its own file.
+    let alone = |id: &str| {
+        let reading = Reading { record_id: Some(id.into()), ..analysis.reading.clone() };
+        SavedAnalysis { reading, ..analysis.clone() }
+    };
+    let row = alone("friday").row("friday", || alone("friday").open(&path));
+    assert_eq!(row.error, None);
+    let file = self::analysis().row("rig", || self::analysis().open(RIG));
+    assert_eq!(row.parameters, file.parameters);
+    let parts = contents(&folder);
+    fs::remove_dir_all(&folder).unwrap();
+    Fleet::new(analysis.clone(), std::slice::from_ref(&path), &folder, 3)
+        .unwrap()
+        .run(1, &|_| ())
+        .unwrap();
+    assert!(parts == contents(&folder));
+
+    let refused = |analysis: &SavedAnalysis| analysis.open(&path).unwrap_err();
+    let error = refused(&analysis);
+    assert!(matches!(error, AnalysisError::RecordId { id: None, records: 4, .. }), "{error}");
+    let error = refused(&alone("sunday")).to_string();
+    assert!(
+        error.ends_with("holds 4 records (monday, cut, broken, friday), none of which is sunday"),
+        "{error}"
+    );
+    // A column that does not tell records apart is the error of the file's row.
+    let reading = Reading { record_column: Some("force".into()), ..Reading::default() };
+    let wrong = SavedAnalysis { reading, ..self::analysis() };
+    let summary = Fleet::new(wrong, &[path], &folder, 3).unwrap().run(1, &|_| ()).unwrap();
+    assert_eq!((summary.records, summary.failures[0].code.as_str()), (1, "io.record-column"));
+}
+
+#[test]
+fn a_folder_of_results_is_read_back_as_it_was_computed() {
+    let home = tempfile::tempdir().unwrap();
+    let (records, folder) = (records(&home), home.path().join("results"));
+    run(&records, &folder, 2);
+    let rows = read_results(&folder).unwrap();
+    assert_eq!(rows.len(), 10);
+    for row in &rows {
+        assert_eq!(*row, analysis().row(&row.record, || analysis().open(&row.record)));
+    }
+    assert!(matches!(read_results(home.path()), Err(AnalysisError::NoRecord)));
+}
+
+#[test]
+fn trends_find_what_stands_out_and_nothing_else() {
+    let rig = analysis().row("rig", || analysis().open(RIG));
+    // Normal values around 25 kg, and one far from them; numbers in the names run against their order.
+    let noise = noise::white(Sampling::new(1.0, 2000).unwrap(), 1, 0.2, 7).unwrap();
+    let rows: Vec<_> = (0..)
+        .zip(noise.channel(0))
+        .map(|(k, noise)| {
+            let value = if k == 1234 { 30.0 } else { 25.0 + noise };
+            let cell = ParameterCell { value, ..rig.parameters[0].clone() };
+            let record = format!("speed-{}.csv", 5000 - k);
+            mechid_analysis::ResultRow {
+                record,
+                parameters: vec![cell],
+                modes: Vec::new(),
+                ..rig.clone()
+            }
+        })
+        .collect();
+    let trends = Trends::of(&rows, TrendAxis::Number);
+    assert_eq!(
+        (trends.records, trends.failed, trends.analyses, trends.series.len()),
+        (2000, 0, 1, 1)
+    );
+    let mass = &trends.series[0];
+    assert!((mass.median - 25.0).abs() < 0.02 && (mass.spread - 0.2).abs() < 0.02, "{mass:?}");
+    assert!(mass.points.is_sorted_by(|a, b| a.at < b.at));
+    assert_eq!(mass.points[0].at, 3001.0);
+    let outliers: Vec<&str> = mass.outliers().map(|point| point.record.as_str()).collect();
+    assert!(outliers.contains(&"speed-3766.csv"));
+    // 3.5 standard deviations leave one normal value in two thousand.
+    assert!(outliers.len() <= 4, "{outliers:?}");
+    // The interval is that of the record.
+    let interval = mass.points[0].interval.unwrap();
+    let error = mass.points[0].standard_error.unwrap();
+    assert!(interval[1] - interval[0] > 3.9 * error);
+    assert_eq!(Trends::of(&rows, TrendAxis::Order).series[0].points[0].at, 1.0);
+    assert_eq!(Trends::of(&[rig], TrendAxis::Number).without_number, 1);
 }

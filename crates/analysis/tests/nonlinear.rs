@@ -8,8 +8,8 @@ use mechid_analysis::{
     ResponseQuantity, identify, predict, reconstruct,
 };
 use mechid_estimate::frequency_domain::Pooling;
-use mechid_estimate::nonlinear::{ShapeConstants, Weighting};
-use mechid_model::{NonlinearSystem, Response, Sdof, UncertainNonlinearSystem};
+use mechid_estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
+use mechid_model::{NonlinearSystem, Response, Sdof, Terms, UncertainNonlinearSystem};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
@@ -106,20 +106,21 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
     assert!(matches!(refused, AnalysisError::NonlinearMachine { .. }), "{refused}");
 }
 
+/// A derivative of two periods of a displacement.
+fn derivative(x: &Record, order: i32) -> Record {
+    let mut lines = Spectrum::of(&x.window(0, PERIOD).unwrap()).lines().clone();
+    for (n, mut row) in lines.row_iter_mut().enumerate() {
+        let factor = Complex::new(0.0, n as f64 * x.sampling().omega0() * 2.0).powi(order);
+        row.iter_mut().for_each(|line| *line *= factor);
+    }
+    let period = x.sampling().with_len(PERIOD).unwrap();
+    Spectrum::from_lines(period, lines).unwrap().to_record().unwrap().repeated(2).unwrap()
+}
+
 /// Displacement, velocity and acceleration with the force, open.
 fn complete_motion() -> (Measurement, Record) {
     let (force, x) = steady_state();
-    let lines = Spectrum::of(&x.window(0, PERIOD).unwrap());
-    let derivative = |order: i32| {
-        let mut lines = lines.lines().clone();
-        for (n, mut row) in lines.row_iter_mut().enumerate() {
-            let factor = Complex::new(0.0, n as f64 * x.sampling().omega0() * 2.0).powi(order);
-            row.iter_mut().for_each(|line| *line *= factor);
-        }
-        let period = x.sampling().with_len(PERIOD).unwrap();
-        Spectrum::from_lines(period, lines).unwrap().to_record().unwrap().repeated(2).unwrap()
-    };
-    let (v, a) = (derivative(1), derivative(2));
+    let (v, a) = (derivative(&x, 1), derivative(&x, 2));
     let responses = [
         (ResponseQuantity::Displacement, &x),
         (ResponseQuantity::Velocity, &v),
@@ -217,6 +218,79 @@ fn output_error_takes_noise_on_the_response() {
     assert!(cubic.standard_error < 0.05 * 4e6, "{cubic:?}");
 }
 
+/// Judge: the terms of the machine. Of one that is linear none is added, and the result is read back.
+#[test]
+fn terms_are_chosen_from_candidates() {
+    let candidates: Nonlinear = Nonlinear {
+        candidates: "k2: x1^2, k3: x1^3, k5: x1^5, c2: |v1| v1, c3: v1^3".parse().unwrap(),
+        ..Nonlinear::default()
+    };
+    let how = Identify::default().nonlinear(candidates.clone());
+    let (force, x) = steady_state();
+    let noisy = |force: &Record, seed| {
+        noise::add_white(force, noise::NoiseLevel::FractionOfRms(0.01), seed).unwrap()
+    };
+    let test = |force: &Record, seed| test_of(&noisy(force, seed), &x).period(PERIOD).unwrap();
+    let found = identify(&[test(&force, 7)], &how).unwrap();
+    let selection = found.summary().nonlinear.as_ref().unwrap().selection.clone().unwrap();
+    let mut added: Vec<_> = selection.steps.iter().filter_map(|row| row.added.as_deref()).collect();
+    added.sort_unstable();
+    assert_eq!((added, selection.candidates), (vec!["k2", "k3"], 5));
+    let refused = selection.refused.unwrap().added.unwrap();
+    let text = found.to_string();
+    assert!(text.contains("selection from 5 candidates by the information criterion"), "{text}");
+    assert!(
+        text.lines().any(|line| line.starts_with(&refused) && line.contains("refused")),
+        "{text}"
+    );
+    assert!(!text.contains("extrapolates badly"), "{text}");
+
+    let response = Response::new(x.clone(), derivative(&x, 1), derivative(&x, 2)).unwrap();
+    let linear = NonlinearSystem::new(machine().linear().clone(), Terms::none(), vec![]).unwrap();
+    let linear = linear.force(&response).unwrap();
+    let found = identify(&[test(&linear, 8)], &how).unwrap();
+    assert!(found.nonlinear().unwrap().terms().is_empty(), "{found}");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("machine.json");
+    std::fs::write(&path, serde_json::to_string(&found).unwrap()).unwrap();
+    assert!(
+        Machine::read(&path).unwrap().nonlinear.is_none_or(|part| part.system().terms().is_empty())
+    );
+
+    let held_out = Nonlinear { criterion: Criterion::HeldOut, ..candidates };
+    let how = Identify::default().nonlinear(held_out);
+    let error = identify(&[test(&force, 7)], &how).unwrap_err();
+    assert!(matches!(error, AnalysisError::Setting { setting: "criterion", .. }), "{error}");
+    let three: Vec<_> = (7..10).map(|seed| test(&force, seed)).collect();
+    let found = identify(&three, &how).unwrap();
+    let mut names: Vec<&str> =
+        found.nonlinear().unwrap().terms().iter().map(|t| t.name()).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["k2", "k3"]);
+}
+
+#[test]
+fn a_fifth_power_is_told_to_extrapolate_badly() {
+    let (force, x) = steady_state();
+    let test = test_of(&force, &x).period(PERIOD).unwrap();
+    let how = Identify::default().nonlinear("k2: x1^2, k3: x1^3, k5: x1^5".parse().unwrap());
+    let found = identify(&[test], &how).unwrap();
+    // The machine has none: its share is nothing, and nothing is told.
+    assert!(!found.to_string().contains("extrapolates badly"), "{found}");
+    let linear = machine().linear().clone();
+    let terms = "k3: x1^3, k5: x1^5".parse().unwrap();
+    let fifth = NonlinearSystem::new(linear, terms, vec![4e6, 2e9]).unwrap();
+    let response = Response::new(x.clone(), derivative(&x, 1), derivative(&x, 2)).unwrap();
+    let test = test_of(&fifth.force(&response).unwrap(), &x).period(PERIOD).unwrap();
+    let doubts = identify(&[test], &how).unwrap().doubts();
+    assert!(
+        doubts
+            .iter()
+            .any(|d| d.starts_with("k5 extrapolates badly: its force grows with the power 5")),
+        "{doubts:?}"
+    );
+}
+
 #[test]
 fn a_force_alone_is_enough_for_a_prediction() {
     let (force, x) = steady_state();
@@ -260,6 +334,7 @@ fn settings_of_terms_survive_json() {
         terms: "c3: v1^3/(1 + (v1/20)^2)".parse().unwrap(),
         search: ShapeConstants { laws: true, delay: false, phase: true },
         weighting: Weighting::SmoothSpectrum,
+        ..Nonlinear::default()
     });
     let saved = serde_json::to_string(&how).unwrap();
     assert_eq!(serde_json::from_str::<Identify>(&saved).unwrap(), how, "{saved}");

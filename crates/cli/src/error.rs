@@ -1,4 +1,4 @@
-//! What can go wrong between the command line and the result.
+//! Errors between the command line and the result.
 
 use mechid::analysis::AnalysisError;
 use mechid::io::IoError;
@@ -25,7 +25,7 @@ pub enum CliError {
     MisplacedOption {
         /// The option.
         option: &'static str,
-        /// What is wrong with it there.
+        /// Reason why it does not belong there.
         why: &'static str,
     },
     /// Which samples are to be predicted is open.

@@ -1,4 +1,4 @@
-//! What a subcommand found, and how it reaches the user.
+//! Result of a subcommand, and its way to the user.
 
 use std::fmt::Write as _;
 use std::io;
@@ -45,7 +45,7 @@ impl<'a> Files<'a> {
 /// The result of a subcommand, complete before anything is written or printed.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What a person reads.
+    /// Text for a person.
     text: String,
     /// `true` if settings in the text are named between backticks.
     names_settings: bool,

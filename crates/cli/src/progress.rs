@@ -2,42 +2,110 @@
 
 use std::io::{IsTerminal as _, stderr};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use log::{Level, LevelFilter, Log, Metadata, Record};
 
 /// Work that is done sooner needs none.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Shows that something moves, how long it has taken, and how it is ended; on a terminal only.
-fn spinner(message: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} (Ctrl-C ends it)");
-    let spinner = ProgressBar::new_spinner()
-        .with_style(style.expect("the template is written correctly"))
-        .with_message(message);
-    spinner.enable_steady_tick(Duration::from_millis(100));
-    spinner
+/// Time between two looks at the progress.
+const TICK: Duration = Duration::from_millis(100);
+
+static PROGRESS: Progress = Progress { parts: Mutex::new([String::new(), String::new()]) };
+
+/// The progress that the crates of this workspace tell of: a part of the work at [`Level::Debug`], and
+/// how far that part is at [`Level::Trace`].
+struct Progress {
+    parts: Mutex<[String; 2]>,
 }
 
-/// Does some work; if it takes long and somebody watches at a terminal, something moves meanwhile.
+impl Log for Progress {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        metadata.target().starts_with("mechid") && metadata.level() >= Level::Debug
+    }
+
+    fn log(&self, record: &Record<'_>) {
+        if !self.enabled(record.metadata()) {
+            return;
+        }
+        let mut parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        match record.level() {
+            Level::Trace => parts[1] = record.args().to_string(),
+            _ => *parts = [record.args().to_string(), String::new()],
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+impl Progress {
+    /// Returns a message followed by the progress.
+    fn after(&self, message: &str) -> String {
+        let parts = self.parts.lock().unwrap_or_else(PoisonError::into_inner);
+        let stated = parts.iter().map(String::as_str).filter(|part| !part.is_empty());
+        [message].into_iter().chain(stated).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Shows what is being done, how far it is, how long it has taken, and how it is ended.
+fn spinner() -> ProgressBar {
+    let style = ProgressStyle::with_template("{spinner} {msg}, {elapsed} (Ctrl-C ends it)");
+    ProgressBar::new_spinner().with_style(style.expect("the template is written correctly"))
+}
+
+/// Does some work; if it takes long and somebody watches at a terminal, its progress is shown meanwhile.
 pub fn watched<T>(message: &'static str, work: impl FnOnce() -> T) -> T {
     if !stderr().is_terminal() {
         return work();
     }
+    // Another logger stays: who calls the program as a library may have one.
+    if log::set_logger(&PROGRESS).is_ok() {
+        log::set_max_level(LevelFilter::Trace);
+    }
     thread::scope(|scope| {
         let (done, end) = channel::<()>();
         scope.spawn(move || {
-            if end.recv_timeout(PATIENCE) != Err(RecvTimeoutError::Timeout) {
-                return;
-            }
-            let spinner = spinner(message);
+            let mut spinner = None;
+            let mut wait = PATIENCE;
             // Until the other end is dropped.
-            let _ = end.recv();
-            spinner.finish_and_clear();
+            while end.recv_timeout(wait) == Err(RecvTimeoutError::Timeout) {
+                let spinner = spinner.get_or_insert_with(self::spinner);
+                spinner.set_message(PROGRESS.after(message));
+                spinner.tick();
+                wait = TICK;
+            }
+            if let Some(spinner) = spinner {
+                spinner.finish_and_clear();
+            }
         });
         let result = work();
         drop(done);
         result
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid::signal::{CrestSearch, Multisine, Phases, lines};
+
+    use super::*;
+
+    #[test]
+    fn the_progress_of_a_search_follows_the_message() {
+        log::set_logger(&PROGRESS).expect("no other test of the program sets one");
+        log::set_max_level(LevelFilter::Trace);
+        assert_eq!(PROGRESS.after("working"), "working");
+        let schroeder = Multisine::flat(lines::odd(11), 1.0, Phases::Schroeder).unwrap();
+        CrestSearch { starts: 3, seed: 1 }.minimise(&schroeder).unwrap();
+        assert_eq!(PROGRESS.after("designing"), "designing, start 3 of 3");
+        log::trace!(target: "mechid_estimate", "step 7");
+        assert_eq!(PROGRESS.after("designing"), "designing, start 3 of 3, step 7");
+        log::debug!(target: "mechid_estimate", "search 2");
+        log::info!(target: "another", "nothing of ours");
+        assert_eq!(PROGRESS.after("identifying"), "identifying, search 2");
+    }
 }

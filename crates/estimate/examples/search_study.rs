@@ -1,4 +1,4 @@
-//! Whether the search for the maximum of the likelihood finds it: 200 seeded machines of 1 to 10
+//! Study of the search for the maximum of the likelihood: 200 seeded machines of 1 to 10
 //! degrees of freedom with 0.01 to 2 % of noise.
 //!
 //! ```sh

@@ -154,7 +154,7 @@ impl SavitzkyGolay {
         Ok(Response::new(derivative(0)?, derivative(1)?, derivative(2)?)?)
     }
 
-    /// For an acceleration without displacement: M, C and K hold between the acceleration's
+    /// Differentiates acceleration and force twice: M, C and K hold between the acceleration's
     /// derivatives and those of the force as they do between the motion and the force,
     /// M ẍ″ + C ẍ′ + K ẍ = F″, without integrating and without its drift.
     ///

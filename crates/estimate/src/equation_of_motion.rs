@@ -33,7 +33,7 @@ use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 #[derive(Debug, Clone)]
 pub struct EquationOfMotion {
     dof: usize,
-    /// Of the columns \[ẍ | ẋ | x | F\].
+    /// Triangular factor of the columns \[ẍ | ẋ | x | F\].
     factor: TriangularFactor,
 }
 
@@ -233,7 +233,7 @@ impl EquationOfMotion {
     }
 }
 
-/// Where a free parameter stands among the solutions.
+/// Position of a free parameter among the solutions.
 struct Place<'a> {
     group: &'a Group,
     row: usize,
@@ -271,13 +271,13 @@ fn minimum(groups: &[Group]) -> usize {
 
 impl Group {
     fn undetermined(&self, free: &[Parameter]) -> Vec<Undetermined> {
-        let mut found = Vec::new();
+        let mut undetermined = Vec::new();
         for direction in &self.solution.undetermined {
             for equation in &self.equations {
                 let parameters: Vec<&Parameter> =
                     free.iter().filter(|p| p.row() == *equation).collect();
                 let involved = direction.involved.iter().enumerate().filter(|(_, i)| **i);
-                found.push(Undetermined {
+                undetermined.push(Undetermined {
                     relative_singular_value: direction.relative_singular_value,
                     terms: involved
                         .map(|(at, _)| (*parameters[at], direction.combination[at]))
@@ -285,7 +285,7 @@ impl Group {
                 });
             }
         }
-        found
+        undetermined
     }
 }
 

@@ -26,7 +26,7 @@ pub struct Estimate {
     undetermined: Vec<Undetermined>,
 }
 
-/// What an estimator hands over to make an [`Estimate`]; values in the order of `unknowns.free()`.
+/// Results from which an estimator makes an [`Estimate`]; values in the order of `unknowns.free()`.
 pub(crate) struct Findings {
     pub(crate) unknowns: Unknowns,
     pub(crate) values: Vec<f64>,
@@ -63,36 +63,36 @@ impl Estimate {
     /// # Errors
     /// [`EstimateError::Unbounded`] if numbers beyond the largest one leave a parameter without a
     /// finite value or standard error, though there are equations enough for both.
-    pub(crate) fn new(mut found: Findings) -> Result<Self, EstimateError> {
-        let parameters = found.unknowns.free();
-        for undetermined in &found.undetermined {
+    pub(crate) fn new(mut findings: Findings) -> Result<Self, EstimateError> {
+        let parameters = findings.unknowns.free();
+        for undetermined in &findings.undetermined {
             for (parameter, _) in &undetermined.terms {
                 let Some(at) = parameters.iter().position(|p| p == parameter) else { continue };
-                found.values[at] = f64::NAN;
-                found.covariance.row_mut(at).fill(f64::NAN);
-                found.covariance.column_mut(at).fill(f64::NAN);
-                found.covariance[(at, at)] = f64::INFINITY;
+                findings.values[at] = f64::NAN;
+                findings.covariance.row_mut(at).fill(f64::NAN);
+                findings.covariance.column_mut(at).fill(f64::NAN);
+                findings.covariance[(at, at)] = f64::INFINITY;
             }
         }
         let open = |p: &Parameter| {
-            found.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
+            findings.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
         };
         for (at, p) in parameters.iter().enumerate().filter(|(_, p)| !open(p)) {
             let unbounded =
-                !found.values[at].is_finite() || !found.covariance[(at, at)].is_finite();
-            if unbounded && found.degrees_of_freedom > 0 {
+                !findings.values[at].is_finite() || !findings.covariance[(at, at)].is_finite();
+            if unbounded && findings.degrees_of_freedom > 0 {
                 return Err(EstimateError::Unbounded { parameter: p.to_string() });
             }
         }
         Ok(Self {
-            unknowns: found.unknowns,
+            unknowns: findings.unknowns,
             parameters,
-            values: found.values,
-            covariance: found.covariance,
-            degrees_of_freedom: found.degrees_of_freedom,
-            residual_nrmse: found.residual_nrmse,
-            condition: found.condition,
-            undetermined: found.undetermined,
+            values: findings.values,
+            covariance: findings.covariance,
+            degrees_of_freedom: findings.degrees_of_freedom,
+            residual_nrmse: findings.residual_nrmse,
+            condition: findings.condition,
+            undetermined: findings.undetermined,
         })
     }
 
@@ -121,10 +121,12 @@ impl Estimate {
     /// # Errors
     /// [`EstimateError::NoSuchParameter`] if it is not among the unknowns.
     pub fn parameter(&self, name: &str) -> Result<Estimated, EstimateError> {
-        self.parameters().find(|found| found.parameter.to_string() == name).ok_or_else(|| {
-            let known: Vec<String> = self.parameters.iter().map(Parameter::to_string).collect();
-            EstimateError::NoSuchParameter { name: name.to_owned(), known: known.join(", ") }
-        })
+        self.parameters().find(|estimated| estimated.parameter.to_string() == name).ok_or_else(
+            || {
+                let known: Vec<String> = self.parameters.iter().map(Parameter::to_string).collect();
+                EstimateError::NoSuchParameter { name: name.to_owned(), known: known.join(", ") }
+            },
+        )
     }
 
     /// Covariance of the estimated entries, in the order of [`Unknowns::free`], each in the product of

@@ -77,7 +77,7 @@ pub(crate) struct Generator {
     roots: Vec<DMatrix<f64>>,
     /// The last of them, or U itself.
     x: DMatrix<f64>,
-    /// By how much Γ was multiplied to be of the size of Φ − I.
+    /// Factor by which Γ was multiplied to be of the size of Φ − I.
     input_scale: f64,
 }
 
@@ -112,7 +112,7 @@ impl Generator {
         Ok(generator)
     }
 
-    /// How \[AΔt BΔt\] changes when \[Φ − I, Γ\] changes by `change` (states × (states + inputs)).
+    /// Returns the change of \[AΔt BΔt\] when \[Φ − I, Γ\] changes by `change` (states × (states + inputs)).
     ///
     /// # Source
     /// Al-Mohy, Higham & Relton (2013), SIAM J. Sci. Comput. 35, C394–C410.

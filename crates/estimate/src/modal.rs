@@ -175,7 +175,7 @@ fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
     partners
 }
 
-/// What is known of the scatter of the parameters.
+/// Scatter of the parameters.
 struct Spread<'a> {
     covariance: &'a DMatrix<f64>,
     degrees_of_freedom: usize,
@@ -271,7 +271,7 @@ struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// From (λ²M + λC + K) φ = 0 and φ_r = 1:
+    /// Solves for the derivatives of (λ²M + λC + K) φ = 0 with φ_r = 1:
     ///
     /// ```text
     /// ┌ λ²M + λC + K   (2λM + C) φ ┐ ┌ dφ ┐     ┌ d(λ²M + λC + K) φ ┐   at fixed λ

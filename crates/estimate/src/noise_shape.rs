@@ -46,7 +46,7 @@ pub(crate) struct Form {
     pub(crate) bumps: Vec<Bump>,
 }
 
-/// What is added to a log power about a line, times an unknown.
+/// Shape that is added to the log powers about a line, times an unknown.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bump {
     shape: Shape,
@@ -230,32 +230,32 @@ pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth
     let per_term = (nu * lines as f64).max(2.0).ln();
     // Intervals that are looked at.
     let per_place = ((lines * widths(lines).count()).max(2) as f64).ln();
-    let cost = |found: &Smooth| {
-        2.0 * nu * found.misfit
-            + channels * found.form.terms() as f64 * per_term
-            + 2.0 * found.form.bumps.len() as f64 * per_place
+    let cost = |smooth: &Smooth| {
+        2.0 * nu * smooth.misfit
+            + channels * smooth.form.terms() as f64 * per_term
+            + 2.0 * smooth.form.bumps.len() as f64 * per_place
     };
     let mut best: Option<(f64, Smooth)> = None;
     for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
-        let mut found = fit(Form { order, bumps: Vec::new() }, omega, variances, nu);
-        let mut least = cost(&found);
-        while found.form.bumps.len() < MAX_BUMPS && 4 * (found.form.terms() + 1) <= lines {
-            let Some(bump) = most_conspicuous(variances, &found.log_power, nu) else { break };
-            let mut form = found.form.clone();
+        let mut smooth = fit(Form { order, bumps: Vec::new() }, omega, variances, nu);
+        let mut least = cost(&smooth);
+        while smooth.form.bumps.len() < MAX_BUMPS && 4 * (smooth.form.terms() + 1) <= lines {
+            let Some(bump) = most_conspicuous(variances, &smooth.log_power, nu) else { break };
+            let mut form = smooth.form.clone();
             form.bumps.push(bump);
             let more = fit(form, omega, variances, nu);
             let now = cost(&more);
             if now >= least {
                 break;
             }
-            (found, least) = (more, now);
+            (smooth, least) = (more, now);
         }
         if best.as_ref().is_none_or(|(before, _)| least < *before) {
-            best = Some((least, found));
+            best = Some((least, smooth));
         }
     }
     let white = || fit(Form { order: 0, bumps: Vec::new() }, omega, variances, nu);
-    best.map_or_else(white, |(_, found)| found)
+    best.map_or_else(white, |(_, smooth)| smooth)
 }
 
 /// The spectrum of a given form.
@@ -264,11 +264,11 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
     let mut log_power = variances.clone();
     let mut misfit = 0.0;
     for (mut column, channel) in log_power.column_iter_mut().zip(variances.column_iter()) {
-        let (mut found, least) = most_likely(&basis, &channel.into_owned());
+        let (mut log_power, least) = most_likely(&basis, &channel.into_owned());
         if !form.bumps.is_empty() {
-            fill_notches(&mut found, (QUIET_DEVIATIONS / nu) as usize);
+            fill_notches(&mut log_power, (QUIET_DEVIATIONS / nu) as usize);
         }
-        column.copy_from(&found);
+        column.copy_from(&log_power);
         misfit += least;
     }
     Smooth { form, basis, log_power, misfit }
@@ -333,7 +333,7 @@ fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64)
     best.filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
 }
 
-/// What a bump of the best height on the best level takes off Σ log p + v/p, from the levels v/p.
+/// Returns by how much a bump of the best height on the best level lowers Σ log p + v/p, from the levels v/p.
 fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
     let lines = levels.nrows() as f64;
     let support = bump.support(levels.nrows());

@@ -19,11 +19,11 @@ pub struct NoiseSpectrum {
     degrees_of_freedom: f64,
     total_degrees_of_freedom: f64,
     models: Vec<NoiseModel>,
-    /// What each of the models was fitted with, if it is a smooth spectrum or white.
+    /// Functions that each of the models was fitted with, if it is a smooth spectrum or white.
     parts: Vec<Option<SmoothPart>>,
 }
 
-/// What the log powers of an experiment were fitted with.
+/// Functions that the log powers of an experiment were fitted with.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SmoothPart {
     /// Orthonormal columns, rows × terms.
@@ -104,7 +104,7 @@ impl NoiseSpectrum {
         Self::new(omega, covariance)
     }
 
-    /// From sample covariances of the quantity measured, each of `degrees_of_freedom`.
+    /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`.
     pub(crate) fn of_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
@@ -175,14 +175,14 @@ impl NoiseSpectrum {
         &self.models
     }
 
-    /// What the log powers were fitted with, experiment by experiment; `None` unless each of them is smooth or
-    /// white, and at least one is not white.
+    /// Returns the functions that the log powers were fitted with, experiment by experiment; `None` unless each
+    /// of them is smooth or white, and at least one is not white.
     pub(crate) fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
         let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
         parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
     }
 
-    /// How many of the covariances are independent of one another; infinite or undefined for known
+    /// Returns the number of covariances independent of one another; infinite or undefined for known
     /// noise.
     pub(crate) fn groups(&self) -> f64 {
         self.total_degrees_of_freedom / self.degrees_of_freedom

@@ -317,7 +317,7 @@ pub(crate) fn freedom(form: &Form, nu: f64, lines: usize, n: usize) -> f64 {
     (n * lines) as f64 * nu / (form.terms() + n - 1) as f64
 }
 
-/// What a form says of the noise.
+/// Returns the model of the noise that a form stands for.
 pub(crate) fn model_of(form: &Form, omega: &[f64]) -> NoiseModel {
     if form.terms() == 1 {
         return NoiseModel::White;

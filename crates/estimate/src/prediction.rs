@@ -106,8 +106,8 @@ impl Step {
         start: &DVector<f64>,
     ) -> [DMatrix<f64>; 3] {
         let (samples, n, loads) = (force.len(), system.dof(), force.data());
-        let mut found = [(); 3].map(|()| DMatrix::zeros(samples, n));
-        let [x, v, a] = &mut found;
+        let mut predicted = [(); 3].map(|()| DMatrix::zeros(samples, n));
+        let [x, v, a] = &mut predicted;
         let (damping, stiffness) = (system.damping(), system.stiffness());
         let mass = system.mass().clone().lu();
         let (mut velocity, mut inertia) = (vec![0.0; n], DVector::zeros(n));
@@ -133,7 +133,7 @@ impl Step {
             }
             self.advance(force, k, &mut at);
         }
-        found
+        predicted
     }
 
     /// The state one step after the last sample.
@@ -145,7 +145,7 @@ impl Step {
         DVector::from_column_slice(at.state())
     }
 
-    /// From the state at a sample of the force to the next; the first sample follows the last.
+    /// Advances from the state at a sample of the force to the next; the first sample follows the last.
     fn advance(&self, force: &Record, sample: usize, at: &mut At) {
         let (loads, next) = (force.data(), (sample + 1) % force.len());
         let size = at.next.len();
@@ -176,7 +176,7 @@ impl Step {
     }
 }
 
-/// Where a step begins, (z, F, F⁺), and the state that it leads to.
+/// Beginning of a step, (z, F, F⁺), and the state that it leads to.
 struct At {
     now: Vec<f64>,
     next: Vec<f64>,

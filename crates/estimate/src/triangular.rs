@@ -132,7 +132,7 @@ impl TriangularFactor {
         )
     }
 
-    /// From now on the rows seen count as `rows`.
+    /// Counts the rows seen so far as `rows` from now on.
     pub(crate) fn stand_for(&mut self, rows: usize) {
         self.rows = rows;
     }

@@ -1,4 +1,4 @@
-//! What each reconstruction costs, on the two-degree-of-freedom bearing:
+//! Cost of each reconstruction, on the two-degree-of-freedom bearing:
 //! `cargo bench -p mechid-force`. Time per sample is constant for all but the dense open record.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};

@@ -30,7 +30,7 @@ pub(crate) trait Operator {
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }
 
-/// What a choice of filter factors does to the measurement at hand.
+/// Effect of a choice of filter factors on the measurement at hand.
 pub(crate) struct Fit {
     /// Energy not explained, ‖y − H f̂‖².
     pub residual: f64,

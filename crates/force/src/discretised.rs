@@ -81,11 +81,11 @@ fn force_of_steps(
     Ok(IdentifiedForce::of(Record::new(sampling, force)?))
 }
 
-/// What tells the input of a step, q in step units, from its change z(k+1) − Φ z(k).
+/// Solver for the input of a step, q in step units, from its change z(k+1) − Φ z(k).
 pub(crate) struct Solution {
     /// Φ, 2n×2n.
     pub state: DMatrix<f64>,
-    /// Of order n where the input is held over a step, of order 2n where it is linear.
+    /// Factor of order n where the input is held over a step, of order 2n where it is linear.
     input: LU<f64, Dyn, Dyn>,
 }
 
@@ -123,7 +123,7 @@ impl Solution {
         Ok(Self { state, input: invertible(input, dt)? })
     }
 
-    /// Of changes, 2n × any number: the input at the start of each step, n × the same; where it is
+    /// Solves for changes, 2n × any number: the input at the start of each step, n × the same; where it is
     /// linear, that at its end too.
     pub fn of(&self, mut change: DMatrix<f64>) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let n = self.state.nrows() / 2;

@@ -50,9 +50,9 @@ pub fn frequency_domain(
     let mut variance = vec![0.0; system.dof()];
     for &n in lines {
         let inverse = transfer.inverse(n, spectrum.omega(n))?;
-        let found = &inverse * spectrum.lines().row(n).transpose();
+        let forces = &inverse * spectrum.lines().row(n).transpose();
         for (f, &dof) in forced.iter().enumerate() {
-            force[(n, dof)] = found[f];
+            force[(n, dof)] = forces[f];
             variance[dof] += noise_weight(sampling.len(), n)
                 * inverse.row(f).iter().zip(&scale).map(|(g, s)| g.norm_sqr() * s * s).sum::<f64>();
         }

@@ -15,7 +15,7 @@ pub struct IdentifiedForce {
     /// Found when it is asked for: of the many forces behind a standard error nobody asks.
     spectrum: OnceLock<Spectrum>,
     standard_error: Option<Record>,
-    /// Of the measured channels; nothing where there are no more of them than forces.
+    /// Remainder of the measured channels; `None` where there are no more of them than forces.
     rest: Option<Rest>,
 }
 

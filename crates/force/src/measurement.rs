@@ -87,7 +87,7 @@ impl Measurement {
         self.record.sampling()
     }
 
-    /// Whether there are more channels than so many forces need: they can contradict one another.
+    /// Returns whether there are more channels than so many forces need: they can contradict one another.
     pub(crate) fn exceeds(&self, forced: &[usize]) -> bool {
         self.channels.len() > forced.len()
     }

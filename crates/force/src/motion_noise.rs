@@ -133,9 +133,9 @@ pub fn discretised_with_noise(
     Ok(force.with_standard_error(Some(error)))
 }
 
-/// What a step says of the force in it, from the motion at its ends.
+/// Estimate of the force in a step, from the motion at its ends.
 struct Side {
-    /// Which step, counted from that which begins with the sample: 0 or, the one before, −1.
+    /// Number of the step, counted from that which begins with the sample: 0 or, the one before, −1.
     step: isize,
     /// n × 2n: what the states at its two ends count.
     of_ends: [DMatrix<f64>; 2],

@@ -14,7 +14,7 @@ use crate::{ForceError, Measurement};
 /// real part: amplitude times √(N/2), at DC √N. Then ‖F‖² is the same in time and over the lines.
 pub(crate) struct PeriodOperator {
     components: Components,
-    /// Where each component lives and the shape of its force.
+    /// Place of each component and the shape of its force.
     places: Vec<Place>,
     sampling: Sampling,
     forces: usize,
@@ -39,7 +39,7 @@ impl PeriodOperator {
         check_lines(&spectrum, lines)?;
         let sampling = measured.sampling();
         let transfer = Transfer { system, channels: measured.channels(), forced, scale };
-        let mut found = Vec::new();
+        let mut terms = Vec::new();
         let (mut outside_energy, mut outside_weight) = (0.0, 0.0);
         for &n in lines {
             let unit = noise_weight(sampling.len(), n).sqrt();
@@ -55,18 +55,18 @@ impl PeriodOperator {
                 let s = svd.singular_values[i];
                 let coefficient = if s > 0.0 { part / s } else { Complex::ZERO };
                 let shape = v_t.row(i).adjoint();
-                found.push((s, part.norm_sqr(), weight, Place { line: n, coefficient, shape }));
+                terms.push((s, part.norm_sqr(), weight, Place { line: n, coefficient, shape }));
             }
         }
-        found.sort_by(|a, b| b.0.total_cmp(&a.0));
+        terms.sort_by(|a, b| b.0.total_cmp(&a.0));
         let components = Components {
-            singular: found.iter().map(|f| f.0).collect(),
-            energy: found.iter().map(|f| f.1).collect(),
-            weight: found.iter().map(|f| f.2).collect(),
+            singular: terms.iter().map(|term| term.0).collect(),
+            energy: terms.iter().map(|term| term.1).collect(),
+            weight: terms.iter().map(|term| term.2).collect(),
             outside_energy,
             outside_weight,
         };
-        let places = found.into_iter().map(|f| f.3).collect();
+        let places = terms.into_iter().map(|term| term.3).collect();
         Ok(Self { components, places, sampling, forces: forced.len() })
     }
 }

@@ -79,21 +79,21 @@ pub fn regularised(
     let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
     let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let level = level.as_deref();
-    let found = if let ForceUnknowns::Samples(start) = unknowns {
+    let solution = if let ForceUnknowns::Samples(start) = unknowns {
         let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
         solve(&operator, system, measured, forced, filter, &scale)?
     } else {
         let operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
         solve(&operator, system, measured, forced, filter, &scale)?
     };
-    let force = found.force;
+    let force = solution.force;
     let rest = measured.exceeds(forced).then(|| match unknowns {
         ForceUnknowns::Samples(start) => {
             Rest::of_open(system, measured, forced, force.record(), *start, &scale, level)
         }
         _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
     });
-    Ok(RegularisedForce { force: force.with_rest(rest.transpose()?), ..found })
+    Ok(RegularisedForce { force: force.with_rest(rest.transpose()?), ..solution })
 }
 
 fn solve(

@@ -23,7 +23,7 @@ pub(crate) struct StateSpace {
     pub start: Vec<f64>,
 }
 
-/// Everything the backward pass needs: one block per sample, laid out once.
+/// Data for the backward pass: one block per sample, laid out once.
 pub(crate) struct Passage {
     mean: Vec<f64>,
     covariance: Vec<f64>,
@@ -166,7 +166,7 @@ impl Filter {
         (innovation, variance)
     }
 
-    /// To the next sample: a ← T a, P ← T P Tᵀ + Q.
+    /// Advances to the next sample: a ← T a, P ← T P Tᵀ + Q.
     fn advance(&mut self, space: &StateSpace) {
         let (m, t) = (space.states, &space.transition);
         times(t, &self.mean, &mut self.moved);
@@ -251,7 +251,7 @@ mod tests {
         (0..LEN * CHANNELS).map(|i| (1.3 * i as f64).sin() + 0.1 * i as f64).collect()
     }
 
-    /// Everything at once: the joint covariance of all states, conditioned on all samples.
+    /// Solution all at once: the joint covariance of all states, conditioned on all samples.
     fn conditioned() -> (DVector<f64>, DVector<f64>, f64) {
         let s = space();
         let t = DMatrix::from_row_slice(M, M, &s.transition);

@@ -67,7 +67,7 @@ impl Rest {
         Self { residual, channels }
     }
 
-    /// On lines of a period: Y_n − S H_n F_n of each.
+    /// Measures on lines of a period: Y_n − S H_n F_n of each.
     ///
     /// White noise of standard deviation σ has the RMS value σ √(Σ w) on them, w the variance that
     /// noise of unit variance has in each part of a line.
@@ -102,7 +102,7 @@ impl Rest {
         Ok(Self::of(in_time(seen)?.data(), in_time(residual)?.into_data(), noise))
     }
 
-    /// Of an open record: what no force of these samples, linear between them, and no motion at the
+    /// Measures in an open record what no force of these samples, linear between them, and no motion at the
     /// first sample explain; the latter in least squares of channels divided by `scale`.
     pub fn of_open(
         system: &SecondOrderSystem,
@@ -133,7 +133,7 @@ impl Rest {
         Ok(Self::of(measured.record().data(), residual, level.map(<[f64]>::to_vec)))
     }
 
-    /// Where displacement, velocity and force of every degree of freedom were found together.
+    /// Measures where displacement, velocity and force of every degree of freedom were found together.
     pub fn of_motion(
         system: &SecondOrderSystem,
         measured: &Measurement,

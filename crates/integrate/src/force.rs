@@ -94,7 +94,7 @@ impl<'a> ForceTable<'a> {
         self.dof
     }
 
-    /// Whether every degree of freedom has its channel.
+    /// Returns whether every degree of freedom has its channel.
     pub(crate) fn is_complete(&self) -> bool {
         self.forced.is_none()
     }

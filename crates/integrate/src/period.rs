@@ -21,7 +21,7 @@ pub(crate) struct Period {
 }
 
 impl Period {
-    /// Of a scheme in `dof` degrees of freedom, over as many steps as `sampling` has samples.
+    /// Makes the map of a scheme in `dof` degrees of freedom, over as many steps as `sampling` has samples.
     pub(crate) fn of(
         transition: &Transition,
         dof: usize,
@@ -153,7 +153,7 @@ fn power_less_identity(change: &DMatrix<f64>, exponent: usize) -> DMatrix<f64> {
     }
 }
 
-/// By inverse iteration on the normal matrix; 0 if the factorisation has a zero pivot.
+/// Estimates it by inverse iteration on the normal matrix; 0 if the factorisation has a zero pivot.
 fn smallest_singular_value(factored: &LU<f64, Dyn, Dyn>) -> f64 {
     if !factored.is_invertible() {
         return 0.0;

@@ -68,13 +68,16 @@ pub(crate) struct Run {
     transition: Option<Transition>,
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
-    /// What rounding has kept from `state` so far.
+    /// Rounding errors kept from `state` so far.
     owed: Vec<f64>,
     /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
 }
 
-/// Up to this many degrees of freedom a step is one small matrix product of fixed size.
+/// Numbers of the state that are computed between two messages about the progress.
+const NUMBERS_PER_MESSAGE: usize = 1 << 20;
+
+/// Number of degrees of freedom up to which a step is one small matrix product of fixed size.
 const FIXED_SIZE_DOF: usize = 2;
 
 impl Run {
@@ -119,7 +122,11 @@ impl Run {
         motion: &mut Motion<'_>,
     ) -> Result<(), IntegrateError> {
         let done = self.advance_fixed(table, from, to, motion);
+        let steps_per_message = (NUMBERS_PER_MESSAGE / self.state.len()).max(1);
         for k in done..to {
+            if k % steps_per_message == 0 {
+                log::trace!("step {k} of {to}");
+            }
             self.step(table, k)?;
             if k + 1 < motion.parts[0].nrows() {
                 motion.set(k + 1, &self.state);
@@ -189,7 +196,7 @@ impl Run {
     }
 }
 
-/// Whether the step is small against every period, (ωΔt)² below about 1.
+/// Returns whether the step is small against every period, (ωΔt)² below about 1.
 ///
 /// The entries of D are rounded, each once and for all, and of the order of (ωΔt)²: beyond that
 /// limit a motion without damping would grow or decay by up to ε in every step. The stepper rounds

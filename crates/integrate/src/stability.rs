@@ -120,7 +120,7 @@ pub(crate) struct Examined<'a> {
     pub(crate) stable_steps: StableSteps,
 }
 
-/// How a scheme prepares a step of a given size for a system.
+/// Function by which a scheme prepares a step of a given size for a system.
 type Prepare<'a> = dyn Fn(&dyn System, f64) -> Result<Box<dyn Stepper>, IntegrateError> + 'a;
 
 /// The system, if it is small enough for its whole amplification matrix.
@@ -162,7 +162,7 @@ impl Examined<'_> {
         Err(IntegrateError::Unstable { scheme: (self.name)(), dt, spectral_radius, critical_step })
     }
 
-    /// Whether the scheme's limit proves a step of `dt` seconds stable on a passive system.
+    /// Returns whether the scheme's limit proves a step of `dt` seconds stable on a passive system.
     fn is_known_stable(&self, system: &dyn System, dt: f64) -> bool {
         let below = |which, limit| passive::is_below(system, which, limit);
         match self.stable_steps {

@@ -83,7 +83,7 @@ pub(crate) enum Axis {
     Stated { step: f64, scalar: usize },
     /// Two such numbers contradict each other.
     Contradiction { scalars: [usize; 2], steps: [f64; 2] },
-    /// In the column with this index.
+    /// Column with this index.
     Column(usize),
 }
 

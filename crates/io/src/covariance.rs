@@ -68,9 +68,9 @@ pub fn read_covariance(path: impl AsRef<Path>) -> Result<Option<ParameterCovaria
     let Written { parameters, matrix, degrees_of_freedom } = covariance;
     let missing = |row: &usize| matrix[*row].iter().any(Option::is_none);
     // A parameter without a variance has no covariances either.
-    let own = |row: &usize| matrix[*row][*row].is_none();
-    let rows = if (0..n).any(|row| own(&row)) {
-        (0..n).filter(own).collect::<Vec<_>>()
+    let without_variance = |row: &usize| matrix[*row][*row].is_none();
+    let rows = if (0..n).any(|row| without_variance(&row)) {
+        (0..n).filter(without_variance).collect::<Vec<_>>()
     } else {
         (0..n).filter(missing).collect()
     };

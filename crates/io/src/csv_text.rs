@@ -81,6 +81,7 @@ impl CsvFile {
             push_row(&mut self.text, time, columns.iter().map(|column| column[k]));
             self.rows += 1;
             if self.text.len() >= BUFFER_BYTES {
+                log::trace!("row {} of {}", self.rows, self.sampling.len());
                 self.file.append(&self.text)?;
                 self.text.clear();
             }

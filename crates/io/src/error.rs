@@ -65,6 +65,30 @@ pub enum IoError {
         /// Cause.
         what: String,
     },
+    /// A column that should name the record of each row does not.
+    #[error("{}", Message(format_args!("{file}: column {column} should name the record of each row, by text or a whole number; \
+        in row {row} (counted from 1) it holds {what}")))]
+    RecordColumn {
+        /// The file.
+        file: String,
+        /// The column.
+        column: String,
+        /// The row, counted from 1.
+        row: usize,
+        /// Contents of that row, in words.
+        what: &'static str,
+    },
+    /// The rows of a record do not follow one another.
+    #[error("{}", Message(format_args!("{file}: record {id} goes on in row {row} (counted from 1) behind rows of other records: sort the \
+        rows by record and time")))]
+    RecordApart {
+        /// The file.
+        file: String,
+        /// The record.
+        id: String,
+        /// The row, counted from 1.
+        row: usize,
+    },
     /// The file breaks its format.
     #[error("{}", Message(format_args!("{file}, {at}: {what}")))]
     Malformed {

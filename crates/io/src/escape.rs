@@ -27,7 +27,7 @@ pub fn escaped(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Whether a character is not shown as it is.
+/// Returns whether a character is not shown as it is.
 fn is_unshown(c: char) -> bool {
     c.is_control()
         || matches!(c,

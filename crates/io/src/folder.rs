@@ -20,10 +20,10 @@ pub struct FileStamp {
 impl FileStamp {
     /// Looks at a file; `None` if there is none or it must not be looked at.
     pub fn of(path: impl AsRef<Path>) -> Option<Self> {
-        let found = fs::metadata(path).ok()?;
-        let since = found.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        let metadata = fs::metadata(path).ok()?;
+        let since = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
         Some(Self {
-            bytes: found.len(),
+            bytes: metadata.len(),
             modified_ns: since.map_or(0, |duration| duration.as_nanos()),
         })
     }

@@ -54,7 +54,10 @@ pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };
 #[cfg(feature = "parquet")]
-pub use parquet::{ParquetColumn, ParquetValues, read_parquet_metadata, write_parquet};
+pub use parquet::{
+    ParquetCell, ParquetColumn, ParquetFile, ParquetValues, RecordRows, parquet_bytes,
+    read_parquet_metadata, read_parquet_rows, write_parquet,
+};
 pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};

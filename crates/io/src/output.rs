@@ -49,17 +49,17 @@ pub struct BegunFile {
     stage: Stage,
 }
 
-/// Where the content stands until it is complete.
+/// Place of the content until it is complete.
 #[derive(Debug)]
 enum Stage {
-    /// In a file without a name, on the file system of the destination.
+    /// File without a name, on the file system of the destination.
     #[cfg(target_os = "linux")]
     Unnamed { destination: PathBuf },
-    /// Under another name beside the destination.
+    /// File under another name beside the destination.
     Beside { temporary: Temporary, destination: PathBuf },
-    /// In a temporary file elsewhere: the destination is no regular file and is written into.
+    /// Temporary file elsewhere: the destination is no regular file and is written into.
     Elsewhere { destination: PathBuf },
-    /// In a temporary file elsewhere: it goes to standard output.
+    /// Temporary file elsewhere: it goes to standard output.
     StandardOutput,
 }
 
@@ -129,7 +129,8 @@ pub fn refuse_replaced_inputs(
 
 /// The regular file that an output would replace.
 fn replaced_file(output: &Path) -> Option<same_file::Handle> {
-    if is_standard_output(output) || !fs::metadata(output).is_ok_and(|found| found.is_file()) {
+    if is_standard_output(output) || !fs::metadata(output).is_ok_and(|metadata| metadata.is_file())
+    {
         return None;
     }
     same_file::Handle::from_path(output).ok()
@@ -160,18 +161,18 @@ impl BegunFile {
         // Through a symbolic link, so that the link stays one.
         let destination = resolved(path);
         let permissions = match fs::metadata(&destination) {
-            Ok(found) if found.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
-            Ok(found) if !found.is_file() => {
+            Ok(metadata) if metadata.is_dir() => return Err(io::ErrorKind::IsADirectory.into()),
+            Ok(metadata) if !metadata.is_file() => {
                 return Ok((tempfile::tempfile()?, Stage::Elsewhere { destination }));
             }
-            Ok(found) => {
+            Ok(metadata) => {
                 // Renaming would not ask for this permission.
-                if found.permissions().readonly() {
+                if metadata.permissions().readonly() {
                     let why = "the file that stands there is read-only";
                     return Err(io::Error::new(io::ErrorKind::PermissionDenied, why));
                 }
                 OpenOptions::new().write(true).open(&destination)?;
-                Some(found.permissions())
+                Some(metadata.permissions())
             }
             Err(_) => None,
         };

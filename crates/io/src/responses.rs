@@ -175,7 +175,7 @@ const FREQUENCY: [&str; 4] = ["frequency_hz", "frequency", "freq", "f"];
 /// Point of a table with a single response.
 const ALONE: &str = "1";
 
-/// What stands before a word at the end of a name: nothing, or something that ends with `_`.
+/// Returns the part before a word at the end of a name: empty, or ending with `_`.
 fn before<'a>(name: &'a str, word: &str) -> Option<&'a str> {
     name.strip_suffix(word).filter(|prefix| prefix.is_empty() || prefix.ends_with('_'))
 }

@@ -14,7 +14,7 @@ const DASH: &str = "-";
 /// to a file, that file would be replaced or overwritten from its beginning.
 const OUTPUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
-/// Whether `path` is the common name of standard input, `-`.
+/// Returns whether `path` is the common name of standard input, `-`.
 pub(crate) fn is_input(path: &Path) -> bool {
     path == Path::new(DASH)
 }

@@ -68,9 +68,9 @@ fn enclosing(name: &str) -> &str {
 
 /// The time step, in s, that a number states.
 fn step(name: &str, value: f64) -> Option<f64> {
-    let own = name.rsplit_once('.').map_or(name, |(_, own)| own);
-    let own = own.to_lowercase().replace('_', "");
-    let step = match own.as_str() {
+    let key = name.rsplit_once('.').map_or(name, |(_, key)| key);
+    let key = key.to_lowercase().replace('_', "");
+    let step = match key.as_str() {
         rate if RATES.contains(&rate) => 1.0 / value,
         step if STEPS.contains(&step) => value,
         _ => return None,

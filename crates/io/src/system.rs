@@ -62,7 +62,7 @@ pub struct NonlinearDescription {
     parameters: Vec<RangeDescription>,
 }
 
-/// What the data of an identification held a parameter by.
+/// Range of the data of an identification that determined a parameter.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct RangeDescription {
     largest: Option<[f64; 2]>,

@@ -1,4 +1,4 @@
-//! What five time-stepping schemes make of one machine: the natural frequency that each of them
+//! Five time-stepping schemes on one machine: the natural frequency that each of them
 //! gives it, against the exact response.
 //!
 //! `cargo run --package mechid --example 02_compare_schemes`

@@ -1,4 +1,4 @@
-//! From the design of an excitation to a machine with intervals: a multisine of low crest factor,
+//! Design of an excitation, measurement, and a machine with intervals: a multisine of low crest factor,
 //! eight measured periods, and what they tell.
 //!
 //! `cargo run --package mechid --example 04_design_measure_identify`

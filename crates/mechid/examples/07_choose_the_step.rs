@@ -1,4 +1,4 @@
-//! Which step a scheme needs: how long it may be, and how far period and damping are off before.
+//! Choice of the step of a scheme: how long it may be, and how far period and damping are off before.
 //!
 //! `cargo run --package mechid --example 07_choose_the_step`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]

@@ -1,4 +1,4 @@
-//! From a file to a machine with intervals and checks, and on to the force, in four statements.
+//! Identification of a file, a machine with intervals and checks, and the force, in four statements.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 use mechid::{

@@ -1,4 +1,4 @@
-//! From a test with noise to an uncertain machine, and with it to an unknown force with its band.
+//! Identification of an uncertain machine from a noisy test, and an unknown force with its band.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 use mechid::model::Sdof;

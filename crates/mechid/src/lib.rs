@@ -29,10 +29,15 @@
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |
 //! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
+//! | [`excitation`] | multisines for a test with one or several inputs, and how good they are |
+//! | [`simulation`] | the record that a described experiment gives, and its summary |
+//! | [`stability`] | time-stepping schemes side by side |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
 
-mod simulation;
+pub mod excitation;
+pub mod simulation;
+pub mod stability;
 
 /// The Rust of the README and of the book, compiled and run with the documentation tests.
 #[cfg(doctest)]
@@ -77,4 +82,9 @@ pub use mechid_plot as plot;
 #[cfg(feature = "report")]
 pub use mechid_report as report;
 pub use mechid_signal as signal;
-pub use simulation::{SimulateError, Simulation, exact_periodic, respond, simulate, sweep};
+pub use simulation::{
+    SimulateError, Simulation, SimulationSummary, exact_periodic, respond, simulate, sweep,
+};
+#[cfg(feature = "report")]
+pub use stability::stability_figure;
+pub use stability::{NamedScheme, SchemeComparison, SteppedMachine, compare_schemes};

@@ -70,7 +70,7 @@ fn bode() -> Figure {
     charts::bode(
         "Receptance of the single-degree-of-freedom system",
         Axis::log10("Angular frequency ω", "rad/s"),
-        Quantity::new("|X/F|", "m/N"),
+        Axis::log10("|X/F|", "m/N"),
         &[FrequencyResponse {
             name: "measured",
             frequency: &coarse,

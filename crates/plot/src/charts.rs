@@ -77,17 +77,20 @@ pub struct FrequencyResponse<'a> {
     pub phase_deg: &'a [f64],
 }
 
-/// Bode plot: measured points under fitted lines, magnitude (logarithmic) above phase (degrees).
+/// Bode plot: measured points under fitted lines, magnitude above phase (degrees). A line of the phase
+/// breaks where it jumps by more than half a turn.
 ///
-/// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`; the fits may lie on a finer grid than the measurement.
+/// `frequency` is the abscissa, such as `Axis::log10("Frequency", "Hz")`, and `magnitude` the ordinate of the
+/// upper panel, such as `Axis::log10("Receptance", "m/N")`; the fits may lie on a finer grid than the
+/// measurement.
 pub fn bode(
     title: &str,
     frequency: Axis,
-    magnitude: Quantity<'_>,
+    magnitude: Axis,
     measured: &[FrequencyResponse<'_>],
     fitted: &[FrequencyResponse<'_>],
 ) -> Figure {
-    let mut above = Panel::new(frequency.clone(), Axis::log10(magnitude.name, magnitude.unit));
+    let mut above = Panel::new(frequency.clone(), magnitude);
     let mut below = Panel::new(frequency, Axis::linear("Phase", "°").step(45.0));
     for (slot, response) in measured.iter().enumerate() {
         // A single measurement is the reference for all fits and is drawn in a neutral colour.
@@ -106,11 +109,17 @@ pub fn bode(
         } else {
             Color::CYCLE[slot % Color::CYCLE.len()]
         };
-        let line = |label: &str, y: &[f64]| {
-            Curve::line(label, response.frequency, y).slot(slot).dash(Dash::Solid).color(color)
+        let line = |label: &str, x: &[f64], y: &[f64]| {
+            Curve::line(label, x, y).slot(slot).dash(Dash::Solid).color(color)
         };
-        above = above.curve(line(response.name, response.magnitude));
-        below = below.curve(line("", response.phase_deg));
+        above = above.curve(line(response.name, response.frequency, response.magnitude));
+        let runs = response.phase_deg.chunk_by(|a, b| (b - a).abs() <= 180.0);
+        let mut start = 0;
+        for run in runs {
+            let end = start + run.len();
+            below = below.curve(line("", &response.frequency[start..end], run));
+            start = end;
+        }
     }
     Figure::new(title).panel(above).panel(below).share_x()
 }

@@ -180,10 +180,10 @@ impl<'a> Planner<'a> {
     fn rows(&self, above: &[bool], top: f64) -> Result<(Vec<f64>, f64), PlotError> {
         let mut margins = vec![Margins::default(); self.rows];
         for (index, panel) in self.figure.panels.iter().enumerate() {
-            let own = self.vertical_margins(index, panel, above[index]);
+            let needed = self.vertical_margins(index, panel, above[index]);
             let row = &mut margins[index / self.columns];
-            row.before = row.before.max(own.before);
-            row.after = row.after.max(own.after);
+            row.before = row.before.max(needed.before);
+            row.after = row.after.max(needed.after);
         }
         let taken: f64 = margins.iter().map(|row| row.before + row.after).sum();
         let height = (self.size.1 - top - taken - EDGE / 2.0) / self.rows as f64;

@@ -42,7 +42,7 @@ pub(crate) enum Level {
 
 /// Splits `10^{−3}` and `K_{xx}` into runs; a mark without its closing brace is ordinary text.
 pub(crate) fn runs(text: &str) -> Vec<(Level, &str)> {
-    let mut found = Vec::new();
+    let mut runs = Vec::new();
     let (mut rest, mut searched) = (text, 0);
     while let Some(offset) = rest[searched..].find(['^', '_']) {
         let mark = searched + offset;
@@ -52,13 +52,13 @@ pub(crate) fn runs(text: &str) -> Vec<(Level, &str)> {
             continue;
         };
         let level = if rest[mark..].starts_with('^') { Level::Raised } else { Level::Lowered };
-        found.push((Level::Base, &rest[..mark]));
-        found.push((level, script));
+        runs.push((Level::Base, &rest[..mark]));
+        runs.push((level, script));
         (rest, searched) = (after, 0);
     }
-    found.push((Level::Base, rest));
-    found.retain(|(_, run)| !run.is_empty());
-    found
+    runs.push((Level::Base, rest));
+    runs.retain(|(_, run)| !run.is_empty());
+    runs
 }
 
 /// Width of `text` in px at `size` px, from the advance widths of the embedded font; `^{…}` and `_{…}` count as drawn.

@@ -86,7 +86,7 @@ pub(crate) fn thin_stems(points: &[Point], base: f64) -> Vec<Point> {
 /// A straight segment of a drawing.
 pub(crate) type Segment = (Point, Point);
 
-/// All that a curve draws, as straight segments; a marker is a segment without length.
+/// Returns all lines of a curve as straight segments; a marker is a segment without length.
 pub(crate) fn footprint(curve: &Curve, maps: Mappings, base: f64, width: f64) -> Vec<Segment> {
     let chain = |points: Vec<Point>| -> Vec<Segment> {
         let points = thin_out(points, width);

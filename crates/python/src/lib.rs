@@ -10,6 +10,7 @@
 
 mod answer;
 mod arrays;
+mod bearing;
 mod failure;
 mod fleet;
 mod identified;
@@ -19,6 +20,7 @@ mod predicted;
 mod program;
 mod questions;
 mod reconstructed;
+mod responses;
 mod simulated;
 mod work;
 
@@ -27,7 +29,9 @@ mod _mechid {
     #[pymodule_export]
     use super::answer::Answer;
     #[pymodule_export]
-    use super::fleet::{fleet_begin, fleet_part, fleet_summary};
+    use super::bearing::{bearing, bearing_of_responses};
+    #[pymodule_export]
+    use super::fleet::{fleet_begin, fleet_part, fleet_rows, fleet_summary};
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]
@@ -42,6 +46,8 @@ mod _mechid {
     use super::questions::{frf, inspect, sweep};
     #[pymodule_export]
     use super::reconstructed::{Reconstructed, reconstruct};
+    #[pymodule_export]
+    use super::responses::{IdentifiedResponses, ResponseTable, identify_responses};
     #[pymodule_export]
     use super::simulated::{integrate, multisine, predict, simulate};
 

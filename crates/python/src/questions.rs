@@ -56,18 +56,18 @@ pub fn sweep(
     let step = move || {
         count.fetch_add(1, Ordering::Relaxed);
     };
-    let mut told = 0;
+    let mut reported = 0;
     let tell = || -> PyResult<()> {
         let steps = done.load(Ordering::Relaxed);
         match &progress {
-            Some(progress) if steps > told => {
-                told = steps;
+            Some(progress) if steps > reported => {
+                reported = steps;
                 progress.call1(py, (steps,)).map(drop)
             }
             _ => Ok(()),
         }
     };
-    let found = match record {
+    let answer = match record {
         Some(record) => {
             let record = record.0.clone();
             let reference = reference.map(|machine| machine.0.system().clone());
@@ -80,5 +80,5 @@ pub fn sweep(
             work::watched(py, threads, tell, move || mechid::sweep(&experiment, &how, &step))?
         }
     };
-    Ok(Answer::of(found))
+    Ok(Answer::of(answer))
 }

@@ -3,9 +3,10 @@
 
 use mechid::SimulateError;
 use mechid::estimate::EstimateError;
+use mechid::excitation::{ExcitationDesign, ExcitationLevel};
 use mechid::io::{Experiment, LineSpec};
 use mechid::model::{Discretisation, InitialState, Response, ResponseQuantity};
-use mechid::signal::{CrestSearch, Extent, Multisine, Phases, Record, Sampling, SignalError};
+use mechid::signal::{Extent, Phases, Record, Sampling, SignalError};
 use nalgebra::DVector;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -14,7 +15,7 @@ use crate::arrays::{self, Named};
 use crate::machine::Machine;
 use crate::{failure, work};
 
-/// What a simulated experiment records: scheme, sampling rate, machine, then force and responses as the
+/// Record of a simulated experiment: scheme, sampling rate, machine, then force and responses as the
 /// sensors tell them, then without their noise.
 type Simulated<'py> = (String, f64, Machine, Channels<'py>, Channels<'py>);
 
@@ -109,23 +110,20 @@ pub fn multisine<'py>(
         "random" => Phases::Random { seed },
         _ => Phases::Zero,
     };
-    let (rms, peak) = (quantity == "rms", quantity == "peak");
     let sampling = work::brief(py, || Sampling::from_rate_hz(fs, samples))?;
     let chosen = work::brief(py, || lines.lines(sampling))?;
+    let (amplitude, level) = match quantity {
+        "rms" => (1.0, Some(ExcitationLevel::Rms(level))),
+        "peak" => (1.0, Some(ExcitationLevel::Peak(level))),
+        _ => (level, None),
+    };
+    let flat = ExcitationDesign::flat(chosen, law);
+    let design = ExcitationDesign { amplitude, level, starts, seed, ..flat };
     let make = move || -> Result<_, SignalError> {
-        let amplitude = if rms || peak { 1.0 } else { level };
-        let mut made = Multisine::flat(chosen, amplitude, law)?;
-        if starts > 0 {
-            made = CrestSearch { starts, seed }.minimise(&made)?;
-        }
-        if rms {
-            made = made.with_rms(level)?;
-        } else if peak {
-            made = made.with_peak(level)?;
-        }
-        let period = made.sample(sampling)?.channel(0).to_vec();
-        let measures = (made.rms(), made.peak(), made.crest_factor()?);
-        Ok((made, period, measures))
+        let made = design.inputs(sampling)?.swap_remove(0);
+        let measures =
+            (made.multisine.rms(), made.multisine.peak(), made.multisine.crest_factor()?);
+        Ok((made.multisine, made.period.channel(0).to_vec(), measures))
     };
     let (made, period, measures) = work::watched(py, None, || Ok(()), make)?;
     let vector = |values: &[f64]| arrays::vector(py, values.to_vec());

@@ -56,6 +56,68 @@ def test_frequency_responses_are_those_of_the_program(
         found.response(2, 1)
 
 
+RIG = {"force": ["fx", "fy"], "acceleration": ["ax", "ay"], "displacement": ["dx", "dy"]}
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"coefficients": "eight", "band_hz": (20, 150), "without_hz": ["60:multiples"]},
+        {"load": 2500.0, "clearance": 1e-4, "diameter": 0.1, "length": 0.05, "viscosity": 0.02},
+    ],
+)
+def test_a_bearing_is_that_of_the_program(program: Callable[..., str], options: dict[str, Any]) -> None:
+    wet, dry = "examples/bearing-rig.csv", "examples/bearing-dry.csv"
+    every = {**RIG, "period": 256, "stator_mass": 20.0, "rotation_hz": 50.0, **options}
+    told = program("bearing", wet, "--baseline", dry, *words(every), "--json")
+    if "without_hz" in every:
+        every["without_hz"] = [{"frequency_hz": 60.0, "multiples": True}]
+    found = mechid.bearing(wet, baseline=dry, **every)
+    assert found.to_json() + "\n" == told
+    assert found.to_svg().startswith("<svg") and "kxy" in str(found) and "kxx=" in repr(found)
+    assert found.covariance.shape == (len(found.coefficients),) * 2
+    np.testing.assert_array_equal(found.stiffness[0, 1], found.coefficients["kxy"].value)
+    np.testing.assert_array_equal(found.mass == 0, np.full((2, 2), "mxx" not in found.coefficients))
+    ratio, mass = found.whirl_frequency_ratio, found.critical_mass
+    assert ratio is not None and 0.4 < ratio.value < 0.6 and mass is not None and mass.value > 1000
+    assert (found.dimensionless is None) == ("load" not in options)
+    again = mechid.bearing(
+        mechid.Measurement.open(wet, **RIG, period=256),
+        baseline=[mechid.Measurement.open(dry, **RIG, period=256)],
+        settings=found.settings,
+    )
+    assert again.to_json() == found.to_json()
+
+
+def test_a_bearing_comes_from_frequency_responses(tmp_path: Path) -> None:
+    """Closed-form responses of a housing on a film and on stingers, which the baseline has alone."""
+    omega = 2 * np.pi * np.arange(24.0, 200.0, 4.0)[:, None, None]
+    film = [np.array(m) for m in ([[7e7, 9e7], [-1.6e7, 4e7]], [[5e5, 1.5e5], [1.4e5, 2e5]], [[3.0, 1.0], [-1.0, 2.0]])]
+    stinger = [np.diag([6e6, 5e6]), np.diag([2e3, 1.5e3]), 0.4 * np.eye(2)]
+
+    def tables(*parts: list[np.ndarray]) -> list[mechid.ResponseTable]:
+        k, c, m = (sum(part[kind] for part in parts) for kind in range(3))
+        receptance = np.linalg.inv(k - omega**2 * (m + 20.0 * np.eye(2)) + 1j * omega * c)
+        hz = omega.ravel() / (2 * np.pi)
+        return [
+            mechid.ResponseTable(hz, receptance, quantity="displacement"),
+            mechid.ResponseTable(hz, -(omega**2) * receptance, quantity="acceleration"),
+        ]
+
+    wet, dry = tables(film, stinger), tables(stinger)
+    found = mechid.bearing(*wet, baseline=dry, stator_mass=20, rotation_hz=50, coefficients="twelve")
+    for matrix, exact in zip((found.stiffness, found.damping, found.mass), film, strict=True):
+        np.testing.assert_allclose(matrix, exact, atol=1e-8 * np.abs(exact).max())
+    assert found.settings["points"] == [] and "neither standard errors" in found.remarks[0]
+    with pytest.raises(mechid.MechidError, match="a test has two tables"):
+        mechid.bearing(wet[0], stator_mass=20)
+    with pytest.raises(TypeError, match="`period` belongs to records"):
+        mechid.bearing(*wet, stator_mass=20, period=256)
+    with pytest.raises(mechid.MechidError, match="stator_mass"):
+        mechid.bearing(*wet)
+
+
 def test_a_frequency_response_is_the_ratio_of_spectra(columns: dict[str, np.ndarray]) -> None:
     found = mechid.frf(columns["force"], columns["displacement"], fs=128, period=256, lines="4:60")
     force, x = (

@@ -149,3 +149,70 @@ def test_an_analysis_that_is_wrong_is_refused_at_once(tmp_path: Path) -> None:
     with pytest.raises(mechid.MechidError) as raised:
         fleet.run(["a.csv"], {}, tmp_path)
     assert raised.value.code == "analysis.no-force"
+
+
+@pytest.mark.parametrize("engine", ["threads", "processes"])
+def test_a_file_of_many_records_makes_a_row_for_each(engine: str, tmp_path: Path) -> None:
+    import pyarrow as pa
+
+    rig = np.loadtxt(ROOT / "examples/machine.csv", delimiter=",", skiprows=1)
+    days = ["monday", "tuesday", "friday"]
+    table = pa.table(
+        {
+            "day": np.repeat(days, len(rig)),
+            "time": pa.array(np.tile(rig[:, 0], 3)),
+            "force": pa.array(np.tile(rig[:, 1], 3)),
+            "displacement": pa.array(np.concatenate([scale * rig[:, 2] for scale in (1, 2, 4)])),
+        }
+    )
+    week = tmp_path / "week.parquet"
+    pq.write_table(table, week, row_group_size=700)
+    analysis = ANALYSIS | {"reading": {"record_column": "day"}}
+    pool = ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) if engine == "processes" else None
+    found = fleet.run(week, analysis, tmp_path / "out", pool, part_records=2)
+    assert (found.records, found.failed, found.parts) == (3, 0, 2)
+    rows = {row["record_id"]: row for row in pq.read_table(tmp_path / "out").to_pylist()}
+    for day, scale in zip(days, (1, 2, 4), strict=True):
+        alone = mechid.identify(
+            week, record_column="day", record_id=day, force="force", displacement="displacement",
+            period=256, method="maximum-likelihood",
+        )  # fmt: skip
+        assert rows[day]["value"][0] == alone.parameters["m"].value
+        assert np.isclose(scale * rows[day]["value"][0], rows["monday"]["value"][0], rtol=1e-9)
+    with pytest.raises(mechid.MechidError) as failure:
+        mechid.inspect(week, record_column="day", record_id="sunday")
+    assert failure.value.code == "analysis.record-id"
+
+
+def test_a_batch_makes_the_rows_that_a_run_makes(tmp_path: Path) -> None:
+    import pyarrow as pa
+
+    rig = np.loadtxt(ROOT / "examples/machine.csv", delimiter=",", skiprows=1)
+    analysis = ANALYSIS | {"reading": {"record_column": "day"}}
+    cells = {"time": rig[:, 0], "force": rig[:, 1], "displacement": rig[:, 2]}
+    broken = np.where(np.arange(len(rig)) == 7, np.nan, rig[:, 2])
+    lists = pa.RecordBatch.from_pydict(
+        {"day": ["monday", "broken", "friday"]}
+        | {name: [values] * 3 for name, values in cells.items()}
+        | {"displacement": [rig[:, 2], broken, rig[:, 2]]}
+    )
+    # The same, one sample per row, and the records in each other.
+    samples = pa.table(
+        {"day": np.tile(["monday", "broken", "friday"], len(rig))}
+        | {name: np.repeat(values, 3) for name, values in cells.items()}
+        | {"displacement": np.column_stack([rig[:, 2], broken, rig[:, 2]]).ravel()}
+    )
+    found = fleet.identify_batch(lists, analysis)
+    assert found["record"].to_pylist() == ["monday", "broken", "friday"]
+    assert found["error_code"].to_pylist() == [None, "io.not-finite", None]
+    assert fleet.identify_batch(samples, analysis) == found
+    fleet.run(ROOT / "examples/machine.csv", ANALYSIS, tmp_path)
+    alone = pq.read_table(tmp_path)
+    assert found.schema.equals(alone.schema)
+    same = [name for name in found.column_names if name not in ("record", "analysis_hash")]
+    assert found.select(same).slice(0, 1).to_pylist() == alone.select(same).to_pylist()
+    with pytest.raises(mechid.MechidError):
+        fleet.identify_batch(lists, {"channels": {}})
+    whole = fleet.identify_batch(pa.table(cells), ANALYSIS)
+    assert whole["record"].to_pylist() == ["the record"]
+    assert whole["value"].to_pylist() == found["value"].to_pylist()[:1]

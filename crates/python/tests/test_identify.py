@@ -48,6 +48,7 @@ CASES = [
     case(X, V, domain="time", between_samples="euler", refine=4, interpolation="spline"),
     case(X, V, A, domain="time", mass=25.0),
     case(X, period=256, nonlinear="k3: x1^3"),
+    case(X, period=256, candidates="k3: x1^3, c2: |v1| v1"),
     case(X, period=256, nonlinear="c2: |v1| v1", weighting="response"),
     case(X, period=256, nonlinear="k3: x1^3", method="maximum-likelihood", search=["delay"]),
     case(X, period=256, periods=1, validate_start=257),

@@ -24,8 +24,11 @@ from .conftest import ROOT
 
 FILE = "examples/machine.csv"
 # A long call, which needs no memory to speak of.
+# Where the tests run in the background, Ctrl-C is ignored, and Python takes that over.
 LONG = """
+import signal
 import mechid
+signal.signal(signal.SIGINT, signal.default_int_handler)
 print("ready", flush=True)
 mechid.sweep("examples/machine.json", npi=[1 + k / 10_000 for k in range(90_000)])
 """

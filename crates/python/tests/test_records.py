@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -73,3 +77,46 @@ def test_what_comes_in_is_copied(columns: dict[str, np.ndarray]) -> None:
     out = record.force
     out[:] = 0.0
     np.testing.assert_array_equal(record.force[:, 0], columns["force"])
+
+
+def test_responses_of_arrays_and_of_a_file_are_one(tmp_path: Path) -> None:
+    """The machine of a closed form, from arrays to rounding, and from the text that the program reads."""
+    omega = np.linspace(5.0, 90.0, 120)
+    mass, damping, stiffness = np.diag([10.0, 6.0]), np.diag([30.0, 20.0]), np.array([[9e3, -4e3], [-4e3, 6e3]])
+    dynamic = stiffness - omega[:, None, None] ** 2 * mass + 1j * omega[:, None, None] * damping
+    response = -(omega[:, None, None] ** 2) * np.linalg.inv(dynamic)
+    hz = omega / (2 * np.pi)
+    table = mechid.ResponseTable(hz, response, quantity="acceleration", points=["x", "y"])
+    found = mechid.identify_responses(table)
+    np.testing.assert_allclose(found.mass, mass, atol=1e-9)
+    np.testing.assert_allclose(found.damping, damping, atol=1e-7)
+    np.testing.assert_allclose(found.stiffness, stiffness, rtol=1e-9, atol=1e-6)
+    assert found.points == ("x", "y")
+    assert found.settings["quantity"] is None
+    np.testing.assert_allclose(found.machine().stiffness, found.stiffness)
+
+    path = tmp_path / "h.csv"
+    pairs = [(i, j) for i in range(2) for j in range(2)]
+    names = [f"h_{'xy'[i]}_{'xy'[j]}" for i, j in pairs]
+    head = ["frequency_hz", *(f"{name}_{part}" for name in names for part in ("real", "imag"))]
+    columns = [hz, *(part for i, j in pairs for part in (response[:, i, j].real, response[:, i, j].imag))]
+    rows = [",".join(head), *(",".join(map(repr, map(float, row))) for row in zip(*columns, strict=True))]
+    path.write_text("\n".join(rows))
+    read = mechid.identify_responses(path, quantity="acceleration")
+    assert [p.value for p in read.parameters.values()] == [p.value for p in found.parameters.values()]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"response": np.ones((3, 2))}, "has not one entry, or one matrix"),
+        ({"response": [1.0, 2.0, np.nan]}, "`response` has a value that is not finite"),
+        ({"std_error": [0.1, 0.1]}, "`std_error` of shape"),
+        ({"coherence": np.ones((3, 2))}, "`coherence` of shape"),
+        ({"points": ["x", "y"]}, "2 names of points and 1 of forces for 1 × 1"),
+    ],
+)
+def test_responses_of_other_shapes_are_refused(arguments: dict[str, Any], said: str) -> None:
+    given = {"response": [1.0, 2.0, 3.0], **arguments}
+    with pytest.raises(ValueError, match=re.escape(said)):
+        mechid.ResponseTable([1.0, 2.0, 3.0], given.pop("response"), **given)

@@ -25,6 +25,9 @@ pub enum ReportError {
     /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+    /// An estimate cannot be evaluated.
+    #[error(transparent)]
+    Estimate(#[from] mechid_estimate::EstimateError),
     /// A model cannot be used.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),

@@ -20,6 +20,8 @@ pub mod page;
 mod spectrum_csv;
 
 pub use error::ReportError;
-pub use figures::ToFigure;
+pub use figures::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle, ToFigure};
+#[cfg(feature = "parquet")]
+pub use page::trends_page;
 pub use page::{PageSettings, page};
 pub use spectrum_csv::spectrum_csv;

@@ -36,6 +36,7 @@
 //! | mean, level and extremes of samples that are not all held | [`RunningStatistics`] |
 //! | the period of a record that repeats | [`repetition()`] |
 //! | the level at which a channel is clipped | [`clipping()`] |
+//! | the hits of a hammer, good and bad | [`hits()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 //! | transforms planned once for many records | [`transform`] |
@@ -47,6 +48,7 @@ mod driven;
 mod error;
 pub mod excitation;
 mod extent;
+mod hits;
 pub mod lines;
 pub mod measures;
 pub mod message;
@@ -67,6 +69,7 @@ pub use crest::CrestSearch;
 pub use driven::driven_lines;
 pub use error::SignalError;
 pub use extent::Extent;
+pub use hits::{Hit, HitFault, HitRule, Hits, hits};
 pub use multisine::Multisine;
 pub use noise::NoiseLevel;
 pub use phases::Phases;

@@ -75,8 +75,8 @@ pub fn repetition(samples: &[f64]) -> Option<Repetition> {
         multiples.all(|lag| differences[lag] <= ALIKE * WORST * WORST)
     };
     let period = valleys(&differences, apart, alike).find(throughout)?;
-    let found = Repetition { period, mismatch: mismatch(&centred, period) };
-    (!grows_or_decays(&centred, period)).then_some(found)
+    let repetition = Repetition { period, mismatch: mismatch(&centred, period) };
+    (!grows_or_decays(&centred, period)).then_some(repetition)
 }
 
 /// Lags of the minima of the difference, one for each run of lags that are `alike`, from `first` on:

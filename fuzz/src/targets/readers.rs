@@ -83,7 +83,7 @@ const JSON: &[&str] = &[
     "[[[[",
 ];
 
-pub const TARGETS: [Target; 5] = [
+pub const TARGETS: [Target; 6] = [
     Target {
         name: "text",
         corpus: "text",
@@ -96,6 +96,20 @@ pub const TARGETS: [Target; 5] = [
         corpus: "binary",
         input: Input::Mutations(BINARY),
         memory: [8 << 20, 100],
+        run: record,
+    },
+    Target {
+        name: "parquet",
+        corpus: "parquet",
+        input: Input::Mutations(&[
+            "PAR1",
+            "\x15\0",
+            "\x19\x2c",
+            "\u{7f}\u{7f}",
+            "units",
+            "{\"x\": \"mm\"}",
+        ]),
+        memory: [8 << 20, 200],
         run: record,
     },
     Target {

@@ -14,16 +14,16 @@ const LINE_STEP: f64 = 15.5;
 const PADDING: f64 = 10.0;
 const ARROW: Stroke = Stroke::solid(Color::DARK, 1.2);
 
-/// What a box stands for, shown by its colour.
+/// Meaning of a box, shown by its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Something given or measured.
     Data,
     /// Something computed from what comes in.
     Process,
-    /// What the diagram is there to find.
+    /// Quantity that the diagram is there to find.
     Result,
-    /// Where a result meets the truth.
+    /// Comparison of a result with the truth.
     Comparison,
 }
 
@@ -38,7 +38,7 @@ impl Role {
     }
 }
 
-/// How an arrow runs from box to box.
+/// Course of an arrow from box to box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Route {
     /// Along the row or the column both boxes lie in.
@@ -183,7 +183,7 @@ impl Grid {
         (self.columns[block.column].0, y)
     }
 
-    /// Where a line from the middle of a box towards `next` crosses the box's edge.
+    /// Returns the point where a line from the middle of a box towards `next` crosses the box's edge.
     fn leave(&self, block: &Block, next: Point) -> Point {
         let (x, y) = self.center(block);
         let (dx, dy) = (next.0 - x, next.1 - y);

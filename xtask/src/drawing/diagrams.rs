@@ -2,7 +2,7 @@
 
 use super::block_diagram::{BlockDiagram, BoxId, Role, Route};
 
-/// Which of the two models a diagram is about.
+/// Model that a diagram is about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Machine {
     /// Mass on spring and damper.
@@ -11,16 +11,16 @@ pub enum Machine {
     Bearing,
 }
 
-/// Where parameters are identified.
+/// Domain in which parameters are identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Domain {
-    /// From samples.
+    /// Identification from samples.
     Time,
-    /// From Fourier coefficients.
+    /// Identification from Fourier coefficients.
     Frequency,
 }
 
-/// Which equation gives the force back.
+/// Equation that gives the force back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ForceEquation {
     /// M̂ ẍ + Ĉ ẋ + K̂ x, sample by sample.
@@ -120,14 +120,15 @@ fn simulation(diagram: &mut BlockDiagram, machine: Machine) -> Simulation {
     Simulation { truth, excitation, response }
 }
 
-/// What estimation adds: the force it reads, the parameters it finds, and the row they stand in.
+/// Part of a diagram that estimation adds: the force it reads, the parameters it finds, and the row they
+/// stand in.
 struct Estimation {
     force: BoxId,
     found: BoxId,
     row: usize,
 }
 
-/// From excitation and response to parameters.
+/// Draws the way from excitation and response to parameters.
 fn estimation(
     diagram: &mut BlockDiagram,
     machine: Machine,

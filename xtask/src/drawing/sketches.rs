@@ -131,7 +131,7 @@ pub fn bearing_scheme() -> String {
     sheet.finish("The bearing as eight linear coefficients")
 }
 
-/// What the springs and dashpots of the scheme cannot show.
+/// Draws what the springs and dashpots of the scheme cannot show.
 fn coupling(sheet: &mut Canvas, (x, y): Point) {
     let start = NOTE.anchored(Anchor::Start);
     let lines = [

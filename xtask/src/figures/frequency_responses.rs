@@ -16,7 +16,8 @@ struct Receptance {
     value: Vec<Complex<f64>>,
 }
 
-/// What the scheme makes of the machine: X(ω)/F(ω) of the degree of freedom `dof`, driven in the last.
+/// Receptance of the machine as the scheme simulates it: X(ω)/F(ω) of the degree of freedom `dof`, driven in
+/// the last.
 fn simulated(
     reading: Reading,
     case: Case,

@@ -1,4 +1,4 @@
-//! What the figures draw: estimates and forces of one simulation, slips replayed or removed.
+//! Series of the figures: estimates and forces of one simulation, slips replayed or removed.
 
 use mechid::force::{continuous, discretised};
 use mechid::model::{Discretisation, KyxSign, SecondOrderSystem};
@@ -39,7 +39,7 @@ impl Reading {
     }
 }
 
-/// Where parameters are identified.
+/// Domain in which parameters are identified.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Domain {
     Time,
@@ -76,7 +76,7 @@ impl Domain {
     }
 }
 
-/// Which equation gives the force back.
+/// Equation that gives the force back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Equation {
     Continuous,

@@ -10,7 +10,7 @@ use super::series::{BEARING, Domain, Reading, same_ordinates};
 use crate::thesis::case::{Case, Machine};
 use crate::thesis::published::Method;
 
-/// What is swept: one machine, one estimator, many NPI.
+/// Sweep: one machine, one estimator, many NPI.
 #[derive(Debug, Clone, PartialEq)]
 struct Sweep {
     machine: Machine,

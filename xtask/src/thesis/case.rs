@@ -5,7 +5,7 @@ use mechid::signal::{Multisine, Phases, Record, Sampling, lines};
 use mechid_problems::{dissertation_bearing, dissertation_sdof};
 use nalgebra::DMatrix;
 
-/// Which of the two models.
+/// Model, one of two.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Machine {
     /// One degree of freedom with this damping in N·s/m (180, in some figures 50).

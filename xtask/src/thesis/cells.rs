@@ -9,20 +9,20 @@ use super::verdict::{Verdict, compare};
 /// A printed number beside ours.
 #[derive(Debug, Clone)]
 pub struct Judged {
-    /// As printed.
+    /// Value as printed.
     pub printed: String,
-    /// As recomputed, slips included.
+    /// Value as recomputed, slips included.
     pub value: f64,
-    /// How they stand to each other.
+    /// Verdict of the comparison.
     pub verdict: Verdict,
-    /// Why, where it is a misprint.
+    /// Reason, where it is a misprint.
     pub reason: Option<&'static str>,
 }
 
 /// One printed cell of an identification table, reproduced and corrected.
 #[derive(Debug, Clone)]
 pub struct Row {
-    /// What is printed.
+    /// Printed cell.
     pub cell: Cell,
     /// The estimate.
     pub estimate: Judged,
@@ -115,7 +115,7 @@ fn judge_error(
 /// A printed mean error beside the mean of the printed errors and beside ours.
 #[derive(Debug, Clone)]
 pub struct Mean {
-    /// What is estimated.
+    /// Estimated parameter.
     pub parameter: String,
     /// Column.
     pub method: Method,
@@ -148,8 +148,8 @@ pub fn means(table: &str, published: &Published, rows: &[Row]) -> Vec<Mean> {
         .collect()
 }
 
-/// As for a cell, a listed misprint is believed only if a mean of the column confirms the number it
-/// ought to be: of the errors as printed, as printed but for their own misprints, or as we compute
+/// Judges a mean: as for a cell, a listed misprint is believed only if a mean of the column confirms the
+/// number it ought to be: of the errors as printed, as printed but for their own misprints, or as we compute
 /// them.
 fn judge_mean(column: &[&Row], printed: &str, listed: Option<&'static MeanMisprint>) -> Judged {
     let digits = |r: &&Row| r.error.printed.parse::<f64>().ok();

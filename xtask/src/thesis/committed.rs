@@ -6,7 +6,7 @@ use std::path::Path;
 /// Difference of two coordinates, in px, that rounding on another processor may make.
 const PIXELS: f64 = 0.1;
 
-/// Whether two texts have the same words, and two drawings points that differ by rounding at most.
+/// Returns whether two texts have the same words, and two drawings points that differ by rounding at most.
 pub fn alike(ours: &str, committed: &str) -> bool {
     if ours == committed || !ours.starts_with("<svg") {
         return ours == committed;

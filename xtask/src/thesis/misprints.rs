@@ -2,7 +2,7 @@
 
 use super::published::Method;
 
-/// Which of the two numbers of a cell.
+/// Number of a cell, one of two.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Field {
     /// The estimate.
@@ -20,13 +20,13 @@ pub struct Misprint {
     pub method: Method,
     /// Row; `None` for the whole column.
     pub npi: Option<f64>,
-    /// Which number.
+    /// Number that is misprinted.
     pub field: Field,
-    /// What is printed; a dash for a column.
+    /// Printed value; a dash for a column.
     pub printed: &'static str,
-    /// What should be.
+    /// Right value.
     pub right: &'static str,
-    /// How we know.
+    /// Reason.
     pub reason: &'static str,
 }
 
@@ -118,7 +118,7 @@ pub struct MeanMisprint {
     pub table: &'static str,
     /// Column.
     pub method: Method,
-    /// What should be.
+    /// Right value.
     pub right: &'static str,
     /// Remark.
     pub reason: &'static str,

@@ -14,21 +14,21 @@ use nalgebra::{Complex, DMatrix};
 use super::published::{Cell, Method, Published};
 use super::verdict::{Verdict, compare};
 
-/// What we chose where the text is silent.
+/// Choices where the text is silent.
 pub const SETTING: &str = "Nt = 2048, amplitude 1 N on the first mass, NPI = 20 on the larger damped frequency, RK4 with a linear mid-step force";
 
 /// A printed modal parameter beside ours.
 #[derive(Debug, Clone)]
 pub struct ModalRow {
-    /// What is printed.
+    /// Printed cell.
     pub cell: Cell,
-    /// As computed: with the dissertation's estimator where a value is identified.
+    /// Computed value: with the dissertation's estimator where a value is identified.
     pub value: Complex<f64>,
-    /// How they stand to each other.
+    /// Verdict of the comparison.
     pub verdict: Verdict,
-    /// Why, where it is a misprint.
+    /// Reason, where it is a misprint.
     pub reason: Option<&'static str>,
-    /// From the response without Euler's bias; `None` for theoretical rows.
+    /// Value from the response without Euler's bias; `None` for theoretical rows.
     pub best: Option<Complex<f64>>,
 }
 

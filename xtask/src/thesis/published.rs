@@ -1,4 +1,4 @@
-//! What the dissertation prints: transcribed cells, never generated.
+//! Printed values of the dissertation: transcribed cells, never generated.
 
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ impl Method {
 pub struct Cell {
     /// Number of the table, for example `5.6.4`.
     pub table: String,
-    /// What is estimated, for example `Kyx`.
+    /// Estimated parameter, for example `Kyx`.
     pub parameter: String,
     /// `time` or `frequency`, empty for adopted values.
     pub domain: String,
@@ -96,7 +96,7 @@ pub struct Cell {
 pub struct MeanError {
     /// Number of the table.
     pub table: String,
-    /// What is estimated.
+    /// Estimated parameter.
     pub parameter: String,
     /// Column.
     pub method: Method,
@@ -104,7 +104,7 @@ pub struct MeanError {
     pub mean_error_percent: String,
 }
 
-/// All that is printed.
+/// Printed tables, all of them.
 #[derive(Debug, Clone)]
 pub struct Published {
     /// Every cell, in the order of the files.

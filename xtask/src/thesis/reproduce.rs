@@ -1,4 +1,4 @@
-//! Everything the reproduction makes, and where it goes.
+//! Artefacts of the reproduction, and their files.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -18,11 +18,11 @@ pub struct Artefact {
     pub name: String,
     /// All digits of its data; `None` for a drawing.
     pub csv: Option<String>,
-    /// What a reader looks at.
+    /// Form in which a reader sees it.
     pub view: View,
 }
 
-/// What a reader looks at.
+/// Form in which a reader sees an artefact.
 #[derive(Debug, Clone)]
 pub enum View {
     /// A table.
@@ -52,7 +52,7 @@ impl View {
         }
     }
 
-    /// What it shows: the first sentence below the heading of a table, the title of a figure without its
+    /// Returns its caption: the first sentence below the heading of a table, the title of a figure without its
     /// `number`.
     fn caption(&self, number: &str) -> &str {
         match self {
@@ -70,7 +70,7 @@ impl View {
     }
 }
 
-/// What [`all`] made.
+/// Artefacts made by [`all`].
 #[derive(Debug, Clone)]
 pub struct Reproduction {
     /// Tables, then figures.
@@ -110,7 +110,7 @@ pub fn all(root: &Path, tick: impl Fn() + Sync) -> Result<Reproduction, String> 
     Ok(Reproduction { artefacts, pages })
 }
 
-/// How many times [`all`] ticks.
+/// Returns the number of times that [`all`] ticks.
 ///
 /// # Errors
 /// A sentence naming the published file that cannot be read.
@@ -118,7 +118,7 @@ pub fn ticks(root: &Path) -> Result<usize, String> {
     Ok(Results::keys(&Published::read(root)?).len() + figures::numbers().len())
 }
 
-/// Whether `only` names the artefact `name` or a part of the dissertation it belongs to: `5.6`
+/// Returns whether `only` names the artefact `name` or a part of the dissertation it belongs to: `5.6`
 /// means 5.6.1, 5.6.2 and so on, `P1` the first paper, `figure-5.2.4` the figure alone.
 fn selects(only: &str, name: &str) -> bool {
     let number = name.split_once('-').map_or(name, |(_, number)| number);
@@ -159,7 +159,7 @@ fn natural(name: &str) -> (bool, Vec<(usize, String)>) {
 }
 
 impl Reproduction {
-    /// Only the tables and figures of that number or part.
+    /// Keeps only the tables and figures of that number or part.
     ///
     /// # Errors
     /// A sentence with the names there are.
@@ -190,7 +190,7 @@ impl Reproduction {
         Ok(written?.iter().sum::<usize>() + self.pages.len())
     }
 
-    /// How many artefacts have a golden file.
+    /// Returns the number of artefacts with a golden file.
     pub fn golden_files(&self) -> usize {
         self.golden().count()
     }

@@ -10,7 +10,7 @@ use super::published::{Cell, Method, Published};
 use super::simulate::{Sequences, correct, slipped_but};
 use super::slips::Slip;
 
-/// What identifies one estimation: a printed row's settings and its column.
+/// Identity of one estimation: a printed row's settings and its column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Key {
     /// Time or frequency.
@@ -45,7 +45,7 @@ impl Key {
         })
     }
 
-    /// Whether a slip takes part in the replay of this key.
+    /// Returns whether a slip takes part in the replay of this key.
     pub fn is_touched_by(self, slip: Slip) -> bool {
         match slip {
             Slip::CentralDifferenceLead => self.method == Method::CentralDifference,
@@ -72,7 +72,7 @@ impl Key {
 /// The estimates of one key, each in the order of `Machine::parameters`.
 #[derive(Debug, Clone)]
 pub struct Estimates {
-    /// With the slips of the original programs.
+    /// Estimates with the slips of the original programs.
     pub slipped: Vec<f64>,
     /// The same estimator on the same scheme, without them.
     pub correct: Vec<f64>,
@@ -80,7 +80,7 @@ pub struct Estimates {
     pub best: Vec<f64>,
 }
 
-/// Everything estimated, by key.
+/// Estimates by key.
 #[derive(Debug, Clone)]
 pub struct Results(BTreeMap<Key, Estimates>);
 

@@ -11,7 +11,7 @@ use super::case::{Case, Machine};
 use super::published::Method;
 use super::slips::{Slip, one_sample_early, stage_loads};
 
-/// What an estimator is given: one period of motion and force.
+/// Input of an estimator: one period of motion and force.
 #[derive(Debug, Clone)]
 pub struct Sequences {
     /// The machine that moved.

@@ -72,7 +72,7 @@ impl Slip {
         }
     }
 
-    /// Which printed numbers it belongs to.
+    /// Returns the printed numbers that it belongs to.
     pub fn place(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "all central-difference columns",
@@ -89,7 +89,7 @@ impl Slip {
         }
     }
 
-    /// What the original programs did.
+    /// Returns what the original programs did.
     pub fn done(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => {
@@ -114,7 +114,7 @@ impl Slip {
         }
     }
 
-    /// What the dissertation's own equations ask for.
+    /// Returns what the dissertation's own equations ask for.
     pub fn right(self) -> &'static str {
         match self {
             Slip::CentralDifferenceLead => "x, v, a and F of the same instant",

@@ -19,7 +19,7 @@ pub struct Table {
     pub number: String,
     /// All digits: what the golden comparison reads.
     pub csv: String,
-    /// For the reader.
+    /// Page for the reader.
     pub markdown: String,
 }
 

@@ -1,6 +1,6 @@
 //! Does a computed number give the printed digits?
 
-/// How a printed number stands to the one computed from its recipe.
+/// Relation of a printed number to the one computed from its recipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Verdict {
     /// Truncating or rounding our value to the printed decimals gives the printed string.

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use mechid_estimate::checks::Verdict;
-use mechid_io::ParameterCovariance;
+use mechid_io::{ParameterCovariance, RecordFile, Table};
 use serde::Serialize;
 
 use super::settings::SavedAnalysis;
@@ -19,6 +19,8 @@ use crate::{AnalysisError, Measurement, identify};
 pub struct ResultRow {
     /// Name of the record: its path, as it was given.
     pub record: String,
+    /// Value of the column that tells the records of a file apart; `None` where the file is the record.
+    pub record_id: Option<String>,
     /// Reason why there is no result.
     pub error: Option<RowError>,
     /// Estimator that was used.
@@ -50,7 +52,7 @@ pub struct ResultRow {
     /// Hash of the analysis, in hexadecimal digits.
     pub analysis_hash: String,
     /// Version of this crate.
-    pub version: &'static str,
+    pub version: String,
 }
 
 /// Reason why a record has no result.
@@ -109,6 +111,16 @@ impl SavedAnalysis {
     ) -> ResultRow {
         ResultRow::of(record, self, source)
     }
+
+    /// Identifies a record whose columns are in memory, as [`SavedAnalysis::row`] does.
+    pub fn row_of_table(&self, record: &str, table: Table) -> ResultRow {
+        let open = || {
+            let file = RecordFile::of_table(table);
+            Measurement::of_file(file, None, &self.channels, &self.reading)?
+                .window(self.window.clone())
+        };
+        self.row(record, open)
+    }
 }
 
 impl ResultRow {
@@ -119,6 +131,7 @@ impl ResultRow {
     ) -> Self {
         let empty = Self {
             record: record.into(),
+            record_id: None,
             error: None,
             estimator: None,
             sample_rate_hz: None,
@@ -134,42 +147,45 @@ impl ResultRow {
             findings: Vec::new(),
             warnings: Vec::new(),
             analysis_hash: analysis.hash(),
-            version: env!("CARGO_PKG_VERSION"),
+            version: env!("CARGO_PKG_VERSION").into(),
         };
         let work = || {
             analysis.check()?;
             identify(&[source()?], &analysis.identify)
         };
         let error = match catch_unwind(AssertUnwindSafe(work)) {
-            Ok(Ok(found)) => return empty.with(found.summary()),
+            Ok(Ok(identification)) => return empty.with(identification.summary()),
             Ok(Err(error)) => RowError { code: error.code(), message: error.to_string() },
-            Err(panic) => RowError { code: "internal".into(), message: told(&*panic) },
+            Err(panic) => RowError { code: "internal".into(), message: panic_message(&*panic) },
         };
         Self { error: Some(error), ..empty }
     }
 
-    fn with(self, found: &IdentificationSummary) -> Self {
-        let WindowRow { first_sample, last_sample, sample_rate_hz, .. } = found.window;
-        let FitRow { nrmse, unexplained_motion, misfit_ratio, condition_number, .. } = found.fit;
-        let of_terms = found.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
-        let entries =
-            found.parameters.iter().map(|p| ParameterCell::new(&p.name, p.unit, p.estimate));
+    fn with(self, identification: &IdentificationSummary) -> Self {
+        let WindowRow { first_sample, last_sample, sample_rate_hz, .. } = identification.window;
+        let FitRow { nrmse, unexplained_motion, misfit_ratio, condition_number, .. } =
+            identification.fit;
+        let of_terms = identification.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
+        let entries = identification
+            .parameters
+            .iter()
+            .map(|p| ParameterCell::new(&p.name, p.unit, p.estimate));
         let terms = of_terms.map(|p| ParameterCell::new(&p.name, &p.unit, p.estimate));
-        let conspicuous = found.checks.iter().filter(|check| check.is_conspicuous());
-        let remarks = found.remarks.iter().cloned();
+        let conspicuous = identification.checks.iter().filter(|check| check.is_conspicuous());
+        let remarks = identification.remarks.iter().cloned();
         Self {
-            estimator: Some(found.estimator.into()),
+            estimator: Some(identification.estimator.into()),
             sample_rate_hz: Some(sample_rate_hz),
             first_sample: Some(first_sample),
             last_sample: Some(last_sample),
             parameters: entries.chain(terms).collect(),
-            covariance: Some(found.covariance.clone()),
-            modes: found.modes.iter().map(ModeCell::of).collect(),
+            covariance: Some(identification.covariance.clone()),
+            modes: identification.modes.iter().map(ModeCell::of).collect(),
             nrmse: Some(nrmse),
             unexplained_motion,
             misfit_ratio,
             condition_number: Some(condition_number),
-            findings: found.checks.iter().map(FindingRow::of).collect(),
+            findings: identification.checks.iter().map(FindingRow::of).collect(),
             warnings: conspicuous.map(CheckRow::sentence).chain(remarks).collect(),
             ..self
         }
@@ -203,7 +219,7 @@ impl FindingRow {
 }
 
 /// Returns what a panic says.
-fn told(panic: &(dyn std::any::Any + Send)) -> String {
+fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<String>().map(String::as_str);
     let text = text.or(panic.downcast_ref::<&str>().copied());
     format!("internal error, please report it: {}", text.unwrap_or("no reason is known"))

@@ -54,47 +54,68 @@ impl BearingData {
         all.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
     }
 
-    /// Takes the displacement relative to the shaft and the acceleration of the housing per shaker
-    /// force, two points and two forces each, at the same frequencies. `tables` says what the tables do
-    /// not: points, averages, band.
+    /// Takes tables of frequency responses, two per test: the displacement relative to the shaft and then
+    /// the acceleration of the housing per shaker force, at the same frequencies. A test has both
+    /// directions of force, or one of them.
+    ///
+    /// The errors of displacement and acceleration are taken as independent of one another, as those of
+    /// their sensors are.
     ///
     /// # Errors
-    /// As [`identify_responses`](crate::identify_responses()), and [`AnalysisError::Setting`] if the
-    /// tables do not belong together.
+    /// [`AnalysisError::NoRecord`], those of [`identify_responses`](crate::identify_responses()), and
+    /// [`AnalysisError::Setting`] if the tables do not belong together or lines are chosen by number.
     ///
     /// # Source
     /// Rouvas and Childs (1993).
     pub fn of_responses(
-        displacement: &FrequencyResponses,
-        acceleration: &FrequencyResponses,
-        tables: &IdentifyResponses,
+        tables: &[FrequencyResponses],
         how: &IdentifyBearing,
     ) -> Result<Self, AnalysisError> {
         how.check()?;
+        let tests = tables.chunks(2).map(|test| match test {
+            [displacement, acceleration] => Self::of_tables(displacement, acceleration, how),
+            _ => Err(apart(&format!(
+                "a test has two tables, of displacement and of acceleration: there are {}",
+                tables.len()
+            ))),
+        });
+        let all = tests.collect::<Result<Vec<_>, _>>()?.into_iter();
+        all.map(Ok).reduce(|a, b| a?.and(b?)).ok_or(AnalysisError::NoRecord)?
+    }
+
+    fn of_tables(
+        displacement: &FrequencyResponses,
+        acceleration: &FrequencyResponses,
+        how: &IdentifyBearing,
+    ) -> Result<Self, AnalysisError> {
+        let settings = how.of_tables()?;
         let of = |table: &FrequencyResponses, quantity| {
-            let how = IdentifyResponses { quantity: Some(quantity), ..tables.clone() };
+            let how = IdentifyResponses { quantity: Some(quantity), ..settings.clone() };
             response_data(table, &how)
         };
         let (d, noise) = of(displacement, ResponseQuantity::Displacement)?;
         let (a, noise_of_a) = of(acceleration, ResponseQuantity::Acceleration)?;
-        let apart = |why: &str| AnalysisError::Setting { setting: "tables", why: why.into() };
         if (d.dof(), a.dof()) != (2, 2) {
             return Err(apart("a bearing has two directions: choose two `points`"));
         }
         if d.omega() != a.omega() || d.force() != a.force() {
-            return Err(apart(
-                "displacement and acceleration need the same frequencies and forces",
-            ));
+            return Err(apart(&format!(
+                "{} and {} need the same frequencies and forces",
+                displacement.file, acceleration.file
+            )));
         }
         let mass = how.stator_mass;
-        let keep: Vec<usize> = (0..d.len())
-            .filter(|row| {
-                let (hz, spacing_hz) = (d.omega()[*row] / TAU, spacing(d.omega()));
-                let others = &how.without.frequencies;
-                !rotates(hz, how.rotation_hz, spacing_hz)
-                    && !others.iter().any(|other| other.reaches(hz, spacing_hz))
-            })
-            .collect();
+        let spacing_hz = spacing(d.omega());
+        let is_kept = |omega: f64| {
+            let (hz, others) = (omega / TAU, &how.without.frequencies);
+            !rotates(hz, how.rotation_hz, spacing_hz)
+                && !others.iter().any(|other| other.reaches(hz, spacing_hz))
+        };
+        let (keep, rotating): (Vec<usize>, Vec<usize>) =
+            (0..d.len()).partition(|row| is_kept(d.omega()[*row]));
+        if keep.is_empty() {
+            return Err(apart("every frequency is a multiple of the rotation, or left out"));
+        }
         let omega: Vec<f64> = keep.iter().map(|row| d.omega()[*row]).collect();
         let motion = d.displacement().select_rows(&keep);
         let mut force = d.force().select_rows(&keep);
@@ -105,12 +126,8 @@ impl BearingData {
                 force[(to, direction)] -= a.displacement()[(*row, direction)] * factor;
             }
         }
-        let mut data = FrequencyData::from_amplitudes(
-            omega.clone(),
-            force,
-            motion,
-            ResponseQuantity::Displacement,
-        )?;
+        let kind = ResponseQuantity::Displacement;
+        let mut data = FrequencyData::from_amplitudes(omega.clone(), force, motion, kind)?;
         let noise = noise.zip(noise_of_a).map(|(noise, _)| noise);
         if let (Some(_), Some(of_d), Some(of_a)) = (noise, d.noise(), a.noise()) {
             let covariance = keep.iter().map(|row| {
@@ -122,16 +139,22 @@ impl BearingData {
             });
             data = data.with_noise(NoiseSpectrum::new(omega, covariance.collect())?)?;
         }
-        let all = d.omega().iter().map(|omega| omega / TAU);
-        let left_out =
-            all.enumerate().filter(|(row, _)| !keep.contains(row)).map(|(_, hz)| hz).collect();
-        let remarks = displacement.remarks.iter().chain(&acceleration.remarks).cloned().collect();
+        let names = vec![displacement.file.clone(), acceleration.file.clone()];
+        let mut remarks = [&displacement.remarks[..], &acceleration.remarks[..]].concat();
+        if noise.is_none() {
+            remarks.push(format!(
+                "{}: neither standard errors nor coherence in both tables; the noise was taken from the \
+                 residual, on the displacement alone",
+                names.join(", ")
+            ));
+        }
+        let left_out_hz = rotating.into_iter().map(|row| d.omega()[row] / TAU).collect();
         Ok(Self {
-            names: vec![displacement.file.clone(), acceleration.file.clone()],
+            names,
             data,
             noise,
             largest_displacement: None,
-            left_out_hz: distinct(left_out),
+            left_out_hz: distinct(left_out_hz),
             remarks,
         })
     }
@@ -204,10 +227,14 @@ impl BearingData {
     }
 }
 
+fn apart(why: &str) -> AnalysisError {
+    AnalysisError::Setting { setting: "frf_table", why: why.into() }
+}
+
 /// Scatter of the periods over the displacement below which it is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Whether the scatter of the periods is more than rounding.
+/// Returns whether the scatter of the periods is more than rounding.
 fn shows_noise(data: &FrequencyData) -> bool {
     let Some(noise) = data.noise() else { return false };
     let variance = |row: usize| (0..2).map(|c| noise.covariance(row)[(c, c)].re).sum::<f64>();
@@ -229,7 +256,7 @@ fn spacing(omega: &[f64]) -> f64 {
     if smallest.is_finite() { smallest / TAU } else { 0.0 }
 }
 
-/// Whether the rotation or a multiple of it shows on a line.
+/// Returns whether the rotation or a multiple of it shows on a line.
 fn rotates(hz: f64, rotation_hz: Option<f64>, spacing_hz: f64) -> bool {
     rotation_hz.is_some_and(|rotation| Disturbance::rotation(rotation).reaches(hz, spacing_hz))
 }

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::AnalysisError;
+use crate::identify::tables::IdentifyResponses;
 use crate::identify::{LeftOut, LineChoice};
 
 /// Settings of the identification of a bearing.
@@ -23,6 +24,11 @@ pub struct IdentifyBearing {
     pub lines: LineChoice,
     /// Spectral lines to leave out of these, beside those of the rotation.
     pub without: LeftOut,
+    /// Independent averages behind the coherence of tables of frequency responses, a pure number; need
+    /// not be whole.
+    pub averages: Option<f64>,
+    /// Points of tables of frequency responses, x before y; empty: all, in the order of the table.
+    pub points: Vec<String>,
 }
 
 /// Size of a bearing and its oil, as far as it is known.
@@ -53,6 +59,24 @@ pub enum Coefficients {
 }
 
 impl IdentifyBearing {
+    /// Returns what these settings say of tables of frequency responses.
+    pub(super) fn of_tables(&self) -> Result<IdentifyResponses, AnalysisError> {
+        let numbered = |setting| {
+            let why = "frequency responses have no numbered lines: choose a band".into();
+            Err(AnalysisError::Setting { setting, why })
+        };
+        let band = match &self.lines {
+            LineChoice::Driven => None,
+            LineChoice::Band(band) => Some(*band),
+            LineChoice::Lines(_) => return numbered("lines"),
+        };
+        if self.without.lines.is_some() {
+            return numbered("without_lines");
+        }
+        let (averages, points) = (self.averages, self.points.clone());
+        Ok(IdentifyResponses { averages, points, band, ..IdentifyResponses::default() })
+    }
+
     /// Checks that every number given is positive and finite.
     pub(super) fn check(&self) -> Result<(), AnalysisError> {
         let size = &self.size;

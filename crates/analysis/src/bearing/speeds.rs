@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 use std::path::PathBuf;
 
+use mechid_io::FrequencyResponses;
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -28,6 +29,8 @@ pub struct BearingPlan {
     pub settings: IdentifyBearing,
     /// Baseline tests for every point that has none of its own.
     pub baseline: Vec<PathBuf>,
+    /// `true` if the files are tables of frequency responses, of displacement and acceleration by turns.
+    pub frf_table: bool,
     /// Speeds and loads.
     pub points: Vec<BearingPoint>,
 }
@@ -36,9 +39,9 @@ pub struct BearingPlan {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct BearingPoint {
-    /// Records of the tests.
+    /// Records of the tests, or their tables of frequency responses.
     pub tests: Vec<PathBuf>,
-    /// Records of the baseline tests.
+    /// Records of the baseline tests, or their tables.
     pub baseline: Vec<PathBuf>,
     /// Speed of rotation, in Hz; `None`: as in the settings.
     pub rotation_hz: Option<f64>,
@@ -53,8 +56,8 @@ impl BearingPlan {
     /// [`AnalysisError::NoRecord`] for a point without tests, and those of
     /// [`BearingData::of_records`] and [`identify_bearing`](super::identify_bearing()).
     pub fn run(&self) -> Result<BearingTable, AnalysisError> {
-        let found = self.points.iter().map(|point| self.at(point));
-        Ok(BearingTable::new(found.collect::<Result<Vec<_>, _>>()?))
+        let bearings = self.points.iter().map(|point| self.at(point));
+        Ok(BearingTable::new(bearings.collect::<Result<Vec<_>, _>>()?))
     }
 
     fn at(&self, point: &BearingPoint) -> Result<IdentifiedBearing, AnalysisError> {
@@ -64,6 +67,10 @@ impl BearingPlan {
             ..self.settings.clone()
         };
         let data = |paths: &[PathBuf]| {
+            if self.frf_table {
+                let tables = paths.iter().map(FrequencyResponses::read);
+                return BearingData::of_responses(&tables.collect::<Result<Vec<_>, _>>()?, &how);
+            }
             let open = |path: &PathBuf| {
                 let (path, channels) = (path.clone(), self.channels.clone());
                 let (reading, window) = (self.reading.clone(), self.window.clone());
@@ -73,8 +80,8 @@ impl BearingPlan {
             BearingData::of_records(&tests, &how)
         };
         let tests = data(&point.tests)?;
-        let own = if point.baseline.is_empty() { &self.baseline } else { &point.baseline };
-        let baseline = if own.is_empty() { None } else { Some(data(own)?) };
+        let recorded = if point.baseline.is_empty() { &self.baseline } else { &point.baseline };
+        let baseline = if recorded.is_empty() { None } else { Some(data(recorded)?) };
         identify_bearing(&tests, baseline.as_ref(), &how)
     }
 }
@@ -88,8 +95,8 @@ pub struct BearingTable {
 
 impl BearingTable {
     /// Sorts results by speed and load.
-    pub fn new(found: impl IntoIterator<Item = IdentifiedBearing>) -> Self {
-        let mut rows: Vec<BearingSummary> = found.into_iter().map(|one| one.summary).collect();
+    pub fn new(bearings: impl IntoIterator<Item = IdentifiedBearing>) -> Self {
+        let mut rows: Vec<BearingSummary> = bearings.into_iter().map(|one| one.summary).collect();
         let key = |row: &BearingSummary| [row.rotation_hz, row.load].map(|x| x.unwrap_or(0.0));
         rows.sort_by(|a, b| {
             let [a, b] = [key(a), key(b)];

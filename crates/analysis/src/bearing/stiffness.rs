@@ -46,9 +46,9 @@ pub(super) fn lines(tests: &BearingData, film: &Film) -> Result<Vec<StiffnessLin
         if group.len() > 1 {
             lines.extend(line(tests, film, group));
         } else if let Some(other) = groups.get(next).filter(|other| other.len() == 1)
-            && let Some(found) = line(tests, film, &[group[0], other[0]])
+            && let Some(measured) = line(tests, film, &[group[0], other[0]])
         {
-            lines.push(found);
+            lines.push(measured);
             next += 1;
         }
     }

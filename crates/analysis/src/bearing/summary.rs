@@ -121,8 +121,8 @@ impl BearingSummary {
         let uncertain = |value: f64, variance: f64| {
             let standard_error = variance.max(0.0).sqrt();
             let degrees_of_freedom = film.degrees_of_freedom;
-            let found = estimate::Uncertain { value, standard_error, degrees_of_freedom };
-            Uncertain::of(&found)
+            let uncertain = estimate::Uncertain { value, standard_error, degrees_of_freedom };
+            Uncertain::of(&uncertain)
         };
         let count = film.values().len();
         let rows = (0..count).map(|at| {

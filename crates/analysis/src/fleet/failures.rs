@@ -24,7 +24,11 @@ impl FailureCount {
     pub(super) fn of(rows: &[ResultRow]) -> Vec<Self> {
         let failed = rows.iter().filter_map(|row| {
             let error = row.error.clone()?;
-            let (code, message, record) = (error.code, error.message, row.record.clone());
+            let (code, message) = (error.code, error.message);
+            let record = match &row.record_id {
+                Some(id) => format!("{}, record {id}", row.record),
+                None => row.record.clone(),
+            };
             Some(Self { code, records: 1, record, message })
         });
         Self::merged(failed)

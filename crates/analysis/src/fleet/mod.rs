@@ -4,6 +4,8 @@
 //! |---|---|
 //! | `part` | the unit of work: some records, whose rows become one file |
 //! | `table` | rows as columns of that file |
+//! | `trends` | the parameters of all records over their order or a number in their names |
+//! | `results` | the rows of all files, read back |
 //! | `summary` | how many records, how fast, and which failed why |
 //!
 //! The folder of results is the whole state: a part is computed where its file is missing, and its
@@ -12,20 +14,25 @@
 
 mod failures;
 mod part;
+mod results;
 mod summary;
 mod table;
+mod trends;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use mechid_io::create_folder;
+use mechid_io::{create_folder, files_of};
 use rayon::ThreadPoolBuilder;
 
 pub use self::failures::FailureCount;
-pub use self::part::{Part, PartDone};
+pub use self::part::{FleetRecord, Part, PartDone};
+pub use self::results::read_results;
 pub use self::summary::FleetSummary;
+pub use self::table::results_as_parquet;
+pub use self::trends::{TrendAxis, TrendPoint, TrendSeries, Trends};
 use crate::{AnalysisError, SavedAnalysis};
 
 /// Number of records in a part unless it is said.
@@ -61,12 +68,13 @@ pub struct Fleet {
 }
 
 impl Fleet {
-    /// Divides records into parts of `records_per_part`, by rising path; a record named twice is taken
-    /// once.
+    /// Divides records into parts of `records_per_part`, by rising path. A folder stands for the files in
+    /// it, and a file with a [`Reading::record_column`](crate::measurement::Reading::record_column) for
+    /// the records in it, in the order of its rows; a record named twice is taken once.
     ///
     /// # Errors
-    /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], and [`AnalysisError::Setting`]
-    /// for parts without records.
+    /// [`AnalysisError::NoRecord`], those of [`SavedAnalysis::check`], [`AnalysisError::Setting`] for parts
+    /// without records, and [`AnalysisError::Io`] if a folder cannot be listed.
     pub fn new(
         analysis: SavedAnalysis,
         records: &[PathBuf],
@@ -74,16 +82,21 @@ impl Fleet {
         records_per_part: usize,
     ) -> Result<Self, AnalysisError> {
         analysis.check()?;
-        if records.is_empty() {
-            return Err(AnalysisError::NoRecord);
-        }
         if records_per_part == 0 {
             let why = "a part has one record at least".into();
             return Err(AnalysisError::Setting { setting: "part_records", why });
         }
-        let mut records = records.to_vec();
-        records.sort();
-        records.dedup();
+        let mut files = Vec::new();
+        for record in records {
+            files.extend(files_of(record)?);
+        }
+        files.sort();
+        files.dedup();
+        if files.is_empty() {
+            return Err(AnalysisError::NoRecord);
+        }
+        let records: Vec<FleetRecord> =
+            files.into_iter().flat_map(|file| FleetRecord::of_file(file, &analysis)).collect();
         let parts = records.chunks(records_per_part).map(|some| Part::new(some, &analysis));
         Ok(Self { folder: folder.as_ref().to_owned(), parts: parts.collect(), analysis })
     }
@@ -91,6 +104,11 @@ impl Fleet {
     /// Returns the parts.
     pub fn parts(&self) -> &[Part] {
         &self.parts
+    }
+
+    /// Returns the number of records.
+    pub fn record_count(&self) -> usize {
+        self.parts.iter().map(|part| part.records().len()).sum()
     }
 
     /// Computes the parts that are missing, with `workers` threads of one record each at a time, and

@@ -2,21 +2,50 @@
 
 use std::path::{Path, PathBuf};
 
-use mechid_io::{FileStamp, read_parquet_metadata, write_parquet};
+use mechid_io::{FileStamp, RecordRows, read_parquet_metadata, write_parquet};
 use serde::{Deserialize, Serialize};
 
 use super::failures::FailureCount;
 use super::table::columns;
 use crate::batch::settings::hash;
+use crate::measurement::{Measurement, open_all, records_of};
 use crate::{AnalysisError, ResultRow, SavedAnalysis};
 
 /// Key in a part's file under which its [`PartDone`] stands.
 const DONE: &str = "mechid.part";
 
+/// Number of rows read at a time of a file that holds many records, unless one of them has more.
+const ROWS_AT_ONCE: usize = 1 << 20;
+
+/// A record to identify: a file, or some rows of one.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FleetRecord {
+    /// The file.
+    pub path: PathBuf,
+    /// Rows of the file, where it holds many records; `None`: all of it is the record.
+    pub rows: Option<RecordRows>,
+}
+
+impl FleetRecord {
+    /// Returns the records of a file as the analysis reads it: those that a column tells apart, or the file
+    /// itself; so, too, where the file cannot be read, which its row will tell.
+    pub(super) fn of_file(path: PathBuf, analysis: &SavedAnalysis) -> Vec<Self> {
+        let column = analysis.reading.record_column.as_ref();
+        let column = column.filter(|_| analysis.reading.record_id.is_none());
+        match column.map(|column| records_of(&path, column, &analysis.reading)) {
+            Some(Ok(records)) if !records.is_empty() => {
+                let one = |rows| Self { path: path.clone(), rows: Some(rows) };
+                records.into_iter().map(one).collect()
+            }
+            _ => vec![Self { path, rows: None }],
+        }
+    }
+}
+
 /// Some records, whose results become the rows of one file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Part {
-    records: Vec<PathBuf>,
+    records: Vec<FleetRecord>,
     file_name: String,
 }
 
@@ -37,19 +66,22 @@ impl Part {
     /// Looks at the records and gives the part its name: a hash of their paths, sizes and times of
     /// modification, of the analysis and of the version of this crate. A record that changes, or an
     /// analysis that does, makes another part.
-    pub fn new(records: &[PathBuf], analysis: &SavedAnalysis) -> Self {
+    pub fn new(records: &[FleetRecord], analysis: &SavedAnalysis) -> Self {
         let mut all = format!("{}\n{}\n", env!("CARGO_PKG_VERSION"), analysis.hash());
-        for record in records {
-            let stamp = FileStamp::of(record).map(|s| (s.bytes, s.modified_ns));
-            // Quoted: no path looks like two.
-            all += &format!("{record:?} {stamp:?}\n");
+        for file in records.chunk_by(|a, b| a.path == b.path) {
+            let path = &file[0].path;
+            let stamp = FileStamp::of(path).map(|s| (s.bytes, s.modified_ns));
+            for FleetRecord { rows, .. } in file {
+                // Quoted: no path looks like two.
+                all += &format!("{path:?} {stamp:?} {rows:?}\n");
+            }
         }
         let file_name = format!("part-{}.parquet", hash(all.as_bytes()));
         Self { records: records.to_vec(), file_name }
     }
 
     /// Returns the records.
-    pub fn records(&self) -> &[PathBuf] {
+    pub fn records(&self) -> &[FleetRecord] {
         &self.records
     }
 
@@ -67,10 +99,20 @@ impl Part {
         if let Some(done) = self.done(&path) {
             return Ok(done);
         }
-        let row = |record: &PathBuf| -> ResultRow {
-            analysis.row(&record.display().to_string(), || analysis.open(record))
-        };
-        let rows: Vec<ResultRow> = self.records.iter().map(row).collect();
+        let mut rows = Vec::with_capacity(self.records.len());
+        for file in self.records.chunk_by(|a, b| a.path == b.path) {
+            let (path, name) = (&file[0].path, file[0].path.display().to_string());
+            let records: Vec<RecordRows> = file.iter().filter_map(|r| r.rows.clone()).collect();
+            if records.is_empty() {
+                rows.push(analysis.row(&name, || analysis.open(path)));
+            }
+            for together in read_together(&records) {
+                for (record, opened) in together.iter().zip(open(path, together, analysis)) {
+                    let row = analysis.row(&name, || opened);
+                    rows.push(ResultRow { record_id: Some(record.id.clone()), ..row });
+                }
+            }
+        }
         let done = PartDone {
             file_name: self.file_name.clone(),
             records: rows.len(),
@@ -78,16 +120,50 @@ impl Part {
             computed: true,
         };
         // As the next run finds it.
-        let found = PartDone { computed: false, ..done.clone() };
-        let found = serde_json::to_string(&found).unwrap_or_default();
-        write_parquet(&path, &columns(&rows), &[(DONE, found)])?;
+        let later = PartDone { computed: false, ..done.clone() };
+        let later = serde_json::to_string(&later).unwrap_or_default();
+        write_parquet(&path, &columns(&rows), &[(DONE, later)])?;
         Ok(done)
     }
 
-    /// What the file says that is there; `None` if none is, or none of ours.
+    /// Returns what the existing file says of itself; `None` if there is none, or it is no part of a fleet.
     fn done(&self, path: &Path) -> Option<PartDone> {
         let pairs = read_parquet_metadata(path).ok()?;
-        let (_, found) = pairs.iter().find(|(key, _)| key == DONE)?;
-        serde_json::from_str(found).ok()
+        let (_, done) = pairs.iter().find(|(key, _)| key == DONE)?;
+        serde_json::from_str(done).ok()
     }
+}
+
+/// Divides records of a file into those that are read together.
+fn read_together(records: &[RecordRows]) -> impl Iterator<Item = &[RecordRows]> {
+    let mut rest = records;
+    std::iter::from_fn(move || {
+        let start = rest.first()?.rows.start;
+        let count =
+            rest.iter().take_while(|record| record.rows.end - start <= ROWS_AT_ONCE).count();
+        let (together, others) = rest.split_at(count.max(1));
+        rest = others;
+        Some(together)
+    })
+}
+
+/// Opens records of a file that follow one another; where their rows cannot be read together, one by one.
+fn open(
+    path: &Path,
+    records: &[RecordRows],
+    analysis: &SavedAnalysis,
+) -> Vec<Result<Measurement, AnalysisError>> {
+    let SavedAnalysis { channels, reading, window, .. } = analysis;
+    let opened = open_all(path, channels, reading, records);
+    let opened = match (opened, records) {
+        (Ok(opened), _) => opened,
+        (Err(error), [_]) => vec![Err(error)],
+        (Err(_), several) => {
+            return several
+                .iter()
+                .flat_map(|one| open(path, std::slice::from_ref(one), analysis))
+                .collect();
+        }
+    };
+    opened.into_iter().map(|opened| opened?.window(window.clone())).collect()
 }

@@ -1,9 +1,17 @@
 //! Rows of results as columns.
 
-use mechid_io::{ParquetColumn, ParquetValues};
+use mechid_io::{ParquetColumn, ParquetValues, parquet_bytes};
 
-use crate::ResultRow;
 use crate::batch::{FindingRow, ModeCell, ParameterCell};
+use crate::{AnalysisError, ResultRow};
+
+/// Returns rows of results as the bytes of a Parquet file, with the columns of a fleet's parts.
+///
+/// # Errors
+/// As [`parquet_bytes`].
+pub fn results_as_parquet(rows: &[ResultRow]) -> Result<Vec<u8>, AnalysisError> {
+    Ok(parquet_bytes(&columns(rows))?)
+}
 
 /// Returns the columns of the table of results: the same ones whatever the rows hold.
 pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
@@ -43,6 +51,7 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         |row: &ResultRow| row.findings.iter().map(|finding| finding.value).collect();
     let all = [
         ("record", text(&|row| Some(row.record.clone()))),
+        ("record_id", text(&|row| row.record_id.clone())),
         ("error_code", text(&|row| row.error.as_ref().map(|error| error.code.clone()))),
         ("error", text(&|row| row.error.as_ref().map(|error| error.message.clone()))),
         ("estimator", text(&|row| row.estimator.clone())),
@@ -75,7 +84,7 @@ pub(super) fn columns(rows: &[ResultRow]) -> Vec<ParquetColumn> {
         ("finding_value", ParquetValues::Numbers(rows.iter().map(finding_values).collect())),
         ("warning", ParquetValues::Texts(rows.iter().map(|row| row.warnings.clone()).collect())),
         ("analysis_hash", text(&|row| Some(row.analysis_hash.clone()))),
-        ("version", text(&|row| Some(row.version.into()))),
+        ("version", text(&|row| Some(row.version.clone()))),
     ];
     all.into_iter().map(|(name, values)| ParquetColumn { name, values }).collect()
 }

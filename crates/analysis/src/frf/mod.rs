@@ -1,10 +1,11 @@
 //! Frequency responses of a record: response per unit force, frequency by frequency.
 
+mod of_hits;
 pub mod table;
 
 use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{HitRule, Record, Spectrum};
 use serde::{Deserialize, Serialize};
 
 pub use self::table::FrfTable;
@@ -25,6 +26,13 @@ pub struct FrfSettings {
     pub without: LeftOut,
     /// Segments that are averaged.
     pub segments: Segmentation,
+    /// Rule by which the record of a hammer test is cut into hits, which are averaged instead of segments.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hits: Option<HitRule>,
+    /// Weight at the end of a hit of an exponential window on force and response, in per cent of that at its
+    /// beginning; `None`: no window.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exponential_percent: Option<f64>,
 }
 
 /// Estimates the frequency responses and the coherence of a record.
@@ -32,12 +40,26 @@ pub struct FrfSettings {
 /// With a periodic excitation the periods of the window are the segments that are averaged.
 ///
 /// # Errors
-/// [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`] or [`AnalysisError::EmptyBand`] if
+/// [`AnalysisError::NoHit`] and [`AnalysisError::Setting`] of a hammer test without a good hit and for settings
+/// that make no sense, [`AnalysisError::StillForce`], [`AnalysisError::NoExcitedLine`] or [`AnalysisError::EmptyBand`] if
 /// no chosen line carries force, [`AnalysisError::Estimate`] if the segments are too few or too long,
 /// and if a file cannot be read again.
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
-    let recorded = measurement.hold(how.segments.hold())?;
     let lines = LineRule { choice: &how.lines, without: &how.without };
+    if let Some(rule) = &how.hits {
+        if measurement.window_settings().period.is_some() {
+            let why = "hits have no `period`: leave one of them out".into();
+            return Err(AnalysisError::Setting { setting: "hits", why });
+        }
+        let recorded = measurement.hold(Hold::Whole)?;
+        let averaged = of_hits::of_hits(&recorded, rule, lines, how)?;
+        return Ok(FrfTable::of_hits(&recorded.held, averaged, how));
+    }
+    if how.exponential_percent.is_some() {
+        let why = "an exponential window is for `hits`".into();
+        return Err(AnalysisError::Setting { setting: "exponential_percent", why });
+    }
+    let recorded = measurement.hold(how.segments.hold())?;
     if let Some(parts) = interleaved(&recorded, how, lines)? {
         return Ok(FrfTable::interleaved(&recorded.held, &parts, how));
     }
@@ -67,9 +89,9 @@ fn interleaved(
     let driver = |line: &usize| -> Option<usize> {
         let amplitude = |dof: &usize| spectrum.line(*line, *dof).norm();
         let by_size = |a: &&usize, b: &&usize| amplitude(a).total_cmp(&amplitude(b));
-        let own = *held.driven.iter().max_by(by_size)?;
-        let idle = |dof: &usize| *dof == own || amplitude(dof) <= IDLE * amplitude(&own);
-        held.driven.iter().all(idle).then_some(own)
+        let shaker = *held.driven.iter().max_by(by_size)?;
+        let idle = |dof: &usize| *dof == shaker || amplitude(dof) <= IDLE * amplitude(&shaker);
+        held.driven.iter().all(idle).then_some(shaker)
     };
     let Some(drivers) = chosen.iter().map(driver).collect::<Option<Vec<usize>>>() else {
         return Ok(None);
@@ -79,8 +101,8 @@ fn interleaved(
     }
     let sampling = held.force.sampling().with_len(period)?;
     let each = held.driven.iter().map(|dof| {
-        let own = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
-        let lines = Lines::new(sampling, own.map(|(line, _)| *line))?;
+        let of_force = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
+        let lines = Lines::new(sampling, of_force.map(|(line, _)| *line))?;
         let average = average_of(recorded, &lines, segments, &[*dof])?;
         let frf = average.frf(how.estimator.estimator())?;
         Ok(Responses { frf, lines, driven: vec![*dof], segments })
@@ -244,7 +266,7 @@ pub(crate) fn average(
     average_of(recorded, lines, segments, &recorded.held.driven)
 }
 
-/// As [`average`], from the forces on some degrees of freedom, counted from 0.
+/// Averages as [`average`] does, from the forces on some degrees of freedom, counted from 0.
 fn average_of(
     recorded: &Windowed,
     lines: &Lines,

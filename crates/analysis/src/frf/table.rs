@@ -10,8 +10,10 @@ use mechid_signal::message;
 use nalgebra::Complex;
 use serde::Serialize;
 
+use super::of_hits::OfHits;
 use super::{FrfSettings, Responses};
 use crate::AnalysisError;
+use crate::hits::{HitRow, heading};
 use crate::measurement::Block;
 use crate::text::{compact, paragraph, significant, text_table};
 
@@ -30,6 +32,12 @@ pub struct FrfTable {
     pub estimator: &'static str,
     /// Segments that were averaged.
     pub segments: SegmentRow,
+    /// Every hit of a hammer test, used or left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hits: Vec<HitRow>,
+    /// Rate, in 1/s, that an exponential window adds to the decay of every mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub added_decay: Option<f64>,
     /// Measured quantity of the response.
     pub quantity: String,
     /// SI unit.
@@ -103,7 +111,16 @@ impl FrfTable {
         Self::of(measured, averaged, how, omega, responses, coherence)
     }
 
-    /// Of forces each of which has lines of its own.
+    /// Makes the table over the hits of a hammer.
+    pub(super) fn of_hits(measured: &Block, averaged: OfHits, how: &FrfSettings) -> Self {
+        let mut table = Self::new(measured, &averaged.responses, how);
+        table.hits = averaged.cut.rows;
+        table.added_decay = averaged.added_decay;
+        table.remarks.extend(averaged.remarks);
+        table
+    }
+
+    /// Makes the table of forces each of which has lines of its own.
     pub(super) fn interleaved(measured: &Block, parts: &[Responses], how: &FrfSettings) -> Self {
         let n = measured.force.channels();
         let all = parts.iter().enumerate().flat_map(|(part, averaged)| {
@@ -114,10 +131,10 @@ impl FrfTable {
         let mut responses = Vec::new();
         for motion in 0..n {
             for (number, averaged) in parts.iter().enumerate() {
-                let own = places.iter().map(|(_, part, at)| (*part == number).then_some(*at));
-                let own: Vec<Option<usize>> = own.collect();
+                let indices = places.iter().map(|(_, part, at)| (*part == number).then_some(*at));
+                let indices: Vec<Option<usize>> = indices.collect();
                 responses
-                    .push(Response::of(averaged, (motion, 0), averaged.driven[0]).spread(&own));
+                    .push(Response::of(averaged, (motion, 0), averaged.driven[0]).spread(&indices));
             }
         }
         let coherence = (0..n).map(|motion| {
@@ -152,6 +169,8 @@ impl FrfTable {
             sample_rate_hz: measured.force.sampling().rate_hz(),
             estimator: how.estimator.name(),
             segments: SegmentRow::of(averaged),
+            hits: Vec::new(),
+            added_decay: None,
             quantity: kind.to_string(),
             unit: match kind {
                 ResponseQuantity::Displacement => "m/N",
@@ -170,6 +189,9 @@ impl FrfTable {
     fn text(&self) -> String {
         let s = &self.segments;
         let cut = match s.window {
+            None if !self.hits.is_empty() => {
+                format!("hits of {}", message::count(s.samples, "sample"))
+            }
             None => format!("periods of {}", message::count(s.samples, "sample")),
             Some(window) => {
                 let samples = message::count(s.samples, "sample");
@@ -182,12 +204,16 @@ impl FrfTable {
             1 => format!("1 line, {low} Hz"),
             n => format!("{n} lines, {low} to {high} Hz"),
         };
-        let mut text = format!(
-            "{}: samples {} to {}, {} Hz\n{} from {cut}, worth {} averages; {lines}\n\n",
-            self.file,
-            self.first_sample,
-            self.last_sample,
-            compact(self.sample_rate_hz, 8),
+        let rate_hz = compact(self.sample_rate_hz, 8);
+        let mut text = match self.hits.is_empty() {
+            true => {
+                let (first, last) = (self.first_sample, self.last_sample);
+                format!("{}: samples {first} to {last}, {rate_hz} Hz\n", self.file)
+            }
+            false => heading(&self.hits, &rate_hz),
+        };
+        text += &format!(
+            "{} from {cut}, worth {} averages; {lines}\n\n",
             self.estimator,
             compact(s.averages, 4),
         );

@@ -6,10 +6,12 @@ use mechid_estimate::Estimate;
 use mechid_estimate::checks::thresholds::{LAGS, SAMPLES_PER_LAG};
 use mechid_estimate::checks::{Finding, SpectralResidual};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, NoiseModel};
-use mechid_estimate::nonlinear::{Distortion, NonlinearEstimate};
+use mechid_estimate::nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
+use nalgebra::DMatrix;
 
+use super::nonlinear::SelectionSummary;
 use super::prediction::{Model, Prediction};
 use crate::AnalysisError;
 use crate::machine::NonlinearPart;
@@ -31,6 +33,8 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
+    /// Coherence of the frequency responses of the first record, if such were fitted.
+    pub coherence: Option<ResponseCoherence>,
     /// Findings before the fit on all records together.
     pub before_all: Vec<Finding>,
     /// Findings before the fit, record by record.
@@ -53,6 +57,15 @@ pub struct Fitted {
     pub remarks: Vec<String>,
 }
 
+/// Multiple coherence of the motions with all forces.
+#[derive(Debug, Clone)]
+pub struct ResponseCoherence {
+    /// Frequencies, in Hz, one per row of `values`.
+    pub frequency_hz: Vec<f64>,
+    /// Values of frequencies × motions, a ratio from 0 to 1 each.
+    pub values: DMatrix<f64>,
+}
+
 /// Result of a fit with nonlinear terms.
 #[derive(Debug)]
 pub struct WithTerms {
@@ -60,6 +73,10 @@ pub struct WithTerms {
     pub estimate: NonlinearEstimate,
     /// Evidence against a linear system in the first record, before any model.
     pub distortion: Distortion,
+    /// Points of the restoring-force surface of the first record.
+    pub restoring: RestoringForce,
+    /// Selection of terms; `None` where there were no candidates.
+    pub selection: Option<SelectionSummary>,
 }
 
 /// Power of a residual over what the noise explains: 1 if the model is right.

@@ -43,11 +43,12 @@ use mechid_signal::Extent;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
-pub use self::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
+pub use self::fitted::{Fitted, Misfit, Residual, ResponseCoherence, SampleResidual, WithTerms};
 use self::left_out::LineRule;
 pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
+use self::open_records::Excitation;
 pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
@@ -56,6 +57,7 @@ use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
+use crate::hits;
 use crate::machine::Machine;
 use crate::measurement::{Block, Hold, Measurement, Windowed};
 
@@ -73,7 +75,7 @@ pub const CONSPICUOUS: f64 = 0.05;
 pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identified, AnalysisError> {
     let hold = how.hold();
     let records = measurements.iter().map(|measured| measured.hold(hold));
-    let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
+    let mut records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
     let first = records.first().ok_or(AnalysisError::NoRecord)?;
     let dofs = first.held.force.channels();
     for record in &records {
@@ -85,10 +87,16 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     }
     let unknowns = how.mass.unknowns(dofs)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
+    let mut hits = Vec::new();
+    if let Some(rule) = &how.hits {
+        how.check_hits(period_given)?;
+        let cut = hits::cut(&records, rule)?;
+        (records, hits) = (cut.hits, cut.rows);
+    }
     let fitted = how
         .fitted(&records, &unknowns, period_given)
         .map_err(|error| explained(error, &records))?;
-    let summary = IdentificationSummary::new(&records, &fitted, how)?;
+    let summary = IdentificationSummary::new(&records, &fitted, hits, how)?;
     Ok(Identified {
         measurements: measurements.to_vec(),
         records,
@@ -114,12 +122,24 @@ impl Identify {
     /// Returns how much of a record must be held in memory to fit it.
     pub(crate) fn hold(&self) -> Hold {
         match &self.fit {
+            _ if self.hits.is_some() => Hold::Whole,
             Fit::Spectra { .. } if self.nonlinear.is_some() => Hold::Whole,
             Fit::Spectra { extent: Some(Extent::Open), .. } => Hold::Whole,
             Fit::Spectra { .. } => Hold::Periods,
             Fit::Responses(how) => how.segments.hold(),
             Fit::Samples(how) => how.hold(),
         }
+    }
+
+    /// Refuses what hits are not fitted with.
+    fn check_hits(&self, period_given: bool) -> Result<(), AnalysisError> {
+        let why = match &self.fit {
+            _ if period_given => "hits have no `period`: leave one of them out",
+            _ if self.nonlinear.is_some() => "nonlinear terms are fitted to whole periods",
+            Fit::Responses(_) => "the hits themselves are fitted: leave `from_frf` out",
+            _ => return Ok(()),
+        };
+        Err(AnalysisError::Setting { setting: "hits", why: why.into() })
     }
 
     fn fitted(
@@ -150,6 +170,8 @@ impl Identify {
                 let likelihood = matches!(method, None | Some(Method::MaximumLikelihood));
                 let wrong =
                     |why: &str| AnalysisError::Setting { setting: "extent", why: why.into() };
+                // A hit dies out in its window or not.
+                let extent = extent.or(self.hits.as_ref().map(|_| Extent::Open));
                 match extent {
                     Some(Extent::Open) if period_given => {
                         Err(wrong("an open record has no `period`: leave one of them out"))
@@ -158,13 +180,18 @@ impl Identify {
                         Err(wrong("the ends of open records take `method` maximum-likelihood"))
                     }
                     Some(Extent::Open) => {
-                        Ok(open_records::fit(records, unknowns, lines, *noise)?.fitted)
+                        let excitation = match self.hits {
+                            Some(_) => Excitation::Hit,
+                            None => Excitation::Lasting,
+                        };
+                        Ok(open_records::fit(records, unknowns, lines, *noise, excitation)?.fitted)
                     }
                     None if likelihood
                         && !period_given
                         && open_records::suit(records, unknowns) =>
                     {
-                        match open_records::fit(records, unknowns, lines, *noise) {
+                        let lasting = Excitation::Lasting;
+                        match open_records::fit(records, unknowns, lines, *noise, lasting) {
                             Ok(open) if open.ends_show => Ok(open.fitted),
                             _ => spectra::fit(records, unknowns, lines, *method, *noise),
                         }

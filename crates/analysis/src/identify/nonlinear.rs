@@ -4,11 +4,12 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{before_spectral_fit, steady_periods};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::nonlinear::{
-    ChannelPhase, EquationErrorOptions, Level, StandardErrors, SteadyExperiments, SteppedRecord,
-    Weighting, distortion, equation_error, output_error,
+    ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
+    SelectionStep, StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion,
+    equation_error, output_error, select_terms,
 };
 use mechid_model::Terms;
-use mechid_signal::{Extent, Record, driven_lines, lines};
+use mechid_signal::{Extent, Record, driven_lines, lines, message};
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};
@@ -20,7 +21,10 @@ use super::rows::Uncertain;
 use super::spectra::{one_motion_of, periods};
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
-use crate::text::significant;
+use crate::text::{significant, text_table};
+
+/// Records or windows, at least, of which each is left out once to judge a candidate.
+const HELD_OUT_RECORDS: usize = 3;
 
 /// Nonlinear terms of an identified system, which [`Machine::read`](crate::Machine::read) reads back.
 #[derive(Debug, Serialize)]
@@ -40,6 +44,76 @@ pub struct NonlinearSummary {
     pub blocks: Option<usize>,
     /// Evidence against a linear system in the first record, before any model.
     pub distortion: DistortionRow,
+    /// Growth of each term, constant forces apart, beyond the data.
+    pub extrapolation: Vec<ExtrapolationRow>,
+    /// Selection of terms; `None` where there were no candidates.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub selection: Option<SelectionSummary>,
+}
+
+/// Restoring force in the equation of motion of a term, at the edge of the data and 1.5 times as far.
+#[derive(Debug, Clone, Serialize)]
+pub struct ExtrapolationRow {
+    /// Name of the term.
+    pub term: String,
+    /// Power with which its force grows there, a pure number.
+    pub order: f64,
+    /// Part of the restoring force that the term makes, at the two places; ratios.
+    pub share: [f64; 2],
+    /// Standard error of the restoring force over the restoring force, at the two places; ratios.
+    pub relative_error: [f64; 2],
+    /// `true` if predictions beyond the data are not to be relied on.
+    pub poor: bool,
+}
+
+impl ExtrapolationRow {
+    fn of(found: Extrapolation) -> Self {
+        let poor = found.is_poor();
+        let Extrapolation { term, order, relative_error, share } = found;
+        Self { term, order, share, relative_error, poor }
+    }
+
+    /// Returns what speaks against extrapolation, in a sentence; `None` if nothing does.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let percent = |ratio: f64| format!("{} %", significant(100.0 * ratio, 2));
+        let [near, far] = self.share.map(percent);
+        let (term, order) = (&self.term, significant(self.order, 2));
+        let error = percent(self.relative_error[1]);
+        self.poor.then(|| {
+            format!(
+                "{term} extrapolates badly: its force grows with the power {order}, from {near} of the \
+                 restoring force at the edge of the data to {far} at {REACH} times as far, where the \
+                 standard error of that force is {error}. Do not predict beyond the amplitudes measured"
+            )
+        })
+    }
+}
+
+/// Terms that were tried, one after the other.
+#[derive(Debug, Clone, Serialize)]
+pub struct SelectionSummary {
+    /// Criterion by which a term was added.
+    pub criterion: Criterion,
+    /// Number of candidates.
+    pub candidates: usize,
+    /// The fits, the first without any candidate, then with each term that was added.
+    pub steps: Vec<SelectionRow>,
+    /// The candidate that came next and was not worth it; `None` if all were added.
+    pub refused: Option<SelectionRow>,
+    /// Names of the terms that were added and removed again, because their coefficients do not differ from
+    /// zero by their standard errors.
+    pub removed: Vec<String>,
+}
+
+/// One step of a selection of terms.
+#[derive(Debug, Clone, Serialize)]
+pub struct SelectionRow {
+    /// Name of the term added; `None` for the first step.
+    pub added: Option<String>,
+    /// The criterion with it, a pure number, the smaller the better.
+    pub score: f64,
+    /// Part of the weighted force that is left with it, a ratio.
+    pub unexplained: f64,
 }
 
 /// One parameter beside those of M, C and K.
@@ -87,7 +161,9 @@ pub(super) fn fit(
         data.push(&held.force, held.response().0)?;
     }
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
-    let start = equation_error(&data, unknowns, &how.terms, &options)?;
+    let selection = select(&data, unknowns, how)?;
+    let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
+    let start = equation_error(&data, unknowns, terms, &options)?;
     let (estimator, estimated) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
@@ -130,12 +206,14 @@ pub(super) fn fit(
                 .into(),
         );
     }
+    let restoring = estimated.restoring_forces(&data)?.swap_remove(0);
     Ok(Fitted {
         domain: "frequency",
         estimator,
         least_squares: false,
         equations: estimated.equations() / dofs,
         frequency: spectra.map(|data| (band, data)),
+        coherence: None,
         before_all,
         before,
         after: vec![Vec::new(); records.len()],
@@ -147,8 +225,74 @@ pub(super) fn fit(
         open: false,
         remarks,
         estimate: estimated.linear().clone(),
-        nonlinear: Some(WithTerms { estimate: estimated, distortion: seen }),
+        nonlinear: Some(WithTerms {
+            estimate: estimated,
+            distortion: seen,
+            restoring,
+            selection: selection.map(|selection| SelectionSummary::of(selection, how)),
+        }),
     })
+}
+
+/// Chooses among the candidates; `None` where there are none.
+fn select(
+    data: &SteadyExperiments,
+    unknowns: &Unknowns,
+    how: &Nonlinear,
+) -> Result<Option<Selection>, AnalysisError> {
+    if how.candidates.is_empty() {
+        return Ok(None);
+    }
+    if how.criterion == Criterion::HeldOut && data.count() < HELD_OUT_RECORDS {
+        let got = data.count();
+        let why = format!(
+            "held-out needs {HELD_OUT_RECORDS} records or windows or more, each left out once, got {got}"
+        );
+        return Err(AnalysisError::Setting { setting: "criterion", why });
+    }
+    let Nonlinear { terms, candidates, criterion, weighting, .. } = how;
+    Ok(Some(select_terms(data, unknowns, terms, candidates, *criterion, *weighting)?))
+}
+
+impl SelectionSummary {
+    fn of(selection: Selection, how: &Nonlinear) -> Self {
+        let row = |step: SelectionStep| SelectionRow {
+            added: step.added,
+            score: step.score,
+            unexplained: step.unexplained,
+        };
+        Self {
+            criterion: how.criterion,
+            candidates: how.candidates.len(),
+            steps: selection.steps.into_iter().map(row).collect(),
+            refused: selection.refused.map(row),
+            removed: selection.removed,
+        }
+    }
+
+    /// Returns the steps as a table below a heading.
+    fn text(&self) -> String {
+        let by = match self.criterion {
+            Criterion::Information => "information criterion",
+            Criterion::HeldOut => "records held out",
+        };
+        let mut rows = vec![["term", "force left", "criterion", ""].map(str::to_owned).to_vec()];
+        let steps = self.steps.iter().map(|row| match &row.added {
+            None => (row, ""),
+            Some(name) if self.removed.contains(name) => (row, "removed: may be zero"),
+            Some(_) => (row, "added"),
+        });
+        for (row, verdict) in steps.chain(self.refused.iter().map(|row| (row, "refused"))) {
+            rows.push(vec![
+                row.added.clone().unwrap_or_else(|| "none of them".into()),
+                format!("{} %", significant(100.0 * row.unexplained, 3)),
+                significant(row.score, 5),
+                verdict.into(),
+            ]);
+        }
+        let candidates = message::count(self.candidates, "candidate");
+        format!("selection from {candidates} by the {by}\n{}", text_table(&rows))
+    }
 }
 
 /// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
@@ -194,7 +338,7 @@ fn mean_period(held: &Block) -> Result<SteppedRecord, AnalysisError> {
 
 impl NonlinearSummary {
     pub(super) fn of(fitted: &WithTerms) -> Result<Self, AnalysisError> {
-        let WithTerms { estimate: fit, distortion } = fitted;
+        let WithTerms { estimate: fit, distortion, selection, .. } = fitted;
         let linear = fit.linear().parameters().len();
         let ranges = fit.ranges().iter().map(|range| Some(*range));
         let rows = fit.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
@@ -219,12 +363,15 @@ impl NonlinearSummary {
                 linear_leaves: distortion.linear_leaves,
                 text: distortion.to_string(),
             },
+            extrapolation: fit.extrapolations()?.into_iter().map(ExtrapolationRow::of).collect(),
+            selection: selection.clone(),
         })
     }
 
     /// Returns the findings before the fit and the amplitudes that hold the terms, a sentence each.
     pub(super) fn text(&self) -> String {
         let mut text = format!("before the fit: {}\n", self.distortion.text);
+        text += &self.selection.as_ref().map(SelectionSummary::text).unwrap_or_default();
         for row in &self.parameters {
             if let Some([x, v]) = row.largest {
                 let (x, v) = (significant(x, 3), significant(v, 3));

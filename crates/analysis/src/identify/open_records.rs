@@ -36,6 +36,15 @@ const PARAMETERS: usize = 100;
 /// The custom of analysers; what the ends of a record fold back grows beyond.
 const RATE_OVER_BAND: f64 = 2.56;
 
+/// Force of an open record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Excitation {
+    /// Force all the time, of which the test for nonlinearity takes powers of the response.
+    Lasting,
+    /// A hit.
+    Hit,
+}
+
 /// A fit of open records, and whether their ends show at all.
 pub(super) struct OpenFit {
     pub(super) fitted: Fitted,
@@ -50,12 +59,13 @@ pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
 }
 
 /// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
-/// record.
+/// record; `excitation` says what the forces are like.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     rule: LineRule<'_>,
     noise: Pooling,
+    excitation: Excitation,
 ) -> Result<OpenFit, AnalysisError> {
     let mut spectra = Vec::new();
     for Windowed { held, .. } in records {
@@ -76,14 +86,19 @@ pub(super) fn fit(
     for ((Windowed { held, .. }, data), lines) in records.iter().zip(&closed).zip(&lines) {
         let mut checks = Vec::from_iter(fitted_band(&fit.estimate, lines)?);
         checks.extend(delay_of_lines(data, lines.sampling().dt(), unknowns));
-        checks.extend(of_linearity(held, lines, &fit.estimate)?);
+        if excitation == Excitation::Lasting {
+            checks.extend(of_linearity(held, lines, &fit.estimate)?);
+        }
         after.push(checks);
     }
     let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&closed, &fit.estimate)?;
-    let remark =
-        "the windows are no periods: the loads of their ends were fitted with the machine, on all \
-                  lines of the band"
-            .to_owned();
+    let windows = match excitation {
+        Excitation::Lasting => "the windows are no periods",
+        Excitation::Hit => "hits are no periods",
+    };
+    let remark = format!(
+        "{windows}: the loads of their ends were fitted with the machine, on all lines of the band"
+    );
     let remarks = one_motion_of(&records[0].held).into_iter();
     let all = joined(&closed)?;
     let fitted = Fitted {
@@ -91,6 +106,7 @@ pub(super) fn fit(
         estimator: "maximum likelihood on open records, in the frequency domain",
         least_squares: false,
         equations: 2 * all.len(),
+        coherence: None,
         before_all: before_spectral_fit(&all, unknowns)?,
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
         before: vec![Vec::new(); records.len()],

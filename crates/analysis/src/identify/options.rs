@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 use mechid_estimate::derivatives::SavitzkyGolay;
 use mechid_estimate::frequency_domain::Pooling;
-use mechid_estimate::nonlinear::{ShapeConstants, Weighting};
+use mechid_estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_model::{Discretisation, Terms};
-use mechid_signal::{Extent, Interpolation};
+use mechid_signal::{Extent, HitRule, Interpolation};
 use serde::{Deserialize, Serialize};
 
 use super::left_out::LeftOut;
@@ -37,6 +37,10 @@ pub struct Identify {
     pub without: LeftOut,
     /// Known masses.
     pub mass: KnownMass,
+    /// Rule by which the records of a hammer test are cut into hits, each of which is fitted as a record of
+    /// its own; `None`: no hammer test.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hits: Option<HitRule>,
     /// Nonlinear springs and dampers, fitted to the spectra of whole periods; `None`: a linear system.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<Nonlinear>,
@@ -100,6 +104,11 @@ pub enum Method {
 pub struct Nonlinear {
     /// Terms as they are written, such as `k3: x1^3, c2: |v1| v1`.
     pub terms: Terms,
+    /// Terms of which those are added that the data ask for; none by default.
+    #[serde(skip_serializing_if = "Terms::is_empty")]
+    pub candidates: Terms,
+    /// Criterion by which a candidate is added.
+    pub criterion: Criterion,
     /// Constants that do not enter linearly, to search for; none by default.
     pub search: ShapeConstants,
     /// Weighting of the lines.
@@ -282,6 +291,12 @@ impl Identify {
         Self { without, ..self }
     }
 
+    /// Cuts the records of a hammer test into hits.
+    #[must_use]
+    pub fn hits(self, rule: HitRule) -> Self {
+        Self { hits: Some(rule), ..self }
+    }
+
     /// Fits nonlinear springs and dampers, too.
     #[must_use]
     pub fn nonlinear(self, nonlinear: Nonlinear) -> Self {
@@ -358,7 +373,13 @@ mod tests {
             Identify::responses(Estimator::Hv, Segmentation::default()),
             Identify { fit: Fit::Samples(samples), ..Identify::default() }
                 .mass("2.5,unknown".parse().unwrap()),
+            Identify::default().hits(HitRule { samples: Some(512), ..HitRule::default() }),
             Identify::default().nonlinear("k3: x1^3, c2: |v1| v1".parse().unwrap()),
+            Identify::default().nonlinear(Nonlinear {
+                candidates: "k3: x1^3, c2: |v1| v1".parse().unwrap(),
+                criterion: Criterion::HeldOut,
+                ..Nonlinear::default()
+            }),
         ];
         for how in all {
             let saved = serde_json::to_string(&how).unwrap();

@@ -1,5 +1,7 @@
 //! Fits frequency responses.
 
+use std::f64::consts::TAU;
+
 use mechid_estimate::checks::{
     Finding, after_response_fit, before_spectral_fit, claimed_period, coherence, delay_of_lines,
     linearity,
@@ -9,7 +11,7 @@ use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
-use super::fitted::{Fitted, Misfit};
+use super::fitted::{Fitted, Misfit, ResponseCoherence};
 use super::left_out::LineRule;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
@@ -41,6 +43,10 @@ pub fn fit(
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let periodic = segments.are_periods();
+    let coherent = responses.first().map(|r| ResponseCoherence {
+        frequency_hz: r.frf.omega().iter().map(|omega| omega / TAU).collect(),
+        values: r.frf.coherence().clone(),
+    });
     let (mut before, mut after) = (Vec::new(), Vec::new());
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
         let mut checks = Vec::from_iter(coherence(&r.frf));
@@ -55,6 +61,7 @@ pub fn fit(
         estimator: name,
         least_squares: *method == Some(Method::LeastSquares),
         equations: 2 * data.len(),
+        coherence: coherent,
         before_all: before_spectral_fit(&data, unknowns)?,
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),
         before,
@@ -119,8 +126,8 @@ fn looked_at(
     Ok(checks)
 }
 
-/// Between the first and the last line fitted; nothing of a free machine, which has no displacement to
-/// take powers of.
+/// Judges the lines between the first and the last one fitted; `None` for a free machine, which has no
+/// displacement to take powers of.
 pub(super) fn of_linearity(
     measured: &Block,
     lines: &Lines,

@@ -113,36 +113,36 @@ impl ModeRow {
     /// Returns frequencies and damping of the modes of an identified system, or of one that is exactly
     /// `known`.
     pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
-        let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
+        let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
         let rounding = EIGENVALUE_ROUNDING * largest;
-        modes.iter().map(|found| Self::of(found, known, rounding)).collect()
+        modes.iter().map(|mode| Self::of(mode, known, rounding)).collect()
     }
 
     /// Growth rates up to `rounding` (1/s) are those of rounding.
-    fn of(found: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
+    fn of(mode: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
         let uncertain = |value: &estimate::Uncertain| match known {
             true => Ok(Uncertain::known(value.value)),
             false => Uncertain::of(value),
         };
-        let grows = !found.is_rigid_body && found.growth_rate.value > rounding;
+        let grows = !mode.is_rigid_body && mode.growth_rate.value > rounding;
         // Real eigenvalues of opposite sign have no natural frequency in common.
-        let shared = found.is_rigid_body || found.squared_frequency.value > 0.0;
-        let rate = uncertain(&found.growth_rate)?;
-        let frequency = &found.natural_frequency_hz;
+        let shared = mode.is_rigid_body || mode.squared_frequency.value > 0.0;
+        let rate = uncertain(&mode.growth_rate)?;
+        let frequency = &mode.natural_frequency_hz;
         Ok(Self {
-            oscillates: found.mode.oscillates(),
-            is_rigid_body: found.is_rigid_body,
+            oscillates: mode.mode.oscillates(),
+            is_rigid_body: mode.is_rigid_body,
             natural_frequency_hz: match known {
                 true => Uncertain::known(frequency.value),
                 false => {
-                    let interval = found.natural_frequency_interval_hz(CONFIDENCE)?;
+                    let interval = mode.natural_frequency_interval_hz(CONFIDENCE)?;
                     Uncertain::new(frequency.value, frequency.standard_error, interval)
                 }
             },
-            damped_frequency_hz: uncertain(&found.damped_frequency_hz)?,
-            damping_ratio: uncertain(&found.damping_ratio)?,
-            pole: (!found.mode.oscillates()).then_some(rate),
-            partner: found.partner.filter(|_| shared).map(|at| at + 1),
+            damped_frequency_hz: uncertain(&mode.damped_frequency_hz)?,
+            damping_ratio: uncertain(&mode.damping_ratio)?,
+            pole: (!mode.mode.oscillates()).then_some(rate),
+            partner: mode.partner.filter(|_| shared).map(|at| at + 1),
             growth_rate: grows.then_some(rate),
         })
     }
@@ -157,9 +157,9 @@ impl ModeRow {
     pub fn quantities(modes: &[Self], damped: bool) -> Vec<(String, Uncertain, &'static str)> {
         let mut all = Vec::new();
         for (at, mode) in modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at)) {
-            let own = (at + 1, mode.pole);
+            let this_mode = (at + 1, mode.pole);
             let other = mode.partner.map(|number| (number, modes[number - 1].pole));
-            let numbers = [Some(own), other].into_iter().flatten();
+            let numbers = [Some(this_mode), other].into_iter().flatten();
             for (number, pole) in numbers.clone() {
                 all.extend(pole.map(|pole| (format!("{number} real pole"), pole, "1/s")));
             }
@@ -200,8 +200,8 @@ impl Uncertain {
     }
 
     /// Returns a value derived from the estimate.
-    pub(crate) fn of(found: &estimate::Uncertain) -> Result<Self, AnalysisError> {
-        Ok(Self::new(found.value, found.standard_error, found.interval(CONFIDENCE)?))
+    pub(crate) fn of(uncertain: &estimate::Uncertain) -> Result<Self, AnalysisError> {
+        Ok(Self::new(uncertain.value, uncertain.standard_error, uncertain.interval(CONFIDENCE)?))
     }
 
     /// Returns a value that was given.
@@ -231,13 +231,13 @@ fn digits(value: f64, error: f64) -> usize {
 
 pub(super) fn parameters(estimate: &Estimate) -> Result<Vec<ParameterRow>, AnalysisError> {
     let mut rows = Vec::new();
-    let found = |parameter: Parameter| {
+    let estimated = |parameter: Parameter| {
         let at = estimate.parameters().position(|p| p.parameter == parameter);
         at.and_then(|at| estimate.parameters().nth(at))
     };
     for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
-        let value = match found(parameter) {
+        let value = match estimated(parameter) {
             Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
             None => {
                 Uncertain::known(estimate.unknowns().fixed(matrix, row, column).unwrap_or_default())

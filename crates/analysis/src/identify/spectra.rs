@@ -65,6 +65,7 @@ pub(super) fn fit(
         estimator,
         least_squares: false,
         equations: 2 * data.len(),
+        coherence: None,
         before_all: before_spectral_fit(&data, unknowns)?,
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
@@ -81,7 +82,7 @@ pub(super) fn fit(
     })
 }
 
-/// Whether a finding says that the windows are no periods of the record.
+/// Returns whether a finding says that the windows are no periods of the record.
 fn no_period(finding: &Finding) -> bool {
     finding.subject() == Subject::Periodicity && finding.verdict() == Verdict::Bad
 }

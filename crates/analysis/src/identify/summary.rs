@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::CONSPICUOUS;
 use super::checks::{self, CheckRow, When};
 use super::fitted::Fitted;
-use super::nonlinear::NonlinearSummary;
+use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::Identify;
 use super::prediction::Prediction;
 use super::rows::{
@@ -20,6 +20,7 @@ use super::rows::{
 };
 use super::validation::Validation;
 use crate::AnalysisError;
+use crate::hits::{HitRow, heading};
 use crate::measurement::{Block, Windowed};
 use crate::text::{compact, paragraph, significant, text_table};
 
@@ -50,8 +51,11 @@ pub struct IdentificationSummary {
     pub modes: Vec<ModeRow>,
     /// Quality of the fit.
     pub fit: FitRow,
-    /// Every record, the first included.
+    /// Every record, the first included; of a hammer test every hit that was used.
     pub records: Vec<RecordRow>,
+    /// Every hit of a hammer test, used or left out.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hits: Vec<HitRow>,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
     /// Prediction of a record that was not fitted.
@@ -104,6 +108,7 @@ impl IdentificationSummary {
     pub(super) fn new(
         records: &[Windowed],
         fitted: &Fitted,
+        hits: Vec<HitRow>,
         how: &Identify,
     ) -> Result<Self, AnalysisError> {
         let records: Vec<&Block> = records.iter().map(|r| &r.held).collect();
@@ -112,7 +117,7 @@ impl IdentificationSummary {
         let unexplained_motion = fitted.unexplained_motion(&system)?;
         let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
         let mut summary = Self {
-            file: records[0].file.clone(),
+            file: hits.first().map_or(&records[0].file, |hit| &hit.record).clone(),
             domain: fitted.domain,
             estimator: fitted.estimator,
             window: WindowRow::of(records[0]),
@@ -138,6 +143,7 @@ impl IdentificationSummary {
                 },
             },
             records: records.iter().map(row).collect(),
+            hits,
             checks: checks::rows(fitted, &records)?,
             validation: None,
             remarks: Vec::new(),
@@ -182,6 +188,8 @@ impl IdentificationSummary {
         for p in self.parameters.iter().filter(|p| p.row == p.column && p.estimate.value < 0.0) {
             doubts.push(format!("{} is negative: no passive machine has that", p.name));
         }
+        let extrapolated = self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.extrapolation);
+        doubts.extend(extrapolated.filter_map(ExtrapolationRow::doubt));
         doubts
     }
 
@@ -229,8 +237,10 @@ impl IdentificationSummary {
     }
 
     fn heading(&self) -> String {
-        let mut text = String::new();
-        for RecordRow { file, window } in &self.records {
+        let rate_hz = compact(self.window.sample_rate_hz, 8);
+        let mut text = heading(&self.hits, &rate_hz);
+        let records = self.records.iter().filter(|_| self.hits.is_empty());
+        for RecordRow { file, window } in records {
             let rate = compact(window.sample_rate_hz, 8);
             let periods = match (self.repeats, window.periods) {
                 (false, _) => String::new(),

@@ -293,7 +293,7 @@ impl Fit {
     }
 }
 
-/// What a table tells of its noise.
+/// Noise as a table states it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Noise {
     Stated,

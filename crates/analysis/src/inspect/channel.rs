@@ -164,7 +164,7 @@ const EQUAL: f64 = 1e-9;
 /// otherwise of all samples weighted by a Hann window.
 #[derive(Debug)]
 pub struct AmplitudeSpectrum {
-    /// From zero on.
+    /// Amplitudes of the lines from 0 Hz on.
     amplitude: Vec<f64>,
     /// That were transformed.
     samples: usize,
@@ -205,13 +205,14 @@ impl AmplitudeSpectrum {
             .filter(|n| is_peak(n) && at(*n) > FAINTEST * strongest)
             .collect();
         peaks.sort_by(|a, b| level(*b).total_cmp(&level(*a)));
-        let told = peaks.into_iter().take(STRONGEST);
-        told.map(|n| SpectrumPeak {
-            cycles_per_sample: self.cycles_per_sample(n),
-            frequency_hz: dt.map(|dt| self.cycles_per_sample(n) / dt),
-            amplitude: at(n),
-        })
-        .collect()
+        let strongest = peaks.into_iter().take(STRONGEST);
+        strongest
+            .map(|n| SpectrumPeak {
+                cycles_per_sample: self.cycles_per_sample(n),
+                frequency_hz: dt.map(|dt| self.cycles_per_sample(n) / dt),
+                amplitude: at(n),
+            })
+            .collect()
     }
 
     fn cycles_per_sample(&self, n: usize) -> f64 {

@@ -12,9 +12,9 @@ use crate::measurement::IN_MEMORY_SAMPLES;
 pub struct Shown {
     pub column: usize,
     pub offset: f64,
-    /// With lines and period, which instants do not have.
+    /// Whether lines and period are looked for, which bare instants do not have.
     pub spectral: bool,
-    /// In the picture, too.
+    /// Whether it is in the picture, too.
     pub drawn: bool,
 }
 
@@ -39,7 +39,7 @@ pub struct Span {
     /// Counted from 0.
     pub start: usize,
     pub len: usize,
-    /// So many of them, from the first on, are looked at together.
+    /// Number of them, from the first on, that are looked at together.
     pub hold: usize,
 }
 

@@ -2,6 +2,7 @@
 
 use mechid_io::Quantity;
 use mechid_model::ResponseQuantity;
+use mechid_signal::message;
 use serde::{Deserialize, Serialize};
 
 use super::units::Role;
@@ -65,6 +66,35 @@ impl Channels {
             ResponseQuantity::Velocity => &self.velocity,
             ResponseQuantity::Acceleration => &self.acceleration,
         }
+    }
+
+    /// Returns the columns of some records in which one force acts, each on another degree of freedom (`dofs`,
+    /// one per record, counted from 1), as that of a hammer does.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] unless there are one force column and a degree of freedom for each record,
+    /// which has a response.
+    pub fn struck(&self, dofs: &[usize], records: usize) -> Result<Vec<Self>, AnalysisError> {
+        let wrong = |why: String| AnalysisError::Setting { setting: "struck", why };
+        let [force] = &self.force[..] else {
+            return Err(wrong(format!("one force column, not {}", self.force.len())));
+        };
+        if dofs.len() != records {
+            let given = message::count(dofs.len(), "degree of freedom");
+            return Err(wrong(format!("{given} for {}", message::count(records, "record"))));
+        }
+        let all = ResponseQuantity::ALL.iter().map(|kind| self.response(*kind).len()).max();
+        let all = all.unwrap_or(0);
+        if let Some(dof) = dofs.iter().find(|dof| !(1..=all).contains(*dof)) {
+            let responses = message::count(all, "response");
+            return Err(wrong(format!("degree of freedom {dof} of {responses}")));
+        }
+        let column = |dof: usize, at: usize| if at + 1 == dof { force.as_str() } else { ABSENT };
+        let of = |dof: &usize| Self {
+            force: (0..all).map(|at| column(*dof, at).to_owned()).collect(),
+            ..self.clone()
+        };
+        Ok(dofs.iter().map(of).collect())
     }
 
     /// Returns the columns that are read and what each is to hold, forces first.

@@ -1,6 +1,8 @@
 //! Measured forces and responses: which file or arrays, which columns, and which window of them.
 
 pub mod channels;
+#[cfg(feature = "parquet")]
+mod many;
 pub mod units;
 mod window;
 
@@ -15,6 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use self::channels::ABSENT;
 pub use self::channels::Channels;
+#[cfg(feature = "parquet")]
+pub(crate) use self::many::{open_all, records_of};
 use self::units::ToSi;
 pub(crate) use self::window::Hold;
 pub use self::window::{Window, Windowed};
@@ -39,6 +43,10 @@ pub struct Reading {
     pub sample_rate_hz: Option<f64>,
     /// Constant to subtract from every channel.
     pub detrend: Detrend,
+    /// Column whose value names the record of each row, where a Parquet file holds many records.
+    pub record_column: Option<String>,
+    /// Record to read of such a file, by its value in that column; `None`: the only one.
+    pub record_id: Option<String>,
     /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
     /// `None`: 1.
     pub limits_factor: Option<usize>,
@@ -59,11 +67,24 @@ impl Reading {
     /// Opens a record file, of whose text at most `rows` rows are held in memory.
     ///
     /// # Errors
-    /// As [`RecordFile::open`].
+    /// As [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
+    /// for, or several and none is asked for.
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
-        let limits = Limits::DEFAULT.times(self.limits_factor.unwrap_or(1));
-        let options = ReadOptions { skip_lines: self.skip_lines, limits };
+        #[cfg(feature = "parquet")]
+        if let Some(column) = &self.record_column {
+            return many::open_one(self, path, column);
+        }
+        #[cfg(not(feature = "parquet"))]
+        if self.record_column.is_some() {
+            let why = "this program was compiled without Parquet".into();
+            return Err(AnalysisError::Setting { setting: "record_column", why });
+        }
+        let options = ReadOptions { skip_lines: self.skip_lines, limits: self.limits() };
         Ok(RecordFile::open(path, &options, rows)?)
+    }
+
+    fn limits(&self) -> Limits {
+        Limits::DEFAULT.times(self.limits_factor.unwrap_or(1))
     }
 
     /// Returns the time axis asked for, that of the file, or the time column found by its name.
@@ -200,7 +221,16 @@ impl Measurement {
         reading: &Reading,
     ) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
-        let file = reading.open(path, IN_MEMORY_SAMPLES)?;
+        Self::of_file(reading.open(path, IN_MEMORY_SAMPLES)?, Some(path), channels, reading)
+    }
+
+    /// Takes columns of a file that is open.
+    pub(crate) fn of_file(
+        file: RecordFile,
+        path: Option<&Path>,
+        channels: &Channels,
+        reading: &Reading,
+    ) -> Result<Self, AnalysisError> {
         let units = ToSi::of_table(file.head(), &channels.roles())?;
         let time = reading.time_axis(file.head()).ok_or_else(|| AnalysisError::NoTimeAxis {
             file: file.head().file().into(),
@@ -212,7 +242,7 @@ impl Measurement {
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let source = Source {
             name: file.head().file().to_owned(),
-            path: Some(path.to_owned()),
+            path: path.map(Path::to_owned),
             channels: channels.clone(),
             reading: reading.clone(),
             sampling: survey.sampling,
@@ -271,9 +301,9 @@ impl Measurement {
     ) -> Result<Self, AnalysisError> {
         let roles = channels.roles();
         let find = |wanted: &String| {
-            let found = columns.iter().find(|(name, _)| *name == wanted);
+            let column = columns.iter().find(|(name, _)| *name == wanted);
             let available = || columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-            found.ok_or_else(|| AnalysisError::NoColumn {
+            column.ok_or_else(|| AnalysisError::NoColumn {
                 column: wanted.clone(),
                 available: available(),
             })

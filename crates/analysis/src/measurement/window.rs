@@ -3,10 +3,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use mechid_signal::Record;
 use serde::{Deserialize, Serialize};
 
 use super::channels::ABSENT;
-use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, Source};
+use super::{Block, CHUNK_SAMPLES, Channels, IN_MEMORY_SAMPLES, Measurement, Source};
 use crate::AnalysisError;
 
 /// Part of a record to use.
@@ -56,12 +57,12 @@ impl Window {
     }
 }
 
-/// How much of a window is held in memory.
+/// Amount of a window that is held in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Hold {
     /// All of it.
     Whole,
-    /// As many whole periods as [`IN_MEMORY_SAMPLES`] samples have, one at least.
+    /// Number of whole periods that [`IN_MEMORY_SAMPLES`] samples have, one at least.
     Periods,
     /// [`IN_MEMORY_SAMPLES`] samples, or this number if it is larger.
     Samples(usize),
@@ -117,6 +118,37 @@ impl Windowed {
     /// Returns the samples held in memory and drops the rest.
     pub fn into_held(self) -> Block {
         self.held
+    }
+
+    /// Returns some samples of a window that is held as a whole, counted from its first, under another force.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Signal`] if the window does not have them.
+    pub(crate) fn part(&self, samples: Range<usize>, force: Record) -> Result<Self, AnalysisError> {
+        let held = &self.held;
+        let part = |record: &Option<Record>| {
+            record.as_ref().map(|r| r.window(samples.start, samples.len())).transpose()
+        };
+        let held = Block {
+            displacement: part(&held.displacement)?,
+            velocity: part(&held.velocity)?,
+            acceleration: part(&held.acceleration)?,
+            first_sample: held.first_sample + samples.start,
+            period: samples.len(),
+            periods: 1,
+            force,
+            file: held.file.clone(),
+            driven: held.driven.clone(),
+            unit_remarks: held.unit_remarks.clone(),
+        };
+        let start = self.window.start;
+        let window = start + samples.start..start + samples.end;
+        Ok(Self { held, source: Arc::clone(&self.source), window })
+    }
+
+    /// Returns the columns of force and response.
+    pub(crate) fn channels(&self) -> &Channels {
+        &self.source.channels
     }
 
     /// Returns how many samples to take at a time: all of a window that is held.

@@ -13,7 +13,7 @@ use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::CHUNK_SAMPLES;
 
-/// Whether a method finds each sample of an open record from those beside it.
+/// Returns whether a method finds each sample of an open record from those beside it.
 pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> bool {
     // The phase that channels add is that of the whole record.
     let phase = machine.nonlinear.as_ref().is_some_and(|p| p.channels != ChannelPhase::default());
@@ -42,8 +42,8 @@ pub fn find(
     let advance = CHUNK_SAMPLES - 2 * beside;
     let (len, mut first) = (recorded.sampling.len(), 0);
     recorded.chunks(CHUNK_SAMPLES, advance, &mut |chunk| {
-        let found = equation(request, machine, chunk, method);
-        let force = found.map_err(|error| of_the_window(error, first))?;
+        let solved = equation(request, machine, chunk, method);
+        let force = solved.map_err(|error| of_the_window(error, first))?;
         let samples = force.record().len();
         let start = if first == 0 { 0 } else { beside };
         let end = if first + samples == len { samples } else { samples - beside };

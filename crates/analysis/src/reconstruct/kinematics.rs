@@ -59,7 +59,7 @@ impl KinematicConsistency {
 
     /// Returns a remark for each pair that does not belong together.
     pub fn remarks(&self, columns: &[String]) -> Vec<String> {
-        let told = |pair: &Pair| {
+        let mismatch = |pair: &Pair| {
             let alike = pair.product / (pair.changes * pair.by_rate).sqrt();
             let ratio = (pair.by_rate / pair.changes).sqrt() * alike.signum();
             let right = (1.0 / ANOTHER_UNIT..ANOTHER_UNIT).contains(&ratio);
@@ -73,6 +73,6 @@ impl KinematicConsistency {
                 )
             })
         };
-        self.0.iter().filter_map(told).collect()
+        self.0.iter().filter_map(mismatch).collect()
     }
 }

@@ -45,7 +45,7 @@ pub struct Found {
 /// Method of a reconstruction and what it chose.
 pub struct How {
     pub method: &'static str,
-    /// Why this method.
+    /// Reason for this method.
     pub why: String,
     /// Whether the standard error counts the noise of the record.
     pub counts_noise: bool,

@@ -158,7 +158,7 @@ fn of_all(channels: &[Channel], quantity: ResponseQuantity, dofs: usize) -> Opti
     (0..dofs).map(find).collect()
 }
 
-/// Whether displacement and velocity of every degree of freedom were measured, and, if asked for,
+/// Returns whether displacement and velocity of every degree of freedom were measured, and, if asked for,
 /// acceleration.
 pub fn complete(channels: &[Channel], dofs: usize, with_acceleration: bool) -> bool {
     let mut needed = vec![ResponseQuantity::Displacement, ResponseQuantity::Velocity];

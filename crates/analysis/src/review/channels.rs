@@ -46,13 +46,13 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
     let motions = measured
         .zip(&whole.motions)
         .map(|((quantity, unit, record, columns), all)| (quantity, unit, record, all, columns));
-    let mut found = Vec::new();
+    let mut channels = Vec::new();
     for (quantity, unit, period, all, columns) in std::iter::once(force).chain(motions) {
         let varying = period.without_mean();
         for (at, column) in columns.iter().enumerate() {
             let levels = &all.levels[at];
             let (mean, rms, peak) = (levels.mean(), levels.rms(), levels.peak());
-            found.push(Channel {
+            channels.push(Channel {
                 column: column.clone(),
                 quantity,
                 dof: (columns.len() > 1).then_some(at + 1),
@@ -65,7 +65,7 @@ pub fn channels(held: &Block, whole: &Whole, names: &Channels) -> Vec<Channel> {
             });
         }
     }
-    found
+    channels
 }
 
 /// Returns the part of a channel, whose mean period varies by `level`, that does not repeat.

@@ -79,7 +79,7 @@ pub fn sizes(compared: &Compared, channel: usize) -> (f64, f64) {
     (size, if rest > ROUNDING * size { rest } else { 0.0 })
 }
 
-/// At the lags at which the checks judge the residual.
+/// Correlates at the lags at which the checks judge the residual.
 fn of_samples(residual: &fitted::SampleResidual) -> Result<Vec<Correlations>, AnalysisError> {
     let (force, span, lags) = (&residual.force, residual.noise_span, residual.lags());
     if lags == 0 {

@@ -24,13 +24,13 @@ impl<'a> Samples<'a> {
     /// Returns the samples that a simulated experiment gives.
     pub fn simulated(simulated: Simulated) -> Self {
         let Simulated { force, response, whole_periods } = simulated;
-        let own = |record: &Record| Cow::Owned(record.clone());
+        let owned = |record: &Record| Cow::Owned(record.clone());
         Self {
             force: Cow::Owned(force),
             motions: vec![
-                (ResponseQuantity::Displacement, own(response.displacement())),
-                (ResponseQuantity::Velocity, own(response.velocity())),
-                (ResponseQuantity::Acceleration, own(response.acceleration())),
+                (ResponseQuantity::Displacement, owned(response.displacement())),
+                (ResponseQuantity::Velocity, owned(response.velocity())),
+                (ResponseQuantity::Acceleration, owned(response.acceleration())),
             ],
             extent: if whole_periods { Extent::WholePeriod } else { Extent::Open },
         }
@@ -64,9 +64,9 @@ impl<'a> Samples<'a> {
 
     /// Returns these samples followed by those of a later chunk.
     pub fn followed_by(&self, later: &Samples<'_>) -> Result<Samples<'static>, AnalysisError> {
-        let join = |own, later| Ok::<_, AnalysisError>(Cow::Owned(joined(own, later)?));
+        let join = |first, later| Ok::<_, AnalysisError>(Cow::Owned(joined(first, later)?));
         let pairs = self.motions.iter().zip(&later.motions);
-        let motions = pairs.map(|((kind, own), (_, later))| Ok((*kind, join(own, later)?)));
+        let motions = pairs.map(|((kind, first), (_, later))| Ok((*kind, join(first, later)?)));
         Ok(Samples {
             force: join(&self.force, &later.force)?,
             motions: motions.collect::<Result<_, AnalysisError>>()?,
@@ -79,8 +79,8 @@ impl<'a> Samples<'a> {
     /// # Errors
     /// [`AnalysisError::SweepMotion`] if it was not measured.
     pub fn motion(&self, wanted: ResponseQuantity) -> Result<&Record, AnalysisError> {
-        let found = self.motions.iter().find(|(kind, _)| *kind == wanted);
-        found.map(|(_, record)| record.as_ref()).ok_or(AnalysisError::SweepMotion { wanted })
+        let motion = self.motions.iter().find(|(kind, _)| *kind == wanted);
+        motion.map(|(_, record)| record.as_ref()).ok_or(AnalysisError::SweepMotion { wanted })
     }
 
     /// The first kind of motion there is.

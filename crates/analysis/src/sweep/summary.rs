@@ -84,7 +84,7 @@ pub type Failure = Arc<AnalysisError>;
 /// Returns the reason why a setting (a pure number, or Hz) gave no estimate.
 pub(crate) fn failure(point: &SweepPoint<f64, Failure>) -> Option<String> {
     match &point.outcome {
-        Ok(found) => found.system().err().map(|reason| reason.to_string()),
+        Ok(estimate) => estimate.system().err().map(|reason| reason.to_string()),
         Err(reason) => Some(reason.to_string()),
     }
 }

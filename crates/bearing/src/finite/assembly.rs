@@ -25,7 +25,7 @@ pub(super) const SIDES: usize = 5;
 pub(super) struct Assembly {
     /// Derivatives with respect to the pressure.
     pub(super) matrix: Banded,
-    /// By node: derivatives with respect to the free fronts, then [`SIDES`] entries.
+    /// Right-hand sides, node by node: derivatives with respect to the free fronts, then [`SIDES`] entries.
     pub(super) right: Vec<f64>,
     /// ∫ P (cos θ, sin θ) dθ dζ over both halves of the bearing.
     pub(super) load: Vector2<f64>,

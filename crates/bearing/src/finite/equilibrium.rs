@@ -211,7 +211,7 @@ mod tests {
         }
     }
 
-    /// What Swift and Stieber ask for: no pressure below zero, no slope at the free ends of the
+    /// Conditions of Swift and Stieber: no pressure below zero, no slope at the free ends of the
     /// film, and beyond them a bore that diverges.
     #[test]
     fn films_meet_the_conditions_of_their_ends() {

@@ -16,7 +16,7 @@ pub(super) struct Integrals {
 }
 
 impl Integrals {
-    /// For an eccentricity below 1 and α in (−π, π].
+    /// Integrates up to the angle `end` in (−π, π], for an eccentricity below 1.
     pub(super) fn new(eccentricity: f64, end: f64) -> Self {
         let e = eccentricity;
         let q = (1.0 - e) * (1.0 + e);

@@ -89,10 +89,10 @@ impl ShortBearing {
                 high = middle;
             }
         }
-        let found = self.at_eccentricity(at(0.5 * (low + high)))?;
-        let near = (found.sommerfeld_number() / sommerfeld - 1.0).abs() < 1e-6;
+        let equilibrium = self.at_eccentricity(at(0.5 * (low + high)))?;
+        let near = (equilibrium.sommerfeld_number() / sommerfeld - 1.0).abs() < 1e-6;
         require("Sommerfeld number", sommerfeld, "within the range of a film", near)?;
-        Ok(found)
+        Ok(equilibrium)
     }
 }
 

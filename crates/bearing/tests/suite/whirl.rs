@@ -6,7 +6,7 @@ use mechid_bearing::{Conditions, ShortBearing, ShortFilm, Threshold};
 
 const CONDITIONS: Conditions =
     Conditions { diameter: 0.05, length: 0.0125, clearance: 50e-6, viscosity: 0.02, omega: 300.0 };
-/// Static load, in N; the eccentricity is 0.35.
+/// Static load, in N; the eccentricity is 0.163.
 const LOAD: f64 = 16.0;
 
 struct Rotor {

@@ -1,6 +1,7 @@
 //! Words of the command line for the choices of the analysis.
 
 use clap::ValueEnum;
+use mechid::analysis::fleet::TrendAxis;
 use mechid::analysis::{Detrend, bearing, frf, identify, reconstruct, sweep};
 use mechid::estimate::nonlinear;
 use mechid::model::{Discretisation, ResponseQuantity};
@@ -30,6 +31,16 @@ choice! {
         None,
         /// The mean of the whole record
         Mean,
+    }
+}
+
+choice! {
+    /// Order of the records in a trend.
+    TrendAxisChoice => TrendAxis {
+        /// One after the other, as their names sort
+        Order,
+        /// By the last number in the name
+        Number,
     }
 }
 
@@ -79,8 +90,19 @@ choice! {
         WhiteForce,
         /// The equation error is equally large on all lines as a response
         Response,
-        /// By the residual's own spectrum, averaged over neighbouring lines
+        /// Residual's own spectrum, averaged over neighbouring lines
         SmoothSpectrum,
+    }
+}
+
+choice! {
+    /// Criterion by which a candidate becomes a term.
+    CriterionChoice => nonlinear::Criterion {
+        /// The extended Bayesian information criterion, and a coefficient that differs from zero
+        Information,
+        /// The misfit of each record, predicted by the fit to the others: three records or windows at
+        /// least
+        HeldOut,
     }
 }
 
@@ -179,7 +201,7 @@ choice! {
         Auto,
         /// Equation of motion, sample by sample: displacement, velocity, acceleration of everything
         Continuous,
-        /// From each sample to the next, the force linear between them: displacement and velocity
+        /// Step from each sample to the next, the force linear between them: displacement and velocity
         Discretised,
         /// Dynamic stiffness, line by line: whole periods
         FrequencyDomain,
@@ -209,11 +231,11 @@ choice! {
 choice! {
     /// Estimator of a sweep.
     SweepEstimatorChoice => sweep::Estimator {
-        /// From sample to sample by Euler's rule, the dissertation's; biased in proportion to the step
+        /// Step from sample to sample by Euler's rule, the dissertation's; biased in proportion to the step
         Euler,
-        /// From sample to sample, the force held between them
+        /// Step from sample to sample, the force held between them
         Held,
-        /// From sample to sample, the force linear between them
+        /// Step from sample to sample, the force linear between them
         Linear,
         /// The equation of motion at the samples, with the acceleration
         EquationOfMotion,

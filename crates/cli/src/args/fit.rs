@@ -3,22 +3,23 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::{ArgGroup, Args, ValueEnum};
 use mechid::analysis::identify::{
     Band, Derivatives, Disturbance, Fit, Identified, IdentifiedResponses, Identify,
     IdentifyResponses, KnownMass, LeftOut, LineChoice, Method, Nonlinear, Refinement, ResponseFit,
     SampleFit, ValidationWindow,
 };
-use mechid::analysis::{Segmentation, Window};
+use mechid::analysis::{Channels, Segmentation, Window};
 use mechid::estimate::frequency_domain::Pooling;
-use mechid::estimate::nonlinear::{ShapeConstants, Weighting};
+use mechid::estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
 
 use super::choices::{
-    BetweenSamplesChoice, EstimatorChoice, ExtentChoice, InterpolationChoice, MethodChoice,
-    QuantityChoice, SearchChoice, WeightChoice, WeightingChoice,
+    BetweenSamplesChoice, CriterionChoice, EstimatorChoice, ExtentChoice, InterpolationChoice,
+    MethodChoice, QuantityChoice, SearchChoice, WeightChoice, WeightingChoice,
 };
+use super::hits::HitArgs;
 use super::{ChannelArgs, RecordArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::Files;
@@ -31,6 +32,11 @@ pub struct FitArgs {
     /// More records of the same machine, with the same columns and window: all are fitted together
     #[arg(value_name = "RECORD")]
     more: Vec<PathBuf>,
+    /// First samples of more windows of the first record, each as long as that from --start on: all are
+    /// fitted together, as realisations of one excitation
+    #[arg(long, value_name = "SAMPLE,…", value_parser = at_least_one, value_delimiter = ',',
+          requires = "period", help_heading = "Time and window")]
+    more_starts: Vec<usize>,
     #[command(flatten)]
     channels: ChannelArgs,
     /// Domain of the fit
@@ -64,6 +70,13 @@ pub struct FitArgs {
         allow_hyphen_values = true
     )]
     mass: KnownMass,
+    #[command(flatten)]
+    hits: HitArgs,
+    /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
+    /// them all
+    #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one,
+          help_heading = "Hammer tests")]
+    struck: Vec<usize>,
     #[command(flatten)]
     nonlinear: NonlinearArgs,
     #[command(flatten)]
@@ -110,28 +123,38 @@ pub struct LineArgs {
 
 /// Nonlinear springs and dampers.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Nonlinear terms")]
+#[command(next_help_heading = "Nonlinear terms", group = ArgGroup::new("terms").multiple(true))]
 struct NonlinearArgs {
     /// Springs and dampers to fit beside mass, damping and stiffness, each `name: law`: powers of x1
     /// and v1 (displacement and velocity of degree of freedom 1) or of (x1-x2) and (v1-v2), |v1| v1,
     /// v1^3/(1 + (v1/b)^2) with a number for b, x1^0 for a constant force
-    #[arg(long, value_name = "TERMS")]
+    #[arg(long, value_name = "TERMS", group = "terms")]
     nonlinear: Option<Terms>,
+    /// Terms to try besides, written in the same way: one after the other the most useful is added, as
+    /// long as --criterion finds it worth it
+    #[arg(long, value_name = "TERMS", group = "terms")]
+    candidates: Option<Terms>,
+    /// Criterion by which a candidate is added [default: information]
+    #[arg(long, value_name = "CRITERION", value_enum, requires = "candidates")]
+    criterion: Option<CriterionChoice>,
     /// Constants to search for besides: those inside the laws, the delay of the force, the phase that
     /// all channels have in common
-    #[arg(long, value_name = "WHAT,…", value_enum, value_delimiter = ',', requires = "nonlinear")]
+    #[arg(long, value_name = "WHAT,…", value_enum, value_delimiter = ',', requires = "terms")]
     search: Vec<SearchChoice>,
     /// Weighting of the lines [default: automatic]
-    #[arg(long, value_name = "WEIGHTING", value_enum, requires = "nonlinear")]
+    #[arg(long, value_name = "WEIGHTING", value_enum, requires = "terms")]
     weighting: Option<WeightingChoice>,
 }
 
 impl NonlinearArgs {
     /// Returns the settings of the terms, if there are any.
     fn settings(&self) -> Option<Nonlinear> {
+        self.given()?;
         let searched = |what| self.search.contains(&what);
         Some(Nonlinear {
-            terms: self.nonlinear.clone()?,
+            terms: self.nonlinear.clone().unwrap_or_default(),
+            candidates: self.candidates.clone().unwrap_or_default(),
+            criterion: self.criterion.map_or(Criterion::default(), Into::into),
             search: ShapeConstants {
                 laws: searched(SearchChoice::Laws),
                 delay: searched(SearchChoice::Delay),
@@ -140,13 +163,19 @@ impl NonlinearArgs {
             weighting: self.weighting.map_or(Weighting::Automatic, Into::into),
         })
     }
+
+    /// Returns the first of these options that was given.
+    fn given(&self) -> Option<&'static str> {
+        let candidates = self.candidates.as_ref().map(|_| "--candidates");
+        self.nonlinear.as_ref().map(|_| "--nonlinear").or(candidates)
+    }
 }
 
 /// Fits in the time domain.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Time domain")]
 struct TimeArgs {
-    /// How to find the velocity and the acceleration where only the displacement was measured, or
+    /// Derivation of the velocity and the acceleration where only the displacement was measured, or
     /// only the acceleration: by the spectrum of whole periods, or by a polynomial of an ORDER
     /// through a sliding WINDOW of samples (odd)
     #[arg(long, value_name = "spectral|savitzky-golay:WINDOW:ORDER")]
@@ -183,9 +212,9 @@ pub struct TableArgs {
     /// The files are tables of frequency responses: text with columns h_1_1_real, h_1_1_imaginary …
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["force", "displacement", "velocity", "acceleration",
-          "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz", "from_frf", "segment", "nonlinear",
-          "between_samples", "extent", "derivatives", "refine", "validate", "validate_start",
-          "validate_samples", "skip_lines"])]
+          "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz", "from_frf", "segment", "nonlinear", "candidates", "more_starts",
+          "between_samples", "extent", "hits", "struck", "derivatives", "refine", "validate", "validate_start",
+          "validate_samples", "skip_lines", "record_column"])]
     frf_table: bool,
     /// Measured quantity of the responses, where the table does not state it
     #[arg(long, value_name = "QUANTITY", value_enum, requires = "frf_table")]
@@ -273,11 +302,14 @@ impl FitArgs {
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
         self.check_options()?;
-        let channels = self.channels.channels();
-        channels.check_pairs()?;
-        let mut records = vec![self.input.open(&channels)?];
-        for record in &self.more {
-            records.push(self.input.open_other(record, &channels, self.input.window())?);
+        let channels = self.channels_of_records()?;
+        let first = self.input.open(&channels[0])?;
+        let mut records = vec![first.clone()];
+        for &start in &self.more_starts {
+            records.push(first.clone().window(Window { start, ..self.input.window() })?);
+        }
+        for (record, channels) in self.more.iter().zip(&channels[1..]) {
+            records.push(self.input.open_other(record, channels, self.input.window())?);
         }
         let mut identified = mechid::identify(&records, &self.settings())?;
         let predicted = &self.validation;
@@ -285,12 +317,26 @@ impl FitArgs {
         let other = match (&predicted.validate, start, samples) {
             (None, None, None) => return Ok(identified),
             (None, None, Some(samples)) => return Err(CliError::ValidationStart { samples }),
-            (Some(record), _, _) => self.input.open_other(record, &channels, Window::default())?,
+            (Some(record), _, _) => {
+                self.input.open_other(record, &channels[0], Window::default())?
+            }
             (None, _, _) => records.swap_remove(0),
         };
         let other = identified.validation_window(other, &ValidationWindow { start, samples })?;
         identified.add_validation(&other)?;
         Ok(identified)
+    }
+
+    /// Returns the columns of each record.
+    fn channels_of_records(&self) -> Result<Vec<Channels>, CliError> {
+        let (channels, records) = (self.channels.channels(), 1 + self.more.len());
+        if self.struck.is_empty() {
+            channels.check_pairs()?;
+            return Ok(vec![channels; records]);
+        }
+        let of_records = channels.struck(&self.struck, records)?;
+        of_records.iter().try_for_each(Channels::check_pairs)?;
+        Ok(of_records)
     }
 
     /// Identifies the machine from tables of frequency responses, if the files are such.
@@ -366,6 +412,7 @@ impl FitArgs {
             lines: self.lines.choice(),
             without: self.lines.without(),
             mass: self.mass.clone(),
+            hits: self.hits.rule(),
             nonlinear: self.nonlinear.settings(),
         }
     }
@@ -378,7 +425,7 @@ impl FitArgs {
             self.method.map(|_| "--method"),
             self.noise.map(|_| "--noise"),
             self.from_frf.map(|_| "--from-frf"),
-            self.nonlinear.nonlinear.as_ref().map(|_| "--nonlinear"),
+            self.nonlinear.given(),
         ];
         let first = |options: &[Option<&'static str>]| options.iter().flatten().next().copied();
         let (misplaced, why) = match self.domain {

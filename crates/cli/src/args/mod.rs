@@ -3,6 +3,8 @@
 pub mod channels;
 pub mod choices;
 pub mod fit;
+pub mod hits;
+mod style;
 
 use std::path::PathBuf;
 
@@ -11,9 +13,10 @@ use mechid::analysis::{Detrend, Measurement, Reading, RecordPlan, Window};
 
 pub use self::channels::{ChannelArgs, ResponseArgs};
 use self::choices::DetrendChoice;
+pub use self::style::StyleArgs;
 use crate::error::CliError;
 
-/// How to print the result.
+/// Format of the printed result.
 #[derive(Debug, Default, Args)]
 pub struct ReportArgs {
     /// Print the report as JSON, for programs
@@ -58,6 +61,12 @@ pub struct RecordArgs {
     /// Number of header lines to skip above the table
     #[arg(long, value_name = "COUNT", default_value_t = 0)]
     pub skip_lines: u64,
+    /// Column whose value names the record of each row, where a Parquet file holds many records
+    #[arg(long, value_name = "COLUMN")]
+    pub record_column: Option<String>,
+    /// Record to read of such a file, by its value in that column [default: the only one]
+    #[arg(long, value_name = "ID", requires = "record_column")]
+    pub record_id: Option<String>,
     /// Factor by which to raise the limits on memory: 4 MiB a row of text, 65536 columns, 1 GiB of a
     /// compressed file, 2^28 numbers held
     #[arg(long, value_name = "FACTOR", value_parser = at_least_one)]
@@ -109,6 +118,8 @@ impl RecordArgs {
             time: self.time.clone(),
             sample_rate_hz: self.sample_rate,
             detrend: self.detrend.map_or(Detrend::None, Detrend::from),
+            record_column: self.record_column.clone(),
+            record_id: self.record_id.clone(),
             limits_factor: self.raise_limits,
         }
     }

@@ -5,12 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::analysis::bearing::{BearingPlan, BearingSize, BearingTable};
 use mechid::analysis::{IdentifyBearing, Measurement};
+use mechid::io::FrequencyResponses;
 use mechid::report::ToFigure as _;
 use mechid::{BearingData, identify_bearing};
 
 use crate::args::choices::CoefficientsChoice;
 use crate::args::fit::LineArgs;
-use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
+use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -22,9 +23,12 @@ use crate::outcome::{Files, Outcome};
 /// y. Of the window, which must hold whole periods, lines at multiples of --rotation-hz are left out.
 /// Baseline tests (no film, shaft at rest) are subtracted with their uncertainty.
 ///
+/// With --frf-table the files are frequency responses instead, two for each test: first the
+/// displacement, then the acceleration per shaker force.
+///
 /// A campaign at several speeds and loads is described by a JSON file with `points`, each with
-/// `tests`, `baseline`, `rotation_hz` and `load`, beside `channels`, `window` and `settings` as --json
-/// prints them: --campaign.
+/// `tests`, `baseline`, `rotation_hz` and `load`, beside `channels`, `window` (or `frf_table`) and
+/// `settings` as --json prints them: --campaign.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid bearing x.csv y.csv --force fx,fy --acceleration ax,ay --displacement dx,dy \\
@@ -32,6 +36,7 @@ use crate::outcome::{Files, Outcome};
   mechid bearing x.csv y.csv --baseline dry-x.csv --baseline dry-y.csv --force fx,fy \\
       --acceleration ax,ay --displacement dx,dy --stator-mass 20 --rotation-hz 50 --load 2500 \\
       --clearance 100e-6 --period 1024 --output coefficients.csv
+  mechid bearing d.unv a.unv --frf-table --averages 32 --stator-mass 20 --rotation-hz 50
   mechid bearing campaign.json --campaign --output coefficients.csv --plot speeds.svg")]
 pub struct BearingArgs {
     #[command(flatten)]
@@ -45,7 +50,7 @@ pub struct BearingArgs {
     /// The file describes tests at several speeds and loads
     #[arg(long, conflicts_with_all = ["more", "baseline", "force", "displacement", "acceleration",
           "velocity", "stator_mass", "rotation_hz", "load", "period", "sample_rate", "time",
-          "detrend", "lines", "without_lines", "without_hz", "band_hz", "clearance", "diameter", "length", "viscosity"])]
+          "detrend", "lines", "without_lines", "without_hz", "band_hz", "clearance", "diameter", "length", "viscosity", "frf_table"])]
     campaign: bool,
     #[command(flatten)]
     channels: ChannelArgs,
@@ -58,13 +63,15 @@ pub struct BearingArgs {
     /// Static load, in N, for dimensionless coefficients
     #[arg(long, value_name = "N")]
     load: Option<f64>,
-    #[command(flatten)]
-    size: SizeArgs,
     /// Coefficients to identify
     #[arg(long, value_name = "WHICH", value_enum, default_value_t = CoefficientsChoice::Automatic)]
     coefficients: CoefficientsChoice,
     #[command(flatten)]
     lines: LineArgs,
+    #[command(flatten)]
+    size: SizeArgs,
+    #[command(flatten)]
+    tables: TableArgs,
     /// Write the coefficients into this file (-: to standard output): speed in rad/s, load, kxx …
     /// myy, and their standard errors, one row per speed and load
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
@@ -73,6 +80,25 @@ pub struct BearingArgs {
     plot: PlotArgs,
     #[command(flatten)]
     pub report: ReportArgs,
+}
+
+/// Frequency responses that were measured elsewhere.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Tables of frequency responses")]
+struct TableArgs {
+    /// The files are tables of frequency responses, of displacement and of acceleration by turns: text
+    /// with columns h_1_1_real, h_1_1_imaginary … as `mechid frf --output` writes it, or universal
+    /// files (datasets 58 of types 4 and 6)
+    #[arg(long, conflicts_with_all = ["force", "displacement", "acceleration", "velocity",
+          "sample_rate", "time", "period", "detrend", "lines", "without_lines"])]
+    frf_table: bool,
+    /// Number of independent averages behind the coherence, from which standard errors follow; not
+    /// needed where the tables have standard errors
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, requires = "frf_table")]
+    averages: Option<usize>,
+    /// Two points to use, x before y, as the tables name them [default: all]
+    #[arg(long, value_name = "POINT,…", value_delimiter = ',', requires = "frf_table")]
+    points: Vec<String>,
 }
 
 /// Size of the bearing.
@@ -110,10 +136,16 @@ impl BearingArgs {
                 .with_plot(&self.plot, || Ok(speeds.figure()?))?;
             return Ok(self.with_table(outcome, &speeds));
         }
-        let channels = self.channels.channels();
-        channels.check_pairs()?;
         let how = self.settings();
+        let channels = self.channels.channels();
+        if !self.tables.frf_table {
+            channels.check_pairs()?;
+        }
         let data = |paths: &mut dyn Iterator<Item = &PathBuf>| -> Result<BearingData, CliError> {
+            if self.tables.frf_table {
+                let tables = paths.map(FrequencyResponses::read).collect::<Result<Vec<_>, _>>()?;
+                return Ok(BearingData::of_responses(&tables, &how)?);
+            }
             let open = |path: &PathBuf| self.input.open_other(path, &channels, self.input.window());
             let tests: Vec<Measurement> = paths.map(open).collect::<Result<_, _>>()?;
             Ok(BearingData::of_records(&tests, &how)?)
@@ -139,6 +171,8 @@ impl BearingArgs {
             coefficients: self.coefficients.into(),
             lines: self.lines.choice(),
             without: self.lines.without(),
+            averages: self.tables.averages.map(|count| count as f64),
+            points: self.tables.points.clone(),
         }
     }
 

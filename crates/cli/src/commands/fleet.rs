@@ -8,7 +8,6 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use mechid::SavedAnalysis;
 use mechid::analysis::fleet::{Fleet, RECORDS_PER_PART};
-use mechid::io::files_of;
 
 use crate::args::{ReportArgs, at_least_one};
 use crate::error::CliError;
@@ -59,26 +58,22 @@ impl FleetArgs {
     /// Computes the parts that are missing, and tells what there is.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let analysis = SavedAnalysis::read(&self.analysis)?;
-        let mut records = Vec::new();
-        for record in &self.records {
-            records.extend(files_of(record)?);
-        }
-        let fleet = Fleet::new(analysis, &records, &self.output, self.part_records)?;
+        let fleet = Fleet::new(analysis, &self.records, &self.output, self.part_records)?;
         let workers =
             self.workers.unwrap_or_else(|| available_parallelism().map_or(1, NonZero::get));
         let bar = match self.report.quiet {
             true => ProgressBar::hidden(),
             // Hides itself where nobody watches.
-            false => ProgressBar::new(records.len() as u64),
+            false => ProgressBar::new(fleet.record_count() as u64),
         };
         let style = "{wide_bar} {pos} of {len} records, {elapsed}, {eta} left (Ctrl-C ends it)";
         bar.set_style(
             ProgressStyle::with_template(style).expect("the template is written correctly"),
         );
-        let found = fleet.run(workers, &|part| bar.inc(part.records as u64));
+        let summary = fleet.run(workers, &|part| bar.inc(part.records as u64));
         bar.finish_and_clear();
-        let found = found?;
-        let outcome = Outcome::new(found.to_string(), &found)?;
-        Ok(if found.failed > 0 { outcome.incomplete() } else { outcome })
+        let summary = summary?;
+        let outcome = Outcome::new(summary.to_string(), &summary)?;
+        Ok(if summary.failed > 0 { outcome.incomplete() } else { outcome })
     }
 }

@@ -56,16 +56,16 @@ pub struct ForceArgs {
     /// averaged [default: estimated]
     #[arg(long, value_name = "LEVEL,…", value_delimiter = ',', allow_negative_numbers = true)]
     noise: Vec<f64>,
-    /// How to choose the regularisation parameter
+    /// Rule that chooses the regularisation parameter
     #[arg(long, value_name = "RULE", value_enum, default_value_t = RuleChoice::Likelihood)]
     rule: RuleChoice,
     /// The regularisation parameter, instead of a rule
     #[arg(long, value_name = "LAMBDA", allow_negative_numbers = true, conflicts_with = "rule")]
     parameter: Option<f64>,
-    /// Where the force goes: time, force and standard error, in s and N
+    /// File for the force: time, force and standard error, in s and N
     #[arg(long, short, value_name = "FORCE.csv", help_heading = "Output")]
     output: Option<PathBuf>,
-    /// Where its spectrum goes, on the lines of --lines or on all: frequency in Hz, amplitude in N,
+    /// File for its spectrum, on the lines of --lines or on all: frequency in Hz, amplitude in N,
     /// phase in degrees
     #[arg(long, value_name = "SPECTRUM.csv", help_heading = "Output")]
     spectrum: Option<PathBuf>,

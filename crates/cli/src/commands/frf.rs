@@ -8,20 +8,22 @@ use mechid::report::ToFigure as _;
 
 use crate::args::choices::EstimatorChoice;
 use crate::args::fit::{LineArgs, SegmentArgs};
-use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs};
+use crate::args::hits::HitArgs;
+use crate::args::{ChannelArgs, PlotArgs, RecordArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
 /// Estimate frequency responses and coherence from measured forces and motions
 ///
 /// With a periodic excitation the periods are the segments that are averaged (--period says how long
-/// one is). With a random excitation say --segment: segments overlap under a window. A long text is
-/// read a stretch at a time and not held.
+/// one is). With a random excitation say --segment: segments overlap under a window. Of a hammer test
+/// the good --hits are averaged. A long text is read a stretch at a time and not held.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
   mechid frf random.csv --force f --acceleration a --segment 1024 --segment-overlap 66 \\
       --estimator hv --band-hz 5:400 --output frf.csv
+  mechid frf hammer.csv --force f --acceleration a --hits --exponential-percent 1
   mechid frf rotor.csv --force fx,fy --displacement x,y --period 512 --json")]
 pub struct FrfArgs {
     #[command(flatten)]
@@ -35,6 +37,18 @@ pub struct FrfArgs {
     lines: LineArgs,
     #[command(flatten)]
     segments: SegmentArgs,
+    #[command(flatten)]
+    hits: HitArgs,
+    /// Exponential window on force and response: its weight at the end of a hit, in per cent of that at
+    /// the beginning [default: no window]
+    #[arg(
+        long,
+        value_name = "PERCENT",
+        requires = "hits",
+        allow_negative_numbers = true,
+        help_heading = "Hammer tests"
+    )]
+    exponential_percent: Option<f64>,
     /// Write the responses into this file (-: to standard output): a table with one row per
     /// frequency, or a universal file (.unv, .uff) of datasets 151, 164 and 58
     #[arg(long, value_name = "FILE.csv|FILE.unv", help_heading = "Output")]
@@ -50,6 +64,8 @@ pub struct FrfArgs {
     points: Vec<String>,
     #[command(flatten)]
     plot: PlotArgs,
+    #[command(flatten)]
+    style: StyleArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -70,10 +86,12 @@ impl FrfArgs {
             lines: self.lines.choice(),
             without: self.lines.without(),
             segments: self.segments.segmentation(),
+            hits: self.hits.rule(),
+            exponential_percent: self.exponential_percent,
         };
         let table = mechid::frf(&self.input.open(&channels)?, &how)?;
         let mut outcome = Outcome::new(table.to_string(), &table)?
-            .with_plot(&self.plot, || Ok(table.figure()?))?;
+            .with_plot(&self.plot, || Ok(table.styled_figure(self.style.style())?))?;
         if let Some(path) = &self.output {
             let universal = path.extension().is_some_and(|ending| {
                 ["unv", "uff"].iter().any(|known| ending.eq_ignore_ascii_case(known))

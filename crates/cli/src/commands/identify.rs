@@ -4,7 +4,7 @@ use clap::Args;
 use mechid::report::ToFigure as _;
 
 use crate::args::fit::{FitArgs, TableArgs};
-use crate::args::{PlotArgs, ReportArgs};
+use crate::args::{PlotArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -12,7 +12,8 @@ use crate::outcome::{Files, Outcome};
 ///
 /// In the frequency domain (the default) the window must hold whole periods of a periodic
 /// excitation, and one kind of motion is enough; the periods are averaged. Of a random excitation,
-/// or any record that is no period, the ends are fitted with the machine. In the time domain any
+/// or any record that is no period, the ends are fitted with the machine; of a hammer test those of each
+/// of the good --hits. In the time domain any
 /// record will do: displacement, velocity and acceleration for the equation of motion itself, or
 /// displacement and velocity with an assumption on the force between the samples; what was not
 /// measured, --derivatives finds.
@@ -31,6 +32,7 @@ use crate::outcome::{Files, Outcome};
   mechid identify rotor.csv --force fx,fy --displacement x,y --mass 14.8,unknown --band-hz 20:90 --json
   mechid identify a.csv b.csv --force f --displacement x --period 512 --method maximum-likelihood \\
       --validate c.csv
+  mechid identify point1.csv point2.csv --force f --struck 1,2 --acceleration a1,a2 --hits
   mechid identify random.csv --force f --acceleration a --from-frf h1 --segment 1024
   mechid identify modal.unv --frf-table --averages 32 --band-hz 20:400
   mechid identify t.csv --force f --displacement x --velocity v --domain time \\
@@ -43,6 +45,8 @@ pub struct IdentifyArgs {
     table: TableArgs,
     #[command(flatten)]
     plot: PlotArgs,
+    #[command(flatten)]
+    style: StyleArgs,
     #[command(flatten)]
     pub report: ReportArgs,
 }
@@ -57,10 +61,10 @@ impl IdentifyArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         if let Some(identified) = self.fit.identify_tables(&self.table)? {
             return Outcome::new(identified.to_string(), &identified)?
-                .with_plot(&self.plot, || Ok(identified.figure()?));
+                .with_plot(&self.plot, || Ok(identified.styled_figure(self.style.style())?));
         }
         let identified = self.fit.identify()?;
         Outcome::new(self.fit.text(&identified), &identified)?
-            .with_plot(&self.plot, || Ok(identified.figure()?))
+            .with_plot(&self.plot, || Ok(identified.styled_figure(self.style.style())?))
     }
 }

@@ -19,6 +19,7 @@ mod report;
 mod simulate;
 mod stability;
 mod sweep;
+mod trends;
 
 use std::ffi::OsString;
 
@@ -63,6 +64,7 @@ pub enum Command {
     Simulate(simulate::SimulateArgs),
     Stability(stability::StabilityArgs),
     Sweep(sweep::SweepArgs),
+    Trends(trends::TrendsArgs),
 }
 
 impl Command {
@@ -84,6 +86,7 @@ impl Command {
             Command::Simulate(args) => args.run(),
             Command::Stability(args) => args.run(),
             Command::Sweep(args) => args.run(),
+            Command::Trends(args) => args.run(),
         }
     }
 
@@ -104,10 +107,12 @@ impl Command {
             Command::Simulate(args) => args.files(),
             Command::Stability(args) => args.files(),
             Command::Sweep(args) => args.files(),
+            Command::Trends(args) => args.files(),
         }
     }
 
-    /// What to say while it computes, if that takes long; nothing if it says so itself, or must not.
+    /// Returns the message shown during a long computation; `None` if the subcommand shows one itself, or
+    /// must not.
     pub fn waiting(&self) -> Option<&'static str> {
         match self {
             Command::Fleet(_) | Command::Sweep(_) => None,
@@ -120,7 +125,7 @@ impl Command {
         }
     }
 
-    /// How the user wants to be told.
+    /// Returns the options for the printed result.
     pub fn report(&self) -> &ReportArgs {
         match self {
             Command::Bearing(args) => &args.report,
@@ -137,6 +142,7 @@ impl Command {
             Command::Simulate(args) => &args.report,
             Command::Stability(args) => &args.report,
             Command::Sweep(args) => &args.report,
+            Command::Trends(args) => &args.report,
         }
     }
 }

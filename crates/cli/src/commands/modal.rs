@@ -6,7 +6,7 @@ use clap::Args;
 use mechid::analysis::{Machine, ModalSummary};
 use mechid::report::ToFigure as _;
 
-use crate::args::{PlotArgs, ReportArgs};
+use crate::args::{PlotArgs, ReportArgs, StyleArgs};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -32,6 +32,8 @@ pub struct ModalArgs {
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
+    style: StyleArgs,
+    #[command(flatten)]
     pub report: ReportArgs,
 }
 
@@ -45,6 +47,7 @@ impl ModalArgs {
     pub fn run(&self) -> Result<Outcome, CliError> {
         let machine = Machine::read(&self.system)?;
         let modes = ModalSummary::of(&machine)?;
-        Outcome::new(modes.to_string(), &modes)?.with_plot(&self.plot, || Ok(machine.figure()?))
+        Outcome::new(modes.to_string(), &modes)?
+            .with_plot(&self.plot, || Ok(machine.styled_figure(self.style.style())?))
     }
 }

@@ -34,7 +34,7 @@ pub struct PredictArgs {
     /// the errors [default: at rest]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     settle: Option<usize>,
-    /// Where the predicted response goes: time in s, then every measured kind of response, or
+    /// File for the predicted response: time in s, then every measured kind of response, or
     /// displacements, in SI units
     #[arg(long, short, value_name = "RESPONSE.csv", help_heading = "Output")]
     output: Option<PathBuf>,

@@ -37,7 +37,7 @@ pub struct PageArgs {
     /// the measured one
     #[arg(long)]
     reconstruct_force: bool,
-    /// Where the report goes (-: to standard output)
+    /// File for the report (-: standard output)
     #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
     output: PathBuf,
     /// Heading of the report [default: the name of the record]
@@ -47,7 +47,8 @@ pub struct PageArgs {
     pub report: ReportArgs,
 }
 
-fn html_file(text: &str) -> Result<PathBuf, String> {
+/// Parses the name of a page.
+pub fn html_file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
         Some("html" | "htm") => Ok(path),

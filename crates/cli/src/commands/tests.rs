@@ -7,8 +7,15 @@ use clap::{Arg, CommandFactory as _, Parser as _};
 use super::Cli;
 
 /// Units by the name of an option's value.
-const UNITS: [(&str, &str); 6] =
-    [("HZ", "Hz"), ("N", "N"), ("DB", "dB"), ("KG", "kg"), ("METRES", "in m"), ("PA·S", "Pa·s")];
+const UNITS: [(&str, &str); 7] = [
+    ("HZ", "Hz"),
+    ("N", "N"),
+    ("DB", "dB"),
+    ("KG", "kg"),
+    ("METRES", "in m"),
+    ("SECONDS", "in s"),
+    ("PA·S", "Pa·s"),
+];
 
 /// Values that are numbers without a unit.
 const PURE: [&str; 9] =

@@ -24,7 +24,14 @@ impl Session {
         let home = tempfile::tempdir().unwrap();
         let folder = home.path().to_owned();
         fs::create_dir(folder.join("examples")).unwrap();
-        for file in ["machine.json", "machine.csv", "bearing-rig.csv", "bearing-dry.csv"] {
+        for file in [
+            "machine.json",
+            "machine.csv",
+            "bearing-rig.csv",
+            "bearing-dry.csv",
+            "hammer-1.csv",
+            "hammer-2.csv",
+        ] {
             let name = Path::new("examples").join(file);
             fs::copy(root.join(&name), folder.join(&name)).unwrap();
         }

@@ -40,6 +40,21 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     // The part of a and b is that of before; the one of c has changed.
     assert_eq!((&report["computed_parts"], &report["other_parts"]), (&1.into(), &1.into()));
 
+    let trends =
+        program(home.path(), "trends out/results --output page.html --plot trends.svg --json");
+    assert_eq!(trends.status.code(), Some(0), "{}", String::from_utf8_lossy(&trends.stderr));
+    let trends: Value = serde_json::from_slice(&trends.stdout).unwrap();
+    // Both versions of the second part are in the folder.
+    assert_eq!((&trends["records"], &trends["failed"]), (&5.into(), &1.into()));
+    assert_eq!(trends["series"][0]["points"].as_array().unwrap().len(), 4);
+    let page = fs::read_to_string(home.path().join("page.html")).unwrap();
+    assert!(
+        page.contains("io.empty") && page.contains("damping ratio 1") && !page.contains("<script")
+    );
+    assert!(home.path().join("trends.svg").exists());
+    let refused = program(home.path(), "trends day");
+    assert_eq!(refused.status.code(), Some(2));
+
     // What is wrong with the analysis concerns no record.
     fs::write(home.path().join("analysis.json"), "{}").unwrap();
     let refused = program(home.path(), "fleet day --analysis analysis.json --output none");

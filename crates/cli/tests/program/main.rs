@@ -1,5 +1,6 @@
 //! What every subcommand has in common: the records it takes, and how it talks.
 
+mod bearing;
 mod checks;
 mod fleet;
 mod forces;
@@ -10,6 +11,7 @@ mod modal;
 mod pictures;
 mod records;
 mod reference;
+mod silverbox;
 mod streams;
 mod stretches;
 mod sweep;

@@ -56,7 +56,14 @@ fn is_named(section: &str, path: &str) -> bool {
 fn every_field_of_every_report_is_in_the_reference() {
     let folder = tempfile::tempdir().unwrap();
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
-    for file in ["machine.csv", "machine.json", "bearing-rig.csv", "bearing-dry.csv"] {
+    for file in [
+        "machine.csv",
+        "machine.json",
+        "bearing-rig.csv",
+        "bearing-dry.csv",
+        "hammer-1.csv",
+        "hammer-2.csv",
+    ] {
         fs::copy(examples.join(file), folder.path().join(file)).unwrap();
     }
     let data = concat!(env!("CARGO_MANIFEST_DIR"), "/../io/tests/data/plain.mat");
@@ -80,6 +87,9 @@ fn every_field_of_every_report_is_in_the_reference() {
         "force machine.csv --system found.json --displacement displacement --period 256".into(),
         "force machine.csv --system machine.json --displacement displacement".into(),
         "frf machine.csv --force force --displacement displacement --period 256".into(),
+        "identify hammer-1.csv hammer-2.csv --force force --struck 1,2 --acceleration a1,a2 --hits"
+            .into(),
+        "frf hammer-1.csv --force force,0 --acceleration a1,a2 --hits --exponential-percent 1".into(),
         "identify frf.csv --frf-table --quantity displacement --band-hz 1:60".into(),
         "bearing bearing-rig.csv --baseline bearing-dry.csv --force fx,fy --acceleration ax,ay \
          --displacement dx,dy --stator-mass 20 --rotation-hz 50 --period 256 --load 2500 --clearance \

@@ -58,7 +58,7 @@ pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Opt
         .filter(|_| is_delayed(data, delay * dt, unknowns))
 }
 
-/// Whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.
+/// Returns whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.
 fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
     let misfit = |data: &FrequencyData| Some(output_error(data, unknowns).ok()?.misfit_ratio);
     let both = || Some([misfit(data)?, misfit(&data.with_later_force(delay))?]);

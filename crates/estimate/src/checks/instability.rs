@@ -12,12 +12,12 @@ use crate::IdentifiedMode;
 /// The p-value is the probability that an estimate grows as many standard errors in any of its modes
 /// though the true modes persist without growing: one-sided, Student's t times the number of modes.
 pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
-    let largest = modes.iter().map(|found| found.mode.natural_frequency()).fold(0.0, f64::max);
-    let grows = |found: &&IdentifiedMode| {
-        !found.is_rigid_body && found.growth_rate.value > EIGENVALUE_ROUNDING * largest
+    let largest = modes.iter().map(|mode| mode.mode.natural_frequency()).fold(0.0, f64::max);
+    let grows = |mode: &&IdentifiedMode| {
+        !mode.is_rigid_body && mode.growth_rate.value > EIGENVALUE_ROUNDING * largest
     };
-    let p_value = |found: &IdentifiedMode| {
-        let rate = found.growth_rate;
+    let p_value = |mode: &IdentifiedMode| {
+        let rate = mode.growth_rate;
         let alone = match (rate.value / rate.standard_error, rate.degrees_of_freedom) {
             (ratio, 1..) if ratio.is_finite() => {
                 StudentsT::new(0.0, 1.0, rate.degrees_of_freedom as f64)
@@ -29,13 +29,13 @@ pub fn instability(modes: &[IdentifiedMode]) -> Option<Finding> {
         };
         (alone * modes.len() as f64).min(1.0)
     };
-    let growing = modes.iter().enumerate().filter(|(_, found)| grows(found));
-    let (mode, found) = growing.min_by(|(_, a), (_, b)| p_value(a).total_cmp(&p_value(b)))?;
+    let growing = modes.iter().enumerate().filter(|(_, mode)| grows(mode));
+    let (index, mode) = growing.min_by(|(_, a), (_, b)| p_value(a).total_cmp(&p_value(b)))?;
     Some(Finding::Instability {
-        mode,
-        frequency_hz: found.damped_frequency_hz.value,
-        growth_rate: found.growth_rate.value,
-        standard_error: found.growth_rate.standard_error,
-        p_value: PValue::of(p_value(found)),
+        mode: index,
+        frequency_hz: mode.damped_frequency_hz.value,
+        growth_rate: mode.growth_rate.value,
+        standard_error: mode.growth_rate.standard_error,
+        p_value: PValue::of(p_value(mode)),
     })
 }

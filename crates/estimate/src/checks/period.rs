@@ -128,13 +128,13 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     }
     let first = (apart..squares.len()).find(alike)?;
     let around = (first..squares.len()).take_while(alike);
-    let found = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
+    let nearest = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
     // Each of so many may be half a sample longer or shorter.
-    let times = (period as f64 / found as f64).round();
-    let off = (period as f64 - times * found as f64).abs();
+    let times = (period as f64 / nearest as f64).round();
+    let off = (period as f64 - times * nearest as f64).abs();
     (off > 0.5 * times + 0.5).then(|| PeriodFault::Other {
-        period: found,
-        mismatch: squares[found].max(0.0).sqrt(),
+        period: nearest,
+        mismatch: squares[nearest].max(0.0).sqrt(),
         samples: channels[0].len(),
     })
 }

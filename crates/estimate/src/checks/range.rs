@@ -24,9 +24,9 @@ const LEVEL_ROUNDING: f64 = 1e-6;
 /// That of [`clipping`].
 pub fn clipped_channels(quantity: Quantity, record: &Record) -> Vec<Finding> {
     let one = |index: usize| {
-        let found = clipping(record.channel(index))?;
+        let clipped = clipping(record.channel(index))?;
         let channel = Channel { quantity, index };
-        Some(Finding::Clipping { channel, level: found.level, samples: found.samples })
+        Some(Finding::Clipping { channel, level: clipped.level, samples: clipped.samples })
     };
     (0..record.channels()).filter_map(one).collect()
 }

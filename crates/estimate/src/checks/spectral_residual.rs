@@ -94,14 +94,14 @@ struct Linearised {
     weighted: Vec<Whitened>,
     /// Combinations of parameters, one per column, that change the residuals by orthonormal columns.
     basis: DMatrix<f64>,
-    /// Those columns.
+    /// Orthonormal columns that the parameters explain.
     explained: Vec<DMatrix<f64>>,
     /// Scalar products of the residuals with those columns.
     coefficients: DVector<f64>,
 }
 
 impl Linearised {
-    /// With an empty basis unless the problem is `small`.
+    /// Makes the problem, with an empty basis unless the problem is `small`.
     fn of(weighted: Vec<Whitened>, small: bool) -> Option<Self> {
         let basis = match small {
             true => orthonormal_basis(&weighted)?,
@@ -188,8 +188,8 @@ impl WeightedFit {
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
         if parts.len() == records.len() {
-            let found = concentration(&parts);
-            records.iter_mut().for_each(|record| record.concentration = found.clone());
+            let lines = concentration(&parts);
+            records.iter_mut().for_each(|record| record.concentration = lines.clone());
         }
         Some(Self { records, step: small.then_some(step) })
     }
@@ -237,7 +237,7 @@ fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
     Some(power.iter().map(|p| (p / rows as f64).sqrt()).collect())
 }
 
-/// Whether the residual of every channel is rounding.
+/// Returns whether the residual of every channel is rounding.
 fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
     let rms = |channel: usize| {
         let lines = data.displacement().column(channel);
@@ -323,7 +323,7 @@ impl SpectralResidual {
         findings
     }
 
-    /// What the search for disturbed lines takes; `None` if no noise is stated.
+    /// Returns the input of the search for disturbed lines; `None` if no noise is stated.
     fn part(&self) -> Option<Part<'_>> {
         let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
         let (n, nu) = (self.data.dof() as f64, noise.degrees_of_freedom());
@@ -462,12 +462,12 @@ impl SpectralResidual {
         let lines = self.data.len();
         let forces = self.data.force().column(force);
         let rows: Vec<usize> = (0..lines).map(|line| self.row(line, channel)).collect();
-        let lags = LAGS.min(lines / LINES_PER_CORRELATION);
+        let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
         let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
         for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
             for at in 0..weights.nrows() {
-                let lag = (at as f64 - lags as f64) * self.lag();
-                let weight = f.conj() * Complex::cis(omega * lag);
+                let shift = (at as f64 - lags as f64) * lag;
+                let weight = f.conj() * Complex::cis(omega * shift);
                 // Re(w r) = Re w Re r − Im w Im r.
                 weights[(at, 2 * line)] = weight.re;
                 weights[(at, 2 * line + 1)] = -weight.im;

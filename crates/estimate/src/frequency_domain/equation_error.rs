@@ -70,8 +70,8 @@ pub(super) fn weighted_equation_errors<'a>(
 ) -> impl Iterator<Item = Estimate> + 'a {
     [f64::INFINITY, CLEAR].into_iter().filter_map(|clear| {
         let rows = weighted_rows(data, 0.0, noise_weight(data, clear)?);
-        let found = rows.ok()?.solve(unknowns).ok()?;
-        found.check_determined().ok().map(|()| found)
+        let solution = rows.ok()?.solve(unknowns).ok()?;
+        solution.check_determined().ok().map(|()| solution)
     })
 }
 
@@ -87,7 +87,7 @@ pub(crate) fn late_rows(
     }
 }
 
-/// Of each row the inverse of what the stated noise puts into it; 0 if that is more than `clear` of
+/// Returns for each row the inverse of what the stated noise puts into it; 0 if that is more than `clear` of
 /// its power.
 fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f64> {
     let noise = data.noise()?;

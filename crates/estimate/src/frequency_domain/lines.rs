@@ -112,7 +112,7 @@ impl Lines {
         Ok(self.read_window(record, 0))
     }
 
-    /// As [`Lines::read`], from the samples starting at `start` of a longer record.
+    /// Reads as [`Lines::read`] does, from the samples starting at `start` of a longer record.
     pub(crate) fn read_window(&self, record: &Record, start: usize) -> DMatrix<Complex<f64>> {
         let mut amplitudes = DMatrix::zeros(self.lines.len(), record.channels());
         let mut reader = self.reader();

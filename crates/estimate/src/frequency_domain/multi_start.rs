@@ -39,13 +39,13 @@ const RESTARTED: usize = 3;
 pub(super) struct Plausible {
     /// That of a right model; `None` if the level of the noise is not known.
     pub expected: Option<f64>,
-    /// How many times as large one may be by chance.
+    /// Factor by which one may be larger by chance.
     pub factor: f64,
 }
 
 /// The best minimum of several searches.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
+pub(super) struct GlobalMinimum {
     pub minimum: Minimum,
     /// Number of searches.
     pub searches: usize,
@@ -70,9 +70,10 @@ pub(super) fn search(
     problem: &mut impl SumOfSquares,
     starts: &Starts<'_>,
     plausible: Plausible,
-) -> Result<Found, EstimateError> {
+) -> Result<GlobalMinimum, EstimateError> {
     let mut ends = Ends { plausible, searches: 0, distinct: Vec::new() };
     for start in in_order(problem, starts.families()) {
+        log::debug!("search {}", ends.searches + 1);
         let steps = if ends.searches == 0 { STEPS } else { STEPS_MORE };
         let start = linear_rounds(problem, start, &plausible);
         ends.push(start.and_then(|start| minimise(problem, start, steps)));
@@ -91,7 +92,7 @@ pub(super) fn search(
     let best = ends.distinct.into_iter().find(|end| end.minimum.converged).ok_or(failed)?;
     problem.try_at(&best.minimum.theta);
     problem.accept();
-    Ok(Found { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
+    Ok(GlobalMinimum { minimum: best.minimum, searches: ends.searches, agreeing: best.count })
 }
 
 /// Searches again from the best ends so far, moved by resampled data.
@@ -99,6 +100,7 @@ fn restart(problem: &mut impl SumOfSquares, ends: &mut Ends) {
     let mut without_gain = 0;
     for seed in 0..MAX_RESTARTS {
         let Some(from) = ends.turn(seed as usize) else { return };
+        log::debug!("search {}", ends.searches + 1);
         problem.resample(Some(seed));
         let moved = minimise(problem, from, STEPS_RESAMPLED);
         problem.resample(None);
@@ -145,11 +147,11 @@ impl Plausible {
     }
 }
 
-/// Where searches have ended.
+/// Ends of the searches.
 struct Ends {
     plausible: Plausible,
     searches: usize,
-    /// Those of different sums of squares, the least first; converged or not.
+    /// Ends of different sums of squares, the least first; converged or not.
     distinct: Vec<End>,
 }
 
@@ -180,17 +182,17 @@ impl Ends {
         place == 0
     }
 
-    /// Whether the noise explains the best end.
+    /// Returns whether the noise explains the best end.
     fn explained(&self) -> bool {
         self.distinct.first().is_some_and(|end| self.plausible.explains(end.minimum.cost))
     }
 
-    /// Whether every search has led to the same minimum.
+    /// Returns whether every search has led to the same minimum.
     fn all_agree(&self) -> bool {
         matches!(&self.distinct[..], [end] if end.count == self.searches && end.minimum.converged)
     }
 
-    /// Whether noise may decide between several ends, or the best is no minimum.
+    /// Returns whether noise may decide between several ends, or the best is no minimum.
     fn many(&self) -> bool {
         let Some(best) = self.distinct.first() else { return true };
         let bound = best.minimum.cost * self.plausible.factor;
@@ -212,7 +214,7 @@ impl Ends {
     }
 }
 
-impl Found {
+impl GlobalMinimum {
     /// The minimum that this one has become for another weighting of the same residuals.
     ///
     /// # Errors

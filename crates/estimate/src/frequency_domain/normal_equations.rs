@@ -17,7 +17,7 @@ const DEPENDENT: f64 = 1e-14;
 /// Lines whose products are held at a time.
 const LINES: usize = 256;
 
-/// Which unknowns stand in which equation of motion.
+/// Places of the unknowns in the equations of motion.
 #[derive(Debug)]
 pub(super) struct Layout {
     dof: usize,
@@ -48,7 +48,7 @@ pub(super) struct Coordinates {
 struct Block {
     row: usize,
     places: Vec<usize>,
-    /// Of an equation with fewer unknown columns than there are: their span, orthonormal.
+    /// Orthonormal span of the unknown columns, for an equation that does not have all of them.
     basis: Option<Rc<DMatrix<f64>>>,
     /// T, upper triangular.
     triangle: Rc<DMatrix<f64>>,
@@ -63,7 +63,7 @@ pub(super) struct NormalEquations {
     pub coordinates: Coordinates,
 }
 
-/// What a Jacobian √2 φ_l ⊗ W_l is made of, row block by row block.
+/// Factors of a Jacobian √2 φ_l ⊗ W_l, row block by row block.
 pub(super) struct Factors {
     /// φ_l, columns of the layout × 2 lines, real parts first.
     pub regressors: DMatrix<f64>,
@@ -299,7 +299,8 @@ fn largest(size: usize, product: &dyn Fn(&DVector<f64>) -> DVector<f64>) -> f64 
             }
         }
     }
-    hermitian_eigen(projected).map_or(f64::INFINITY, |found| found.eigenvalues.max())
+    hermitian_eigen(projected)
+        .map_or(f64::INFINITY, |decomposition| decomposition.eigenvalues.max())
 }
 
 impl Coordinates {

@@ -110,20 +110,20 @@ fn with_known_noise(
     // A sampled covariance makes the weights too large by ν/(ν − n) on average.
     let expected = spare * noise.mean_inverse_ratio(data.dof());
     let plausible = plausible(Some(expected), spare, noise.total_degrees_of_freedom() as f64);
-    let found = search(&mut misfit, &starts, plausible)?;
+    let best = search(&mut misfit, &starts, plausible)?;
     let scale = Scale {
         level: 1.0,
         inflation,
-        weights: uncertain_weights(data, unknowns, &found.minimum.theta, noise),
+        weights: uncertain_weights(data, unknowns, &best.minimum.theta, noise),
         degrees_of_freedom: noise.total_degrees_of_freedom(),
-        misfit_ratio: found.minimum.cost / expected,
-        deviance: Some(found.minimum.cost / inflation),
+        misfit_ratio: best.minimum.cost / expected,
+        deviance: Some(best.minimum.cost / inflation),
         noise: noise.models().to_vec(),
     };
-    finish(data, unknowns, &mut misfit, &found, scale)
+    finish(data, unknowns, &mut misfit, &best, scale)
 }
 
-/// What an estimate leaves of the displacement, rows × n, in units of the stated noise: independent
+/// Returns the residual of the displacement, rows × n, in units of the stated noise: independent
 /// numbers with E|r|² = 1 if the machine and the noise are as stated. Nothing if the noise is not
 /// stated, or some of it is none at all.
 pub(crate) fn in_units_of_noise(

@@ -5,7 +5,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::ends::{self, Ends};
 use super::misfit::Misfit;
-use super::multi_start::{Found, Plausible};
+use super::multi_start::{GlobalMinimum, Plausible};
 use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum};
@@ -112,11 +112,11 @@ pub(super) fn plausible(expected: Option<f64>, spare: f64, known: f64) -> Plausi
     Plausible { expected, factor: 1.0 + PLAUSIBLE * spread }
 }
 
-/// How the covariance follows from the Fisher information.
+/// Scale of the covariance relative to the inverse of the Fisher information.
 pub(super) struct Scale {
     /// Power of the noise over that of the weights.
     pub(super) level: f64,
-    /// By which the covariance is larger for weights that are uncertain, where nothing better is known.
+    /// Factor by which the covariance is larger for weights that are uncertain, where nothing better is known.
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
     pub(super) degrees_of_freedom: usize,
@@ -129,12 +129,12 @@ pub(super) fn finish(
     data: &FrequencyData,
     unknowns: &Unknowns,
     misfit: &mut Misfit<'_>,
-    found: &Found,
+    best: &GlobalMinimum,
     scale: Scale,
 ) -> Result<OutputErrorFit, EstimateError> {
     let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
-    let (entries, tau) = parts(data, &found.minimum.theta);
+    let (entries, tau) = parts(data, &best.minimum.theta);
     let of_ends = covariance.view((entries.len(), entries.len()), (tau.len(), tau.len()));
     let ends = EndLoads::of(data, tau, of_ends * scale.level);
     let covariance = covariance.view((0, 0), (entries.len(), entries.len())).into_owned();
@@ -165,15 +165,15 @@ pub(super) fn finish(
         estimate,
         misfit_ratio: scale.misfit_ratio,
         deviance: scale.deviance,
-        steps: found.minimum.steps,
-        searches: found.searches,
-        agreeing: found.agreeing,
+        steps: best.minimum.steps,
+        searches: best.searches,
+        agreeing: best.agreeing,
         noise: scale.noise,
         ends,
     })
 }
 
-/// What is known of weights that were estimated, the loads of open ends taken as known.
+/// Finds the uncertainty of weights that were estimated, the loads of open ends taken as known.
 pub(super) fn uncertain_weights(
     data: &FrequencyData,
     unknowns: &Unknowns,

@@ -23,7 +23,7 @@ pub struct RepeatedPeriods {
     /// Periods to come, by which they are split into halves.
     expected: usize,
     count: usize,
-    /// Of all periods, and of the first and the second half of those expected: lines × 2n, first the
+    /// Sums of all periods, and of the first and the second half of those expected: lines × 2n, first the
     /// motions as measured, then the forces.
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
@@ -211,7 +211,7 @@ impl RepeatedPeriods {
         )
     }
 
-    /// Whether the force is the same in every period, to rounding: a computed one, not measured.
+    /// Returns whether the force is the same in every period, to rounding: a computed one, not measured.
     fn force_repeats(&self) -> bool {
         let (n, count) = (self.dof, self.count as f64);
         let scatter = self.scatter.iter().map(|s| (n..2 * n).map(|i| s[(i, i)].re).sum::<f64>());

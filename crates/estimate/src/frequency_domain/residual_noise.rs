@@ -4,7 +4,7 @@ use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::misfit::Misfit;
-use super::multi_start::{Found, search};
+use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
     OutputErrorFit, Scale, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
@@ -31,7 +31,7 @@ const KEPT: f64 = 0.1;
 
 /// A fit and the noise by which it was weighted.
 struct Weighted {
-    fit: Found,
+    fit: GlobalMinimum,
     noise: NoiseSpectrum,
 }
 
@@ -83,7 +83,7 @@ fn with_white_noise(
 ) -> Result<(Weighted, bool), EstimateError> {
     let measured = measured_size(data, data.displacement());
     let mut levels = measured.clone();
-    let mut last: Option<Found> = None;
+    let mut last: Option<GlobalMinimum> = None;
     for _ in 0..MAX_ROUNDS {
         let noise = white_noise(data, &levels)?;
         let mut misfit = Misfit::new(data, unknowns, &noise)?;
@@ -95,21 +95,21 @@ fn with_white_noise(
             }
             Some(before) => before.followed(&mut misfit)?,
         };
-        let found = measured_size(data, &misfit.errors());
+        let sizes = measured_size(data, &misfit.errors());
         // Only the ratios between the channels weigh; the common level is the residual's.
-        let common = found[0] / levels[0];
+        let common = sizes[0] / levels[0];
         let settled =
-            found.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
+            sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
         // Rounding has no level that could settle.
-        let exact = found.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
+        let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
         if settled || exact || data.dof() == 1 {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
         }
         last = Some(fit);
         // A channel without any residual must not take all the weight.
-        let least = found.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
-        levels = found.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
+        let least = sizes.iter().zip(&levels).map(|(f, l)| f / l).fold(0.0, f64::max) * 1e-6;
+        levels = sizes.iter().zip(&levels).map(|(f, l)| f.max(l * least)).collect();
     }
     let (searches, steps) = last.map_or((0, 0), |fit| (fit.searches, fit.minimum.steps));
     Err(EstimateError::NotConverged { searches, steps })

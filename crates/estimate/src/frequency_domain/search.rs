@@ -30,7 +30,7 @@ pub(super) trait SumOfSquares {
     fn curvature(&self, coordinates: &Coordinates, step: &DVector<f64>) -> DVector<f64>;
 }
 
-/// Where a search ended.
+/// End of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub theta: DVector<f64>,
@@ -42,7 +42,7 @@ pub(super) struct Minimum {
 /// A step that promises less than this share of the cost ends the search: about
 /// 10⁻⁶·√(residuals) standard errors.
 const COST_TOLERANCE: f64 = 1e-12;
-/// So does one smaller than this share of the parameters, for data without noise.
+/// Step, as a fraction of the parameters, below which a search ends, too, for data without noise.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// First damping, against a Gram matrix of unit diagonal.
 const FIRST_DAMPING: f64 = 1e-8;
@@ -76,6 +76,7 @@ pub(super) fn minimise(
     problem.accept();
     let mut damping = 0.0;
     for steps in 0..max_steps {
+        log::trace!("step {}, sum of squares {cost:.4e}", steps + 1);
         let equations = problem.normal_equations()?;
         let NormalEquations { gram, gradient, coordinates } = &equations;
         let undamped = Cholesky::new(gram, 0.0);

@@ -22,7 +22,7 @@ const ROUNDS: usize = 4;
 
 /// Linear estimates from spectra, each equation of motion by itself.
 pub(super) struct Starts<'a> {
-    /// Of open records those under a window that leaves little of their ends.
+    /// Data as measured; of open records those under a window that leaves little of their ends.
     data: Cow<'a, FrequencyData>,
     /// Number of unknown loads of these ends, which start at zero.
     ends: usize,
@@ -38,7 +38,7 @@ struct Equation {
     parameters: Vec<(usize, Parameter)>,
 }
 
-/// How noise on the regressors is treated.
+/// Treatment of noise on the regressors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     /// Taken for none: ordinary least squares.
@@ -94,7 +94,7 @@ impl<'a> Starts<'a> {
         let weighted = weighted_equation_errors(&self.data, self.unknowns);
         let single = self.estimate(Kind::Total, &self.powers(0)).into_iter();
         let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
-        let single = single.chain(weighted.map(|found| values(&found)));
+        let single = single.chain(weighted.map(|solution| values(&solution)));
         let all = std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start]));
         let with_ends = |start: DVector<f64>| {
             let len = start.len() + self.ends;

@@ -12,12 +12,12 @@ const SENSITIVITIES: usize = 1 << 20;
 pub(super) struct WeightUncertainty {
     /// Added to the inverse of the Fisher information.
     pub(super) excess: DMatrix<f64>,
-    /// Of the variance of the parameter that has the fewest.
+    /// Degrees of freedom of the variance of the parameter that has the fewest.
     pub(super) degrees_of_freedom: f64,
 }
 
 impl WeightUncertainty {
-    /// Of an estimate at `values`, weighted by `noise`; `None` where the noise is no smooth spectrum or the
+    /// Judges an estimate at `values`, weighted by `noise`; `None` where the noise is no smooth spectrum or the
     /// fit is a large one.
     ///
     /// With log powers B β of unit information times ν, orthonormal sensitivities Q and

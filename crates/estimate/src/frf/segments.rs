@@ -94,9 +94,9 @@ impl Segments {
         };
         let overlapping = len.div_ceil(hop);
         let at = |lines: usize| (0..overlapping).map(|apart| common(apart, lines)).sum::<f64>();
-        let own = at(0);
+        let at_zero = at(0);
         let mut correlation: Vec<f64> =
-            (0..FARTHEST_LINES.min(len)).map(|lines| at(lines) / own).collect();
+            (0..FARTHEST_LINES.min(len)).map(|lines| at(lines) / at_zero).collect();
         let tied = correlation.iter().rposition(|c| *c >= INDEPENDENT).unwrap_or(0);
         correlation.truncate(tied + 1);
         correlation
@@ -110,7 +110,7 @@ impl Segments {
         }
     }
 
-    /// What the samples of a piece are weighted with, if anything.
+    /// Returns the window over the samples of a piece; `None` for none.
     pub(super) fn weights(self) -> Result<Option<Vec<f64>>, EstimateError> {
         match self {
             Segments::Periods(_) => Ok(None),

@@ -79,9 +79,13 @@ impl BlockScores {
     }
 
     /// (B − 1)/B Σ d dᵀ over B blocks, d = (AᵀA − A_bᵀA_b)⁻¹ s_b being the change of the estimate
-    /// without block b, and `inverse` = (AᵀA)⁻¹; with the degrees of freedom of the parameter that has
-    /// least. `None` if a parameter rests on one block alone.
-    pub(super) fn covariance(&self, inverse: &DMatrix<f64>) -> Option<(DMatrix<f64>, usize)> {
+    /// without block b, and `inverse` = (AᵀA)⁻¹; with the degrees of freedom of that of the first
+    /// `wanted` parameters that has least. `None` if a parameter rests on one block alone.
+    pub(super) fn covariance(
+        &self,
+        inverse: &DMatrix<f64>,
+        wanted: usize,
+    ) -> Option<(DMatrix<f64>, usize)> {
         let blocks = self.blocks.len() as f64;
         let mut sum = DMatrix::zeros(self.parameters, self.parameters);
         for (score, gram) in &self.blocks {
@@ -93,13 +97,14 @@ impl BlockScores {
             }
             sum.ger(1.0, &change, &change, 1.0);
         }
-        Some((sum * ((blocks - 1.0) / blocks), self.degrees_of_freedom(inverse)))
+        Some((sum * ((blocks - 1.0) / blocks), self.degrees_of_freedom(inverse, wanted)))
     }
 
     /// Satterthwaite's degrees of freedom of a variance to which the blocks contribute as unequally as
-    /// they carry information, (Σ w)²/Σ w² − 1 with w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk; of the
-    /// parameter k that has least.
-    fn degrees_of_freedom(&self, inverse: &DMatrix<f64>) -> usize {
+    /// they carry information, (Σ w)²/Σ w² − 1 with w = \[(AᵀA)⁻¹ A_bᵀA_b (AᵀA)⁻¹\]_kk; of that of the
+    /// first `wanted` parameters k that has least. An initial state, which stands behind them, rests on
+    /// the first block alone and says nothing of the others.
+    fn degrees_of_freedom(&self, inverse: &DMatrix<f64>, wanted: usize) -> usize {
         let mut sums = DVector::<f64>::zeros(self.parameters);
         let mut squares = DVector::<f64>::zeros(self.parameters);
         for (_, gram) in &self.blocks {
@@ -108,7 +113,8 @@ impl BlockScores {
             sums += variances;
         }
         let of = |(sum, square): (&f64, &f64)| sum * sum / square - 1.0;
-        let least = sums.iter().zip(squares.iter()).map(of).fold(f64::INFINITY, f64::min);
+        let each = sums.iter().zip(squares.iter()).take(wanted).map(of);
+        let least = each.fold(f64::INFINITY, f64::min);
         // Never more than blocks, never less than one.
         (least as usize).clamp(1, self.blocks.len().max(2) - 1)
     }

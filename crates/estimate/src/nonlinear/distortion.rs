@@ -141,16 +141,16 @@ fn level(
             Some((0..free.len()).map(of).sum::<f64>())
         }
     };
-    let found = power(&off)?;
-    let above = (found - noise.unwrap_or(0.0)).max(0.0);
+    let total = power(&off)?;
+    let above = (total - noise.unwrap_or(0.0)).max(0.0);
     Ok(Some(Level {
         db: 10.0 * (above / power(&on)?).log10(),
         lines: free.len(),
-        over_noise: noise.map(|noise| if noise > 0.0 { found / noise } else { f64::INFINITY }),
+        over_noise: noise.map(|noise| if noise > 0.0 { total / noise } else { f64::INFINITY }),
     }))
 }
 
-/// What a linear model leaves of the force, and the kinds of terms by what they explain of it.
+/// Returns the part of the force that a linear model leaves, and the kinds of terms by what they explain of it.
 fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind>), EstimateError> {
     let (terms, names) = candidates(data.dof())?;
     // As responses for how much a kind explains; as likely as can be for whether that is chance.
@@ -158,7 +158,7 @@ fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind
     let chance = OneByOne::new(data, unknowns, &terms, Weighting::Automatic)?;
     let spare = chance.spare as f64;
     let fisher = FisherSnedecor::new(1.0, spare).expect("positive degrees of freedom");
-    let mut found = Vec::new();
+    let mut kinds = Vec::new();
     for (at, (term, name)) in terms.iter().zip(names).enumerate() {
         let (after, _) = chance.with(at)?;
         let fall = (chance.without - after).max(0.0);
@@ -167,10 +167,10 @@ fn kinds(data: &SteadyExperiments, unknowns: &Unknowns) -> Result<(f64, Vec<Kind
         let (after, coefficient) = size.with(at)?;
         let before = size.without;
         let explained = if before > 0.0 { (1.0 - after / before).max(0.0) } else { 0.0 };
-        found.push(Kind { term: term.clone(), name, coefficient, explained, p_value });
+        kinds.push(Kind { term: term.clone(), name, coefficient, explained, p_value });
     }
-    found.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-    Ok(((size.without / size.all).sqrt(), found))
+    kinds.sort_by(|a, b| b.explained.total_cmp(&a.explained));
+    Ok(((size.without / size.all).sqrt(), kinds))
 }
 
 /// A linear fit that one term after the other joins.
@@ -203,12 +203,12 @@ impl OneByOne {
         let linear: Vec<usize> = (0..equations.free.len()).collect();
         let all = rows.triangle().column(equations.count()).norm_squared();
         let spare = equations.equations().saturating_sub(linear.len() + 1).max(1);
-        let mut found = Self { rows, linear, all, without: 0.0, spare };
-        found.without = found.solve(&found.linear)?.0;
-        Ok(found)
+        let mut sizes = Self { rows, linear, all, without: 0.0, spare };
+        sizes.without = sizes.solve(&sizes.linear)?.0;
+        Ok(sizes)
     }
 
-    /// What is left with one of the terms, and its coefficient.
+    /// Returns the part that is left with one of the terms, and its coefficient.
     fn with(&self, term: usize) -> Result<(f64, f64), EstimateError> {
         self.solve(&[&self.linear[..], &[self.linear.len() + term]].concat())
     }
@@ -274,14 +274,14 @@ impl fmt::Display for Distortion {
                 )?;
             }
         }
-        let mut told = |name: &str, level: Option<Level>| match level {
+        let mut write_level = |name: &str, level: Option<Level>| match level {
             Some(level) if level.db.is_finite() => {
                 write!(f, "; {name} distortion {:.0} dB against the response", level.db)
             }
             Some(_) => write!(f, "; no {name} distortion above the noise"),
             None => Ok(()),
         };
-        told("even", self.even)?;
-        told("odd", self.odd)
+        write_level("even", self.even)?;
+        write_level("odd", self.odd)
     }
 }

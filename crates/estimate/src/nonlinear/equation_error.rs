@@ -115,7 +115,7 @@ pub(super) fn weighted(
     unreachable!("the last round returns")
 }
 
-/// Whether two sets of weights differ by a common factor of each equation and little else.
+/// Returns whether two sets of weights differ by a common factor of each equation and little else.
 fn settled(before: &DMatrix<f64>, after: &DMatrix<f64>, tolerance: f64) -> bool {
     before.column_iter().zip(after.column_iter()).all(|(before, after)| {
         let scale = after.norm() / before.norm();
@@ -264,7 +264,7 @@ impl Fit {
                 scores.push(blocks, &parts);
             }
             let count = scores.count();
-            if let Some((covariance, freedom)) = scores.covariance(inverse) {
+            if let Some((covariance, freedom)) = scores.covariance(inverse, parameters) {
                 return (covariance, StandardErrors::Blocks(count), freedom);
             }
         }
@@ -308,7 +308,7 @@ fn named<'a>(
     entries.chain(terms).chain(shape.names())
 }
 
-/// What the residual force makes of displacement through the linear part, as a part of the
+/// Returns the displacement that the residual force causes through the linear part, as a part of the
 /// displacement, on the lines of the fit.
 fn unexplained(
     equations: &Equations<'_>,

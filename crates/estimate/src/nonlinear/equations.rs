@@ -27,7 +27,7 @@ pub(super) struct Equations<'a> {
     terms: usize,
     /// Lines of the rows; line 0 is the first if a term is a constant force.
     pub(super) rows: Vec<usize>,
-    /// Of each equation the coefficients and their places among the parameters.
+    /// Coefficients of each equation and their places among the parameters.
     coefficients: Vec<Vec<(usize, Coefficient)>>,
     /// Factor of each row and equation that makes all of one variance under white noise, 0 where the
     /// equation does not hold: rows × degrees of freedom.
@@ -89,7 +89,7 @@ impl<'a> Equations<'a> {
         self.data.omega(self.rows[row])
     }
 
-    /// What a coefficient multiplies in the equation it belongs to.
+    /// Returns the quantity that a coefficient multiplies in the equation it belongs to.
     fn entry(&self, columns: &Columns, row: usize, coefficient: Coefficient) -> Complex<f64> {
         match coefficient {
             Coefficient::Entry(parameter) => {
@@ -200,7 +200,7 @@ impl<'a> Equations<'a> {
         })
     }
 
-    /// Whether a coefficient stands in the equation of this degree of freedom.
+    /// Returns whether a coefficient stands in the equation of this degree of freedom.
     pub(super) fn concerns(&self, dof: usize) -> bool {
         !self.coefficients[dof].is_empty()
     }

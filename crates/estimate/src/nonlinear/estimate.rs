@@ -124,7 +124,7 @@ impl NonlinearEstimate {
         &self.unexplained
     }
 
-    /// For each term the largest displacement (m) and velocity (m/s) of its coordinate in the data.
+    /// Returns for each term the largest displacement (m) and velocity (m/s) of its coordinate in the data.
     /// Beyond them the term is extrapolated.
     pub fn ranges(&self) -> &[[f64; 2]] {
         &self.ranges

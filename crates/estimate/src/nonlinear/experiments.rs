@@ -38,7 +38,7 @@ struct Steady {
     displacement: DMatrix<Complex<f64>>,
 }
 
-/// What stands in the equations of one experiment at the rows of a fit.
+/// Columns of the equations of one experiment at the rows of a fit.
 pub(super) struct Columns {
     /// Rows × degrees of freedom.
     pub(super) force: DMatrix<Complex<f64>>,
@@ -176,6 +176,20 @@ impl SteadyExperiments {
         (0..self.dof).map(signal).collect()
     }
 
+    /// Displacement of every experiment, corrected for what the channels do to it: lines × degrees of
+    /// freedom.
+    pub(super) fn displacements(&self, channels: &ChannelPhase) -> Vec<DMatrix<Complex<f64>>> {
+        let corrections = self.corrections(channels);
+        let corrected = |one: &Steady| {
+            let mut lines = one.displacement.clone();
+            for (mut row, [_, correction]) in lines.row_iter_mut().zip(&corrections) {
+                row.iter_mut().for_each(|line| *line *= *correction);
+            }
+            lines
+        };
+        self.steady.iter().map(corrected).collect()
+    }
+
     fn corrections(&self, channels: &ChannelPhase) -> Vec<[Complex<f64>; 2]> {
         let half = 0.5 * self.period.len() as f64;
         let at = |n: usize| channels.corrections(self.omega(n), n as f64 / half);
@@ -189,10 +203,10 @@ impl SteadyExperiments {
     /// The largest |q| (m) and |q̇| (m/s) of all experiments, for the coordinate of each term.
     pub(super) fn ranges(&self, terms: &Terms, channels: &ChannelPhase) -> Vec<[f64; 2]> {
         let corrections = self.corrections(channels);
-        let mut found = vec![[0.0f64; 2]; terms.len()];
+        let mut ranges = vec![[0.0f64; 2]; terms.len()];
         for steady in &self.steady {
             let signals = self.signals(steady, &corrections, terms);
-            for (term, range) in terms.iter().zip(&mut found) {
+            for (term, range) in terms.iter().zip(&mut ranges) {
                 for k in 0..FINER * self.period.len() {
                     for (kind, largest) in range.iter_mut().enumerate() {
                         let of = |dof: usize| signals[dof].as_ref().map_or(0.0, |s| s[kind][k]);
@@ -202,6 +216,6 @@ impl SteadyExperiments {
                 }
             }
         }
-        found
+        ranges
     }
 }

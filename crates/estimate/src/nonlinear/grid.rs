@@ -16,7 +16,7 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// For lines 0 to `lines` − 1, all of them below half of `samples`.
+    /// Makes the grid for lines 0 to `lines` − 1, all of them below half of `samples`.
     pub(super) fn new(lines: usize, samples: usize) -> Self {
         let (forward, inverse) = (transform::forward(samples), transform::inverse(samples));
         Self { lines, samples, forward, inverse }

@@ -16,7 +16,7 @@ pub(super) trait SumOfSquares {
     fn jacobian(&self, jacobian: &mut DMatrix<f64>);
 }
 
-/// Where a search ended.
+/// End of a search.
 #[derive(Debug, Clone)]
 pub(super) struct Minimum {
     pub theta: DVector<f64>,
@@ -27,7 +27,7 @@ pub(super) struct Minimum {
 /// A step that promises less than this share of the cost ends the search: about
 /// 10⁻⁶·√(residuals) standard errors.
 const COST_TOLERANCE: f64 = 1e-12;
-/// So does one smaller than this share of the parameters, for data without noise.
+/// Step, as a fraction of the parameters, below which a search ends, too, for data without noise.
 const STEP_TOLERANCE: f64 = 1e-12;
 /// More steps than this mean that the start was not near a minimum.
 const MAX_STEPS: usize = 60;

@@ -13,6 +13,7 @@
 //! | choose terms | [`select_terms`] |
 //! | fit steady periods, fast and without start values | [`equation_error`] on [`SteadyExperiments`] |
 //! | fit any record, without bias from noise on the response | [`output_error`], started from it |
+//! | look at the restoring force, within the data and beyond | [`NonlinearEstimate::restoring_forces`], [`NonlinearEstimate::extrapolations`] |
 //! | predict a response | [`predict()`], from the [`fitted_start`] |
 
 mod channel_phase;
@@ -26,6 +27,7 @@ mod grid;
 mod levenberg_marquardt;
 mod output_error;
 mod predict;
+mod restoring;
 mod selection;
 mod shape;
 mod simulate;
@@ -38,6 +40,7 @@ pub use estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
 pub use experiments::SteadyExperiments;
 pub use output_error::{NonlinearFit, SteppedRecord, output_error};
 pub use predict::{fitted_start, predict};
+pub use restoring::{Extrapolation, REACH, RestoringForce};
 pub use selection::{Criterion, Selection, SelectionStep, select_terms};
 pub use shape::ShapeConstants;
 pub use weighting::Weighting;

@@ -368,7 +368,7 @@ impl<'a> Problem<'a> {
                 scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
             }
             let count = scores.count();
-            if let Some((covariance, freedom)) = scores.covariance(inverse) {
+            if let Some((covariance, freedom)) = scores.covariance(inverse, self.shared.len()) {
                 return (covariance, StandardErrors::Blocks(count), freedom);
             }
         }

@@ -11,11 +11,17 @@ use crate::{EstimateError, LeastSquares, Unknowns};
 
 /// Criterion by which a term is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
 pub enum Criterion {
     /// The extended Bayesian information criterion: the misfit must fall by more than its
     /// logarithmic price for a parameter chosen among so many. Because it takes the residual as
-    /// white, the coefficient must also differ from zero by its standard error over blocks of time,
-    /// at 1 % for all candidates together.
+    /// white, the terms added are looked at again when all are there: one whose coefficient does not
+    /// differ from zero by its standard error over blocks of time, at 1 % for all candidates together,
+    /// is removed.
     ///
     /// # Source
     /// Chen & Chen (2008), Biometrika 95, 759–771.
@@ -38,6 +44,8 @@ pub struct Selection {
     pub steps: Vec<SelectionStep>,
     /// The candidate that would have come next, and was not worth it.
     pub refused: Option<SelectionStep>,
+    /// Names of the terms that were added and removed again, the least certain first.
+    pub removed: Vec<String>,
 }
 
 /// One step of a selection.
@@ -59,7 +67,8 @@ const LEVEL: f64 = 0.05;
 const ZERO: f64 = 0.01;
 
 /// Adds to the terms given, one after the other, the candidate that lowers the equation error most, as
-/// long as the criterion finds it worth it.
+/// long as the criterion finds it worth it, and removes those that turn out to be uncertain
+/// ([`Criterion::Information`]).
 ///
 /// Rows are weighted by what a fit with all candidates leaves, so that no missing term shapes the
 /// weights. Constants inside the laws are kept as they are.
@@ -103,7 +112,7 @@ pub fn select_terms(
     let mut before = judge.misfit(&chosen)?;
     let mut steps = vec![judge.step(None, &before, chosen.len())];
     let mut terms = given.clone();
-    loop {
+    let refused = loop {
         let mut best: Option<(usize, Misfit)> = None;
         for at in (base..equations.count()).filter(|at| !chosen.contains(at)) {
             let misfit = judge.misfit(&[&chosen[..], &[at]].concat())?;
@@ -112,36 +121,63 @@ pub fn select_terms(
             }
         }
         let Some((at, after)) = best else {
-            return Ok(Selection { terms, steps, refused: None });
+            break None;
         };
         let term: &Term = all.iter().nth(at - equations.free.len()).expect("one of all terms");
         let step = judge.step(Some(term.name().to_owned()), &after, chosen.len() + 1);
-        let longer = terms.and(term.clone())?;
-        let worth = judge.better(&before, &after, chosen.len())
-            && (criterion == Criterion::HeldOut || {
-                let options = EquationErrorOptions { weighting, ..Default::default() };
-                let fit = equation_error(data, unknowns, &longer, &options)?;
-                let estimate = fit.parameter(term.name())?.estimate;
-                let [low, high] = estimate.interval(1.0 - ZERO / candidates.len() as f64)?;
-                low > 0.0 || high < 0.0
-            });
-        if !worth {
-            return Ok(Selection { terms, steps, refused: Some(step) });
+        if !judge.better(&before, &after, chosen.len()) {
+            break Some(step);
         }
-        terms = longer;
+        terms = terms.and(term.clone())?;
         chosen.push(at);
         steps.push(step);
         before = after;
+    };
+    let mut removed = Vec::new();
+    if criterion == Criterion::Information {
+        let options = EquationErrorOptions { weighting, ..Default::default() };
+        while let Some(name) = uncertain(data, unknowns, &terms, candidates, &options)? {
+            let mut kept = terms.iter().filter(|term| term.name() != name).cloned();
+            terms = kept.try_fold(Terms::none(), |kept, term| kept.and(term))?;
+            removed.push(name);
+        }
     }
+    Ok(Selection { terms, steps, refused, removed })
+}
+
+/// Returns the least certain of the candidates among some terms, if its coefficient is not
+/// distinguishable from zero.
+fn uncertain(
+    data: &SteadyExperiments,
+    unknowns: &Unknowns,
+    terms: &Terms,
+    candidates: &Terms,
+    options: &EquationErrorOptions,
+) -> Result<Option<String>, EstimateError> {
+    let is_candidate = |term: &&Term| candidates.iter().any(|other| other.name() == term.name());
+    if !terms.iter().any(|term| is_candidate(&term)) {
+        return Ok(None);
+    }
+    let fit = equation_error(data, unknowns, terms, options)?;
+    let mut least: Option<(f64, String)> = None;
+    for term in terms.iter().filter(is_candidate) {
+        let estimate = fit.parameter(term.name())?.estimate;
+        let [low, high] = estimate.interval(1.0 - ZERO / candidates.len() as f64)?;
+        let certainty = estimate.value.abs() / estimate.standard_error;
+        if low <= 0.0 && high >= 0.0 && least.as_ref().is_none_or(|(least, _)| certainty < *least) {
+            least = Some((certainty, term.name().to_owned()));
+        }
+    }
+    Ok(least.map(|(_, name)| name))
 }
 
 /// Weighted squares that some columns leave.
 struct Misfit {
-    /// Of all experiments, fitted together.
+    /// Sum of all experiments, fitted together.
     fitted: f64,
-    /// Of all experiments without any model.
+    /// Sum of all experiments without any model.
     all: f64,
-    /// Of each experiment, by the fit to the others; empty where they are not held out.
+    /// Sum of each experiment, by the fit to the others; empty where they are not held out.
     held_out: Vec<f64>,
 }
 

@@ -205,7 +205,7 @@ struct Projected<'a> {
     at: Option<Point>,
 }
 
-/// Where the residual was last evaluated.
+/// Point at which the residual was last evaluated.
 struct Point {
     shape: Shape,
     columns: Vec<Columns>,

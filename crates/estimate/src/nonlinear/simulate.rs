@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::EstimateError;
 
-/// What a response is differentiated by.
+/// Quantity that a response is differentiated by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Direction {
     /// An entry of the initial state: displacements, then velocities.
@@ -63,12 +63,12 @@ impl FineForce {
             Extent::WholePeriod => force.clone(),
             Extent::Open => mirrored(force)?,
         };
-        let mut found = Self::new(force.len(), &period, FEWEST_STEPS.max(needed as usize))?;
+        let mut grid = Self::new(force.len(), &period, FEWEST_STEPS.max(needed as usize))?;
         let mut tangent = Tangent::new(system, &[]);
-        let mut before = tangent.run(&found, start);
-        while 2 * found.steps <= MOST_STEPS {
-            found = Self::new(force.len(), &period, 2 * found.steps)?;
-            let after = tangent.run(&found, start);
+        let mut before = tangent.run(&grid, start);
+        while 2 * grid.steps <= MOST_STEPS {
+            grid = Self::new(force.len(), &period, 2 * grid.steps)?;
+            let after = tangent.run(&grid, start);
             if let (Some(before), Some(after)) = (&before, &after) {
                 let n = system.dof();
                 let of = |course: &Course| course.state.columns(0, n).into_owned();
@@ -78,7 +78,7 @@ impl FineForce {
             }
             before = after;
         }
-        Ok(found)
+        Ok(grid)
     }
 
     fn new(samples: usize, period: &Record, steps: usize) -> Result<Self, EstimateError> {
@@ -125,7 +125,7 @@ pub(super) struct Tangent<'a> {
 pub(super) struct Course {
     /// Samples × 3n: displacement, velocity, acceleration.
     pub(super) state: DMatrix<f64>,
-    /// Of each direction samples × 3n.
+    /// Derivatives by each direction, samples × 3n.
     pub(super) derivatives: Vec<DMatrix<f64>>,
     /// State and derivatives one sampling interval after the last sample.
     pub(super) end: Vec<f64>,
@@ -184,12 +184,12 @@ impl<'a> Tangent<'a> {
                 if step == 0 {
                     let all = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
                     for (column, course) in all {
-                        let own = 2 * n * column;
+                        let start = 2 * n * column;
                         for entry in 0..2 * n {
-                            course[(sample, entry)] = z[own + entry];
+                            course[(sample, entry)] = z[start + entry];
                         }
                         for dof in 0..n {
-                            course[(sample, 2 * n + dof)] = k1[own + n + dof];
+                            course[(sample, 2 * n + dof)] = k1[start + n + dof];
                         }
                     }
                 }

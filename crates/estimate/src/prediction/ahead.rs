@@ -83,7 +83,7 @@ pub fn missing_force(
     Ok([Record::new(sampling, missing)?, Record::new(sampling, inertia)?])
 }
 
-/// What is left of a column once the others have been fitted to it.
+/// Returns the remainder of a column once the others have been fitted to it.
 fn remainder(columns: DMatrix<f64>, target: DVector<f64>) -> Result<DVector<f64>, EstimateError> {
     let mut factor = TriangularFactor::new(columns.ncols() + 1);
     let right = DMatrix::from_columns(&[target]);
@@ -106,7 +106,7 @@ impl Step {
         velocity: DMatrix<f64>,
     ) -> DMatrix<f64> {
         let (intervals, n) = displacement.shape();
-        let mut found = DMatrix::zeros(intervals, n);
+        let mut predicted = DMatrix::zeros(intervals, n);
         let mut at = At::new(&vec![0.0; 2 * n]);
         for k in 0..intervals {
             let velocities = velocity.row(k) * self.dt;
@@ -115,9 +115,9 @@ impl Step {
                 self.advance(force, sample, &mut at);
             }
             for (column, z) in at.state()[n..].iter().enumerate() {
-                found[(k, column)] = z / self.dt;
+                predicted[(k, column)] = z / self.dt;
             }
         }
-        found
+        predicted
     }
 }

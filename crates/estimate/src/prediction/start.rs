@@ -47,12 +47,12 @@ pub fn fitted_start(
 pub struct StartFit {
     system: SecondOrderSystem,
     discretisation: Discretisation,
-    /// Where the motions have come to that are superposed: free ones from each unit start, and the
+    /// Present states of the motions that are superposed: free ones from each unit start, and the
     /// one from rest under the force.
     runs: Vec<InitialState>,
-    /// Of each channel measured the columns \[free motions | what the forced one leaves\].
+    /// Factor for each measured channel of the columns \[free motions | what the forced one leaves\].
     channels: Vec<TriangularFactor>,
-    /// Of each channel measured the sum of squares.
+    /// Sum of squares of each measured channel.
     sizes: Vec<f64>,
 }
 
@@ -154,11 +154,11 @@ impl StartFit {
             .collect();
         let svd = svd(free)?;
         let floor = UNSEEN * svd.singular_values.max();
-        let mut found = svd.solve(&gap, floor).expect("both sides were computed");
-        for (value, length) in found.iter_mut().zip(lengths) {
+        let mut start = svd.solve(&gap, floor).expect("both sides were computed");
+        for (value, length) in start.iter_mut().zip(lengths) {
             *value = if length > 0.0 { *value / length } else { 0.0 };
         }
-        state(&found, n)
+        state(&start, n)
     }
 }
 

@@ -43,14 +43,14 @@ impl Continuous {
         Ok(this)
     }
 
-    /// How \[A B\] changes with \[Φ − I, Γ\].
+    /// Returns the change of \[A B\] with \[Φ − I, Γ\].
     pub(super) fn derivative(&self, change: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
         let Some(generator) = &self.generator else { return Ok(change / self.dt) };
         let moved = generator.derivative(&self.scaled(change, 1.0))?;
         Ok(self.scaled(&moved, -1.0) / self.dt)
     }
 
-    /// To the state (x, Δt ẋ), or with `power` −1 back to (x, ẋ).
+    /// Transforms to the state (x, Δt ẋ), or with `power` −1 back to (x, ẋ).
     fn scaled(&self, matrix: &DMatrix<f64>, power: f64) -> DMatrix<f64> {
         let (n, factor) = (self.dof, self.dt.powf(power));
         let mut scaled = matrix.clone();

@@ -30,7 +30,7 @@ struct Fitted<'a> {
     continuous: Continuous,
 }
 
-/// How each parameter follows from \[A₂₁ A₂₂ B₂\]: d p = −Σ_j M_ij weight · d(row j).
+/// Dependence of each parameter on \[A₂₁ A₂₂ B₂\]: d p = −Σ_j M_ij weight · d(row j).
 struct Sensitivity {
     equation: usize,
     weight: RowDVector<f64>,
@@ -253,7 +253,7 @@ impl Fitted<'_> {
         free: &[Parameter],
         place: impl Fn(&Parameter) -> usize,
     ) -> Vec<Undetermined> {
-        let mut found = Vec::new();
+        let mut undetermined = Vec::new();
         for direction in &self.regression.solution.undetermined {
             for equation in 0..self.rows.dof() {
                 let parameters = free.iter().filter(|p| p.row() == equation);
@@ -264,11 +264,11 @@ impl Fitted<'_> {
                 // A direction among the forces alone concerns neither C nor K.
                 if !terms.is_empty() {
                     let relative_singular_value = direction.relative_singular_value;
-                    found.push(Undetermined { relative_singular_value, terms });
+                    undetermined.push(Undetermined { relative_singular_value, terms });
                 }
             }
         }
-        found
+        undetermined
     }
 
     /// M ẍ + C ẋ + K x = F with the accelerations that belong to the samples.

@@ -26,7 +26,7 @@ const BLOCK: usize = 256;
 pub struct Transitions {
     dof: usize,
     dt: f64,
-    /// Of the columns \[x | ẋ | F | F⁺ | x⁺ − x | ẋ⁺ − ẋ\].
+    /// Triangular factor of the columns \[x | ẋ | F | F⁺ | x⁺ − x | ẋ⁺ − ẋ\].
     factor: TriangularFactor,
 }
 

@@ -117,6 +117,69 @@ fn coefficients_of_a_prescribed_response_come_out() {
     }
 }
 
+/// Judge: the springs and dampers of the system at the prescribed response, in closed form.
+#[test]
+fn points_of_the_surface_are_those_of_the_springs_and_dampers() {
+    for (system, channels) in [(single("k2: x^2, c2: v^3", vec![40.0, 0.02]), 1), (coupled(), 2)] {
+        let response = prescribed(channels);
+        let force = system.force(&response).unwrap();
+        let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
+        // The mean of x² is no line of the fit: what is compared is the rest.
+        let found =
+            fitted(&all, &system.terms().to_string(), &EquationErrorOptions::default()).unwrap();
+        let points = &found.restoring_forces(&all).unwrap()[0];
+        let mut exact =
+            Record::new(sampling(), DMatrix::zeros(LEN, channels)).unwrap().data().clone();
+        for k in 0..LEN {
+            let at = |record: &Record| record.data().row(k).iter().copied().collect::<Vec<_>>();
+            let mut restoring = vec![0.0; channels];
+            let (x, v) = (at(response.displacement()), at(response.velocity()));
+            system.restoring_force(&x, &v, &mut restoring);
+            exact.row_mut(k).iter_mut().zip(restoring).for_each(|(entry, force)| *entry = force);
+        }
+        let exact = Record::new(sampling(), exact).unwrap().without_mean();
+        let scale = exact.data().amax();
+        let measured = points.measured.without_mean();
+        assert!((measured.data() - exact.data()).amax() < 1e-9 * scale);
+        assert!(points.residual.data().amax() < 1e-9 * scale);
+        let displacement = response.displacement().data();
+        assert!((points.displacement.data() - displacement).amax() < 1e-12);
+        assert!((points.velocity.data() - response.velocity().data()).amax() < 1e-9);
+    }
+}
+
+/// Judge: powers. A cubic spring is held by the data as far as one and a half times its range; of the
+/// fifth order it is not, nor is one that noise drowns.
+#[test]
+fn terms_that_extrapolate_badly_are_told() {
+    let response = prescribed(1);
+    let with = |terms: &str, coefficients: Vec<f64>, noise: f64| {
+        let force = single(terms, coefficients).force(&response).unwrap();
+        let level = mechid_signal::NoiseLevel::FractionOfRms(noise);
+        let force = mechid_signal::noise::add_white(&force, level, 5).unwrap();
+        let all = data(&force, response.displacement(), ResponseQuantity::Displacement);
+        fitted(&all, terms, &EquationErrorOptions::default()).unwrap().extrapolations().unwrap()
+    };
+    for terms in ["k3: x^3", "c2: |v| v", "cx: x^2 v", "c3: v^3"] {
+        let told = with(terms, vec![2.0], 1e-4);
+        assert!(!told[0].is_poor(), "{told:?}");
+    }
+    let fifth = with("k3: x^3, k5: x^5", vec![80.0, 20.0], 1e-4);
+    assert!(!fifth[0].is_poor() && fifth[1].is_poor(), "{fifth:?}");
+    assert!((fifth[0].order - 3.0).abs() < 1e-9 && (fifth[1].order - 5.0).abs() < 1e-9);
+    let x = response.displacement().data().amax();
+    for (at, reach) in [1.0, 1.5].into_iter().enumerate() {
+        let x = reach * x;
+        let [k1, k3, k5] = [900.0 * x, 80.0 * x.powi(3), 20.0 * x.powi(5)];
+        assert!((fifth[1].share[at] / (k5 / (k1 + k3 + k5)) - 1.0).abs() < 0.02, "{fifth:?}");
+    }
+    // The constant force is no growth; noise drowns the damper.
+    let drowned = with("f: x^0, c3: v^3", vec![1.5, 1e-4], 0.3);
+    assert_eq!(drowned.len(), 1);
+    assert!(drowned[0].is_poor() && !drowned[0].grows_fast(), "{drowned:?}");
+    assert!(drowned[0].relative_error[1] > drowned[0].relative_error[0]);
+}
+
 #[test]
 fn velocity_and_acceleration_will_do_for_odd_terms() {
     let system = single("k3: x^3", vec![80.0]);

@@ -74,7 +74,11 @@ fn identify(
     let mean = |record: &Record| record.period_mean(LEN).unwrap();
     let record =
         SteppedRecord { force: mean(force), response: mean(response), extent: Extent::WholePeriod };
-    output_error(&[record], DISPLACEMENT, &start).unwrap().estimate
+    let found = output_error(&[record], DISPLACEMENT, &start).unwrap().estimate;
+    // A start that is estimated rests on the first block alone; the intervals of the rest do not.
+    let freedom = found.linear().degrees_of_freedom();
+    assert!(freedom >= 5, "{freedom} degrees of freedom, {:?}", found.standard_errors());
+    found
 }
 
 /// Coverage of the 95 % interval, and bias in standard deviations, of each parameter.

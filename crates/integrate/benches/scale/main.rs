@@ -19,7 +19,7 @@ use nalgebra_sparse::csr::CsrMatrix;
 
 const DT: f64 = 1e-3;
 
-/// Whether every measurement is only to run once, as `cargo test` lets it.
+/// Returns whether every measurement is only to run once, as `cargo test` lets it.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }

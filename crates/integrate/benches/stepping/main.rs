@@ -50,7 +50,7 @@ fn noise(samples: usize, channels: usize) -> Record {
     Record::new(Sampling::new(1e-3, samples).expect("valid"), data).expect("finite")
 }
 
-/// Whether every measurement is only to run once, as `cargo test` lets it; criterion looks for the
+/// Returns whether every measurement is only to run once, as `cargo test` lets it; criterion looks for the
 /// same word.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")

@@ -53,7 +53,7 @@ impl Band {
         band
     }
 
-    /// Where entry (i, j) is stored.
+    /// Returns the index of entry (i, j).
     fn at(&self, i: usize, j: usize) -> usize {
         j * (2 * self.lower + self.upper + 1) + self.lower + self.upper + i - j
     }
@@ -63,7 +63,7 @@ impl Band {
         self.lower.min(self.n - 1 - j)
     }
 
-    /// How far below the diagonal the pivot of column `j` is taken from.
+    /// Returns the number of rows below the diagonal from which the pivot of column `j` is taken.
     fn pivot(&self, j: usize) -> usize {
         let top = self.at(j, j);
         let column = &self.entries[top..=top + self.below(j)];
@@ -138,7 +138,7 @@ impl BandedLu {
         Ok(Self::packed(&band, widest, exchanges))
     }
 
-    /// Whether elimination without exchanges meets positive pivots only.
+    /// Returns whether elimination without exchanges meets positive pivots only.
     pub(crate) fn has_positive_pivots(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> bool {
         let mut band = Band::of(matrix, ordering);
         (0..band.n).all(|j| {

@@ -70,7 +70,7 @@ pub(crate) fn combination(terms: &[(f64, &CsrMatrix<f64>)]) -> (CsrMatrix<f64>, 
     (matrix, sizes)
 }
 
-/// Whether the symmetric `matrix` is positive definite: whether elimination without exchanges meets
+/// Returns whether the symmetric `matrix` is positive definite: whether elimination without exchanges meets
 /// positive pivots only.
 pub(crate) fn is_positive_definite(matrix: &CsrMatrix<f64>) -> bool {
     BandedLu::has_positive_pivots(matrix, &Ordering::narrowing(matrix.pattern()))

@@ -103,7 +103,7 @@ impl Symmetric {
         shifted.is_definite()
     }
 
-    /// Whether the diagonal entries are positive (or zero) and not (or hardly) less than the rest of
+    /// Returns whether the diagonal entries are positive (or zero) and not (or hardly) less than the rest of
     /// their rows, of which follows that the matrix is positive definite (or semidefinite).
     fn is_dominant(&self, strictly: bool) -> bool {
         let sums = self.row_sums();
@@ -112,9 +112,9 @@ impl Symmetric {
             Self::Sparse(matrix) => matrix.get_entry(i, i).map_or(0.0, |entry| entry.into_value()),
         };
         sums.iter().enumerate().all(|(i, &sum)| {
-            let own = diagonal(i);
-            let rest = sum - own.abs();
-            if strictly { own > rest * (1.0 + 1e-9) } else { own >= rest - NEGATIVE * sum }
+            let pivot = diagonal(i);
+            let rest = sum - pivot.abs();
+            if strictly { pivot > rest * (1.0 + 1e-9) } else { pivot >= rest - NEGATIVE * sum }
         })
     }
 
@@ -138,7 +138,7 @@ impl Symmetric {
 /// The vector of norm 1 in the product by M that comes nearest to the largest eigenvalue of M⁻¹A.
 pub(super) struct Top {
     pub(super) vector: DVector<f64>,
-    /// At most 1: the root of its Rayleigh quotient, in parts of the root of the largest eigenvalue.
+    /// Root of its Rayleigh quotient, as a fraction of the root of the largest eigenvalue.
     pub(super) share: f64,
 }
 

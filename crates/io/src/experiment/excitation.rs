@@ -131,7 +131,7 @@ struct RandomForce {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ImpulseForce {
-    /// In N·s.
+    /// Momentum (N·s).
     momentum: f64,
     #[serde(default)]
     at_s: f64,

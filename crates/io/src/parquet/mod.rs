@@ -3,9 +3,14 @@
 //! The columns are read and written one by one, without Arrow: its crates would double what the
 //! feature costs to compile, and a record is nothing but columns of numbers.
 
+mod pages;
 mod read;
+mod records;
+mod rows;
 mod write;
 
 pub(crate) use self::read::read;
 pub use self::read::read_parquet_metadata;
-pub use self::write::{ParquetColumn, ParquetValues, write_parquet};
+pub use self::records::{ParquetFile, RecordRows};
+pub use self::rows::{ParquetCell, read_parquet_rows};
+pub use self::write::{ParquetColumn, ParquetValues, parquet_bytes, write_parquet};

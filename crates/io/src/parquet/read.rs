@@ -1,6 +1,8 @@
 //! Columns of numbers from Parquet files, row group by row group.
 
+use std::fmt;
 use std::fs::File;
+use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
@@ -8,11 +10,13 @@ use ::parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type};
 use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use ::parquet::data_type::DataType;
 use ::parquet::errors::ParquetError;
-use ::parquet::file::metadata::FileMetaData;
+use ::parquet::file::metadata::{ColumnChunkMetaData, FileMetaData};
 use ::parquet::file::reader::{ChunkReader, FileReader as _, SerializedFileReader};
+use ::parquet::record::reader::RowIter;
 use ::parquet::schema::types::ColumnDescriptor;
 use bytes::Bytes;
 
+use super::pages::{bytes_of, largest_page};
 use crate::IoError;
 use crate::contents::{Column, Contents, Place};
 use crate::limits::{Budget, Limit, Limits};
@@ -20,7 +24,7 @@ use crate::standard::input_name;
 use crate::stated_rates::with_stated_rates;
 
 /// Number of rows decoded at a time.
-const CHUNK_ROWS: usize = 1 << 16;
+pub(super) const CHUNK_ROWS: usize = 1 << 16;
 
 /// Key of the units of the columns, a JSON object such as `{"x": "mm"}`.
 const UNITS: &str = "units";
@@ -30,13 +34,22 @@ const PANDAS_ATTRIBUTES: &str = "PANDAS_ATTRS";
 
 /// Reads the columns of a file.
 pub(crate) fn read(file: &str, bytes: Vec<u8>, limits: &Limits) -> Result<Contents, IoError> {
-    let contents = guarded(|| contents(Bytes::from(bytes), Budget::new(limits)))
-        .map_err(|trouble| trouble.error(file))?;
-    let contents = with_stated_rates(contents);
+    let bytes = Bytes::from(bytes);
+    let contents = guarded(|| {
+        let columns = Columns::new(bytes.clone(), bytes)?;
+        let whole = 0..columns.rows()?;
+        let mut contents = columns.contents(None, std::slice::from_ref(&whole), limits)?;
+        Ok(contents.swap_remove(0))
+    });
+    contents.map_err(|trouble| trouble.error(file)).and_then(|contents| usable(file, contents))
+}
+
+/// Returns contents with the rate that a file states, unless it has no column.
+pub(super) fn usable(file: &str, contents: Contents) -> Result<Contents, IoError> {
     if contents.columns.is_empty() {
         return Err(IoError::Empty { file: file.into(), found: "it has no column" });
     }
-    Ok(contents.with_usual_length())
+    Ok(with_stated_rates(contents).with_usual_length())
 }
 
 /// Reads the keys and values that stand in a Parquet file beside its columns, without the columns.
@@ -50,8 +63,9 @@ pub fn read_parquet_metadata(path: impl AsRef<Path>) -> Result<Vec<(String, Stri
         .map_err(|trouble| trouble.error(&file))
 }
 
-/// What stops the reading.
-enum Trouble {
+/// Reason why the reading stops.
+pub(super) enum Trouble {
+    /// The file contradicts itself.
     Damaged(String),
     /// The limit, and the number of rows read before.
     TooLarge(usize, Limit),
@@ -67,7 +81,16 @@ impl From<ParquetError> for Trouble {
 }
 
 impl Trouble {
-    fn error(self, file: &str) -> IoError {
+    /// Returns it as it is met after so many rows.
+    fn after(self, rows: usize) -> Self {
+        match self {
+            Self::TooLarge(_, limit) => Self::TooLarge(rows, limit),
+            other => other,
+        }
+    }
+
+    /// Returns it as an error of the file.
+    pub fn error(self, file: &str) -> IoError {
         let file = file.to_owned();
         match self {
             Self::Damaged(what) => IoError::Parquet { file, what },
@@ -79,7 +102,7 @@ impl Trouble {
 }
 
 /// Reads something of a file; a panic of the decoder, which damaged files can cause, is an error.
-fn guarded<T>(read: impl FnOnce() -> Result<T, Trouble>) -> Result<T, Trouble> {
+pub(super) fn guarded<T>(read: impl FnOnce() -> Result<T, Trouble>) -> Result<T, Trouble> {
     catch_unwind(AssertUnwindSafe(read))
         .unwrap_or_else(|_| Err(Trouble::Damaged("its contents contradict each other".into())))
 }
@@ -88,40 +111,189 @@ fn reader<R: ChunkReader + 'static>(source: R) -> Result<SerializedFileReader<R>
     SerializedFileReader::new(source)
 }
 
-fn contents(bytes: Bytes, mut budget: Budget) -> Result<Contents, Trouble> {
-    let reader = reader(bytes)?;
-    let metadata = reader.metadata();
-    let stated = Stated::of(metadata.file_metadata());
-    let mut contents =
-        Contents { format: "Parquet".into(), scalars: stated.numbers, ..Contents::default() };
-    let descriptions = metadata.file_metadata().schema_descr_ptr();
-    for (at, description) in descriptions.columns().iter().enumerate() {
-        budget.take_column().map_err(|limit| Trouble::TooLarge(0, limit))?;
-        let name = description.path().parts().join(".");
-        let about = stated.units.iter().find(|(column, _)| *column == name);
-        let about = about.map(|(_, unit)| unit.clone()).unwrap_or_default();
-        let kind = match Kind::of(description) {
-            Ok(kind) => kind,
-            Err(what) => {
-                let root = description.path().parts().first().cloned().unwrap_or_default();
-                // The leaves of a list are called after it.
-                let name = if description.max_rep_level() > 0 { root } else { name };
-                contents.columns.push(Column { about, ..Column::unusable(name, what) });
-                continue;
-            }
-        };
-        let mut values = Vec::new();
-        let mut first = None;
-        for (group, described) in metadata.row_groups().iter().enumerate() {
-            let rows = usize::try_from(described.num_rows())
-                .map_err(|_| Trouble::Damaged("a row group has less than no rows".into()))?;
-            budget.take_numbers(rows).map_err(|limit| Trouble::TooLarge(values.len(), limit))?;
-            let column = reader.get_row_group(group)?.get_column_reader(at)?;
-            kind.append(column, rows, &mut first, &mut values)?;
-        }
-        contents.columns.push(Column { about, ..Column::of_numbers(name, values) });
+/// The columns of an open file.
+pub(super) struct Columns<R: ChunkReader + 'static> {
+    source: R,
+    reader: SerializedFileReader<R>,
+}
+
+impl<R: ChunkReader + 'static> fmt::Debug for Columns<R> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Columns").field("metadata", self.reader.metadata()).finish_non_exhaustive()
     }
-    Ok(contents)
+}
+
+impl<R: ChunkReader + 'static> Columns<R> {
+    /// Reads what a file says of its columns; `source` and `same` are the same file.
+    pub fn new(source: R, same: R) -> Result<Self, Trouble> {
+        Ok(Self { source, reader: reader(same)? })
+    }
+
+    /// Returns the number of rows.
+    pub fn rows(&self) -> Result<usize, Trouble> {
+        let rows = self.group_rows().try_fold(0_usize, |sum, rows| sum.checked_add(rows?));
+        rows.ok_or_else(|| Trouble::Damaged("its row groups have an impossible size".into()))
+    }
+
+    /// Numbers of rows of the row groups; `None` for a negative one.
+    fn group_rows(&self) -> impl Iterator<Item = Option<usize>> {
+        self.reader
+            .metadata()
+            .row_groups()
+            .iter()
+            .map(|group| usize::try_from(group.num_rows()).ok())
+    }
+
+    /// Reads spans of rows, which follow one another, each as the contents of a file of its own; of
+    /// columns that are not `wanted`, by their indices, the name alone.
+    pub fn contents(
+        &self,
+        wanted: Option<&[usize]>,
+        spans: &[Range<usize>],
+        limits: &Limits,
+    ) -> Result<Vec<Contents>, Trouble> {
+        let mut budget = Budget::new(limits);
+        let metadata = self.reader.metadata().file_metadata();
+        let stated = Stated::of(metadata);
+        let empty = || Contents {
+            format: "Parquet".into(),
+            scalars: stated.numbers.clone(),
+            ..Contents::default()
+        };
+        let mut contents: Vec<Contents> = spans.iter().map(|_| empty()).collect();
+        for (at, description) in metadata.schema_descr().columns().iter().enumerate() {
+            budget.take_column().map_err(|limit| Trouble::TooLarge(0, limit))?;
+            let name = description.path().parts().join(".");
+            let about = stated.units.iter().find(|(column, _)| *column == name);
+            let about = about.map(|(_, unit)| unit.clone()).unwrap_or_default();
+            let columns: Vec<Column> = match Kind::of(description) {
+                Err(what) => {
+                    let root = description.path().parts().first().cloned().unwrap_or_default();
+                    // The leaves of a list are called after it.
+                    let name = if description.max_rep_level() > 0 { root } else { name };
+                    spans.iter().map(|_| Column::unusable(name.clone(), what)).collect()
+                }
+                Ok(_) if wanted.is_some_and(|wanted| !wanted.contains(&at)) => spans
+                    .iter()
+                    .map(|_| Column::unusable(name.clone(), "numbers not read"))
+                    .collect(),
+                Ok(kind) => {
+                    let values = self.numbers(at, kind, spans, &mut budget)?.into_iter();
+                    values.map(|values| Column::of_numbers(name.clone(), values)).collect()
+                }
+            };
+            for (contents, column) in contents.iter_mut().zip(columns) {
+                contents.columns.push(Column { about: about.clone(), ..column });
+            }
+        }
+        Ok(contents)
+    }
+
+    /// Reads spans of rows of a column of numbers.
+    fn numbers(
+        &self,
+        at: usize,
+        kind: Kind,
+        spans: &[Range<usize>],
+        budget: &mut Budget,
+    ) -> Result<Vec<Vec<f64>>, Trouble> {
+        let mut values: Vec<Vec<f64>> = vec![Vec::new(); spans.len()];
+        let mut first = vec![None; spans.len()];
+        self.visit(at, spans, &budget.clone(), &mut |column, span, rows| {
+            budget
+                .take_numbers(rows)
+                .map_err(|limit| Trouble::TooLarge(values[span].len(), limit))?;
+            kind.append(column, rows, &mut first[span], &mut values[span])
+        })?;
+        Ok(values)
+    }
+
+    /// Passes a column to `take` at the beginning of every stretch of rows that belongs to a span and a
+    /// row group, with the index of the span and the number of rows, which `take` has to read.
+    pub fn visit(
+        &self,
+        at: usize,
+        spans: &[Range<usize>],
+        budget: &Budget,
+        take: &mut dyn FnMut(&mut ColumnReader, usize, usize) -> Result<(), Trouble>,
+    ) -> Result<(), Trouble> {
+        let mut start = 0_usize;
+        for (group, rows) in self.group_rows().enumerate() {
+            let negative = || Trouble::Damaged("a row group has less than no rows".into());
+            let end = rows.and_then(|rows| start.checked_add(rows)).ok_or_else(negative)?;
+            let within = |span: &Range<usize>| span.start.max(start)..span.end.min(end);
+            if spans.iter().any(|span| !within(span).is_empty()) {
+                let described = self.reader.metadata().row_group(group).column(at);
+                self.check_pages(described, budget).map_err(|trouble| trouble.after(start))?;
+                let mut column = self.reader.get_row_group(group)?.get_column_reader(at)?;
+                let mut position = start;
+                for (index, span) in spans.iter().enumerate() {
+                    let rows = within(span);
+                    if !rows.is_empty() {
+                        skip(&mut column, rows.start - position)?;
+                        take(&mut column, index, rows.len())?;
+                        position = rows.end;
+                    }
+                }
+            }
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Refuses a column whose pages are not in the file, or larger than what may be unpacked.
+    fn check_pages(&self, column: &ColumnChunkMetaData, budget: &Budget) -> Result<(), Trouble> {
+        let damaged = || Trouble::Damaged("the pages of a column contradict its size".into());
+        let len = usize::try_from(self.source.len()).unwrap_or(usize::MAX);
+        let pages = bytes_of(column, len).ok_or_else(damaged)?;
+        let pages = self.source.get_bytes(pages.start as u64, pages.len())?;
+        let allowed = budget.unpacked_bytes();
+        match largest_page(&pages).ok_or_else(damaged)? > allowed {
+            true => Err(Trouble::TooLarge(0, Limit::UnpackedBytes(allowed))),
+            false => Ok(()),
+        }
+    }
+
+    /// Refuses a file of which any column has pages that are not there, or too large.
+    pub fn check_all_pages(&self, budget: &mut Budget) -> Result<(), Trouble> {
+        for group in self.reader.metadata().row_groups() {
+            for column in group.columns() {
+                let values = usize::try_from(column.num_values()).unwrap_or(usize::MAX);
+                budget.take_numbers(values).map_err(|limit| Trouble::TooLarge(0, limit))?;
+                self.check_pages(column, budget)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns the rows, cell by cell.
+    pub fn row_cells(&self) -> Result<RowIter<'_>, Trouble> {
+        Ok(self.reader.get_row_iter(None)?)
+    }
+
+    /// Returns the description of a column.
+    pub fn description(&self, at: usize) -> &ColumnDescriptor {
+        &self.reader.metadata().file_metadata().schema_descr().columns()[at]
+    }
+}
+
+/// Skips rows of a column.
+fn skip(column: &mut ColumnReader, rows: usize) -> Result<(), Trouble> {
+    let skipped = match column {
+        ColumnReader::BoolColumnReader(column) => column.skip_records(rows),
+        ColumnReader::Int32ColumnReader(column) => column.skip_records(rows),
+        ColumnReader::Int64ColumnReader(column) => column.skip_records(rows),
+        ColumnReader::Int96ColumnReader(column) => column.skip_records(rows),
+        ColumnReader::FloatColumnReader(column) => column.skip_records(rows),
+        ColumnReader::DoubleColumnReader(column) => column.skip_records(rows),
+        ColumnReader::ByteArrayColumnReader(column) => column.skip_records(rows),
+        ColumnReader::FixedLenByteArrayColumnReader(column) => column.skip_records(rows),
+    }?;
+    if skipped == rows { Ok(()) } else { Err(short()) }
+}
+
+fn short() -> Trouble {
+    Trouble::Damaged("a column is shorter than its row group".into())
 }
 
 /// Meaning of the numbers of a column.
@@ -177,7 +349,7 @@ impl Kind {
     /// Appends the rows of a row group; `first` is the first instant of the column.
     fn append(
         self,
-        column: ColumnReader,
+        column: &mut ColumnReader,
         rows: usize,
         first: &mut Option<i64>,
         into: &mut Vec<f64>,
@@ -217,7 +389,7 @@ fn per_second(unit: &TimeUnit) -> f64 {
 
 /// Appends so many rows as numbers, NaN where there is none.
 fn append<T: DataType>(
-    mut column: ColumnReaderImpl<T>,
+    column: &mut ColumnReaderImpl<T>,
     rows: usize,
     mut number: impl FnMut(&T::T) -> f64,
     into: &mut Vec<f64>,
@@ -230,7 +402,7 @@ fn append<T: DataType>(
         let at_once = left.min(CHUNK_ROWS);
         let (read, ..) = column.read_records(at_once, Some(&mut levels), None, &mut values)?;
         if read == 0 {
-            return Err(Trouble::Damaged("a column is shorter than its row group".into()));
+            return Err(short());
         }
         if values.len() == read {
             into.extend(values.iter().map(&mut number));
@@ -247,7 +419,7 @@ fn append<T: DataType>(
     Ok(())
 }
 
-/// What a file says beside its columns.
+/// Statements of a file beside its columns.
 struct Stated {
     numbers: Vec<(String, f64)>,
     /// Columns and their units.

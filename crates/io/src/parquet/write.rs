@@ -56,6 +56,15 @@ pub fn write_parquet(
     write_all(Vec::new(), &[OutputFile { path: path.to_owned(), content }])
 }
 
+/// Returns a table of one row group, as [`write_parquet`] writes it.
+///
+/// # Errors
+/// [`IoError::Parquet`] if the columns have not equally many rows.
+pub fn parquet_bytes(columns: &[ParquetColumn]) -> Result<Vec<u8>, IoError> {
+    encoded(columns, &[])
+        .map_err(|error| IoError::Parquet { file: "the table".into(), what: error.to_string() })
+}
+
 fn encoded(
     columns: &[ParquetColumn],
     metadata: &[(&str, String)],

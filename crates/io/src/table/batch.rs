@@ -11,7 +11,7 @@ use crate::contents::{DecimalSign, Lines, Place, Unusable};
 /// Largest number of characters of a field that a message repeats.
 const SHOWN: usize = 40;
 
-/// What is known of a text before its rows are read.
+/// Properties of a text known before its rows are read.
 #[derive(Debug, Clone)]
 pub(super) struct Plan {
     pub layout: Layout,
@@ -42,7 +42,7 @@ pub(super) struct Batch {
     pub samples: usize,
     /// Numbers of the wanted columns, fewer than `samples` in one that is not usable.
     pub columns: Vec<Vec<f64>>,
-    /// Why a wanted column cannot be used.
+    /// Reason why a wanted column cannot be used.
     pub unusable: Vec<Option<Unusable>>,
     /// Lines of the samples.
     pub lines: Lines,
@@ -57,7 +57,7 @@ pub(super) struct Batch {
     fields: Fields,
     /// A number with a point in place of its comma.
     with_point: String,
-    /// What is wrong with fields of the row at hand, by the index of the wanted column.
+    /// Faults of the fields of the row at hand, by the index of the wanted column.
     faults: Vec<(usize, Unusable)>,
 }
 

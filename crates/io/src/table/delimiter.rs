@@ -20,7 +20,7 @@ impl Delimiter {
         }
     }
 
-    /// Whether numbers may have a decimal comma.
+    /// Returns whether numbers may have a decimal comma.
     pub fn allows_decimal_comma(self) -> bool {
         self != Delimiter::Byte(b',')
     }
@@ -29,7 +29,7 @@ impl Delimiter {
 /// First byte of a comment line.
 pub(crate) const COMMENT: u8 = b'#';
 
-/// Whether a line is a comment.
+/// Returns whether a line is a comment.
 pub(crate) fn is_comment(line: &[u8], delimiter: Delimiter) -> bool {
     let first = match delimiter {
         Delimiter::Byte(_) => line.first(),

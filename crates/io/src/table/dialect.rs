@@ -9,7 +9,7 @@ use crate::contents::DecimalSign;
 /// Number of lines from which the delimiter and the decimal sign are found.
 const SAMPLE_LINES: usize = 8;
 
-/// Whether the beginning of a text has as many whole lines as [`detect`] looks at.
+/// Returns whether the beginning of a text has as many whole lines as [`detect`] looks at.
 pub(crate) fn is_sample(start: &[u8], terminator: u8) -> bool {
     // The last line may be cut off, so one more is needed.
     sample(start, terminator).nth(SAMPLE_LINES).is_some()
@@ -104,7 +104,7 @@ pub(crate) fn number(
     Some(Number { value, sign: Some(DecimalSign::Comma) })
 }
 
-/// Whether a field is a number.
+/// Returns whether a field is a number.
 pub(crate) fn is_number(field: &[u8], delimiter: Delimiter) -> bool {
     number(field, delimiter, &mut String::new()).is_some()
 }

@@ -20,7 +20,7 @@ pub(crate) struct Layout {
 /// A row of a text that is neither empty nor a comment.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Row<'a> {
-    /// Without the end of its line.
+    /// Text without the end of its line.
     pub text: &'a [u8],
     /// Offset in the text.
     pub at: usize,

@@ -29,7 +29,7 @@ use self::text::{TextReader, Wanted};
 pub use self::time_axis::TimeAxis;
 use self::unit::without_unit;
 pub use self::unit::{Quantity, Unit};
-use crate::contents::{Axis, Contents, DecimalSign, Place};
+use crate::contents::{Axis, Column, Contents, DecimalSign, Place};
 use crate::limits::ReadOptions;
 use crate::{IoError, escaped, mat, uff};
 
@@ -158,9 +158,29 @@ impl Table {
             Kind::Hdf5 => return Err(IoError::Hdf5 { file }),
             Kind::Unknown => return Err(IoError::UnknownFormat { file }),
         };
-        let names = contents.columns.iter().map(|column| column.name.clone()).collect();
-        let table = Self { file, gzip, utf16, names, contents };
+        let table = Self { gzip, utf16, ..Self::of_contents(file, contents) };
         Ok(FirstRows { table, is_whole, decimal })
+    }
+
+    /// Takes named columns from memory; `name` is that of the table in messages. A unit may stand in the
+    /// name of a column, as in a file; one that holds infinite numbers or NaN is refused where it is used.
+    pub fn from_columns(
+        name: impl Into<String>,
+        columns: impl IntoIterator<Item = (String, Vec<f64>)>,
+    ) -> Self {
+        let columns = columns.into_iter().map(|(name, values)| Column::of_numbers(name, values));
+        let contents = Contents {
+            format: "columns in memory".into(),
+            columns: columns.collect(),
+            ..Contents::default()
+        };
+        Self::of_contents(name.into(), contents.with_usual_length())
+    }
+
+    /// A table of what was read from a file.
+    pub(crate) fn of_contents(file: String, contents: Contents) -> Self {
+        let names = contents.columns.iter().map(|column| column.name.clone()).collect();
+        Self { file, gzip: false, utf16: false, names, contents }
     }
 
     /// Name of the file in messages.

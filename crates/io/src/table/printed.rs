@@ -176,7 +176,7 @@ impl PrintedInstants {
         self.count += 1;
     }
 
-    /// Whether the instants are equally spaced but for rounding by less than the step.
+    /// Returns whether the instants are equally spaced but for rounding by less than the step.
     pub fn are_uniform(&self) -> bool {
         let mut intervals = Intervals::default();
         for (k, time) in self.beginning.iter().enumerate() {
@@ -234,7 +234,7 @@ fn single_unit(value: f64) -> f64 {
     f64::from(single.next_up()) - f64::from(single)
 }
 
-/// Whether a number is a multiple of a unit, as far as a double can tell.
+/// Returns whether a number is a multiple of a unit, as far as a double can tell.
 fn is_multiple(value: f64, unit: f64) -> bool {
     let multiple = value / unit;
     let tolerance = 1e-6 + 4.0 * f64::EPSILON * multiple.abs();

@@ -97,6 +97,12 @@ impl RecordFile {
         Ok(Self { path, options: *options, head, whole, decimal })
     }
 
+    /// Takes a table that was read before as a file held whole.
+    pub fn of_table(table: Table) -> Self {
+        let (path, options) = (PathBuf::from(table.file()), ReadOptions::default());
+        Self { path, options, head: table, whole: true, decimal: None }
+    }
+
     /// The table, with only the first samples if the file is not held whole.
     pub fn head(&self) -> &Table {
         &self.head

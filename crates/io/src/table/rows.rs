@@ -207,7 +207,7 @@ impl Rows {
         }
     }
 
-    /// Whether rows were read on the assumption of another decimal sign than that of the rows before.
+    /// Returns whether rows were read on the assumption of another decimal sign than that of the rows before.
     pub fn contradicts(&self, batch: &Batch) -> bool {
         self.decimal.is_some() && batch.decimal.is_some() && self.decimal != batch.decimal
     }
@@ -217,6 +217,7 @@ impl Rows {
     /// # Errors
     /// [`IoError::Ragged`] and [`IoError::TooLarge`] for a row that does not fit.
     pub fn append(&mut self, batch: &mut Batch) -> Result<(), IoError> {
+        log::trace!("row {}", self.samples + batch.samples);
         let plan = self.plan();
         if batch.samples > 0 {
             for (line, fields) in std::mem::take(&mut self.empty) {
@@ -288,7 +289,7 @@ impl Rows {
         })
     }
 
-    /// Whether more numbers are held than the limit allows.
+    /// Returns whether more numbers are held than the limit allows.
     pub fn check_numbers(&self) -> Result<(), IoError> {
         let width = self.wanted.as_ref().map_or(0, Vec::len);
         if self.samples.saturating_mul(width) > self.limits.numbers {

@@ -132,13 +132,13 @@ fn peek<'a>(
     Ok((head.clone(), Box::new(Cursor::new(head).chain(stream))))
 }
 
-/// Whether the first bytes are the byte order mark of UTF-16, and not that of UTF-32.
+/// Returns whether the first bytes are the byte order mark of UTF-16, and not that of UTF-32.
 fn is_utf16(head: &[u8]) -> bool {
     let little = head.starts_with(&[0xff, 0xfe]) && !head.starts_with(&[0xff, 0xfe, 0, 0]);
     little || head.starts_with(&[0xfe, 0xff])
 }
 
-/// Whether the first bytes are no text: zeros may stand only at its end, where a preallocated file has
+/// Returns whether the first bytes are no text: zeros may stand only at its end, where a preallocated file has
 /// them.
 fn is_binary(head: &[u8]) -> bool {
     let text = head.len() - head.iter().rev().take_while(|b| **b == 0).count();
@@ -147,13 +147,13 @@ fn is_binary(head: &[u8]) -> bool {
         || head[..text].contains(&0)
 }
 
-/// Whether the first bytes are those of Parquet, and not the name of a column in a text.
+/// Returns whether the first bytes are those of Parquet, and not the name of a column in a text.
 fn is_parquet(head: &[u8]) -> bool {
     let rest = head.strip_prefix(b"PAR1").and_then(<[u8]>::first);
     rest.is_some_and(|b| b.is_ascii_control() && !b.is_ascii_whitespace())
 }
 
-/// Whether a text begins as an object of JSON does, or a list of objects.
+/// Returns whether a text begins as an object of JSON does, or a list of objects.
 fn is_json(head: &[u8]) -> bool {
     let text = head.strip_prefix(BYTE_ORDER_MARK).unwrap_or(head);
     let mut marks = text.iter().filter(|b| !b.is_ascii_whitespace());
@@ -169,7 +169,7 @@ pub(crate) fn failed(file: &str, gzip: bool, source: io::Error) -> IoError {
     if gzip { IoError::Gzip { file, source } } else { IoError::Read { file, source } }
 }
 
-/// Whether the first line that is not empty holds -1 in its columns 5 and 6, and the next one the
+/// Returns whether the first line that is not empty holds -1 in its columns 5 and 6, and the next one the
 /// number of a dataset in its first six, or a misplaced 58b.
 fn is_uff(head: &[u8]) -> bool {
     let mut lines =

@@ -30,7 +30,7 @@ pub(super) struct TextReader<'a> {
     rows: Rows,
 }
 
-/// Which columns of a text to read, and what is known of it.
+/// Columns of a text to read, and properties of the text.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Wanted {
     /// Indices of the columns, rising; all if `None`.

@@ -30,9 +30,9 @@ const SAME_STEP: f64 = 1e-5;
 /// The instants of one column.
 #[derive(Debug, Clone, Copy)]
 struct Instants {
-    /// In s.
+    /// First instant (s).
     start: f64,
-    /// In s.
+    /// Time step (s).
     step: f64,
 }
 
@@ -81,8 +81,8 @@ pub(super) fn same_length(
     if lengths.iter().all(|(_, other)| Some(*other) == len) {
         return Ok(len);
     }
-    let told = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));
-    let lengths = told.collect::<Vec<_>>().join(", ");
+    let each = lengths.iter().map(|(c, len)| format!("{} has {len}", table.label(*c)));
+    let lengths = each.collect::<Vec<_>>().join(", ");
     Err(IoError::Lengths { file: table.file().into(), lengths })
 }
 

@@ -29,7 +29,7 @@ pub(super) fn stated(column: &Column) -> Option<f64> {
     named.or_else(|| known(&column.about))
 }
 
-/// Whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.
+/// Returns whether a name is that of a time column: `time`, `t`, `Time_s`, `time [ms]`, `t (s)`.
 pub(super) fn is_time(name: &str) -> bool {
     let (bare, unit) = split(name);
     NAMES.contains(&bare.to_lowercase().as_str()) && (unit.is_some() || bare == name.trim())

@@ -71,7 +71,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Whether a line begins or ends a dataset.
+/// Returns whether a line begins or ends a dataset.
 pub(crate) fn is_mark(line: &[u8]) -> bool {
     line == b"    -1"
 }

@@ -56,8 +56,9 @@ fn datasets(lines: &mut Lines<'_>, mut budget: Budget) -> Result<Contents, Fault
         skip_to_end(lines)?;
     }
     if !skipped.is_empty() {
-        let told: Vec<String> = skipped.iter().map(|(n, count)| format!("{n} ({count})")).collect();
-        contents.remarks.push(format!("left out: datasets {}", told.join(", ")));
+        let counts: Vec<String> =
+            skipped.iter().map(|(n, count)| format!("{n} ({count})")).collect();
+        contents.remarks.push(format!("left out: datasets {}", counts.join(", ")));
     }
     Ok(contents)
 }

@@ -142,7 +142,7 @@ impl Binary {
     }
 }
 
-/// Whether the mark of an end follows so many bytes, at once or on the next line.
+/// Returns whether the mark of an end follows so many bytes, at once or on the next line.
 fn ends_after(bytes: &[u8], len: usize) -> bool {
     let Some(rest) = bytes.get(len..) else { return false };
     let line_end = rest.iter().take_while(|b| matches!(b, b'\n' | b'\r')).count();

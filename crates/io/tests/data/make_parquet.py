@@ -38,3 +38,20 @@ frame.attrs = {"units": {"force": "mN", "x": "mm"}}
 frame.to_parquet("pandas.parquet", compression="gzip")
 pl.from_pandas(frame).write_parquet("polars.parquet", compression="zstd")
 duckdb.sql("COPY frame TO 'duckdb.parquet' (FORMAT parquet)")
+
+# Three records of 100, 120 and 80 rows in five row groups; one sample of the second is not a number.
+lengths = [100, 120, 80]
+broken = force.copy()
+broken[150] = np.nan
+many = pa.table(
+    {
+        "machine": np.repeat(["pump 1", "pump 2", "fan"], lengths),
+        "day": np.repeat(np.array([7, 8, 9], dtype=np.int32), lengths),
+        "again": np.repeat([1, 2, 1], lengths),
+        "named": pa.array([None if i == 5 else "a" for i in k]),
+        "stamp": pa.array(1_700_000_000_000_000_000 + k * 7_812_500, pa.timestamp("ns")),
+        "force": broken,
+        "x": x,
+    }
+)
+pq.write_table(many, "many.parquet", row_group_size=64, data_page_size=128, use_dictionary=["machine", "force"])

@@ -82,8 +82,8 @@ impl UncertainNonlinearSystem {
         let (mut points, mut reached) = (Vec::new(), 0.0);
         for &amplitude in amplitudes {
             require("amplitude of a backbone", amplitude, "positive", amplitude > 0.0)?;
-            let Some(found) = balance.reach(&motion, dof, [reached, amplitude]) else { break };
-            (motion, reached) = (found, amplitude);
+            let Some(next) = balance.reach(&motion, dof, [reached, amplitude]) else { break };
+            (motion, reached) = (next, amplitude);
             let Some(variance) = self.variance(&balance, &motion, dof)? else { break };
             let (omega, standard_error) = (motion.omega, variance.max(0.0).sqrt());
             points.push(BackbonePoint { amplitude, omega, standard_error });
@@ -126,7 +126,7 @@ impl UncertainNonlinearSystem {
 struct Motion {
     /// Degrees of freedom × (harmonics + 1), in m.
     cosines: DMatrix<f64>,
-    /// In rad/s.
+    /// Frequency (rad/s).
     omega: f64,
 }
 
@@ -140,13 +140,13 @@ fn start(system: &NonlinearSystem, mode: usize) -> Result<(Motion, usize), Model
         .iter()
         .filter(|mode| mode.oscillates() && mode.damping_ratio().abs() < UNDAMPED)
         .collect();
-    let found = oscillating
+    let mode = oscillating
         .get(mode)
         .ok_or(ModelError::NoSuchMode { mode: mode + 1, modes: oscillating.len() })?;
-    let dof = found.shape().icamax();
+    let dof = mode.shape().icamax();
     let mut cosines = DMatrix::zeros(linear.dof(), HARMONICS + 1);
-    cosines.set_column(1, &found.shape().map(|entry| (entry / found.shape()[dof]).re));
-    Ok((Motion { cosines, omega: found.damped_frequency() }, dof))
+    cosines.set_column(1, &mode.shape().map(|entry| (entry / mode.shape()[dof]).re));
+    Ok((Motion { cosines, omega: mode.damped_frequency() }, dof))
 }
 
 /// Balance of the harmonics of a free motion without damping.
@@ -175,8 +175,8 @@ impl<'a> Balance<'a> {
             let mut guess = at.clone();
             guess.cosines *= next / at.cosines[(dof, 1)];
             match self.solve(guess, dof, next) {
-                Some(found) if next == amplitude => return Some(found),
-                Some(found) => (at, reached, next) = (found, next, amplitude),
+                Some(motion) if next == amplitude => return Some(motion),
+                Some(motion) => (at, reached, next) = (motion, next, amplitude),
                 None => next = 0.5 * (reached + next),
             }
         }
@@ -241,8 +241,8 @@ impl<'a> Balance<'a> {
         let inertia = linear.mass() * &motion.cosines;
         for h in 0..=HARMONICS {
             let multiple = h as f64;
-            let own = linear.stiffness() - linear.mass() * (multiple * motion.omega).powi(2);
-            jacobian.view_mut((h * n, h * n), (n, n)).copy_from(&own);
+            let block = linear.stiffness() - linear.mass() * (multiple * motion.omega).powi(2);
+            jacobian.view_mut((h * n, h * n), (n, n)).copy_from(&block);
             let by_omega = inertia.column(h) * (-2.0 * multiple * multiple * motion.omega);
             jacobian.view_mut((h * n, last), (n, 1)).copy_from(&by_omega);
         }

@@ -60,7 +60,7 @@ struct Product {
 }
 
 struct Parser {
-    /// Without spaces.
+    /// Text without spaces.
     text: Vec<char>,
     at: usize,
 }

@@ -268,7 +268,7 @@ impl<'a> IntoIterator for &'a Terms {
 }
 
 impl fmt::Display for Terms {
-    /// As it is parsed.
+    /// Writes the term in the form that is parsed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let terms: Vec<String> = self.0.iter().map(Term::to_string).collect();
         f.write_str(&terms.join(", "))

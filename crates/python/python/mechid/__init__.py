@@ -16,8 +16,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ._doors import bearing as bearing
     from ._doors import frf as frf
     from ._doors import identify as identify
+    from ._doors import identify_responses as identify_responses
     from ._doors import inspect as inspect
     from ._doors import integrate as integrate
     from ._doors import multisine as multisine
@@ -28,9 +30,12 @@ if TYPE_CHECKING:
     from ._errors import MechidError as MechidError
     from ._mechid import __version__ as __version__
     from ._records import Measurement as Measurement
+    from ._records import ResponseTable as ResponseTable
     from ._results import Finding as Finding
     from ._results import FrequencyResponses as FrequencyResponses
     from ._results import Identified as Identified
+    from ._results import IdentifiedBearing as IdentifiedBearing
+    from ._results import IdentifiedResponses as IdentifiedResponses
     from ._results import Inspected as Inspected
     from ._results import Machine as Machine
     from ._results import Mode as Mode
@@ -46,8 +51,10 @@ if TYPE_CHECKING:
 
 # Where each name is: imported when it is used, so that the program starts without NumPy.
 _HOMES = {
+    "bearing": "_doors",
     "frf": "_doors",
     "identify": "_doors",
+    "identify_responses": "_doors",
     "inspect": "_doors",
     "integrate": "_doors",
     "multisine": "_doors",
@@ -58,9 +65,12 @@ _HOMES = {
     "MechidError": "_errors",
     "__version__": "_mechid",
     "Measurement": "_records",
+    "ResponseTable": "_records",
     "Finding": "_results",
     "FrequencyResponses": "_results",
     "Identified": "_results",
+    "IdentifiedBearing": "_results",
+    "IdentifiedResponses": "_results",
     "Inspected": "_results",
     "Machine": "_results",
     "Mode": "_results",
@@ -79,6 +89,8 @@ __all__ = [
     "Finding",
     "FrequencyResponses",
     "Identified",
+    "IdentifiedBearing",
+    "IdentifiedResponses",
     "Inspected",
     "Machine",
     "Measurement",
@@ -89,13 +101,16 @@ __all__ = [
     "Predicted",
     "Receptances",
     "Reconstructed",
+    "ResponseTable",
     "Simulation",
     "Sweep",
     "Uncertain",
     "Validation",
     "__version__",
+    "bearing",
     "frf",
     "identify",
+    "identify_responses",
     "inspect",
     "integrate",
     "multisine",

@@ -15,15 +15,19 @@ from . import _mechid
 from ._records import (
     Measurement,
     RecordOptions,
+    ResponseTable,
     Window,
     _index,
     matrix,
     measurements,
     plan_of,
+    reading_of,
 )
 from ._results import (
     FrequencyResponses,
     Identified,
+    IdentifiedBearing,
+    IdentifiedResponses,
     Inspected,
     Machine,
     Multisine,
@@ -86,10 +90,13 @@ def identify(
     segment_overlap: float | None = None,
     between_samples: Literal["euler", "held", "linear"] | None = None,
     extent: Literal["open", "period"] | None = None,
+    hits: bool | Mapping[str, Any] = False,
     derivatives: str | None = None,
     refine: int | None = None,
     interpolation: Literal["linear", "spline", "band-limited"] | None = None,
     nonlinear: str | None = None,
+    candidates: str | None = None,
+    criterion: Literal["information", "held-out"] | None = None,
     search: Sequence[Literal["laws", "delay", "phase"]] = (),
     weighting: Literal["automatic", "white-force", "response", "smooth-spectrum"] | None = None,
     validate: Measurement | None = None,
@@ -141,6 +148,10 @@ def identify(
         Extent of the window. Of open records the unknown loads of their ends are fitted with the
         machine; without, the window is a period where `period` is given, and otherwise unless the ends
         show (in the time domain it is open).
+    hits : bool or dict, optional
+        Cut the records of a hammer test into hits, leave bad ones out and fit each of the others as a
+        record of its own; a dict changes the rule: ``trigger_percent``, ``double_percent``,
+        ``weak_percent``, ``bounce_s``, and ``before`` and ``samples`` of a hit in samples.
     derivatives : str, optional
         How to find what was not measured: ``"spectral"`` or ``"savitzky-golay:WINDOW:ORDER"``.
     refine, interpolation : optional
@@ -148,6 +159,11 @@ def identify(
     nonlinear : str, optional
         Springs and dampers to fit beside mass, damping and stiffness, such as
         ``"k3: x1^3, c2: |v1| v1"``.
+    candidates : str, optional
+        Terms of which those are added that the data ask for, written in the same way.
+    criterion : {"information", "held-out"}, optional
+        Criterion by which a candidate is added: the extended Bayesian information criterion, or the
+        misfit of each record, predicted by the fit to the others (three records at least).
     search : sequence of {"laws", "delay", "phase"}
         Constants to search for besides: those inside the laws, the delay of the force, the phase that
         all channels have in common.
@@ -162,7 +178,7 @@ def identify(
     **record
         What is in the records, as `RecordOptions`: ``force``, ``displacement``, ``velocity``,
         ``acceleration``, ``fs``, ``start``, ``period``, ``periods``, ``time``, ``skip_lines``,
-        ``detrend``.
+        ``detrend``, ``record_column``, ``record_id``.
 
     Returns
     -------
@@ -189,7 +205,9 @@ def identify(
         told = _identify_settings(
             method, noise, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
             extent, derivatives, refine, interpolation, lines, band,
-            _without(without_lines, without_hz), tuple(_mass(mass)), nonlinear, tuple(search), weighting,
+            _without(without_lines, without_hz), tuple(_mass(mass)), _hits(hits), nonlinear, candidates,
+            criterion,
+            tuple(search), weighting,
         )
     else:
         told = json.dumps(settings)
@@ -206,6 +224,186 @@ def identify(
     return Identified(inner)
 
 
+def identify_responses(
+    *tables: str | os.PathLike[str] | ResponseTable,
+    quantity: Literal["displacement", "velocity", "acceleration"] | None = None,
+    averages: float | None = None,
+    points: Sequence[str] = (),
+    band_hz: tuple[float, float] | None = None,
+    mass: float | Sequence[float | None] | None = None,
+    method: Method | None = None,
+    threads: int | None = None,
+) -> IdentifiedResponses:
+    """Identify mass, damping and stiffness from frequency responses measured elsewhere.
+
+    It is ``mechid identify --frf-table``.
+
+    Parameters
+    ----------
+    *tables
+        One or several tables, fitted together: texts or universal files by path, or `ResponseTable`
+        objects made of arrays.
+    quantity : {"displacement", "velocity", "acceleration"}, optional
+        Measured quantity, where the table does not state it.
+    averages : float, optional
+        Number of independent averages behind the coherence.
+    points : sequence of str
+        Points to use, one per degree of freedom; all of them, without.
+    band_hz : (float, float), optional
+        Frequencies to use, in Hz; all above zero, without.
+    mass : float or sequence of float or None, optional
+        Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
+        one.
+    method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
+        Estimator; maximum likelihood, without.
+    threads : int, optional
+        Number of threads; as many as there are processors, without.
+
+    Returns
+    -------
+    IdentifiedResponses
+
+    Raises
+    ------
+    MechidError
+        If a table cannot be read or lacks a response, or the fit fails.
+
+    Examples
+    --------
+    >>> import mechid, numpy as np
+    >>> omega = np.linspace(10.0, 60.0, 100)
+    >>> response = 1 / (5000 - omega**2 * 10 + 1j * omega * 180)
+    >>> found = mechid.identify_responses(mechid.ResponseTable(omega / (2 * np.pi), response))
+    >>> round(found.parameters["k"].value, 6)
+    5000.0
+    """
+    given = [one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in tables]
+    band = None if band_hz is None else {"low_hz": float(band_hz[0]), "high_hz": float(band_hz[1])}
+    settings = {
+        "quantity": quantity,
+        "averages": None if averages is None else float(averages),
+        "points": [str(point) for point in points],
+        "band": band,
+        "mass": _mass(mass),
+        "method": method,
+    }
+    inner = _mechid.identify_responses([one._inner for one in given], json.dumps(settings), threads)
+    return IdentifiedResponses(inner)
+
+
+def bearing(
+    *tests: object,
+    baseline: object = (),
+    stator_mass: float | None = None,
+    rotation_hz: float | None = None,
+    load: float | None = None,
+    clearance: float | None = None,
+    diameter: float | None = None,
+    length: float | None = None,
+    viscosity: float | None = None,
+    coefficients: Literal["automatic", "eight", "twelve"] = "automatic",
+    lines: str | None = None,
+    band_hz: tuple[float, float] | None = None,
+    without_lines: str | None = None,
+    without_hz: Sequence[float | Mapping[str, Any]] = (),
+    frf_table: bool = False,
+    averages: float | None = None,
+    points: Sequence[str] = (),
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> IdentifiedBearing:
+    """Identify the stiffness, damping and mass coefficients of a journal bearing from rig tests.
+
+    Every option of the program's ``mechid bearing`` but `campaign` is a keyword of the same name.
+
+    Parameters
+    ----------
+    *tests, **record
+        Records as in `identify`, all of one speed and load: the forces of the shakers, the accelerations
+        of the housing and its displacements relative to the shaft, x before y, and the `period`. Or
+        tables of frequency responses, as `ResponseTable` objects, or by path with `frf_table`:
+        displacement and acceleration per shaker force by turns.
+    baseline : object or sequence
+        Baseline tests (no film, shaft at rest), likewise.
+    stator_mass : float
+        Mass of the housing with all that moves with it, in kg.
+    rotation_hz : float, optional
+        Speed of rotation in Hz; its lines and multiples are left out.
+    load : float, optional
+        Static load, in N.
+    clearance, diameter, length, viscosity : float, optional
+        Size of the bearing in m, and viscosity of the oil in Pa·s, for dimensionless coefficients and the
+        Sommerfeld number.
+    coefficients : {"automatic", "eight", "twelve"}
+        Coefficients to identify; a likelihood-ratio test at 5 % chooses, without.
+    lines, band_hz, without_lines, without_hz : optional
+        Spectral lines, as in `identify`.
+    frf_table : bool
+        Whether paths name tables of frequency responses.
+    averages : float, optional
+        Number of independent averages behind the coherence of tables.
+    points : sequence of str
+        Two points of the tables to use, x before y; all of them, without.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads; as many as there are processors, without.
+
+    Returns
+    -------
+    IdentifiedBearing
+
+    Raises
+    ------
+    MechidError
+        If a record cannot be read, a setting is not positive, or the tests excite one direction only.
+
+    Examples
+    --------
+    >>> import mechid
+    >>> found = mechid.bearing(
+    ...     "examples/bearing-rig.csv", baseline="examples/bearing-dry.csv", force=["fx", "fy"],
+    ...     acceleration=["ax", "ay"], displacement=["dx", "dy"], period=256, stator_mass=20,
+    ...     rotation_hz=50)
+    >>> print(f"{found.coefficients['kxy'].value:.3g} N/m")
+    9.26e+07 N/m
+    """
+    if settings is None:
+        settings = {
+            "stator_mass": 0.0 if stator_mass is None else float(stator_mass),
+            "rotation_hz": rotation_hz,
+            "load": load,
+            "size": {
+                "clearance": clearance, "diameter": diameter, "length": length, "viscosity": viscosity,
+            },
+            "coefficients": coefficients,
+            "lines": _lines(lines, band_hz),
+            "without": json.loads(_without(without_lines, without_hz)),
+            "averages": None if averages is None else float(averages),
+            "points": [str(point) for point in points],
+        }
+    dry = list(baseline) if isinstance(baseline, (list, tuple)) else [baseline]
+    if frf_table or any(isinstance(test, ResponseTable) for test in tests):
+        if record:
+            raise TypeError(f"`{next(iter(record))}` belongs to records, not to frequency responses")
+        inner = _mechid.bearing_of_responses(
+            _response_tables(tests), _response_tables(dry), json.dumps(settings), threads
+        )
+    else:
+        wet = measurements(tests, "bearing", record)
+        still = measurements(dry, "bearing", record) if dry else []
+        inner = _mechid.bearing(
+            [one._inner for one in wet], [one._inner for one in still], json.dumps(settings), threads
+        )
+    return IdentifiedBearing(inner)
+
+
+def _response_tables(sources: Sequence[object]) -> list[_mechid.ResponseTable]:
+    read = (one if isinstance(one, ResponseTable) else ResponseTable.read(one) for one in sources)  # type: ignore[arg-type]
+    return [table._inner for table in read]
+
+
 def frf(
     *sources: object,
     estimator: Estimator = "h1",
@@ -216,6 +414,8 @@ def frf(
     segment: int | None = None,
     segment_window: Weight | None = None,
     segment_overlap: float | None = None,
+    hits: bool | Mapping[str, Any] = False,
+    exponential_percent: float | None = None,
     settings: dict[str, Any] | None = None,
     threads: int | None = None,
     **record: Unpack[RecordOptions],
@@ -235,6 +435,10 @@ def frf(
         Spectral lines of a segment, as in `identify`.
     segment, segment_window, segment_overlap : optional
         Samples of a segment, its weights, and the part that the next one repeats, in per cent.
+    hits : bool or dict, optional
+        Average over the good hits of a hammer test, as in `identify`.
+    exponential_percent : float, optional
+        Weight at the end of a hit of an exponential window on force and response, in per cent.
     settings : dict, optional
         ``settings`` of another result, instead of the options above.
     threads : int, optional
@@ -256,12 +460,14 @@ def frf(
             "lines": _lines(lines, band_hz),
             "without": json.loads(_without(without_lines, without_hz)),
             "segments": _segments(True, segment, segment_window, segment_overlap),
+            "hits": json.loads(_hits(hits) or "null"),
+            "exponential_percent": exponential_percent,
         }
     return FrequencyResponses(_mechid.frf(found._inner, json.dumps(settings), threads))
 
 
 def reconstruct(
-    machine: Machine | Identified | str | os.PathLike[str],
+    machine: Machine | Identified | IdentifiedResponses | str | os.PathLike[str],
     *sources: object,
     method: ForceMethod = "auto",
     forced: Sequence[int] = (),
@@ -334,6 +540,8 @@ def inspect(
     time: str | None = None,
     skip_lines: int = 0,
     detrend: Literal["none", "mean"] = "none",
+    record_column: str | None = None,
+    record_id: str | None = None,
     **window: Unpack[Window],
 ) -> Inspected:
     """Tell what is in a record file: format, columns, sampling, levels, strongest lines, period.
@@ -346,7 +554,7 @@ def inspect(
         Columns to show, by name or number; every column that holds numbers only, without.
     curves : bool
         Whether to gather the curves that `Inspected.to_svg` draws.
-    fs, time, skip_lines, detrend, **window
+    fs, time, skip_lines, detrend, record_column, record_id, **window
         As in `Measurement.open`.
 
     Returns
@@ -358,7 +566,8 @@ def inspect(
     MechidError
         If the file cannot be read or has no such columns or samples.
     """
-    plan = json.dumps(plan_of(path, {}, fs, time, skip_lines, detrend, window))
+    reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id)
+    plan = json.dumps(plan_of(path, {}, reading, window))
     settings = json.dumps({"columns": list(columns), "curves": curves})
     return Inspected(_mechid.inspect(plan, settings))
 
@@ -372,7 +581,7 @@ def sweep(
     unknown_mass: bool = False,
     mass: float | Sequence[float | None] | None = None,
     natural_frequency_hz: float | None = None,
-    reference: Machine | Identified | str | os.PathLike[str] | None = None,
+    reference: Machine | Identified | IdentifiedResponses | str | os.PathLike[str] | None = None,
     settings: dict[str, Any] | None = None,
     progress: Callable[[int], object] | None = None,
     threads: int | None = None,
@@ -466,7 +675,7 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
 
 
 def integrate(
-    machine: Machine | Identified,
+    machine: Machine | Identified | IdentifiedResponses,
     force: ArrayLike,
     fs: float,
     *,
@@ -534,7 +743,7 @@ def integrate(
 
 
 def predict(
-    machine: Machine | Identified,
+    machine: Machine | Identified | IdentifiedResponses,
     force: ArrayLike,
     fs: float,
     *,
@@ -663,7 +872,10 @@ def _identify_settings(
     band_hz: tuple[float, float] | None,
     without: str,
     mass: tuple[float | None, ...],
+    hits: str | None,
     nonlinear: str | None,
+    candidates: str | None,
+    criterion: str | None,
     search: tuple[str, ...],
     weighting: str | None,
 ) -> str:
@@ -681,7 +893,8 @@ def _identify_settings(
         "lines": _lines(lines, band_hz),
         "without": json.loads(without),
         "mass": list(mass),
-        "nonlinear": _nonlinear(nonlinear, search, weighting),
+        "hits": None if hits is None else json.loads(hits),
+        "nonlinear": _nonlinear(nonlinear, candidates, criterion, search, weighting),
     }
     return json.dumps(settings)
 
@@ -749,6 +962,13 @@ def _segments(
     return {name: value for name, value in kept.items() if value is not None}
 
 
+def _hits(hits: bool | Mapping[str, Any]) -> str | None:
+    """Return the rule for hits as JSON, or None if there are none."""
+    if isinstance(hits, Mapping):
+        return json.dumps(dict(hits))
+    return "{}" if hits else None
+
+
 def _without(lines: str | None, hz: Sequence[float | Mapping[str, Any]]) -> str:
     """Return the lines to leave out as JSON."""
     frequencies = [dict(one) if isinstance(one, Mapping) else {"frequency_hz": float(one)} for one in hz]
@@ -767,17 +987,26 @@ def _lines(lines: str | None, band_hz: tuple[float, float] | None) -> Any:
 
 
 def _nonlinear(
-    terms: str | None, search: Sequence[str], weighting: str | None
+    terms: str | None,
+    candidates: str | None,
+    criterion: str | None,
+    search: Sequence[str],
+    weighting: str | None,
 ) -> dict[str, Any] | None:
-    if terms is None:
+    if candidates is None:
+        _refuse({"criterion": criterion}, "belongs to `candidates`")
+    if terms is None and candidates is None:
         _refuse({"search": search or None, "weighting": weighting}, "belongs to `nonlinear`")
         return None
     constants = ("laws", "delay", "phase")
     for name in search:
         if name not in constants:
             raise ValueError(f"`search` names {', '.join(constants)}, got {name!r}")
+    tried = {} if candidates is None else {"candidates": candidates}
     return {
-        "terms": terms,
+        "terms": terms or "",
+        **tried,
+        "criterion": criterion or "information",
         "search": {name: name in search for name in constants},
         "weighting": weighting or "automatic",
     }

@@ -2,24 +2,34 @@
 
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import TypeAlias, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+# A record of a fleet: its file and, of a file of many records, its name and its rows (from, to).
+_Place: TypeAlias = tuple[Path, tuple[str, int, int] | None]
+
 __all__ = [
     "Answer",
     "Identified",
+    "IdentifiedResponses",
     "Machine",
     "Measurement",
     "Predicted",
     "Reconstructed",
+    "ResponseTable",
     "__version__",
+    "bearing",
+    "bearing_of_responses",
     "fleet_begin",
     "fleet_part",
+    "fleet_rows",
     "fleet_summary",
     "frf",
     "identify",
+    "identify_responses",
     "inspect",
     "integrate",
     "multisine",
@@ -107,6 +117,35 @@ def identify(
     validate: tuple[Measurement, str] | None,
     threads: int | None,
 ) -> Identified: ...
+
+@final
+class ResponseTable:
+    @staticmethod
+    def read(path: str | PathLike[str]) -> ResponseTable: ...
+    @staticmethod
+    def from_arrays(
+        layout: str,
+        frequency_hz: NDArray[np.float64],
+        response: NDArray[np.complex128],
+        std_error: NDArray[np.float64] | None,
+        coherence: NDArray[np.float64] | None,
+    ) -> ResponseTable: ...
+    @property
+    def name(self) -> str: ...
+    @property
+    def frequencies(self) -> int: ...
+
+@final
+class IdentifiedResponses:
+    def to_json(self) -> str: ...
+    def text(self) -> str: ...
+    def svg(self) -> str: ...
+    def interval(self, name: str, level: float) -> list[float]: ...
+    def machine(self) -> Machine: ...
+
+def identify_responses(
+    tables: Sequence[ResponseTable], settings: str, threads: int | None
+) -> IdentifiedResponses: ...
 @final
 class Answer:
     def to_json(self) -> str: ...
@@ -148,6 +187,12 @@ class Predicted:
 
 def predict_record(record: Measurement, machine: Machine, settings: str) -> Predicted: ...
 def frf(record: Measurement, settings: str, threads: int | None) -> Answer: ...
+def bearing(
+    tests: Sequence[Measurement], baseline: Sequence[Measurement], settings: str, threads: int | None
+) -> Answer: ...
+def bearing_of_responses(
+    tests: Sequence[ResponseTable], baseline: Sequence[ResponseTable], settings: str, threads: int | None
+) -> Answer: ...
 def inspect(plan: str, settings: str) -> Answer: ...
 def sweep(
     record: Measurement | None,
@@ -178,7 +223,12 @@ def multisine(
     search: tuple[int, int],
     level: tuple[str, float],
 ) -> _Sampled: ...
-def fleet_begin(analysis: str, folder: str) -> None: ...
-def fleet_part(records: Sequence[str], analysis: str, folder: str) -> str: ...
+def fleet_begin(
+    records: Sequence[str | PathLike[str]], analysis: str, folder: str, part_records: int
+) -> list[list[_Place]]: ...
+def fleet_part(records: Sequence[_Place], analysis: str, folder: str) -> str: ...
+def fleet_rows(
+    records: Sequence[tuple[str, Sequence[tuple[str, NDArray[np.float64]]]]], analysis: str
+) -> bytes: ...
 def fleet_summary(parts: Sequence[str], folder: str, elapsed_s: float) -> tuple[str, str]: ...
 def program(arguments: Sequence[str]) -> int: ...

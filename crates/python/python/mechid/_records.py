@@ -7,7 +7,18 @@ import os
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias, TypedDict, Unpack, final, runtime_checkable
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypedDict,
+    TypeVar,
+    Unpack,
+    final,
+    runtime_checkable,
+)
 
 import numpy as np
 
@@ -29,6 +40,7 @@ Names: TypeAlias = str | Sequence[str]
 """Columns, one per degree of freedom: names separated by commas, or a sequence of names."""
 
 _KINDS = ("force", "displacement", "velocity", "acceleration")
+_OF_FILES = ("time", "skip_lines", "detrend", "record_column", "record_id")
 
 
 class Window(TypedDict, total=False):
@@ -50,8 +62,9 @@ class RecordOptions(Window, total=False):
     ``force``, ``displacement``, ``velocity`` and ``acceleration`` are columns of a file or table, or
     arrays of shape (samples,) or (samples, degrees of freedom) in N, m, m/s and m/s². ``fs`` is the
     sampling rate in Hz, which arrays and tables need. Of files: ``time`` names the time column,
-    ``skip_lines`` counts header lines to skip, and ``detrend="mean"`` subtracts the mean of every
-    channel.
+    ``skip_lines`` counts header lines to skip, ``detrend="mean"`` subtracts the mean of every
+    channel, ``record_column`` names the column that tells the records of a Parquet file apart, and
+    ``record_id`` the record by its value there.
     """
 
     force: Names | ArrayLike
@@ -62,6 +75,8 @@ class RecordOptions(Window, total=False):
     time: str | None
     skip_lines: int
     detrend: Literal["none", "mean"]
+    record_column: str | None
+    record_id: str | None
 
 
 @final
@@ -90,6 +105,8 @@ class Measurement:
         time: str | None = None,
         skip_lines: int = 0,
         detrend: Literal["none", "mean"] = "none",
+        record_column: str | None = None,
+        record_id: str | None = None,
         **window: Unpack[Window],
     ) -> Measurement:
         """Open a record file: text, MATLAB or universal file, packed with gzip or not.
@@ -109,6 +126,10 @@ class Measurement:
             Number of header lines to skip above the table.
         detrend : {"none", "mean"}
             Constant to subtract from every channel.
+        record_column : str, optional
+            Column whose value names the record of each row, where a Parquet file holds many records.
+        record_id : str, optional
+            The record of such a file, by its value in that column; its only one, without.
         **window
             ``start``, ``period`` and ``periods``, as in `window`.
 
@@ -119,7 +140,8 @@ class Measurement:
         """
         columns = dict(zip(_KINDS, (force, displacement, velocity, acceleration), strict=True))
         channels = {kind: _names(kind, given) for kind, given in columns.items()}
-        plan = plan_of(path, channels, fs, time, skip_lines, detrend, window)
+        reading = reading_of(fs, time, skip_lines, detrend, record_column, record_id)
+        plan = plan_of(path, channels, reading, window)
         return cls(_mechid.Measurement.open(json.dumps(plan)))
 
     @classmethod
@@ -333,7 +355,7 @@ def measurements(
     """
     if sources and all(isinstance(source, Measurement) for source in sources):
         known = [source for source in sources if isinstance(source, Measurement)]
-        given = [name for name in ("fs", "time", "skip_lines", "detrend", *_KINDS) if name in options]
+        given = [name for name in ("fs", *_OF_FILES, *_KINDS) if name in options]
         if given:
             raise TypeError(f"a Measurement knows its `{given[0]}`: leave it out")
         window = _window_of(options)
@@ -351,27 +373,42 @@ def measurements(
         arrays[kind] = values
     if arrays.get("fs") is None:
         raise TypeError("arrays need their sampling rate: give `fs`, in Hz")
-    for name in ("time", "skip_lines", "detrend"):
+    for name in _OF_FILES:
         if name in arrays:
             raise TypeError(f"`{name}` belongs to files")
     return [Measurement.from_arrays(**arrays)]  # type: ignore[arg-type]
 
 
-def plan_of(
-    path: str | os.PathLike[str],
-    channels: Mapping[str, list[str]],
+def reading_of(
     fs: float | None,
     time: str | None,
     skip_lines: int,
     detrend: str,
+    record_column: str | None,
+    record_id: str | None,
+) -> dict[str, object]:
+    """Return how a file is read."""
+    return {
+        "skip_lines": skip_lines,
+        "time": time,
+        "sample_rate_hz": _rate(fs),
+        "detrend": detrend,
+        "record_column": record_column,
+        "record_id": record_id,
+    }
+
+
+def plan_of(
+    path: str | os.PathLike[str],
+    channels: Mapping[str, list[str]],
+    reading: Mapping[str, object],
     window: Window,
 ) -> dict[str, object]:
     """Return what opens a file."""
-    reading = {"skip_lines": skip_lines, "time": time, "sample_rate_hz": _rate(fs), "detrend": detrend}
     return {
         "path": os.fspath(path),
         "channels": dict(channels),
-        "reading": reading,
+        "reading": dict(reading),
         "window": _window(window),
     }
 
@@ -384,6 +421,111 @@ def _named(counts: tuple[int, ...]) -> tuple[list[str], str]:
         for kind, count in zip(_KINDS, counts, strict=True)
     }
     return [name for names in channels.values() for name in names], json.dumps(channels)
+
+
+@final
+class ResponseTable:
+    """Frequency responses that were measured elsewhere, for `identify_responses`.
+
+    Parameters
+    ----------
+    frequency_hz : array_like, shape (frequencies,)
+        Frequencies in Hz.
+    response : array_like of complex
+        Responses per unit of force, in m/N, m/(s·N) or m/(s²·N): shape (frequencies,) of one degree of
+        freedom, otherwise (frequencies, degrees of freedom, forces).
+    quantity : {"displacement", "velocity", "acceleration"}
+        Measured quantity.
+    std_error : array_like, optional
+        Standard error of the real and of the imaginary part alike, of the shape of ``response``.
+    coherence : array_like, optional
+        Multiple coherence, shape (frequencies,) or (frequencies, degrees of freedom).
+    points : sequence of str, optional
+        Names of the degrees of freedom; ``"1"``, ``"2"`` …, without.
+    forces : sequence of str, optional
+        Points at which the forces act; the first ones, without.
+    name : str
+        Name of the table in messages.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not go together, or a number is not finite.
+    """
+
+    def __init__(
+        self,
+        frequency_hz: ArrayLike,
+        response: ArrayLike,
+        *,
+        quantity: Literal["displacement", "velocity", "acceleration"] = "displacement",
+        std_error: ArrayLike | None = None,
+        coherence: ArrayLike | None = None,
+        points: Sequence[str] | None = None,
+        forces: Sequence[str] | None = None,
+        name: str = "arrays",
+    ) -> None:
+        hz = _finite("frequency_hz", np.asarray(frequency_hz, dtype=np.float64))
+        values = _finite("response", np.asarray(response, dtype=np.complex128))
+        if hz.ndim != 1 or values.ndim not in (1, 3) or len(values) != len(hz):
+            raise ValueError(
+                f"`response` of shape {values.shape} has not one entry, or one matrix, for each frequency "
+                f"of `frequency_hz` of shape {hz.shape}"
+            )
+        values = values.reshape(len(hz), *(values.shape[1:] or (1, 1)))
+        _, motions, columns = values.shape
+        errors = None
+        if std_error is not None:
+            errors = _finite("std_error", np.asarray(std_error, dtype=np.float64))
+            if errors.size != values.size or len(errors) != len(hz):
+                raise ValueError(f"`std_error` of shape {errors.shape} has not that of `response`")
+            errors = errors.reshape(values.shape)
+        coherent = None
+        if coherence is not None:
+            coherent = _finite("coherence", np.asarray(coherence, dtype=np.float64))
+            if coherent.shape not in ((len(hz), motions), (len(hz),) if motions == 1 else ()):
+                raise ValueError(f"`coherence` of shape {coherent.shape} is not frequencies × points")
+            coherent = coherent.reshape(len(hz), motions)
+        names = [str(i + 1) for i in range(motions)] if points is None else [str(p) for p in points]
+        driven = names[:columns] if forces is None else [str(force) for force in forces]
+        if len(names) != motions or len(driven) != columns:
+            raise ValueError(
+                f"{len(names)} names of points and {len(driven)} of forces for {motions} × {columns}"
+            )
+        layout = {"name": name, "quantity": quantity, "points": names, "forces": driven}
+        self._inner = _mechid.ResponseTable.from_arrays(
+            json.dumps(layout), hz, values, errors, coherent
+        )
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str]) -> ResponseTable:
+        """Read a text or a universal file (dataset 58) of frequency responses.
+
+        Raises
+        ------
+        MechidError
+            If the file cannot be read, or has no frequency response.
+        """
+        table = cls.__new__(cls)
+        table._inner = _mechid.ResponseTable.read(path)
+        return table
+
+    @property
+    def name(self) -> str:
+        """Name of the table in messages."""
+        return self._inner.name
+
+    def __repr__(self) -> str:
+        return f"<ResponseTable {self.name!r}: {self._inner.frequencies} frequencies>"
+
+
+_Numbers = TypeVar("_Numbers", bound="NDArray[Any]")
+
+
+def _finite(name: str, values: _Numbers) -> _Numbers:
+    if not np.isfinite(values).all():
+        raise ValueError(f"`{name}` has a value that is not finite")
+    return values
 
 
 def matrix(name: str, values: object) -> NDArray[np.float64]:

@@ -69,7 +69,7 @@ class Parameter:
     row: int
     column: int
     known: bool
-    _found: _mechid.Identified
+    _found: _mechid.Identified | _mechid.IdentifiedResponses
 
     def __float__(self) -> float:
         return self.value
@@ -274,17 +274,10 @@ class Receptances:
     model: NDArray[np.complex128]
 
 
-@final
-class Identified(Drawn):
-    """An identified machine, with what speaks for and against it.
+class Estimated(Drawn):
+    """A machine with the uncertainty of its parameters, and what speaks for and against it."""
 
-    ``print`` shows it as the program does; `to_json` is the JSON of the program.
-    """
-
-    def __init__(self, inner: _mechid.Identified) -> None:
-        self.__dict__["_inner"] = inner
-
-    _inner: _mechid.Identified
+    _inner: _mechid.Identified | _mechid.IdentifiedResponses
 
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
@@ -361,6 +354,26 @@ class Identified(Drawn):
         """Quality of the fit: ``nrmse``, ``unexplained_motion``, ``condition_number`` …"""
         return MappingProxyType(self._told["fit"])
 
+    def machine(self) -> Machine:
+        """Return M, C and K with the covariance of their entries."""
+        return Machine._of(self._inner.machine())
+
+    def _values(self) -> str:
+        return ", ".join(f"{p.name}={p.value:.6g} {p.unit}" for p in self.parameters.values())
+
+
+@final
+class Identified(Estimated):
+    """A machine identified from records.
+
+    ``print`` shows it as the program does; `to_json` is the JSON of the program.
+    """
+
+    def __init__(self, inner: _mechid.Identified) -> None:
+        self.__dict__["_inner"] = inner
+
+    _inner: _mechid.Identified
+
     @property
     def nonlinear(self) -> Mapping[str, Any] | None:
         """Nonlinear terms with their coefficients and standard errors; None for a linear system."""
@@ -372,10 +385,6 @@ class Identified(Drawn):
         """Prediction of the record given as ``validate``."""
         told = self.to_dict()["validation"]
         return None if told is None else Validation._of(told)
-
-    def machine(self) -> Machine:
-        """Return M, C and K with the covariance of their entries."""
-        return Machine._of(self._inner.machine())
 
     def validate(
         self,
@@ -487,8 +496,97 @@ class Identified(Drawn):
         return _labelled.identified(self)
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{p.name}={p.value:.6g} {p.unit}" for p in self.parameters.values())
-        return f"<Identified {self._told['file']!r}: {values}>"
+        return f"<Identified {self._told['file']!r}: {self._values()}>"
+
+
+@final
+class IdentifiedResponses(Estimated):
+    """A machine identified from tables of frequency responses.
+
+    ``print`` shows it as the program does; `to_json` is the JSON of the program.
+    """
+
+    def __init__(self, inner: _mechid.IdentifiedResponses) -> None:
+        self.__dict__["_inner"] = inner
+
+    _inner: _mechid.IdentifiedResponses
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """Points of the responses, one per degree of freedom."""
+        return tuple(self._told["points"])
+
+    def __repr__(self) -> str:
+        return f"<IdentifiedResponses {self._told['files']!r}: {self._values()}>"
+
+
+@final
+class IdentifiedBearing(Drawn):
+    """The coefficients of a journal bearing, from tests on a rig.
+
+    ``print`` shows them as the program does; `to_json` is the JSON of the program.
+    """
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @cached_property
+    def coefficients(self) -> Mapping[str, Uncertain]:
+        """Eight or twelve coefficients by name, ``"kxx"`` to ``"myy"``, in N/m, N·s/m and kg."""
+        return MappingProxyType({row["name"]: _uncertain(row) for row in self._told["coefficients"]})
+
+    @property
+    def stiffness(self) -> NDArray[np.float64]:
+        """K, in N/m, shape (2, 2)."""
+        return self._matrix("k")
+
+    @property
+    def damping(self) -> NDArray[np.float64]:
+        """C, in N·s/m, likewise."""
+        return self._matrix("c")
+
+    @property
+    def mass(self) -> NDArray[np.float64]:
+        """M, in kg, likewise; zero where eight coefficients were identified."""
+        return self._matrix("m")
+
+    def _matrix(self, kind: str) -> NDArray[np.float64]:
+        names = (f"{kind}{entry}" for entry in ("xx", "xy", "yx", "yy"))
+        found = (self.coefficients.get(name) for name in names)
+        return np.array([0.0 if one is None else one.value for one in found]).reshape(2, 2)
+
+    @property
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of the coefficients, in their order."""
+        return _array(self._told["covariance"]["matrix"])
+
+    @cached_property
+    def dimensionless(self) -> Mapping[str, Uncertain] | None:
+        """Coefficients over W/c, W/(c Ω) and W/(c Ω²); None without load or clearance."""
+        told = self._told["dimensionless"]
+        if told is None:
+            return None
+        return MappingProxyType({row["name"]: _uncertain(row) for row in told["coefficients"]})
+
+    @property
+    def whirl_frequency_ratio(self) -> Uncertain | None:
+        """Whirl frequency of a rigid rotor over that of rotation; None where it does not whirl."""
+        return self._of_rotor("whirl_frequency_ratio")
+
+    @property
+    def critical_mass(self) -> Uncertain | None:
+        """Mass per bearing above which a rigid rotor is unstable, in kg; None if there is none."""
+        return self._of_rotor("critical_mass")
+
+    def _of_rotor(self, name: str) -> Uncertain | None:
+        told = (self._told["stability"] or {}).get(name)
+        return None if told is None else _uncertain(told)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name}={one.value:.6g}" for name, one in self.coefficients.items())
+        return f"<IdentifiedBearing {self._told['tests']!r}: {values}>"
 
 
 @final
@@ -982,9 +1080,9 @@ class Multisine:
         return cls(fs, force, tuple(lines), amplitudes, phases, *measures)
 
 
-def machine_of(given: Machine | Identified | str | os.PathLike[str]) -> Machine:
+def machine_of(given: Machine | Estimated | str | os.PathLike[str]) -> Machine:
     """Return the machine that is meant."""
-    if isinstance(given, Identified):
+    if isinstance(given, Estimated):
         return given.machine()
     if isinstance(given, Machine):
         return given

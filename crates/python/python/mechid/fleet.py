@@ -20,11 +20,17 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_complete
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from . import _mechid
 
-__all__ = ["Failure", "Summary", "run"]
+if TYPE_CHECKING:
+    import pyarrow
+    from numpy.typing import NDArray
+
+__all__ = ["Failure", "Summary", "identify_batch", "run"]
 
 
 @dataclass(frozen=True)
@@ -81,7 +87,8 @@ def run(
     Parameters
     ----------
     records : path or iterable of paths
-        The records, of any format; a folder stands for the files in it.
+        The records, of any format; a folder stands for the files in it, and a Parquet file for the
+        records in it that the ``record_column`` of ``reading`` tells apart.
     analysis : mapping or path
         The analysis: ``channels``, ``reading``, ``window`` and ``identify``; or a JSON file of it.
     out : path
@@ -106,23 +113,17 @@ def run(
         If the analysis cannot be understood, or a part cannot be written. What is wrong with a record
         is in its row.
     """
-    if isinstance(analysis, Mapping):
-        saved = json.dumps(analysis)
-    else:
-        saved = Path(analysis).read_text(encoding="utf-8")
+    saved = _saved(analysis)
     folder = os.fspath(out)
-    names = sorted(_files(records))
-    if part_records < 1:
-        raise ValueError("part_records: a part has one record at least")
+    given = [records] if isinstance(records, str | os.PathLike) else list(records)
     begun = time.monotonic()
-    _mechid.fleet_begin(saved, folder)
+    parts = _mechid.fleet_begin(given, saved, folder, part_records)
     if executor is None:
         own = ThreadPoolExecutor(os.cpu_count())
     with nullcontext(executor) if executor is not None else own as engine:
-        parts = [names[at : at + part_records] for at in range(0, len(names), part_records)]
         futures = [engine.submit(_part, part, saved, folder) for part in parts]
         try:
-            done = list(_told(futures, len(names), progress))
+            done = list(_told(futures, sum(map(len, parts)), progress))
         except BaseException:
             for future in futures:
                 future.cancel()
@@ -133,7 +134,111 @@ def run(
     return Summary(**fields, text=text)
 
 
-def _part(records: list[str], analysis: str, folder: str) -> str:
+def identify_batch(
+    batch: pyarrow.RecordBatch | pyarrow.Table, analysis: Mapping[str, Any] | str | os.PathLike[str]
+) -> pyarrow.Table:
+    """Identify the records of an Arrow batch: a table of results with one row per record.
+
+    A pure function of its arguments, for engines that hand out batches: ``mapInArrow`` and
+    ``applyInArrow`` of Spark, ``map_batches`` of Ray, ``map_partitions`` of Dask.
+
+    Parameters
+    ----------
+    batch : pyarrow.RecordBatch or pyarrow.Table
+        The records, one per row with lists of numbers as columns, or one sample per row. The
+        ``record_column`` of ``reading`` names them; without it the rows of lists are numbered from 1,
+        and rows of samples are one record.
+    analysis : mapping or path
+        The analysis, as in `run`; the sampling rate is its ``sample_rate_hz``, or that of a column of
+        instants.
+
+    Returns
+    -------
+    pyarrow.Table
+        The columns that `run` writes, in the order of the records. What is wrong with a record is in its row.
+
+    Raises
+    ------
+    MechidError
+        If the analysis cannot be understood.
+    KeyError
+        If the batch has no ``record_column``.
+
+    Examples
+    --------
+    >>> import numpy as np, pyarrow as pa
+    >>> from mechid import fleet
+    >>> rig = np.loadtxt("examples/machine.csv", delimiter=",", skiprows=1)
+    >>> batch = pa.table({"day": ["monday"], "time": [rig[:, 0]], "force": [rig[:, 1]], "x": [rig[:, 2]]})
+    >>> analysis = {"channels": {"force": ["force"], "displacement": ["x"]},
+    ...             "reading": {"record_column": "day"}, "window": {"period": 256}}
+    >>> found = fleet.identify_batch(batch, analysis)
+    >>> found["record"].to_pylist(), found["error"].null_count
+    (['monday'], 1)
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    saved = _saved(analysis)
+    column = json.loads(saved).get("reading", {}).get("record_column")
+    names = None if column is None else batch.column(column).to_pylist()
+    channels = {field.name: batch.column(field.name) for field in batch.schema if field.name != column}
+    lists = {name: cells for name, cells in channels.items() if _is_list(cells.type)}
+    if lists:
+        names = range(1, batch.num_rows + 1) if names is None else names
+        records = [
+            (str(record), [(name, _numbers(cells[row].values)) for name, cells in lists.items()])
+            for row, record in enumerate(names)
+        ]
+    else:
+        samples = [
+            (name, _numbers(cells)) for name, cells in channels.items() if _is_number(cells.type)
+        ]
+        rows = {"the record": np.arange(batch.num_rows)} if names is None else _rows_of(names)
+        records = [
+            (str(record), [(name, np.ascontiguousarray(values[at])) for name, values in samples])
+            for record, at in rows.items()
+        ]
+    found: pa.Table = pq.read_table(pa.BufferReader(_mechid.fleet_rows(records, saved)))
+    return found
+
+
+def _saved(analysis: Mapping[str, Any] | str | os.PathLike[str]) -> str:
+    """Return an analysis as JSON."""
+    if isinstance(analysis, Mapping):
+        return json.dumps(analysis)
+    return Path(analysis).read_text(encoding="utf-8")
+
+
+def _is_number(kind: pyarrow.DataType) -> bool:
+    import pyarrow.types as types
+
+    return bool(types.is_floating(kind) or types.is_integer(kind))
+
+
+def _is_list(kind: pyarrow.DataType) -> bool:
+    import pyarrow.types as types
+
+    lists = (types.is_list, types.is_large_list, types.is_fixed_size_list)
+    return any(is_one(kind) for is_one in lists) and _is_number(kind.value_type)
+
+
+def _numbers(values: pyarrow.Array | pyarrow.ChunkedArray | None) -> NDArray[np.float64]:
+    """Return numbers, NaN where there is none; no number for a list that is missing."""
+    if values is None:
+        return np.empty(0)
+    return np.asarray(values.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+
+def _rows_of(names: list[Any]) -> dict[Any, NDArray[np.intp]]:
+    """Return the rows of each record, in the order in which the records appear."""
+    rows: dict[Any, list[int]] = {}
+    for row, name in enumerate(names):
+        rows.setdefault(name, []).append(row)
+    return {name: np.asarray(at, dtype=np.intp) for name, at in rows.items()}
+
+
+def _part(records: list[_mechid._Place], analysis: str, folder: str) -> str:
     """Compute one part, wherever the engine has put it."""
     return _mechid.fleet_part(records, analysis, folder)
 
@@ -148,15 +253,3 @@ def _told(
         if progress is not None:
             progress(records, count)
         yield part
-
-
-def _files(records: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> set[str]:
-    """Return the files, those of folders without hidden ones."""
-    given = [records] if isinstance(records, str | os.PathLike) else list(records)
-    files: set[str] = set()
-    for path in map(Path, given):
-        if path.is_dir():
-            files |= {str(f) for f in path.iterdir() if not f.name.startswith(".") and not f.is_dir()}
-        else:
-            files.add(str(path))
-    return files

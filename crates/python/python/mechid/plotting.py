@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ._results import FrequencyResponses, Identified, Machine, Reconstructed, Sweep
+from ._results import FrequencyResponses, Identified, IdentifiedResponses, Machine, Reconstructed, Sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -173,7 +173,7 @@ def sweep(found: Sweep, *, ax: Axes | None = None) -> Axes:
     return axes
 
 
-def modes(machine: Machine | Identified, *, ax: Axes | None = None) -> Axes:
+def modes(machine: Machine | Identified | IdentifiedResponses, *, ax: Axes | None = None) -> Axes:
     """Plot the eigenvalues of a machine in the complex plane, in rad/s."""
     axes = _axes(ax)
     values = np.array([mode.eigenvalue for mode in machine.modes])

@@ -1,14 +1,15 @@
 //! Magnitude, phase and coherence.
 
 use mechid_analysis::FrfTable;
-use mechid_plot::charts::{Quantity, bode};
+use mechid_plot::charts::Quantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 use nalgebra::Complex;
 
+use super::style::{FigureStyle, FrequencyScale};
 use super::trace::Trace;
 
 /// Magnitude above phase above coherence, one curve for every pair of motion and force.
-pub fn figure(report: &FrfTable) -> Figure {
+pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     let alone = report.responses.len() == 1;
     let traces: Vec<Trace> = report
         .responses
@@ -20,25 +21,27 @@ pub fn figure(report: &FrfTable) -> Figure {
             };
             let values = r.real.iter().zip(&r.imaginary).map(|(re, im)| Complex::new(*re, *im));
             let omega = report.frequency_hz.iter().map(|hz| hz * std::f64::consts::TAU);
-            Trace::continuous(name, omega.zip(values))
+            Trace::line(style, name, omega.zip(values))
         })
         .collect();
-    let curves: Vec<_> = traces.iter().map(Trace::as_response).collect();
     let name = match report.quantity.as_str() {
         "displacement" => "Receptance",
         "velocity" => "Mobility",
         _ => "Accelerance",
     };
     let title = format!("{}, {}", report.file, report.estimator);
-    let frequency = || Axis::linear("Frequency", "Hz");
-    let mut coherence = Panel::new(frequency(), Axis::linear("Coherence", "").range(0.0, 1.0));
+    let frequency = style.frequency_axis(FrequencyScale::Linear);
+    let mut coherence = Panel::new(frequency, Axis::linear("Coherence", "").range(0.0, 1.0));
     for c in &report.coherence {
         let name = match report.coherence.len() {
             1 => String::new(),
             _ => format!("{} {}", report.quantity, c.motion),
         };
-        coherence = coherence.curve(Curve::line(name, &report.frequency_hz, &c.values));
+        // 0 Hz has no place on a logarithmic axis.
+        let hidden = report.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
+        let (hz, values) = (&report.frequency_hz[hidden..], &c.values[hidden..]);
+        coherence = coherence.curve(Curve::line(name, hz, values));
     }
     let quantity = Quantity::new(name, report.unit);
-    bode(&title, frequency(), quantity, &[], &curves).panel(coherence)
+    style.chart(&title, FrequencyScale::Linear, quantity, [&[], &traces]).panel(coherence)
 }

@@ -8,10 +8,16 @@ pub mod modal;
 mod motion;
 pub mod receptance;
 mod record;
+pub mod restoring;
+mod style;
 mod sweep;
 pub mod trace;
+#[cfg(feature = "parquet")]
+pub mod trends;
 
 use mechid_analysis::bearing::BearingTable;
+#[cfg(feature = "parquet")]
+use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
     FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
     Reconstructed, SweepSummary,
@@ -20,6 +26,7 @@ use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
 use mechid_plot::Figure;
 
+pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
 
 /// A result that can be drawn.
@@ -29,28 +36,48 @@ pub trait ToFigure {
     /// # Errors
     /// [`ReportError::NoColumnToDraw`] or [`ReportError::NothingResonates`] if the result has nothing to draw,
     /// [`ReportError::Analysis`] if a curve cannot be computed.
-    fn figure(&self) -> Result<Figure, ReportError>;
+    fn figure(&self) -> Result<Figure, ReportError> {
+        self.styled_figure(FigureStyle::default())
+    }
+
+    /// Returns the usual figure of the result, its frequency responses in a given style.
+    ///
+    /// # Errors
+    /// As [`ToFigure::figure`].
+    fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError>;
 }
 
 fn receptance_or_responses(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    style: FigureStyle,
 ) -> Result<Figure, ReportError> {
-    match receptance::receptance(title, data, system)? {
+    match receptance::receptance(title, data, system, style)? {
         Some(figure) => Ok(figure),
-        None => receptance::responses(&format!("{title}; {}", receptance::WHY), data, system),
+        None => {
+            receptance::responses(&format!("{title}; {}", receptance::WHY), data, system, style)
+        }
     }
 }
 
 impl ToFigure for Identified {
     /// Draws measured and identified receptance, or, where no line separates the forces, the amplitudes of
-    /// the response, measured and predicted; for a fit in the time domain measured and predicted
-    /// response of the first record.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    /// the response, measured and predicted, and the coherence of averaged responses; for a fit in the time
+    /// domain measured and predicted response of the first record; with nonlinear terms the restoring force.
+    fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
+        if let Some(fitted) = &self.fitted().nonlinear {
+            return restoring::figure(&title, fitted);
+        }
         match self.spectra() {
-            Some(data) => receptance_or_responses(&title, data, &self.system()?),
+            Some(data) => {
+                let drawn = receptance_or_responses(&title, data, &self.system()?, style)?;
+                Ok(match &self.fitted().coherence {
+                    Some(coherence) => drawn.panel(receptance::coherence(coherence, style)),
+                    None => drawn,
+                })
+            }
             None => Ok(motion::motion(&title, &self.compared()?[0])),
         }
     }
@@ -58,58 +85,66 @@ impl ToFigure for Identified {
 
 impl ToFigure for IdentifiedResponses {
     /// Draws measured and identified receptance.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
-        receptance_or_responses(&title, self.data(), &self.system()?)
+        receptance_or_responses(&title, self.data(), &self.system()?, style)
     }
 }
 
 impl ToFigure for IdentifiedBearing {
     /// Draws the dynamic stiffness, measured line by line and fitted.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(bearing::dynamic_stiffness(self.summary()))
     }
 }
 
 impl ToFigure for BearingTable {
     /// Draws the coefficients over speed.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(bearing::over_speed(self))
     }
 }
 
 impl ToFigure for FrfTable {
     /// Draws magnitude, phase and coherence.
-    fn figure(&self) -> Result<Figure, ReportError> {
-        Ok(frf::figure(self))
+    fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
+        Ok(frf::figure(self, style))
     }
 }
 
 impl ToFigure for Reconstructed {
     /// Draws each force over time with twice its standard error, and its spectrum.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(force::figure(self))
     }
 }
 
 impl ToFigure for SweepSummary {
     /// Draws the error over the settings.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         Ok(sweep::figure(self))
     }
 }
 
 impl ToFigure for Inspected {
     /// Draws columns over time beside their spectra.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         record::figure(self)
+    }
+}
+
+#[cfg(feature = "parquet")]
+impl ToFigure for Trends {
+    /// Draws every parameter, natural frequency and damping ratio over the records, with 95 % intervals.
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
+        Ok(trends::figure(self))
     }
 }
 
 impl ToFigure for Machine {
     /// Draws the receptance around the natural frequencies; of a machine whose nonlinear terms were
     /// identified, to which no receptance belongs, the frequency of each mode over its amplitude.
-    fn figure(&self) -> Result<Figure, ReportError> {
+    fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let backbone = self.backbone()?;
         if !backbone.is_empty() {
             return Ok(backbone::figure(&self.name, &backbone));
@@ -119,6 +154,6 @@ impl ToFigure for Machine {
             .iter()
             .map(|mode| (mode.natural_frequency_hz.value, mode.damping_ratio.value))
             .collect();
-        modal::figure(&self.name, self.system(), &resonances)
+        modal::figure(&self.name, self.system(), &resonances, style)
     }
 }

@@ -4,13 +4,14 @@ use std::f64::consts::TAU;
 
 use mechid_analysis::text::compact;
 use mechid_model::SecondOrderSystem;
-use mechid_plot::charts::{Quantity, bode};
-use mechid_plot::{Axis, Figure};
+use mechid_plot::Figure;
+use mechid_plot::charts::Quantity;
 
+use super::style::{FigureStyle, FrequencyScale};
 use super::trace::Trace;
 use crate::ReportError;
 
-/// Up to so many degrees of freedom every pair of motion and force is drawn, of more the driving
+/// Number of degrees of freedom up to which every pair of motion and force is drawn, of more the driving
 /// points.
 const PAIRS: usize = 2;
 
@@ -38,7 +39,7 @@ const SHARPEST: f64 = 1e-4;
 const ROUNDING: f64 = 1e-7;
 
 /// Natural frequencies that a legend tells of by their values.
-const TOLD: usize = 3;
+const LISTED: usize = 3;
 
 /// A natural frequency, in Hz, with its damping ratio.
 pub type Resonance = (f64, f64);
@@ -52,6 +53,7 @@ pub fn figure(
     file: &str,
     system: &SecondOrderSystem,
     modes: &[Resonance],
+    style: FigureStyle,
 ) -> Result<Figure, ReportError> {
     // A free machine moves at 0 Hz, too, to rounding, where no logarithmic axis reaches.
     let highest = modes.iter().map(|(hz, _)| *hz).fold(0.0, f64::max);
@@ -67,11 +69,10 @@ pub fn figure(
     let alone = pairs.len() == 1;
     let traces = pairs.into_iter().map(|(i, j, name)| {
         let name = if alone { String::new() } else { name };
-        Trace::continuous(name, omega.iter().zip(&receptances).map(|(w, h)| (*w, h[(i, j)])))
+        Trace::line(style, name, omega.iter().zip(&receptances).map(|(w, h)| (*w, h[(i, j)])))
     });
     // What no force moves has nothing that a logarithmic axis could show.
     let traces: Vec<Trace> = traces.filter(|trace| !trace.is_empty()).collect();
-    let curves: Vec<_> = traces.iter().map(Trace::as_response).collect();
     let title = match system.dof() {
         dof if dof > DRIVING_POINTS => {
             format!("{file}, driving points 1 to {DRIVING_POINTS} of {dof}")
@@ -79,12 +80,12 @@ pub fn figure(
         _ => file.to_owned(),
     };
     let natural: Vec<f64> = modes.iter().map(|(hz, _)| *hz).collect();
-    let axis = Axis::log10("Frequency", "Hz");
-    let drawn = bode(&title, axis, Quantity::new("Receptance", "m/N"), &[], &curves);
+    let quantity = Quantity::new("Receptance", "m/N");
+    let drawn = style.chart(&title, FrequencyScale::Logarithmic, quantity, [&[], &traces]);
     Ok(drawn.mark_x(&label(&natural), &natural))
 }
 
-/// ResponseQuantity, force, and the name of each curve.
+/// Returns motion, force, and the name of each curve.
 fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
     let dof = system.dof();
     let name = |i: usize, j: usize| format!("x{}/F{}", i + 1, j + 1);
@@ -105,10 +106,10 @@ fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
 }
 
 fn label(natural: &[f64]) -> String {
-    let told: Vec<String> = natural.iter().map(|hz| compact(*hz, 5)).collect();
-    match told.len() {
-        1 => format!("natural frequency, {} Hz", told[0]),
-        len if len <= TOLD => format!("natural frequencies, {} Hz", told.join(", ")),
+    let frequencies: Vec<String> = natural.iter().map(|hz| compact(*hz, 5)).collect();
+    match frequencies.len() {
+        1 => format!("natural frequency, {} Hz", frequencies[0]),
+        len if len <= LISTED => format!("natural frequencies, {} Hz", frequencies.join(", ")),
         _ => "natural frequencies".into(),
     }
 }

@@ -1,13 +1,15 @@
 //! Measured and fitted receptance.
 
+use mechid_analysis::identify::ResponseCoherence;
 use mechid_analysis::review::receptance::acts_alone;
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
 use mechid_model::linear_algebra::singular_values;
-use mechid_plot::charts::{Quantity, bode};
+use mechid_plot::charts::Quantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::style::{FigureStyle, FrequencyScale, MagnitudeScale};
 use super::trace::Trace;
 use crate::ReportError;
 
@@ -20,9 +22,15 @@ const SEPARABLE: f64 = 100.0;
 /// Relative difference of frequencies that are the same line of several records.
 const SAME_LINE: f64 = 1e-9;
 
+/// Number of degrees of freedom up to which each pair of motion and force has panels of its own.
+const GRID: usize = 4;
+
 /// Magnitude and phase of x_i / F_j, measured and fitted, for every pair of degrees of freedom that the
 /// records show: on the lines where F_j acts alone, and where as many records as degrees of freedom have
 /// independent forces. `None` where no line separates the forces.
+///
+/// The panels are those of a matrix, a row for each motion and a column for each force; with more than four
+/// degrees of freedom all pairs are drawn together.
 ///
 /// # Errors
 /// [`ReportError::Analysis`] if the system has no receptance at a line.
@@ -30,10 +38,63 @@ pub fn receptance(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    style: FigureStyle,
 ) -> Result<Option<Figure>, ReportError> {
-    let (mut measured, mut fitted) = (Vec::new(), Vec::new());
+    let dof = data.dof();
+    let forces: Vec<Vec<Column>> = columns(data);
+    let shown: Vec<usize> = (0..dof).filter(|j| !forces[*j].is_empty()).collect();
+    if shown.is_empty() {
+        return Ok(None);
+    }
+    let grid = (2..=GRID).contains(&dof);
+    // Row by row: of each motion, measured and fitted under each force.
+    let mut pairs: Vec<Vec<[Trace; 2]>> = (0..dof).map(|_| Vec::new()).collect();
+    for j in &shown {
+        let points = &forces[*j];
+        let omega: Vec<f64> = points.iter().map(|(omega, _)| *omega).collect();
+        let fine = fine_grid(&omega);
+        let receptances = system.receptances(&fine)?;
+        for (i, row) in pairs.iter_mut().enumerate() {
+            let name = if dof == 1 || grid { String::new() } else { format!(" {}", pair(i, *j)) };
+            let model = fine.iter().zip(&receptances).map(|(omega, h)| (*omega, h[(i, *j)]));
+            let model = Trace::line(style, format!("identified{name}"), model);
+            let measured = points.iter().map(|(omega, h)| (*omega, h[i]));
+            let measured = Trace::beside(style, &model, format!("measured{name}"), measured);
+            row.push([measured, model]);
+        }
+    }
+    let quantity = Quantity::new("Receptance", "m/N");
+    let usual = FrequencyScale::Linear;
+    if !grid {
+        let (measured, fitted): (Vec<Trace>, Vec<Trace>) =
+            pairs.into_iter().flatten().map(|[measured, fitted]| (measured, fitted)).unzip();
+        return Ok(Some(style.chart(title, usual, quantity, [&measured, &fitted])));
+    }
+    let mut figure = Figure::new(title);
+    for (i, row) in pairs.into_iter().enumerate() {
+        let charts: Vec<Figure> = row
+            .into_iter()
+            .map(|[measured, fitted]| style.chart("", usual, quantity, [&[measured], &[fitted]]))
+            .collect();
+        for at in 0..2 {
+            for (chart, j) in charts.iter().zip(&shown) {
+                let panel = chart.panels()[at].clone();
+                figure = figure.panel(if at == 0 { panel.title(pair(i, *j)) } else { panel });
+            }
+        }
+    }
+    Ok(Some(figure.columns(shown.len()).share_x().shared_legend()))
+}
+
+/// Name of a receptance.
+fn pair(motion: usize, force: usize) -> String {
+    format!("x{}/F{}", motion + 1, force + 1)
+}
+
+/// Measured columns of H for each force, by rising frequency.
+fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
     let separated = separated(data);
-    for j in 0..data.dof() {
+    let of_force = |j: usize| {
         let alone = (0..data.len()).filter(|row| acts_alone(data, *row, j));
         let alone = alone.map(|row| {
             let force = data.force()[(row, j)];
@@ -42,28 +103,9 @@ pub fn receptance(
         let mut points: Vec<Column> = alone.collect();
         points.extend(separated.iter().map(|(omega, h)| (*omega, h.column(j).into_owned())));
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let omega: Vec<f64> = points.iter().map(|(omega, _)| *omega).collect();
-        let fine = fine_grid(&omega);
-        let receptances = system.receptances(&fine)?;
-        for i in 0..data.dof().min(points.len()) {
-            let name = match data.dof() {
-                1 => String::new(),
-                _ => format!(" x{}/F{}", i + 1, j + 1),
-            };
-            let model = fine.iter().zip(&receptances).map(|(omega, h)| (*omega, h[(i, j)]));
-            let model = Trace::continuous(format!("identified{name}"), model);
-            let points = points.iter().map(|(omega, h)| (*omega, h[i]));
-            measured.push(Trace::beside(&model, format!("measured{name}"), points));
-            fitted.push(model);
-        }
-    }
-    if measured.is_empty() {
-        return Ok(None);
-    }
-    let [measured, fitted] = [&measured, &fitted]
-        .map(|traces| traces.iter().map(Trace::as_response).collect::<Vec<_>>());
-    let frequency = Axis::linear("Frequency", "Hz");
-    Ok(Some(bode(title, frequency, Quantity::new("Receptance", "m/N"), &measured, &fitted)))
+        points
+    };
+    (0..data.dof()).map(of_force).collect()
 }
 
 /// One column of H at an angular frequency.
@@ -79,7 +121,7 @@ fn separated(data: &FrequencyData) -> Vec<(f64, DMatrix<Complex<f64>>)> {
         let [a, b] = [a, b].map(|row| data.omega()[*row]);
         b - a <= SAME_LINE * b
     };
-    let mut found = Vec::new();
+    let mut receptances = Vec::new();
     for group in rows.chunk_by(same).filter(|group| dof > 1 && group.len() == dof) {
         let is_alone = |row: &usize| (0..dof).any(|j| acts_alone(data, *row, j));
         if group.iter().all(is_alone) {
@@ -91,10 +133,10 @@ fn separated(data: &FrequencyData) -> Vec<(f64, DMatrix<Complex<f64>>)> {
         if singular.is_ok_and(|s| s.max() <= SEPARABLE * s.min())
             && let Some(h) = force.lu().solve(&data.displacement().select_rows(group))
         {
-            found.push((data.omega()[group[0]], h.transpose()));
+            receptances.push((data.omega()[group[0]], h.transpose()));
         }
     }
-    found
+    receptances
 }
 
 /// Amplitude of each displacement, measured and predicted from the measured forces.
@@ -105,6 +147,7 @@ pub fn responses(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    style: FigureStyle,
 ) -> Result<Figure, ReportError> {
     let frequency_hz: Vec<f64> =
         data.omega().iter().map(|omega| omega / std::f64::consts::TAU).collect();
@@ -120,17 +163,37 @@ pub fn responses(
         let points = |label: &str, size: &dyn Fn(usize) -> f64| {
             let shown: Vec<usize> = (0..data.len()).filter(|row| size(*row) > 0.0).collect();
             let x: Vec<f64> = shown.iter().map(|row| frequency_hz[*row]).collect();
-            let y: Vec<f64> = shown.iter().map(|row| size(*row)).collect();
+            let scaled = |size: f64| match style.magnitude {
+                MagnitudeScale::Logarithmic => size,
+                MagnitudeScale::Decibel => 20.0 * size.log10(),
+            };
+            let y: Vec<f64> = shown.iter().map(|row| scaled(size(*row))).collect();
             Curve::points(label, &x, &y)
         };
-        let y = Axis::log10(format!("Displacement {}", channel + 1), "m");
+        let name = format!("Displacement {}", channel + 1);
+        let y = style.magnitude_axis(Quantity::new(&name, "m"));
         figure = figure.panel(
-            Panel::new(Axis::linear("Frequency", "Hz"), y)
+            Panel::new(style.frequency_axis(FrequencyScale::Linear), y)
                 .curve(points("measured", &|row| data.displacement()[(row, channel)].norm()))
                 .curve(points("predicted", &|row| predicted[(row, channel)].norm())),
         );
     }
     Ok(figure.share_x())
+}
+
+/// Coherence of each motion with all forces.
+pub fn coherence(measured: &ResponseCoherence, style: FigureStyle) -> Panel {
+    let axis = style.frequency_axis(FrequencyScale::Linear);
+    let mut panel = Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0));
+    // 0 Hz has no place on a logarithmic axis.
+    let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
+    let motions = measured.values.ncols();
+    for (at, values) in measured.values.column_iter().enumerate() {
+        let name = if motions == 1 { String::new() } else { format!("x{}", at + 1) };
+        let values: Vec<f64> = values.iter().skip(hidden).copied().collect();
+        panel = panel.curve(Curve::line(name, &measured.frequency_hz[hidden..], &values));
+    }
+    panel
 }
 
 /// Reason for a figure of responses instead of receptances.
@@ -186,13 +249,19 @@ mod tests {
             let truth = machine().receptance(omega).unwrap();
             assert!((h - &truth).norm() < 1e-10 * truth.norm(), "{omega}");
         }
-        let curves = |data: &FrequencyData| receptance("", data, &machine()).unwrap();
-        assert_eq!(curves(&both).expect("two experiments").panels().len(), 2);
+        let style = FigureStyle::default();
+        let curves = |data: &FrequencyData| receptance("", data, &machine(), style).unwrap();
+        let drawn = curves(&both).expect("two experiments");
+        let titles: Vec<&str> = drawn.panels().iter().map(Panel::name).collect();
+        assert_eq!(titles, ["x1/F1", "x1/F2", "", "", "x2/F1", "x2/F2", "", ""]);
+        let drawn = curves(&record(1, 0.0)).expect("one force acts alone");
+        let titles: Vec<&str> = drawn.panels().iter().map(Panel::name).collect();
+        assert_eq!(titles, ["x1/F2", "", "x2/F2", ""]);
         // Forces in a fixed ratio say no more in two records than in one.
         let same = record(0, 0.5).and(&record(0, 0.5)).unwrap();
         for data in [record(0, 0.02), same] {
             assert!(curves(&data).is_none());
-            assert_eq!(responses("", &data, &machine()).unwrap().panels().len(), 2);
+            assert_eq!(responses("", &data, &machine(), style).unwrap().panels().len(), 2);
         }
     }
 }

@@ -83,7 +83,7 @@ fn spectrum(column: &Drawn, dt: Option<f64>) -> Panel {
     panel(Axis::log10("Amplitude", unit(column)).range(low, high), title, curve)
 }
 
-/// What an axis of these amplitudes shows; nothing without any.
+/// Returns the range of an axis for these amplitudes; `None` without any.
 fn reach(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     let amplitudes = points.iter().map(|(_, amplitude)| *amplitude);
     let strongest = amplitudes.clone().reduce(f64::max)?;

@@ -1,9 +1,11 @@
-//! Curves of complex frequency responses with a continuous phase.
+//! Curves of complex frequency responses.
 
 use std::f64::consts::TAU;
 
 use mechid_plot::charts::FrequencyResponse;
 use nalgebra::Complex;
+
+use super::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 
 /// A curve before it is drawn.
 pub struct Trace {
@@ -13,10 +15,22 @@ pub struct Trace {
     phase_deg: Vec<f64>,
 }
 
+/// Difference of angles, in degrees, that is rounding.
+const ALIKE: f64 = 1e-6;
+
+/// Returns an angle of ±180°, to rounding, with the sign of the one before, or −180°: a machine without
+/// damping must not jump to and fro.
+fn wrapped(previous: Option<f64>, angle: f64) -> f64 {
+    match angle.abs() > 180.0 - ALIKE {
+        true if previous.is_some_and(|previous| previous > 90.0) => 180.0,
+        true => -180.0,
+        false => angle,
+    }
+}
+
 /// The angle on the branch next to another one, both in degrees. Of two that are as near, as there
 /// are where a machine without damping turns over, the smaller one, or −180° of ±180°.
 fn next_to(other: f64, angle: f64) -> f64 {
-    const ALIKE: f64 = 1e-6;
     let near = angle - 360.0 * ((angle - other) / 360.0).round();
     let beyond = near - (near - other).signum() * 360.0;
     let smaller = beyond.abs() < near.abs() - ALIKE;
@@ -26,40 +40,56 @@ fn next_to(other: f64, angle: f64) -> f64 {
 }
 
 impl Trace {
-    /// The curve of points (ω, H) with a phase that never jumps.
-    pub fn continuous(name: String, points: impl Iterator<Item = (f64, Complex<f64>)>) -> Self {
+    /// Makes the curve of points (ω, H).
+    pub fn line(
+        style: FigureStyle,
+        name: String,
+        points: impl Iterator<Item = (f64, Complex<f64>)>,
+    ) -> Self {
         let mut previous = 0.0;
-        Self::with_phase(name, points, |_, angle| {
+        Self::with_phase(style, name, points, |_, angle| {
             previous = next_to(previous, angle);
             previous
         })
     }
 
-    /// The points (ω, H) with their phases on the branch next to those of a curve.
+    /// Makes the points (ω, H), with continuous phases on the branch next to those of a curve.
     pub fn beside(
+        style: FigureStyle,
         curve: &Self,
         name: String,
         points: impl Iterator<Item = (f64, Complex<f64>)>,
     ) -> Self {
-        Self::with_phase(name, points, |frequency_hz, angle| {
+        Self::with_phase(style, name, points, |frequency_hz, angle| {
             let right = curve.frequency_hz.partition_point(|f| *f < frequency_hz);
             let at = right.min(curve.phase_deg.len().saturating_sub(1));
             next_to(curve.phase_deg.get(at).copied().unwrap_or(0.0), angle)
         })
     }
 
-    /// Points of no magnitude cannot be drawn on a logarithmic axis and are left out.
+    /// Points of no magnitude, and those at 0 Hz on a logarithmic axis, cannot be drawn and are left out.
     fn with_phase(
+        style: FigureStyle,
         name: String,
         points: impl Iterator<Item = (f64, Complex<f64>)>,
-        mut phase: impl FnMut(f64, f64) -> f64,
+        mut continuous: impl FnMut(f64, f64) -> f64,
     ) -> Self {
         let mut trace =
             Self { name, frequency_hz: Vec::new(), magnitude: Vec::new(), phase_deg: Vec::new() };
-        for (omega, h) in points.filter(|(_, h)| h.norm() > 0.0) {
+        let positive = style.frequency == Some(FrequencyScale::Logarithmic);
+        let is_shown =
+            |(omega, h): &(f64, Complex<f64>)| h.norm() > 0.0 && (!positive || *omega > 0.0);
+        for (omega, h) in points.filter(is_shown) {
+            let angle = h.arg().to_degrees();
             trace.frequency_hz.push(omega / TAU);
-            trace.magnitude.push(h.norm());
-            trace.phase_deg.push(phase(omega / TAU, h.arg().to_degrees()));
+            trace.magnitude.push(match style.magnitude {
+                MagnitudeScale::Logarithmic => h.norm(),
+                MagnitudeScale::Decibel => 20.0 * h.norm().log10(),
+            });
+            trace.phase_deg.push(match style.phase {
+                PhaseStyle::Wrapped => wrapped(trace.phase_deg.last().copied(), angle),
+                PhaseStyle::Continuous => continuous(omega / TAU, angle),
+            });
         }
         trace
     }

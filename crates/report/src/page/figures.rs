@@ -13,8 +13,9 @@ use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid_signal::{Record, Spectrum};
 
 use super::Captions as _;
+use crate::FigureStyle;
 use crate::ReportError;
-use crate::figures::receptance as picture;
+use crate::figures::{receptance as picture, restoring as surface};
 
 /// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
 /// one can still be read.
@@ -30,7 +31,7 @@ pub(crate) struct Drawn {
     pub caption: String,
 }
 
-fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, ReportError> {
+pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn, ReportError> {
     let panels = figure.panels();
     // Many curves have a legend of several rows.
     let curves = panels.iter().map(|panel| panel.data().len()).max().unwrap_or(0);
@@ -129,7 +130,8 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
 /// [`ReportError::NothingToDraw`].
 pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
     let (system, origin) = (identified.system()?, &measured.origin);
-    let (figure, caption) = match picture::receptance("", &measured.data, &system)? {
+    let style = FigureStyle::default();
+    let (figure, caption) = match picture::receptance("", &measured.data, &system, style)? {
         Some(figure) => {
             let caption = format!(
                 "Receptance, motion over force: that of the identified machine, and that of the record, \
@@ -143,7 +145,7 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
                  forces; no receptance, for {}.",
                 picture::WHY
             );
-            (picture::responses("", &measured.data, &system)?, caption)
+            (picture::responses("", &measured.data, &system, style)?, caption)
         }
     };
     drawn("receptance".into(), figure, caption)
@@ -310,6 +312,15 @@ pub fn correlations(
     let caption =
         format!("{what}; 95 % of the stems of noise stay between the dashed lines.{spanned}");
     drawn(part.id("correlations"), figure, caption)
+}
+
+/// The restoring force of a machine with nonlinear terms, of the first record.
+pub fn restoring(identified: &Identified) -> Result<Option<Drawn>, ReportError> {
+    let Some(fitted) = &identified.fitted().nonlinear else { return Ok(None) };
+    let caption = "Restoring force of the first record: points of its surface, springs and dampers with their \
+                   confidence intervals, drawn to 1.2 times the amplitudes measured, and what they leave.";
+    let figure = surface::figure("first record", fitted)?;
+    drawn("restoring-force".into(), figure, caption.into()).map(Some)
 }
 
 /// The force found and the one measured.

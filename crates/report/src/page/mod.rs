@@ -4,6 +4,8 @@ mod checks;
 mod figures;
 mod sections;
 mod tables;
+#[cfg(feature = "parquet")]
+mod trends;
 
 use std::path::PathBuf;
 
@@ -15,6 +17,8 @@ use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
 use self::figures::Drawn;
+#[cfg(feature = "parquet")]
+pub use self::trends::trends_page;
 use crate::ReportError;
 
 /// Inline, for the file stands alone.
@@ -42,7 +46,7 @@ pub struct PageSettings {
     pub command: Option<String>,
 }
 
-/// Everything the page shows.
+/// Contents of the page.
 struct Contents<'a> {
     title: String,
     review: &'a Review<'a>,
@@ -107,7 +111,7 @@ fn html(contents: &Contents<'_>) -> Result<String, ReportError> {
     let bodies = [
         Some(sections::data(contents)?),
         Some(sections::excitation(contents)?),
-        Some(sections::machine(contents)),
+        Some(sections::machine(contents)?),
         Some(sections::response(contents)?),
         Some(sections::residual(contents)?),
         sections::validation(contents)?,
@@ -181,7 +185,7 @@ fn heading(contents: &Contents<'_>) -> Markup {
                     div { dt { "Mode " (name) } dd { (number) (unit) small { "± " (error) (unit) } } }
                 }
                 @if let Some(part) = report.fit.unexplained_motion {
-                    div { dt { "ResponseQuantity left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }
+                    div { dt { "Motion left unexplained" } dd { (significant(100.0 * part, 3)) " %" } }
                 }
             }
             @if !report.modes.is_empty() {
@@ -196,7 +200,7 @@ fn files(contents: &Contents<'_>) -> String {
     names.join(", ")
 }
 
-/// What speaks against the numbers, and what for them.
+/// Section of warnings, and of what supports the numbers.
 fn remarks(contents: &Contents<'_>) -> Markup {
     let (doubts, merits) = (judgement::doubts(contents.review), judgement::merits(contents.review));
     html! {

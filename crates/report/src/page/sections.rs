@@ -1,8 +1,11 @@
 //! The sections of the report.
 
+use std::f64::consts::TAU;
+
 use maud::{Markup, html};
+use mechid_analysis::AnalysisError;
 use mechid_analysis::identify::checks::When;
-use mechid_analysis::identify::rows::{ModeRow, Uncertain};
+use mechid_analysis::identify::rows::{ModeRow, ParameterRow, Uncertain};
 use mechid_analysis::identify::summary::IdentificationSummary;
 use mechid_analysis::identify::validation::Share;
 use mechid_analysis::review::channels::Channel;
@@ -11,6 +14,7 @@ use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Residual, sizes};
 use mechid_analysis::review::{RecordReview, judgement};
 use mechid_analysis::text::{compact, significant};
+use mechid_model::Mode;
 use mechid_signal::message;
 
 use super::tables::Table;
@@ -43,7 +47,7 @@ fn of_each(
     })
 }
 
-/// What is in the records.
+/// Section on what is in the records.
 pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let records = of_each(contents, |part| {
         let header =
@@ -66,7 +70,7 @@ pub fn data(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-/// What the page says of all samples and what of a part, where the record is long.
+/// Sentence that tells which statements are about all samples and which about a part, where the record is long.
 fn part_held(part: &RecordReview<'_>) -> Option<String> {
     let (first, last) = (part.held().first_sample, part.held().held_to()?);
     Some(format!(
@@ -116,7 +120,7 @@ fn channel_row(channel: &Channel) -> Vec<String> {
     row
 }
 
-/// Whether the force suits.
+/// Section on whether the force suits.
 pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let header = [
         "force",
@@ -163,23 +167,89 @@ fn uncertain(name: String, value: &Uncertain, unit: &str) -> Vec<String> {
     row
 }
 
-/// Parameters and modes.
-pub fn machine(contents: &Contents<'_>) -> Markup {
+/// Parameters, matrices, modes and their shapes.
+///
+/// # Errors
+/// [`ReportError::Analysis`] if the modes cannot be computed.
+pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let report = contents.review.identified.summary();
     let interval = format!("{} % interval", compact(100.0 * report.confidence, 3));
     let header = |what| [what, "value", "standard error", &interval, "unit"];
-    let parameters =
-        report.parameters.iter().map(|p| uncertain(p.name.clone(), &p.estimate, p.unit)).collect();
+    let linear = report.parameters.iter();
+    let terms = report.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters);
+    let parameters = linear
+        .map(|p| uncertain(p.name.clone(), &p.estimate, p.unit))
+        .chain(terms.map(|p| uncertain(p.name.clone(), &p.estimate, &p.unit)))
+        .collect();
+    let modes_of = if report.nonlinear.is_some() { "Modes of small amplitude" } else { "Modes" };
+    let restoring = figures::restoring(contents.review.identified)?;
     let modes = ModeRow::quantities(&report.modes, true).into_iter();
     let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
-    html! {
+    let matrices = matrices(&report.parameters);
+    let dofs = contents.review.identified.estimate().dof();
+    let shapes = shapes(contents)?;
+    let numbered: Vec<String> = (1..=dofs).map(|dof| dof.to_string()).collect();
+    let columns: Vec<&str> =
+        std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
+    Ok(html! {
         div.tables {
             (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
-            (Table { caption: "Modes", header: &header("mode"), numbers_from: 1, rows: modes }.html())
+            (Table { caption: modes_of, header: &header("mode"), numbers_from: 1, rows: modes }.html())
             (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
         }
+        @if dofs > 1 {
+            div.tables {
+                @for (caption, rows) in matrices {
+                    (Table { caption: &caption, header: &columns, numbers_from: 1, rows }.html())
+                }
+                (shapes)
+            }
+        }
+        @if let Some(drawn) = &restoring { div.figures { (figure(drawn)) } }
         @for remark in &contents.review.identified.fitted().remarks { p.note { "How it was done: " (remark) "." } }
-    }
+    })
+}
+
+/// Returns caption and cells of each of M, C and K, values with their standard errors.
+fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
+    let of_one = |entries: &[ParameterRow]| {
+        let unit = entries.first().map_or("", |entry| entry.unit);
+        let name = entries.first().map_or("", |entry| entry.matrix.as_str());
+        let rows = entries.chunk_by(|a, b| a.row == b.row).map(|row| {
+            let number = row.first().map_or(0, |entry| entry.row);
+            let cells = row.iter().map(|entry| {
+                let [value, error, _] = entry.estimate.cells();
+                match entry.estimate.standard_error {
+                    Some(_) => format!("{value} ± {error}"),
+                    None => value,
+                }
+            });
+            std::iter::once(number.to_string()).chain(cells).collect()
+        });
+        (format!("Matrix of {name}, {unit}"), rows.collect())
+    };
+    parameters.chunk_by(|a, b| a.matrix == b.matrix).map(of_one).collect()
+}
+
+/// Shapes of the modes, modulus and phase of each degree of freedom.
+fn shapes(contents: &Contents<'_>) -> Result<Markup, ReportError> {
+    let system = contents.review.identified.system()?;
+    let modes = system.modes().map_err(AnalysisError::from)?;
+    let name = |(number, mode): (usize, &Mode)| {
+        format!("mode {number}, {} Hz", significant(mode.natural_frequency() / TAU, 4))
+    };
+    let names: Vec<String> = (1..).zip(&modes).map(name).collect();
+    let header: Vec<&str> = std::iter::once("").chain(names.iter().map(String::as_str)).collect();
+    let row = |dof: usize| -> Vec<String> {
+        let cells = modes.iter().map(|mode| {
+            let entry = mode.shape()[dof];
+            format!("{} ∠ {:.1}°", significant(entry.norm(), 4), entry.arg().to_degrees())
+        });
+        std::iter::once((dof + 1).to_string()).chain(cells).collect()
+    };
+    let rows = (0..system.dof()).map(row).collect();
+    let caption = "Mode shapes, modulus and phase by degree of freedom; the largest entry is 1";
+    Ok(Table { caption, header: &header, numbers_from: 1, rows }.html())
 }
 
 fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
@@ -194,7 +264,7 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
     }
     rows.push(pair("Residual of the fit (NRMSE)", percent(fit.nrmse)));
     if let Some(part) = fit.unexplained_motion {
-        rows.push(pair("ResponseQuantity the linear model leaves unexplained", percent(part)));
+        rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
     }
     if let Some(misfit) = &contents.review.identified.fitted().misfit {
         let what = format!("Power of the residual over what {} explains", misfit.noise);
@@ -227,7 +297,7 @@ pub fn response(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-/// Whether what is left is noise.
+/// Section on whether the residual is noise.
 pub fn residual(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let records = of_each(contents, |part| match &part.residual {
         Ok(residual) => residual_of(part, residual),

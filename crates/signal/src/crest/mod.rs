@@ -71,6 +71,7 @@ impl CrestSearch {
         let mut best = multisine.clone();
         let mut least = best.peak();
         for start in 0..self.starts.max(1) {
+            log::debug!("start {} of {}", start + 1, self.starts.max(1));
             let mut phases = self.start(multisine, start)?;
             let mut damping = FIRST_DAMPING;
             for (exponents, norm) in &stages {
@@ -78,10 +79,10 @@ impl CrestSearch {
                     phases = newton::minimise(norm, phases, *p, &mut damping);
                 }
             }
-            let found = multisine.clone().with_phases(Phases::Given(phases))?;
-            let peak = found.peak();
+            let candidate = multisine.clone().with_phases(Phases::Given(phases))?;
+            let peak = candidate.peak();
             if peak < least {
-                (best, least) = (found, peak);
+                (best, least) = (candidate, peak);
             }
         }
         Ok(best)

@@ -1,4 +1,4 @@
-//! How many printed numbers come out, table by table.
+//! Numbers of printed values that come out, table by table.
 
 use super::super::cells::Judged;
 use super::super::published::{Cell, Method};

@@ -7,11 +7,11 @@ use super::super::published::{Method, Published};
 use super::super::results::Results;
 use super::markdown::number;
 
-/// What is printed and what is computed, cell by cell.
+/// Printed and computed values, cell by cell.
 pub struct Evidence<'a> {
-    /// What is printed.
+    /// Printed values.
     pub published: &'a Published,
-    /// What is computed.
+    /// Computed values.
     pub results: &'a Results,
     /// The numbers of the tables, in printed order.
     pub tables: Vec<String>,
@@ -62,7 +62,7 @@ fn sorting(table: &str) -> Vec<(bool, u32, String)> {
     table.split('.').map(part).collect()
 }
 
-/// Which numbers a claim is held against.
+/// Numbers that a claim is held against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Source {
     /// The printed ones (for reruns: with every slip replayed).
@@ -75,7 +75,7 @@ pub enum Source {
 #[derive(Clone, Copy)]
 pub struct View<'a> {
     evidence: &'a Evidence<'a>,
-    /// Which numbers.
+    /// Source of the numbers.
     pub source: Source,
 }
 

@@ -110,7 +110,7 @@ fn system(listed: &[f64], machine: Machine) -> Result<SecondOrderSystem, String>
     SecondOrderSystem::new(mass, matrix(damping), matrix(stiffness)).map_err(|e| e.to_string())
 }
 
-/// With which machine a force is sought.
+/// Machine with which a force is sought.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameters {
     /// The true one.
@@ -119,7 +119,7 @@ pub enum Parameters {
     From(Domain),
 }
 
-/// How a force is sought.
+/// Equation by which a force is sought.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Equation {
     /// Sample by sample, eq. (4.8.1).
@@ -141,7 +141,7 @@ pub struct Ratios {
 }
 
 impl Ratios {
-    /// Of a force sought in given sequences.
+    /// Computes the errors of a force sought in given sequences.
     ///
     /// # Errors
     /// The words of the force equation.

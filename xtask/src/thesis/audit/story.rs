@@ -1,4 +1,4 @@
-//! What was done, what came out, what one learns: for a reader who has never seen the
+//! Work, results and lessons: for a reader who has never seen the
 //! dissertation.
 
 use super::super::published::Method::{
@@ -147,7 +147,7 @@ fn lessons(evidence: &Evidence) -> Result<String, String> {
     ))
 }
 
-/// Which step size: the larger of the errors in K and C with the exact discretisation.
+/// Compares step sizes: the larger of the errors in K and C with the exact discretisation.
 fn steps(evidence: &Evidence) -> String {
     let view = evidence.corrected();
     let at = |t, m, npi: f64| {

@@ -1,4 +1,4 @@
-//! What the dissertation proposes for later, and what the library does about it.
+//! Proposals of the dissertation for later work, and what the library does about them.
 
 use mechid::force::{Measurement, Noise, frequency_domain, inner_lines};
 use mechid::model::{Discretisation, ResponseQuantity};

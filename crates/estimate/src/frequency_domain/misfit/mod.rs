@@ -56,7 +56,7 @@ pub(super) struct Misfit<'a> {
     tried: Vec<Row>,
     /// The regressors X̂ s^p at the parameters last accepted, orthonormal.
     regressors: DMatrix<f64>,
-    /// How much each row counts; 1 but in a search's restarts.
+    /// Weight of each row; 1 but in a search's restarts.
     shares: Vec<f64>,
 }
 
@@ -183,7 +183,7 @@ impl SumOfSquares for Misfit<'_> {
         std::mem::swap(&mut self.rows, &mut self.tried);
     }
 
-    /// With the measured displacement in place of X̂ the equations of a step lead to the least
+    /// Takes a step with the measured displacement in place of X̂ the equations of a step lead to the least
     /// |W (D X − F)|² for fixed W, which is linear in the parameters.
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);

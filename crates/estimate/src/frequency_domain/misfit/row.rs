@@ -94,7 +94,7 @@ impl Row {
             && lower.solve_lower_triangular_mut(&mut self.white_receptance)
     }
 
-    /// As [`Row::whiten`], with L from the covariance of displacements and forces, and the most
+    /// Whitens as [`Row::whiten`] does, with L from the covariance of displacements and forces, and the most
     /// likely force F̂ = F − Q (L Lᴴ)⁻¹ e with Q = E[ΔF ΔXᴴ] − E[ΔF ΔFᴴ] Gᴴ.
     pub(super) fn whiten_both(
         &mut self,
@@ -146,8 +146,8 @@ fn solve_in_place(a: &mut ComplexMatrix, b: &mut ComplexMatrix) -> bool {
         for j in (0..n).rev() {
             let upper = &a.as_slice()[j * n..=j * n + j];
             column[j] /= upper[j];
-            let found = column[j];
-            subtract(&mut column[..j], &upper[..j], found);
+            let pivot = column[j];
+            subtract(&mut column[..j], &upper[..j], pivot);
         }
     }
     true

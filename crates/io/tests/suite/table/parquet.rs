@@ -3,8 +3,8 @@
 use std::fs;
 
 use mechid_io::{
-    IoError, Limit, Limits, ParquetColumn, ParquetValues, Quantity, ReadOptions, Table, TimeAxis,
-    read_parquet_metadata, write_parquet,
+    IoError, Limit, Limits, ParquetColumn, ParquetFile, ParquetValues, Quantity, ReadOptions,
+    RecordRows, Table, TimeAxis, read_parquet_metadata, write_parquet,
 };
 use mechid_model::ResponseQuantity;
 
@@ -129,4 +129,77 @@ fn a_table_of_results_is_read_back() {
     let error = write_parquet(&path, &unequal, &[]).unwrap_err();
     assert!(matches!(error, IoError::Parquet { .. }), "{error}");
     fs::remove_file(path).unwrap();
+}
+
+fn many() -> ParquetFile {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/many.parquet");
+    ParquetFile::open(path, &Limits::default()).unwrap()
+}
+
+#[test]
+fn a_column_tells_the_records_of_a_file_apart() {
+    let rows = |ids: [&str; 3]| {
+        let spans = ids.into_iter().zip([0..100, 100..220, 220..300]);
+        spans.map(|(id, rows)| RecordRows { id: id.into(), rows }).collect::<Vec<_>>()
+    };
+    assert_eq!(many().records("machine").unwrap(), rows(["pump 1", "pump 2", "fan"]));
+    assert_eq!(many().records("day").unwrap(), rows(["7", "8", "9"]));
+    let error = many().records("again").unwrap_err();
+    assert!(matches!(&error, IoError::RecordApart { id, row: 221, .. } if id == "1"), "{error}");
+    let error = many().records("named").unwrap_err();
+    assert!(matches!(error, IoError::RecordColumn { row: 6, what: "nothing", .. }), "{error}");
+    let error = many().records("x").unwrap_err();
+    assert!(matches!(error, IoError::RecordColumn { row: 1, .. }), "{error}");
+    assert!(matches!(many().records("lost").unwrap_err(), IoError::MissingColumn { .. }));
+}
+
+#[test]
+fn records_of_a_file_are_read_together_and_alone_alike() {
+    let (file, path) = (many(), "many.parquet");
+    let records = file.records("machine").unwrap();
+    let wanted = ["stamp", "force"].map(|name| file.head().find(name).unwrap());
+    let together = file.tables(Some(&wanted), &records).unwrap();
+    for (record, table) in records.iter().zip(&together) {
+        let alone = file.tables(None, std::slice::from_ref(record)).unwrap().swap_remove(0);
+        let rows = record.rows.clone();
+        assert_eq!(alone.column("x").unwrap(), &written("x")[rows.clone()]);
+        // Instants count from the first of the record, whatever is read with it.
+        let first = written("stamp")[rows.start];
+        for (read, stamp) in
+            table.column("stamp").unwrap().iter().zip(&written("stamp")[rows.clone()])
+        {
+            assert!((read - (stamp - first)).abs() < 1e-12, "{read}");
+        }
+        assert_eq!(table.column("stamp").unwrap(), alone.column("stamp").unwrap());
+        // What is not finite in one record is in the way of that one only.
+        match (record.id.as_str(), table.column("force")) {
+            ("pump 2", force) => {
+                let error = force.unwrap_err().to_string();
+                assert!(error.contains("many.parquet (record pump 2)"), "{error}");
+                assert!(error.contains("sample 51"), "{error}");
+            }
+            (_, force) => assert_eq!(force.unwrap(), &written("force")[rows]),
+        }
+        assert!(matches!(table.column("x").unwrap_err(), IoError::NoNumbers { .. }), "{path}");
+    }
+}
+
+#[test]
+fn damage_of_a_file_of_many_records_is_an_error_and_no_panic() {
+    let whole = bytes("many");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("damaged.parquet");
+    let mut refused = 0;
+    for at in (0..whole.len()).step_by(61) {
+        let mut damaged = whole.clone();
+        damaged[at] ^= 0x55;
+        fs::write(&path, &damaged).unwrap();
+        // Read or refused: a flipped bit of a number is not found.
+        let read = ParquetFile::open(&path, &Limits::default()).and_then(|file| {
+            let records = file.records("machine")?;
+            file.tables(None, &records).map(drop)
+        });
+        refused += usize::from(read.is_err());
+    }
+    assert!(refused > 0);
 }

@@ -16,7 +16,7 @@ use super::super::published::Method;
 use super::evidence::{Evidence, View};
 use super::markdown::table;
 
-/// Whether a claim holds.
+/// Verdict on a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holds {
     /// Every test of it passes.
@@ -41,7 +41,7 @@ impl Holds {
     }
 }
 
-/// How many tests of a claim passed.
+/// Number of tests of a claim that passed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Tally {
     held: usize,
@@ -84,7 +84,7 @@ impl Finding {
         Self { tally: tests.into_iter().collect(), numbers: numbers.into() }
     }
 
-    /// Whether the claim holds.
+    /// Returns whether the claim holds.
     pub fn holds(&self) -> Holds {
         self.tally.holds()
     }
@@ -97,7 +97,7 @@ impl Finding {
 
 type Judge = fn(&View) -> Result<Finding, String>;
 
-/// What the dissertation offers in support of a claim.
+/// Support that the dissertation offers for a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Support {
     /// Tables: the printed numbers are judged.
@@ -113,13 +113,13 @@ pub enum Support {
 pub struct Claim {
     /// Running number.
     pub number: u8,
-    /// Where it is made.
+    /// Section in which it is made.
     pub section: &'static str,
-    /// What it says.
+    /// Statement of the claim.
     pub statement: &'static str,
-    /// How it is tested: what each of the counted tests asks.
+    /// Test of the claim: what each of the counted tests asks.
     pub test: &'static str,
-    /// What the dissertation offers.
+    /// Support that the dissertation offers.
     pub support: Support,
     judge: Judge,
 }
@@ -200,7 +200,7 @@ pub fn section(judged: &[Judged]) -> String {
     text
 }
 
-/// Which claims go from which verdict to which.
+/// Lists the claims that go from one verdict to another.
 fn changes(judged: &[Judged]) -> Vec<Vec<String>> {
     let all = [Holds::Yes, Holds::Mostly, Holds::Hardly, Holds::No];
     let pairs = all.iter().flat_map(|from| all.iter().map(move |to| (*from, *to)));

@@ -1,6 +1,6 @@
 //! Misprints of the equations; the library follows the corrected ones.
 
-/// Where, what is printed, what should be, how we know.
+/// Misprints of equations: place, printed, right, reason.
 pub const EQUATIONS: &[[&str; 4]] = &[
     ["after (3.3.1.4)", "X at t − Dt", "X at t + Dt", "the central difference solves for it"],
     ["table 3.2, B3", "time t", "time t + Dt", "Houbolt's equilibrium is at t + Dt"],

@@ -17,13 +17,13 @@ use super::markdown::{number, table};
 /// Something printed wrongly or ambiguously outside the identification tables.
 #[derive(Debug, Clone)]
 pub struct Remark {
-    /// Where it stands.
+    /// Place of the misprint.
     pub place: String,
-    /// What is printed.
+    /// Printed value.
     pub printed: String,
-    /// What should be.
+    /// Right value.
     pub right: String,
-    /// How we know.
+    /// Reason.
     pub reason: String,
 }
 

@@ -13,7 +13,7 @@ const RATIO_E1: (Complex<f64>, Complex<f64>, f64) =
 const RATIO_STEFFEN_RADE: (Complex<f64>, Complex<f64>, f64) =
     (Complex::new(-0.682, 0.275), Complex::new(-0.697, 0.291), 1.32);
 
-/// What is wrong in tables E1, E2 and the reproduced table of Steffen & Rade (1991).
+/// Lists what is wrong in tables E1, E2 and the reproduced table of Steffen & Rade (1991).
 ///
 /// # Errors
 /// The words of the eigenvalue solver.

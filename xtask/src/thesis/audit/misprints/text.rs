@@ -1,6 +1,6 @@
 //! Slips of the running text, the captions and the numbering.
 
-/// Where, what is printed, what should be, how we know.
+/// Misprints of the text: place, printed, right, reason.
 pub const TEXT: &[[&str; 4]] = &[
     [
         "section 5.2",

@@ -1,22 +1,28 @@
 //! The record an experiment would give: excitation, response, noise.
 
+#[cfg(feature = "report")]
+mod figure;
+mod schemes;
+mod summary;
+
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
-    AllowUnstable, AlphaAcceleration, Bathe, CentralDifference, CentralDifferenceStart, Convention,
-    GeneralisedAlpha, Houbolt, HouboltStart, IntegrateError, MatrixExponential, Newmark,
-    RungeKutta4, SampledForce, Scheme, SubStepForce, SystemWithForces, TermForces, WilsonLoad,
-    WilsonTheta, integrate, integrate_periodic, periodic_orbit,
+    AllowUnstable, Convention, IntegrateError, SampledForce, Scheme, SystemWithForces, TermForces,
+    integrate, integrate_periodic, periodic_orbit,
 };
-use mechid_io::{
-    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, IoError, Level, LoadBeyond,
-    MiddleLoad, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
-};
+use mechid_io::{Experiment, IoError, Level, ResponseKind};
 use mechid_model::{
     InitialState, Instability, ModelError, NonlinearSystem, Response, SecondOrderSystem,
 };
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
+
+use self::schemes::{has_given_start, scheme};
+pub use self::summary::{
+    FreeGrowth, SchemeConvention, SimulatedChannel, SimulatedMode, SimulatedTerms,
+    SimulationSummary,
+};
 
 /// Result of [`simulate`]: the true response and the measured record.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,6 +31,10 @@ pub struct Simulation {
     pub system: SecondOrderSystem,
     /// The machine with its nonlinear terms; `None` of a linear one.
     pub nonlinear: Option<NonlinearSystem>,
+    /// Kind of the response: the steady state, or one with a beginning.
+    pub response_kind: ResponseKind,
+    /// Number of periods of the force.
+    pub periods: usize,
     /// Scheme that computed the response, with its parameters.
     pub scheme: String,
     /// The scheme's conventions in force.
@@ -108,6 +118,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         conventions: scheme.map_or_else(Vec::new, |s| s.conventions()),
         system: machine.linear,
         nonlinear: machine.nonlinear,
+        response_kind: experiment.response.clone(),
+        periods: experiment.periods,
         force,
         response,
         measured_force,
@@ -324,75 +336,6 @@ pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Resp
     let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
     let [x, v, a] = motions.map(record);
     Response::new(x?, v?, a?)
-}
-
-fn has_given_start(experiment: &Experiment) -> bool {
-    matches!(experiment.scheme, SchemeChoice::Houbolt { start: FirstSteps::Given { .. } })
-}
-
-fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, SimulateError> {
-    Ok(Some(match &experiment.scheme {
-        SchemeChoice::Newmark { beta, gamma } => Box::new(Newmark::new(*beta, *gamma)?),
-        SchemeChoice::CentralDifference { start } => Box::new(CentralDifference {
-            start: match start {
-                FirstDisplacements::Taylor => CentralDifferenceStart::Taylor,
-                FirstDisplacements::Rest => CentralDifferenceStart::Rest,
-            },
-        }),
-        SchemeChoice::Houbolt { start } => Box::new(Houbolt {
-            start: match start {
-                FirstSteps::AverageAcceleration => HouboltStart::AverageAcceleration,
-                FirstSteps::CentralDifference => HouboltStart::CentralDifference,
-                FirstSteps::Given { at_dt, at_2dt } => HouboltStart::Given {
-                    at_dt: experiment.per_dof("the displacement at Δt", at_dt)?,
-                    at_2dt: experiment.per_dof("the displacement at 2Δt", at_2dt)?,
-                },
-            },
-        }),
-        SchemeChoice::WilsonTheta { theta, load } => {
-            Box::new(WilsonTheta::new(*theta)?.with_load(match load {
-                LoadBeyond::Projected => WilsonLoad::Projected,
-                LoadBeyond::Interpolated => WilsonLoad::Interpolated,
-            }))
-        }
-        SchemeChoice::GeneralisedAlpha { rho_infinity, acceleration } => {
-            returning(GeneralisedAlpha::new(*rho_infinity)?, *acceleration)
-        }
-        SchemeChoice::HhtAlpha { rho_infinity, acceleration } => {
-            returning(GeneralisedAlpha::hilber_hughes_taylor(*rho_infinity)?, *acceleration)
-        }
-        SchemeChoice::WbzAlpha { rho_infinity, acceleration } => {
-            returning(GeneralisedAlpha::wood_bossak_zienkiewicz(*rho_infinity)?, *acceleration)
-        }
-        SchemeChoice::Bathe { load } => Box::new(Bathe::HALVES.with_force(sub_step_force(*load))),
-        SchemeChoice::RhoInfinityBathe { rho_infinity, load } => {
-            Box::new(Bathe::new(*rho_infinity)?.with_force(sub_step_force(*load)))
-        }
-        SchemeChoice::MatrixExponential { load } => Box::new(match load {
-            HeldOrLinear::Held => MatrixExponential::HELD,
-            HeldOrLinear::Linear => MatrixExponential::LINEAR,
-        }),
-        SchemeChoice::RungeKutta4 { load } => Box::new(match load {
-            MiddleLoad::Held => RungeKutta4::HELD,
-            MiddleLoad::Linear => RungeKutta4::LINEAR,
-            MiddleLoad::Exact => RungeKutta4::SUPPLIED,
-        }),
-        _ => return Ok(None),
-    }))
-}
-
-fn returning(scheme: GeneralisedAlpha, acceleration: ReturnedAcceleration) -> Box<dyn Scheme> {
-    Box::new(scheme.with_acceleration(match acceleration {
-        ReturnedAcceleration::EquationOfMotion => AlphaAcceleration::EquationOfMotion,
-        ReturnedAcceleration::Carried => AlphaAcceleration::Carried,
-    }))
-}
-
-fn sub_step_force(load: SubStepLoad) -> SubStepForce {
-    match load {
-        SubStepLoad::Linear => SubStepForce::Linear,
-        SubStepLoad::Exact => SubStepForce::Supplied,
-    }
 }
 
 fn with_middle<'a>(force: &'a Record, middle: Option<&'a Record>) -> SampledForce<'a> {

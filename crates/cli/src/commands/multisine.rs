@@ -1,21 +1,19 @@
 //! `mechid multisine`: an excitation to drive a test with, and how good it is.
 
-mod design;
-mod report;
-
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
+use mechid::excitation::{
+    DesignedInput, ExcitationDesign, ExcitationLevel, ExcitationSummary, Separation,
+    excitation_figure,
+};
 use mechid::io::{BegunFile, CsvFile, LineSpec};
-use mechid::plot::{Axis, Curve, Figure, Panel};
-use mechid::signal::resample::refine;
-use mechid::signal::{Interpolation, Sampling};
+use mechid::signal::multi_input::Mixing;
+use mechid::signal::{Phases, Sampling};
 
 use crate::args::{PlotArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
-use design::Channel;
-use report::Report;
 
 /// Make a multisine excitation, write its record and judge it
 ///
@@ -41,7 +39,7 @@ pub struct MultisineArgs {
     /// separated by commas
     #[arg(long, value_name = "LINES", default_value = "all")]
     lines: LineSpec,
-    /// How the phases are chosen
+    /// Rule for the phases
     #[arg(long, value_name = "LAW", value_enum, default_value_t)]
     phases: PhaseLaw,
     /// Amplitude of every line, in N [default: 1]
@@ -79,14 +77,14 @@ pub struct MultisineArgs {
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Several inputs")]
     inputs: usize,
-    /// How the inputs are kept apart
+    /// Separation of the inputs
     #[arg(long, value_name = "HOW", value_enum, default_value_t, help_heading = "Several inputs")]
-    uncorrelated: Separation,
+    uncorrelated: Uncorrelated,
     /// Periods in the record written
     #[arg(long, value_name = "COUNT", default_value_t = 1, value_parser = at_least_one,
           help_heading = "Output")]
     periods: usize,
-    /// Where the record goes (-: to standard output): columns time, in s, and force, in N; with
+    /// File for the record (-: standard output): columns time, in s, and force, in N; with
     /// several inputs force_1, force_2, …
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: Option<PathBuf>,
@@ -114,7 +112,7 @@ enum PhaseLaw {
 
 /// Ways to tell several inputs apart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-enum Separation {
+enum Uncorrelated {
     /// Each input has lines of its own, dealt out in turn: one experiment
     #[default]
     Interleaved,
@@ -136,8 +134,8 @@ impl MultisineArgs {
     /// Designs the excitation, samples it and measures it.
     pub fn run(&self) -> Result<Outcome, CliError> {
         let columns = match self.uncorrelated {
-            Separation::Interleaved => self.inputs,
-            Separation::Dft | Separation::Hadamard => self.inputs.saturating_mul(self.inputs),
+            Uncorrelated::Interleaved => self.inputs,
+            Uncorrelated::Dft | Uncorrelated::Hadamard => self.inputs.saturating_mul(self.inputs),
         };
         let length = self.samples.saturating_mul(self.periods);
         let numbers = length.saturating_mul(columns);
@@ -145,45 +143,50 @@ impl MultisineArgs {
             return Err(CliError::RecordSize { numbers, largest: LARGEST });
         }
         let sampling = Sampling::from_rate_hz(self.rate, self.samples)?;
-        let channels = self.channels(sampling)?;
-        let report = Report::of(sampling, &channels)?;
-        let mut outcome = Outcome::new(report.text(), &report)?;
+        let inputs = self.design(sampling)?.inputs(sampling)?;
+        let summary = ExcitationSummary::of(&inputs)?;
+        let mut outcome = Outcome::new(summary.to_string(), &summary)?;
         if let Some(path) = &self.output {
-            outcome = outcome.with_begun(self.record(path, &channels)?);
+            outcome = outcome.with_begun(self.record(path, &inputs)?);
         }
-        outcome.with_plot(&self.plot, || figure(&channels))
+        outcome.with_plot(&self.plot, || Ok(excitation_figure(&inputs)?))
     }
 
-    /// The record, period after period.
-    fn record(&self, path: &Path, channels: &[Channel]) -> Result<BegunFile, CliError> {
-        let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
-        let period: Vec<&[f64]> = channels.iter().map(|c| c.period.channel(0)).collect();
-        let sampling = channels[0].period.sampling().with_len(self.samples * self.periods)?;
+    fn design(&self, sampling: Sampling) -> Result<ExcitationDesign, CliError> {
+        Ok(ExcitationDesign {
+            lines: self.lines.lines(sampling)?,
+            amplitude: self.amplitude.unwrap_or(1.0),
+            slope_db: self.slope,
+            phases: match self.phases {
+                PhaseLaw::Schroeder | PhaseLaw::LowCrest => Phases::Schroeder,
+                PhaseLaw::SchroederBinary => Phases::SchroederBinary,
+                PhaseLaw::Random => Phases::Random { seed: self.seed },
+                PhaseLaw::Zero => Phases::Zero,
+            },
+            starts: if self.phases == PhaseLaw::LowCrest { self.starts } else { 0 },
+            seed: self.seed,
+            inputs: self.inputs,
+            separation: match self.uncorrelated {
+                Uncorrelated::Interleaved => Separation::Interleaved,
+                Uncorrelated::Dft => Separation::Orthogonal(Mixing::Dft),
+                Uncorrelated::Hadamard => Separation::Orthogonal(Mixing::Hadamard),
+            },
+            level: match (self.rms, self.peak) {
+                (Some(rms), _) => Some(ExcitationLevel::Rms(rms)),
+                (None, peak) => peak.map(ExcitationLevel::Peak),
+            },
+        })
+    }
+
+    /// Writes the record, period after period.
+    fn record(&self, path: &Path, inputs: &[DesignedInput]) -> Result<BegunFile, CliError> {
+        let names: Vec<&str> = inputs.iter().map(|input| input.name.as_str()).collect();
+        let period: Vec<&[f64]> = inputs.iter().map(|input| input.period.channel(0)).collect();
+        let sampling = inputs[0].period.sampling().with_len(self.samples * self.periods)?;
         let mut file = CsvFile::begin(path, sampling, &names)?;
         for _ in 0..self.periods {
             file.append(&period)?;
         }
         Ok(file.finish()?)
     }
-}
-
-/// Points a drawn period has at least: enough to see what it does between its samples.
-const DRAWN_POINTS: usize = 4096;
-
-/// One period of each input against time above the amplitudes of the lines.
-fn figure(channels: &[Channel]) -> Result<Figure, CliError> {
-    let mut figure = Figure::new("Multisine");
-    let mut lines = Panel::new(Axis::linear("Frequency", "Hz"), Axis::linear("Amplitude", "N"));
-    for Channel { name, multisine, period } in channels {
-        // A single curve needs no name.
-        let name = if channels.len() == 1 { "" } else { name.as_str() };
-        let fine = refine(period, DRAWN_POINTS.div_ceil(period.len()), Interpolation::BandLimited)?;
-        let instants: Vec<f64> = fine.sampling().times().collect();
-        let time = Panel::new(Axis::linear("Time", "s"), Axis::linear("Force", "N")).title(name);
-        figure = figure.panel(time.curve(Curve::line("", &instants, fine.channel(0)).width(1.0)));
-        let spacing_hz = period.sampling().line_spacing_hz();
-        let f: Vec<f64> = multisine.lines().iter().map(|n| *n as f64 * spacing_hz).collect();
-        lines = lines.curve(Curve::stems(name, &f, multisine.amplitudes()));
-    }
-    Ok(figure.panel(lines))
 }

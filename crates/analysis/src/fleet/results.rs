@@ -1,0 +1,144 @@
+//! The table of results, read back as rows.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use mechid_estimate::checks::Verdict;
+use mechid_io::{Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
+
+use crate::batch::{FindingRow, ModeCell, ParameterCell, RowError};
+use crate::{AnalysisError, ResultRow};
+
+/// Reads the rows of all parts in a folder of results, by rising record, as they were written.
+///
+/// # Errors
+/// [`AnalysisError::Io`] if the folder or a part cannot be read, [`AnalysisError::NoRecord`] if it holds
+/// no row.
+pub fn read_results(folder: impl AsRef<Path>) -> Result<Vec<ResultRow>, AnalysisError> {
+    let mut rows = Vec::new();
+    for path in files_of(folder.as_ref())? {
+        let is_part = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .is_some_and(|name| name.starts_with("part-") && name.ends_with(".parquet"));
+        if is_part {
+            let read = read_parquet_rows(&path, &Limits::DEFAULT)?.into_iter();
+            rows.extend(read.map(|cells| Cells(cells.into_iter().collect()).row()));
+        }
+    }
+    // Stable: the records of one file stay in the order of its rows.
+    rows.sort_by(|a, b| a.record.cmp(&b.record));
+    if rows.is_empty() { Err(AnalysisError::NoRecord) } else { Ok(rows) }
+}
+
+/// Cells of a row by the names of their columns.
+struct Cells(BTreeMap<String, ParquetCell>);
+
+impl Cells {
+    fn row(mut self) -> ResultRow {
+        let error = self
+            .text("error_code")
+            .map(|code| RowError { code, message: self.text("error").unwrap_or_default() });
+        let covariance = self.count("degrees_of_freedom").map(|degrees_of_freedom| {
+            let parameters = self.texts("covariance_parameter");
+            let entries: Vec<f64> = self.numbers("covariance").into_iter().flatten().collect();
+            let rows = entries.chunks(parameters.len().max(1)).map(<[f64]>::to_vec);
+            ParameterCovariance { matrix: rows.collect(), parameters, degrees_of_freedom }
+        });
+        let parameters = {
+            let names = self.texts("parameter").into_iter().zip(self.texts("unit"));
+            let numbers = self.numbers("value").into_iter().zip(self.numbers("standard_error"));
+            let all = names.zip(numbers).map(|((name, unit), (value, standard_error))| {
+                ParameterCell { name, unit, value: value.unwrap_or(f64::NAN), standard_error }
+            });
+            all.collect()
+        };
+        let modes = {
+            let frequency = self.numbers("natural_frequency_hz").into_iter();
+            let frequency = frequency.zip(self.numbers("natural_frequency_standard_error_hz"));
+            let damping = self.numbers("damping_ratio").into_iter();
+            let damping = damping.zip(self.numbers("damping_ratio_standard_error"));
+            let all =
+                frequency.zip(damping).map(|((hz, hz_error), (ratio, ratio_error))| ModeCell {
+                    natural_frequency_hz: hz.unwrap_or(f64::NAN),
+                    natural_frequency_standard_error_hz: hz_error,
+                    damping_ratio: ratio.unwrap_or(f64::NAN),
+                    damping_ratio_standard_error: ratio_error,
+                });
+            all.collect()
+        };
+        let findings = {
+            let codes = self.texts("finding").into_iter().zip(self.texts("finding_verdict"));
+            let verdict = |written: &str| {
+                let mut all = [Verdict::Good, Verdict::Doubtful].into_iter();
+                all.find(|verdict| verdict.to_string() == written).unwrap_or(Verdict::Bad)
+            };
+            let all = codes.zip(self.numbers("finding_value")).map(|((code, written), value)| {
+                FindingRow { code, verdict: verdict(&written), value }
+            });
+            all.collect()
+        };
+        ResultRow {
+            record: self.text("record").unwrap_or_default(),
+            record_id: self.text("record_id"),
+            error,
+            estimator: self.text("estimator"),
+            sample_rate_hz: self.number("sample_rate_hz"),
+            first_sample: self.count("first_sample"),
+            last_sample: self.count("last_sample"),
+            parameters,
+            covariance,
+            modes,
+            nrmse: self.number("nrmse"),
+            unexplained_motion: self.number("unexplained_motion"),
+            misfit_ratio: self.number("misfit_ratio"),
+            condition_number: self.number("condition_number"),
+            findings,
+            warnings: self.texts("warning"),
+            analysis_hash: self.text("analysis_hash").unwrap_or_default(),
+            version: self.text("version").unwrap_or_default(),
+        }
+    }
+
+    fn text(&mut self, column: &str) -> Option<String> {
+        match self.0.remove(column) {
+            Some(ParquetCell::Text(text)) => Some(text),
+            _ => None,
+        }
+    }
+
+    fn count(&mut self, column: &str) -> Option<usize> {
+        match self.0.remove(column) {
+            Some(ParquetCell::Count(count)) => usize::try_from(count).ok(),
+            _ => None,
+        }
+    }
+
+    fn number(&mut self, column: &str) -> Option<f64> {
+        match self.0.remove(column) {
+            Some(ParquetCell::Number(number)) => Some(number),
+            _ => None,
+        }
+    }
+
+    fn list(&mut self, column: &str) -> Vec<ParquetCell> {
+        match self.0.remove(column) {
+            Some(ParquetCell::List(cells)) => cells,
+            _ => Vec::new(),
+        }
+    }
+
+    fn texts(&mut self, column: &str) -> Vec<String> {
+        let cells = self.list(column).into_iter();
+        cells
+            .map(|cell| if let ParquetCell::Text(text) = cell { text } else { String::new() })
+            .collect()
+    }
+
+    fn numbers(&mut self, column: &str) -> Vec<Option<f64>> {
+        let cells = self.list(column).into_iter();
+        cells
+            .map(|cell| if let ParquetCell::Number(number) = cell { Some(number) } else { None })
+            .collect()
+    }
+}

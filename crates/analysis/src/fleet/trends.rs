@@ -1,0 +1,301 @@
+//! The results of many records side by side: parameters over records, outliers, failures.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::Path;
+
+use mechid_estimate::Uncertain;
+use mechid_signal::message;
+use serde::Serialize;
+
+use super::failures::FailureCount;
+use super::read_results;
+use crate::text::{significant, text_table};
+use crate::{AnalysisError, ResultRow};
+
+/// Distance from the median, in robust standard deviations, beyond which a value is an outlier.
+///
+/// # Source
+/// Iglewicz & Hoaglin, *How to Detect and Handle Outliers* (1993): the modified z score, limit 3.5.
+pub const OUTLIER: f64 = 3.5;
+
+/// Standard deviation of a normal distribution over its median absolute deviation.
+const NORMAL_OVER_MAD: f64 = 1.482_602_218_505_602;
+
+/// Number of outliers that the text lists.
+const LISTED: usize = 10;
+
+/// Order of the records in a trend.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TrendAxis {
+    /// The records one after the other, by their names, counted from 1.
+    #[default]
+    Order,
+    /// The last number in the name of a record, such as 1500 in `speed-1500.csv`.
+    Number,
+}
+
+/// Parameters and modes of many records, each over the records.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Trends {
+    /// Order of the records.
+    pub over: TrendAxis,
+    /// Number of records.
+    pub records: usize,
+    /// Number of records without a result.
+    pub failed: usize,
+    /// Failures by their code, the most frequent first.
+    pub failures: Vec<FailureCount>,
+    /// Number of records left out because their names hold no number.
+    pub without_number: usize,
+    /// Number of analyses and versions that the rows come from; several are not comparable.
+    pub analyses: usize,
+    /// One series for each parameter, natural frequency and damping ratio.
+    pub series: Vec<TrendSeries>,
+}
+
+/// One quantity of many records.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrendSeries {
+    /// Name, such as `k11`, or `frequency 1` and `damping ratio 1` of the first mode.
+    pub name: String,
+    /// SI unit; empty for a ratio.
+    pub unit: String,
+    /// Median of the values, in the unit.
+    pub median: f64,
+    /// Robust standard deviation of the values (1.4826 × the median absolute deviation), in the unit.
+    pub spread: f64,
+    /// Median of the standard errors, in the unit; `None` if no value has one.
+    pub standard_error: Option<f64>,
+    /// The values, in the order of the records.
+    pub points: Vec<TrendPoint>,
+}
+
+/// Value of one record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrendPoint {
+    /// Name of the record.
+    pub record: String,
+    /// Place of the record on the axis, a pure number: that in its name, or its position counted from 1.
+    pub at: f64,
+    /// Value, in the unit of the series.
+    pub value: f64,
+    /// Standard error, in the same unit.
+    pub standard_error: Option<f64>,
+    /// Ends of the 95 % interval, in the same unit.
+    pub interval: Option<[f64; 2]>,
+    /// `true` if the value is farther from the median than [`OUTLIER`] standard deviations, those of the
+    /// series and of the value together.
+    pub is_outlier: bool,
+}
+
+impl Trends {
+    /// Reads a folder of results.
+    ///
+    /// # Errors
+    /// As [`read_results`].
+    pub fn read(folder: impl AsRef<Path>, over: TrendAxis) -> Result<Self, AnalysisError> {
+        Ok(Self::of(&read_results(folder)?, over))
+    }
+
+    /// Gathers rows, in the order given.
+    pub fn of(rows: &[ResultRow], over: TrendAxis) -> Self {
+        let failures = FailureCount::of(rows);
+        let mut placed: Vec<(f64, &ResultRow)> = Vec::new();
+        let mut without_number = 0;
+        for (position, row) in (1..).zip(rows) {
+            match over {
+                TrendAxis::Order => placed.push((f64::from(position), row)),
+                TrendAxis::Number => match number_in(row) {
+                    Some(number) => placed.push((number, row)),
+                    None => without_number += 1,
+                },
+            }
+        }
+        placed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut series: Vec<TrendSeries> = Vec::new();
+        for (at, row) in placed {
+            for (name, unit, value) in quantities(row) {
+                let known = series.iter().position(|one| one.name == name && one.unit == unit);
+                let one = known.unwrap_or_else(|| {
+                    let (median, spread, points) = (f64::NAN, f64::NAN, Vec::new());
+                    series.push(TrendSeries {
+                        name,
+                        unit,
+                        median,
+                        spread,
+                        standard_error: None,
+                        points,
+                    });
+                    series.len() - 1
+                });
+                let is_uncertain = value.standard_error.is_finite();
+                series[one].points.push(TrendPoint {
+                    record: name_of(row),
+                    at,
+                    value: value.value,
+                    standard_error: is_uncertain.then_some(value.standard_error),
+                    interval: value.interval(0.95).ok().filter(|_| is_uncertain),
+                    is_outlier: false,
+                });
+            }
+        }
+        series.iter_mut().for_each(TrendSeries::judge);
+        let analyses: BTreeSet<_> =
+            rows.iter().map(|row| (&row.analysis_hash, &row.version)).collect();
+        Self {
+            over,
+            records: rows.len(),
+            failed: failures.iter().map(|count| count.records).sum(),
+            failures,
+            without_number,
+            analyses: analyses.len(),
+            series,
+        }
+    }
+}
+
+impl TrendSeries {
+    /// Computes median and spread, and marks the outliers.
+    fn judge(&mut self) {
+        let values: Vec<f64> = self.points.iter().map(|point| point.value).collect();
+        self.median = median(values.clone());
+        let away = values.iter().map(|value| (value - self.median).abs()).collect();
+        self.spread = NORMAL_OVER_MAD * median(away);
+        let errors: Vec<f64> =
+            self.points.iter().filter_map(|point| point.standard_error).collect();
+        self.standard_error = (!errors.is_empty()).then(|| median(errors));
+        for point in &mut self.points {
+            let deviation = self.spread.hypot(point.standard_error.unwrap_or(0.0));
+            point.is_outlier = (point.value - self.median).abs() > OUTLIER * deviation;
+        }
+    }
+
+    /// Returns the outliers.
+    pub fn outliers(&self) -> impl Iterator<Item = &TrendPoint> {
+        self.points.iter().filter(|point| point.is_outlier)
+    }
+}
+
+/// Names, units and values of what a row says of its machine.
+fn quantities(row: &ResultRow) -> Vec<(String, String, Uncertain)> {
+    let degrees_of_freedom = row.covariance.as_ref().map_or(0, |c| c.degrees_of_freedom);
+    let uncertain = |value: f64, standard_error: Option<f64>| Uncertain {
+        value,
+        standard_error: standard_error.unwrap_or(f64::INFINITY),
+        degrees_of_freedom,
+    };
+    let of_parameters = row.parameters.iter().map(|cell| {
+        (cell.name.clone(), cell.unit.clone(), uncertain(cell.value, cell.standard_error))
+    });
+    let of_modes = (1..).zip(&row.modes).flat_map(|(number, mode)| {
+        let hz = uncertain(mode.natural_frequency_hz, mode.natural_frequency_standard_error_hz);
+        let ratio = uncertain(mode.damping_ratio, mode.damping_ratio_standard_error);
+        [
+            (format!("frequency {number}"), "Hz".to_owned(), hz),
+            (format!("damping ratio {number}"), String::new(), ratio),
+        ]
+    });
+    let all = of_parameters.chain(of_modes);
+    all.filter(|(.., value)| value.value.is_finite()).collect()
+}
+
+/// Returns the name of a record as messages show it.
+fn name_of(row: &ResultRow) -> String {
+    match &row.record_id {
+        Some(id) => id.clone(),
+        None => row.record.clone(),
+    }
+}
+
+/// Returns the last number in the name of a record, without its folder and ending.
+fn number_in(row: &ResultRow) -> Option<f64> {
+    let stem = match &row.record_id {
+        Some(id) => id.clone(),
+        None => Path::new(&row.record).file_stem()?.to_string_lossy().into_owned(),
+    };
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    let numbers = stem.split(|c| !is_part(c)).map(|part| part.trim_matches('.'));
+    numbers.filter(|part| !part.is_empty()).filter_map(|part| part.parse().ok()).next_back()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        len => f64::midpoint(values[(len - 1) / 2], values[len / 2]),
+    }
+}
+
+impl fmt::Display for Trends {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let identified = self.records - self.failed;
+        writeln!(
+            f,
+            "{}: {identified} identified, {} failed",
+            message::count(self.records, "record"),
+            self.failed
+        )?;
+        for FailureCount { code, records, record, message: why } in &self.failures {
+            let count = message::count(*records, "record");
+            writeln!(f, "  {code}: {count}, such as {record} ({why})")?;
+        }
+        if self.without_number > 0 {
+            let count = message::count(self.without_number, "record");
+            writeln!(f, "left out: {count} without a number in the name")?;
+        }
+        if self.analyses > 1 {
+            writeln!(
+                f,
+                "note: the rows come from {} analyses or versions, which may not be comparable",
+                self.analyses
+            )?;
+        }
+        let head = ["quantity", "median", "spread", "standard error", "outliers", "unit"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        for series in &self.series {
+            let error = series.standard_error.map_or_else(|| "–".into(), |e| significant(e, 2));
+            rows.push(vec![
+                series.name.clone(),
+                significant(series.median, 6),
+                significant(series.spread, 2),
+                error,
+                format!("{} of {}", series.outliers().count(), series.points.len()),
+                series.unit.clone(),
+            ]);
+        }
+        write!(f, "\n{}", text_table(&rows))?;
+        let all =
+            || self.series.iter().flat_map(|one| one.outliers().map(move |point| (one, point)));
+        if all().next().is_some() {
+            writeln!(f, "\noutliers, more than {OUTLIER} standard deviations from the median:")?;
+        }
+        for (series, point) in all().take(LISTED) {
+            let value = format!("{} {}", significant(point.value, 6), series.unit);
+            writeln!(f, "  {} of {}: {}", series.name, point.record, value.trim_end())?;
+        }
+        match all().count().saturating_sub(LISTED) {
+            0 => Ok(()),
+            more => writeln!(f, "  … ({more} more)"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_found_in_names() {
+        let number = |record: &str, id: Option<&str>| {
+            let analysis = crate::SavedAnalysis::default();
+            let row = analysis.row(record, || Err(AnalysisError::NoRecord));
+            number_in(&ResultRow { record_id: id.map(str::to_owned), ..row })
+        };
+        assert_eq!(number("day-2/speed-1500.csv", None), Some(1500.0));
+        assert_eq!(number("load 1.5 kN.mat", None), Some(1.5));
+        assert_eq!(number("week.parquet", Some("run 7")), Some(7.0));
+        assert_eq!(number("2026/pump.csv", None), None);
+    }
+}

@@ -1,0 +1,126 @@
+//! Frequency responses averaged over the hits of a hammer.
+
+use std::ops::Range;
+
+use mechid_estimate::frequency_domain::Lines;
+use mechid_estimate::{FrfAverage, Segments};
+use mechid_signal::{HitRule, Record};
+use nalgebra::DVector;
+
+use super::{FrfSettings, Responses};
+use crate::AnalysisError;
+use crate::hits::{Cut, cut};
+use crate::identify::left_out::LineRule;
+use crate::measurement::Windowed;
+use crate::text::significant;
+
+/// Number of parts of a window by which it is told whether the response has died out.
+const PARTS: usize = 20;
+
+/// RMS of the last part, or before the pulse, over that of the largest part, from which the response has not
+/// died out.
+const DIED_OUT: f64 = 0.02;
+
+/// Frequency responses from hits, and what there is to tell of them.
+pub(super) struct OfHits {
+    pub responses: Responses,
+    pub cut: Cut,
+    /// Rate at which the exponential window decays, in 1/s.
+    pub added_decay: Option<f64>,
+    pub remarks: Vec<String>,
+}
+
+/// Averages the responses to all good hits of a record, each cut to the length of the shortest.
+///
+/// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM and
+/// K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the machine at
+/// iω + σ.
+///
+/// # Source
+/// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
+pub(super) fn of_hits(
+    recorded: &Windowed,
+    rule: &HitRule,
+    lines: LineRule<'_>,
+    how: &FrfSettings,
+) -> Result<OfHits, AnalysisError> {
+    let cut = cut(std::slice::from_ref(recorded), rule)?;
+    let first = &cut.hits[0].held;
+    let driven = first.driven.clone();
+    let (kind, outputs) = (first.response().1, first.response().0.channels());
+    let len = cut.hits.iter().map(|hit| hit.held.force.len()).min().unwrap_or(0);
+    let sampling = first.force.sampling().with_len(len)?;
+    let chosen = lines.lines(&first.force.window(0, len)?, len)?;
+    let lines = Lines::new(sampling, chosen)?;
+    let added_decay = match how.exponential_percent {
+        None => None,
+        Some(percent) if percent > 0.0 && percent < 100.0 => {
+            Some(-(0.01 * percent).ln() / sampling.duration())
+        }
+        Some(percent) => {
+            let given = mechid_signal::message::number(percent);
+            let why = format!("a window ends above 0 and below 100 %, got {given}");
+            return Err(AnalysisError::Setting { setting: "exponential_percent", why });
+        }
+    };
+    let rate = added_decay.unwrap_or(0.0);
+    let weights = DVector::from_fn(len, |k, _| (-rate * sampling.time(k)).exp());
+    let weighted = |record: &Record, channels: &[usize]| {
+        let mut data = record.data().rows(0, len).select_columns(channels);
+        data.column_iter_mut().for_each(|mut column| column.component_mul_assign(&weights));
+        Record::new(sampling, data)
+    };
+    let segments = Segments::Periods(len);
+    let mut average = FrfAverage::new(lines.clone(), [1, outputs], kind, segments)?;
+    let all: Vec<usize> = (0..outputs).collect();
+    let (mut left, mut before) = (0.0_f64, 0.0_f64);
+    for hit in &cut.hits {
+        let force = weighted(&hit.held.force, &driven)?;
+        let response = weighted(hit.held.response().0, &all)?;
+        let pulse = force.channel(0).iter().position(|f| *f != 0.0).unwrap_or(0);
+        before = before.max(over_largest(&response, 0..pulse));
+        left = left.max(over_largest(&response, len - len.div_ceil(PARTS)..len));
+        average.push(&force, &response)?;
+    }
+    let frf = average.frf(how.estimator.estimator())?;
+    let mut remarks = Vec::new();
+    if left > DIED_OUT {
+        remarks.push(format!(
+            "at the end of a window the response is still {} % of its largest: leakage makes resonances \
+             blunt; fit the hits with `mechid identify --hits`, which takes the ends into account, or give \
+             `exponential_percent`",
+            significant(100.0 * left, 2)
+        ));
+    }
+    if before > DIED_OUT {
+        remarks.push(format!(
+            "before a hit the response is still {} % of its largest, and no window mends that: wait longer \
+             between hits, or fit them with `mechid identify --hits`",
+            significant(100.0 * before, 2)
+        ));
+    }
+    if let Some(rate) = added_decay {
+        remarks.push(format!(
+            "the exponential window adds {} 1/s to the decay of every mode: a damping ratio read from these \
+             responses is too large by {} Hz over the natural frequency",
+            significant(rate, 4),
+            significant(rate / std::f64::consts::TAU, 4)
+        ));
+    }
+    let responses = Responses { frf, lines, driven, segments };
+    Ok(OfHits { responses, cut, added_decay, remarks })
+}
+
+/// RMS of some samples of a response over that of its largest part, of the channel where that is largest.
+fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
+    let rms = |samples: &[f64]| {
+        (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+    };
+    let part = response.len().div_ceil(PARTS);
+    let of_channel = |channel: usize| {
+        let all = response.channel(channel);
+        let largest = all.chunks(part).map(rms).fold(0.0, f64::max);
+        if largest > 0.0 { rms(&all[samples.clone()]) / largest } else { 0.0 }
+    };
+    (0..response.channels()).map(of_channel).fold(0.0, f64::max)
+}

@@ -1,0 +1,146 @@
+//! Records of a hammer test, cut into their hits.
+
+use std::fmt;
+
+use mechid_signal::{Hit, HitFault, HitRule, Record, hits};
+use serde::Serialize;
+
+use crate::AnalysisError;
+use crate::measurement::Windowed;
+use crate::text::significant;
+
+/// One hit of a record, used or left out.
+#[derive(Debug, Clone, Serialize)]
+pub struct HitRow {
+    /// The record.
+    pub record: String,
+    /// Number in its record, from 1.
+    pub number: usize,
+    /// Degree of freedom that is struck, counted from 1.
+    pub force: usize,
+    /// First sample of its window, counted from 1.
+    pub first_sample: usize,
+    /// Last sample of its window, counted from 1.
+    pub last_sample: usize,
+    /// Instant at which its pulse begins, in s after the first sample of the record.
+    pub time_s: f64,
+    /// Duration of its pulse, in s.
+    pub duration_s: f64,
+    /// Largest force, in N.
+    pub peak: f64,
+    /// `true` if it was used.
+    pub used: bool,
+    /// Reasons why it was left out, a sentence each.
+    pub reasons: Vec<String>,
+    /// The same reasons with their numbers.
+    pub faults: Vec<HitFault>,
+}
+
+impl HitRow {
+    fn new(record: &Windowed, number: usize, dof: usize, hit: &Hit) -> Self {
+        let dt = record.held.force.sampling().dt();
+        let first = record.held.first_sample;
+        Self {
+            record: record.held.file.clone(),
+            number,
+            force: dof + 1,
+            first_sample: first + hit.window.start,
+            last_sample: first + hit.window.end - 1,
+            time_s: (first - 1 + hit.pulse.start) as f64 * dt,
+            duration_s: hit.pulse.len() as f64 * dt,
+            peak: hit.peak,
+            used: hit.faults.is_empty(),
+            reasons: hit.faults.iter().map(HitFault::to_string).collect(),
+            faults: hit.faults.clone(),
+        }
+    }
+}
+
+impl fmt::Display for HitRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (peak, time) = (significant(self.peak, 3), significant(self.time_s, 4));
+        write!(f, "hit {}, {peak} N at {time} s", self.number)?;
+        match self.used {
+            true => Ok(()),
+            false => write!(f, ", left out: {}", self.reasons.join("; ")),
+        }
+    }
+}
+
+/// Returns a line for every record with its number of hits, and one for every hit that was left out.
+pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
+    let mut text = String::new();
+    for of_record in rows.chunk_by(|a, b| a.record == b.record && a.number < b.number) {
+        let used = of_record.iter().filter(|hit| hit.used).count();
+        let (file, all) = (&of_record[0].record, of_record.len());
+        let dof = of_record[0].force;
+        text += &format!(
+            "{file}: {used} of {all} hits on degree of freedom {dof} used, {sample_rate_hz} Hz\n"
+        );
+        for hit in of_record.iter().filter(|hit| !hit.used) {
+            text += &format!("  {hit}\n");
+        }
+    }
+    text
+}
+
+/// Good hits of records, each a record of its own, and a row for every hit.
+pub(crate) struct Cut {
+    pub hits: Vec<Windowed>,
+    pub rows: Vec<HitRow>,
+}
+
+/// Cuts records that are held as a whole into their hits.
+///
+/// # Errors
+/// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act,
+/// [`AnalysisError::NoHit`] if a record has none that is good.
+pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
+    let mut all = Cut { hits: Vec::new(), rows: Vec::new() };
+    for record in records {
+        let held = &record.held;
+        let [dof] = held.driven[..] else {
+            let why = format!(
+                "a hammer strikes one degree of freedom, and {} forces act in {}: name one column, and 0 \
+                 for the others",
+                held.driven.len(),
+                held.file
+            );
+            return Err(AnalysisError::Setting { setting: "hits", why });
+        };
+        let force = held.force.channel(dof);
+        let wrong = |error: mechid_signal::SignalError| AnalysisError::Setting {
+            setting: "hits",
+            why: error.to_string(),
+        };
+        let mut found = hits(force, held.force.sampling().dt(), rule).map_err(wrong)?;
+        for (_, response) in held.responses() {
+            found.check_response(response)?;
+        }
+        let rows = found.all.iter().enumerate();
+        let rows: Vec<HitRow> =
+            rows.map(|(at, hit)| HitRow::new(record, at + 1, dof, hit)).collect();
+        if rows.iter().all(|row| !row.used) {
+            let reasons = match rows.is_empty() {
+                true => "the force does not rise above its noise".into(),
+                false => rows.iter().map(HitRow::to_string).collect::<Vec<_>>().join("; "),
+            };
+            return Err(AnalysisError::NoHit { file: held.file.clone(), reasons });
+        }
+        for (hit, row) in found.all.iter().zip(&rows).filter(|(_, row)| row.used) {
+            let mut pulse = held.force.window(hit.window.start, hit.window.len())?.into_data();
+            pulse.fill(0.0);
+            pulse.column_mut(dof).copy_from_slice(&found.pulse_alone(force, hit));
+            let pulse = Record::new(held.force.sampling().with_len(hit.window.len())?, pulse)?;
+            let mut part = record.part(hit.window.clone(), pulse)?;
+            part.held.file = format!("{}, hit {}", held.file, row.number);
+            // Once a record.
+            if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
+                part.held.unit_remarks.clear();
+            }
+            all.hits.push(part);
+        }
+        all.rows.extend(rows);
+    }
+    Ok(all)
+}

@@ -1,0 +1,102 @@
+//! `mechid simulate`: the record an experiment would give.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::SimulationSummary;
+use mechid::io::{CsvFile, Experiment};
+use serde::Serialize;
+
+use crate::args::{PlotArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Simulate the experiment described in a file and write its record
+///
+/// The description is a JSON file with
+///
+///   system      mass, damping, stiffness (numbers, or matrices as lists of rows), or mass,
+///               natural_frequency_hz, damping_ratio
+///
+///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and coefficients, a
+///               list, as identify --json prints them
+///
+///   sampling    samples in one period, rate_hz
+///
+///   excitation  a list of forces, each with dof (counted from 1) and a kind; without a kind a
+///               multisine:
+///                 multisine  lines (all, odd, 1:2:99 …), amplitude of each line in N, phases
+///                            (schroeder, schroeder-binary, random with seed, zero)
+///                 harmonic   amplitude in N, frequency_hz, phase_rad
+///                 sweep      amplitude in N, start_hz, end_hz, duration_s, law (linear,
+///                            logarithmic), ramp_s
+///                 prbs       order, amplitude in N, hold_samples
+///                 random     standard_deviation in N, band_hz [low, high], burst (part of the
+///                            period), seed
+///                 impulse    momentum in N·s, at_s
+///                 half-sine  peak in N, start_s, duration_s
+///
+///   scheme      name (exact, newmark, central-difference, houbolt, wilson-theta, generalised-alpha,
+///               hht-alpha, wbz-alpha, bathe, rho-infinity-bathe, matrix-exponential, runge-kutta-4)
+///               and its parameters (beta, gamma; start: taylor, rest; start: average-acceleration,
+///               central-difference, {"given": {"at_dt": …, "at_2dt": …}} in m; theta, load:
+///               projected, interpolated; rho_infinity, acceleration: equation-of-motion, carried;
+///               rho_infinity, load: linear, exact; load: held, linear; load: held, linear, exact)
+///
+///   response    periodic (the steady state), from-rest, or {"from": {"displacement": …,
+///               "velocity": …}} in m and m/s
+///
+///   periods     how many
+///
+///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
+///               fraction_of_rms; and a seed
+///
+/// The picture shows over time what the record holds, noise and all, of up to four degrees of freedom.
+#[derive(Debug, Args)]
+#[command(
+    verbatim_doc_comment,
+    after_help = "Examples:\n  mechid simulate examples/machine.json --output record.csv\n  \
+                  mechid simulate examples/machine.json --output record.csv --plot run.svg\n  \
+                  mechid identify record.csv --force force --displacement displacement"
+)]
+pub struct SimulateArgs {
+    /// The description of the experiment (-: on standard input)
+    #[arg(value_name = "SYSTEM.json")]
+    experiment: PathBuf,
+    /// File for the record (-: standard output): columns time, force, displacement, velocity,
+    /// acceleration in SI units; with several degrees of freedom force_1, force_2, …
+    #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
+    output: PathBuf,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+#[derive(Debug, Serialize)]
+struct Report {
+    record: String,
+    #[serde(flatten)]
+    summary: SimulationSummary,
+}
+
+impl SimulateArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.experiment]).writes([&self.output]).writes(&self.plot.plot)
+    }
+
+    /// Simulates and hands over the record.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let simulation = mechid::simulate(&Experiment::read(&self.experiment)?)?;
+        let (names, columns): (Vec<String>, Vec<&[f64]>) = simulation.columns().into_iter().unzip();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let mut file = CsvFile::begin(&self.output, simulation.force.sampling(), &names)?;
+        file.append(&columns)?;
+        let record = mechid::io::output_name(&self.output);
+        let report = Report { record, summary: simulation.summary()? };
+        Outcome::new(format!("{}: {}", report.record, report.summary), &report)?
+            .with_begun(file.finish()?)
+            .with_plot(&self.plot, || Ok(simulation.figure(&report.record)))
+    }
+}

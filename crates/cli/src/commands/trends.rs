@@ -1,0 +1,60 @@
+//! `mechid trends`: the results of many records side by side.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use mechid::analysis::fleet::Trends;
+use mechid::report::{ToFigure as _, trends_page};
+
+use super::report::html_file;
+use crate::args::choices::TrendAxisChoice;
+use crate::args::{PlotArgs, ReportArgs};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Show the results of `mechid fleet` side by side: parameters and modes over the records, outliers, failures
+///
+/// An outlier is farther from the median than 3.5 standard deviations, those of the series (a robust
+/// estimate) and of the value together.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid trends results --output trends.html
+  mechid trends results --over number --plot stiffness.svg")]
+pub struct TrendsArgs {
+    /// The folder of results
+    #[arg(value_name = "FOLDER")]
+    results: PathBuf,
+    /// Order of the records: as their names sort, or by the last number in the name (1500 of
+    /// speed-1500.csv)
+    #[arg(long, value_name = "ORDER", value_enum, default_value = "order")]
+    over: TrendAxisChoice,
+    /// File for a page with all series, outliers and failures (-: standard output)
+    #[arg(long, short, value_name = "FILE.html", value_parser = html_file, help_heading = "Output")]
+    output: Option<PathBuf>,
+    /// Heading of the page [default: the folder]
+    #[arg(long, value_name = "TEXT", requires = "output", help_heading = "Output")]
+    title: Option<String>,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+impl TrendsArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.results]).writes(&self.output).writes(&self.plot.plot)
+    }
+
+    /// Reads the results, and draws them.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let trends = Trends::read(&self.results, self.over.into())?;
+        let mut outcome = Outcome::new(trends.to_string(), &trends)?;
+        if let Some(file) = &self.output {
+            let of_folder = || format!("Results in {}", self.results.display());
+            let title = self.title.clone().unwrap_or_else(of_folder);
+            outcome = outcome.with_file(file, trends_page(&trends, &title)?);
+        }
+        outcome.with_plot(&self.plot, || Ok(trends.figure()?))
+    }
+}

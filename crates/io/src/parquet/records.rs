@@ -1,0 +1,200 @@
+//! Many records in one file, told apart by a column.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::ops::Range;
+use std::path::Path;
+use std::slice;
+
+use ::parquet::basic::Type;
+use ::parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use ::parquet::data_type::{AsBytes as _, DataType};
+
+use super::read::{CHUNK_ROWS, Columns, Trouble, guarded, usable};
+use crate::limits::{Budget, Limits};
+use crate::standard::input_name;
+use crate::{IoError, Table, escaped};
+
+/// A Parquet file of which rows are read as they are asked for.
+///
+/// Only the row groups and columns that hold them are read, so that the memory needed does not grow
+/// with the file.
+#[derive(Debug)]
+pub struct ParquetFile {
+    head: Table,
+    columns: Columns<File>,
+    limits: Limits,
+}
+
+/// Rows of a file that belong to one record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RecordRows {
+    /// Value that the identifier column has in these rows.
+    pub id: String,
+    /// The rows, counted from 0.
+    pub rows: Range<usize>,
+}
+
+impl ParquetFile {
+    /// Opens a file and reads what it says of its columns.
+    ///
+    /// # Errors
+    /// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or none,
+    /// [`IoError::Empty`] without columns, [`IoError::TooLarge`].
+    pub fn open(path: impl AsRef<Path>, limits: &Limits) -> Result<Self, IoError> {
+        let file = input_name(path.as_ref());
+        let open =
+            || File::open(&path).map_err(|source| IoError::Read { file: file.clone(), source });
+        let (source, same) = (open()?, open()?);
+        let read = guarded(|| {
+            let columns = Columns::new(source, same)?;
+            let head = columns.contents(None, slice::from_ref(&(0..0)), limits)?.swap_remove(0);
+            Ok((columns, head))
+        });
+        let (columns, head) = read.map_err(|trouble| trouble.error(&file))?;
+        let head = Table::of_contents(file.clone(), usable(&file, head)?);
+        Ok(Self { head, columns, limits: *limits })
+    }
+
+    /// Returns the table without its rows: names, units and time axis of the columns.
+    pub fn head(&self) -> &Table {
+        &self.head
+    }
+
+    /// Returns the records that a column of texts or whole numbers tells apart, in the order of their rows.
+    ///
+    /// # Errors
+    /// [`IoError::MissingColumn`], [`IoError::RecordColumn`] if the column holds something else or
+    /// nothing in some row, [`IoError::RecordApart`] if the rows of a record do not follow one another,
+    /// [`IoError::Parquet`].
+    pub fn records(&self, column: &str) -> Result<Vec<RecordRows>, IoError> {
+        let at = self.head.find(column)?;
+        let mut ids = Ids::default();
+        let trouble = guarded(|| {
+            let whole = 0..self.columns.rows()?;
+            let budget = Budget::new(&self.limits);
+            self.columns.visit(at, slice::from_ref(&whole), &budget, &mut |column, _, rows| {
+                ids.read(column, rows)
+            })
+        });
+        let file = || self.head.file().to_owned();
+        match (ids.refusal, trouble) {
+            (Some(Refusal::NoId), _) => {
+                let what = match self.columns.description(at).physical_type() {
+                    Type::INT32 | Type::INT64 | Type::BYTE_ARRAY => "nothing",
+                    _ => "neither text nor a whole number",
+                };
+                let (column, row) = (self.head.label(at), ids.rows + 1);
+                Err(IoError::RecordColumn { file: file(), column, row, what })
+            }
+            (Some(Refusal::Apart(id)), _) => {
+                Err(IoError::RecordApart { file: file(), id, row: ids.rows + 1 })
+            }
+            (None, trouble) => {
+                trouble.map_err(|trouble| trouble.error(self.head.file()))?;
+                Ok(ids.records)
+            }
+        }
+    }
+
+    /// Reads records, which follow one another, each as a table of its own; columns whose indices, counted
+    /// from 0, are not in `wanted` have a name and no numbers (`None`: all are read).
+    ///
+    /// # Errors
+    /// [`IoError::Parquet`] if the file is damaged, [`IoError::TooLarge`].
+    pub fn tables(
+        &self,
+        wanted: Option<&[usize]>,
+        records: &[RecordRows],
+    ) -> Result<Vec<Table>, IoError> {
+        let file = self.head.file();
+        let spans: Vec<Range<usize>> = records.iter().map(|record| record.rows.clone()).collect();
+        let contents = guarded(|| self.columns.contents(wanted, &spans, &self.limits));
+        let contents = contents.map_err(|trouble| trouble.error(file))?.into_iter();
+        let named = contents.zip(records).map(|(contents, record)| {
+            let name = format!("{file} (record {})", escaped(&record.id));
+            Ok(Table::of_contents(name, usable(file, contents)?))
+        });
+        named.collect()
+    }
+}
+
+/// Identifiers read so far.
+#[derive(Default)]
+struct Ids {
+    records: Vec<RecordRows>,
+    known: BTreeSet<String>,
+    rows: usize,
+    refusal: Option<Refusal>,
+}
+
+/// Reason why rows cannot be divided into records; it stands in the row after those read.
+enum Refusal {
+    NoId,
+    /// The record has rows before others.
+    Apart(String),
+}
+
+impl Ids {
+    /// Reads rows of the column, which end early where they cannot be used.
+    fn read(&mut self, column: &mut ColumnReader, rows: usize) -> Result<(), Trouble> {
+        match column {
+            ColumnReader::Int32ColumnReader(column) => self.of(column, rows, |id| id.to_string()),
+            ColumnReader::Int64ColumnReader(column) => self.of(column, rows, |id| id.to_string()),
+            ColumnReader::ByteArrayColumnReader(column) => {
+                self.of(column, rows, |id| String::from_utf8_lossy(id.as_bytes()).into_owned())
+            }
+            _ => self.refused(Refusal::NoId),
+        }
+    }
+
+    fn of<T: DataType>(
+        &mut self,
+        column: &mut ColumnReaderImpl<T>,
+        rows: usize,
+        text: impl Fn(&T::T) -> String,
+    ) -> Result<(), Trouble> {
+        let (mut levels, mut values) = (Vec::new(), Vec::new());
+        let end = self.rows + rows;
+        while self.rows < end {
+            levels.clear();
+            values.clear();
+            let at_once = (end - self.rows).min(CHUNK_ROWS);
+            let (read, ..) = column.read_records(at_once, Some(&mut levels), None, &mut values)?;
+            if read == 0 {
+                return Err(Trouble::Damaged("a column is shorter than its row group".into()));
+            }
+            let full = levels.iter().copied().max().unwrap_or_default();
+            let complete = match values.len() == read {
+                true => read,
+                false => levels.iter().position(|level| *level < full).unwrap_or_default(),
+            };
+            for run in values[..complete.min(values.len())].chunk_by(|a, b| a == b) {
+                self.push(text(&run[0]), run.len())?;
+            }
+            if complete < read {
+                return self.refused(Refusal::NoId);
+            }
+        }
+        Ok(())
+    }
+
+    /// Appends rows of one identifier.
+    fn push(&mut self, id: String, count: usize) -> Result<(), Trouble> {
+        match self.records.last_mut().filter(|record| record.id == id) {
+            Some(record) => record.rows.end += count,
+            None if self.known.insert(id.clone()) => {
+                self.records.push(RecordRows { id, rows: self.rows..self.rows + count });
+            }
+            None => return self.refused(Refusal::Apart(id)),
+        }
+        self.rows += count;
+        Ok(())
+    }
+
+    /// Ends the reading; [`ParquetFile::records`] tells the refusal.
+    fn refused(&mut self, refusal: Refusal) -> Result<(), Trouble> {
+        self.refusal = Some(refusal);
+        Err(Trouble::Damaged("its records cannot be told apart".into()))
+    }
+}

@@ -1,0 +1,64 @@
+//! Rows of a table of results, read back.
+
+use std::fs::File;
+use std::path::Path;
+
+use ::parquet::record::Field;
+
+use super::read::{Columns, Trouble, guarded};
+use crate::IoError;
+use crate::limits::{Budget, Limits};
+use crate::standard::input_name;
+
+/// A cell of a table that [`write_parquet`](super::write_parquet) writes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParquetCell {
+    /// Null, or a value of another kind.
+    Null,
+    /// Text.
+    Text(String),
+    /// Whole number.
+    Count(i64),
+    /// Number, in the unit of the column.
+    Number(f64),
+    /// List of cells.
+    List(Vec<ParquetCell>),
+}
+
+impl ParquetCell {
+    fn of(field: Field) -> Self {
+        match field {
+            Field::Str(text) => Self::Text(text),
+            Field::Long(count) => Self::Count(count),
+            Field::Double(number) => Self::Number(number),
+            Field::ListInternal(list) => {
+                Self::List(list.elements().iter().cloned().map(Self::of).collect())
+            }
+            _ => Self::Null,
+        }
+    }
+}
+
+/// Reads all rows of a table of results, each as its cells with the names of their columns.
+///
+/// # Errors
+/// [`IoError::Read`] if there is no such file, [`IoError::Parquet`] if it is damaged or none,
+/// [`IoError::TooLarge`].
+pub fn read_parquet_rows(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+) -> Result<Vec<Vec<(String, ParquetCell)>>, IoError> {
+    let file = input_name(path.as_ref());
+    let open = || File::open(&path).map_err(|source| IoError::Read { file: file.clone(), source });
+    let (source, same) = (open()?, open()?);
+    let rows = guarded(|| {
+        let columns = Columns::new(source, same)?;
+        columns.check_all_pages(&mut Budget::new(limits))?;
+        let rows = columns.row_cells()?.map(|row| {
+            let cells = row?.into_columns().into_iter();
+            Ok(cells.map(|(name, field)| (name, ParquetCell::of(field))).collect())
+        });
+        rows.collect::<Result<_, Trouble>>()
+    });
+    rows.map_err(|trouble| trouble.error(&file))
+}

@@ -1,0 +1,252 @@
+//! Summary of a simulation, as text and as JSON.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use mechid_analysis::text::{compact, significant, text_table};
+use mechid_io::{ResponseKind, SystemMatrices};
+use mechid_model::{Instability, ModelError, NonlinearSystem, Term, Terms};
+use mechid_signal::{Record, message};
+use serde::Serialize;
+
+use super::Simulation;
+
+/// Summary of a [`Simulation`]; `Display` writes it for a person, `Serialize` the same for programs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SimulationSummary {
+    /// Scheme that computed the response, with its parameters.
+    pub scheme: String,
+    /// The scheme's conventions in force.
+    pub conventions: Vec<SchemeConvention>,
+    /// Kind of the response.
+    pub response: ResponseKind,
+    /// Number of samples.
+    pub samples: usize,
+    /// Number of periods of the force.
+    pub periods: usize,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+    /// Oscillating modes of the machine, of a nonlinear one at small amplitude, by rising frequency.
+    pub modes: Vec<SimulatedMode>,
+    /// Channels of the record, in its order.
+    pub channels: Vec<SimulatedChannel>,
+    /// The fastest growing free response of an unstable machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub instability: Option<FreeGrowth>,
+    /// Mass, damping and stiffness matrix, in SI units.
+    pub system: SystemMatrices,
+    /// Nonlinear terms of the machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nonlinear: Option<SimulatedTerms>,
+}
+
+/// A convention of a scheme where the literature has several.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SchemeConvention {
+    /// Subject of the convention.
+    pub what: &'static str,
+    /// Choice in force.
+    pub choice: &'static str,
+}
+
+/// A mode of the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SimulatedMode {
+    /// Natural frequency, in Hz.
+    pub natural_frequency_hz: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+}
+
+/// A channel of the record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SimulatedChannel {
+    /// Name of its column.
+    pub column: String,
+    /// SI unit of its samples.
+    pub unit: &'static str,
+    /// RMS value without noise, in `unit`.
+    pub rms: f64,
+    /// RMS value of the noise, in `unit`.
+    pub noise_rms: f64,
+}
+
+/// The fastest growing free response.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FreeGrowth {
+    /// Real and imaginary part, in rad/s.
+    pub pole: [f64; 2],
+    /// Growth rate, in 1/s.
+    pub growth_rate: f64,
+    /// Time in which the response doubles, in s.
+    pub doubling_time_s: f64,
+    /// The same as a sentence.
+    pub text: String,
+}
+
+/// Nonlinear terms and what they are multiplied with.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SimulatedTerms {
+    /// The terms.
+    pub terms: Terms,
+    /// Coefficients in their SI units, one per term.
+    pub coefficients: Vec<f64>,
+}
+
+/// One quantity of all degrees of freedom, before and after noise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Group<'a> {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub truth: &'a Record,
+    pub measured: &'a Record,
+}
+
+impl Simulation {
+    /// Returns names and samples of the columns of the measured record, in SI units: force,
+    /// displacement, velocity and acceleration of each degree of freedom.
+    pub fn columns(&self) -> Vec<(String, &[f64])> {
+        let mut columns = Vec::new();
+        for group in self.groups() {
+            let record = group.measured;
+            columns
+                .extend((0..record.channels()).map(|dof| (group.column(dof), record.channel(dof))));
+        }
+        columns
+    }
+
+    /// Summarises the machine, the response and the record.
+    ///
+    /// # Errors
+    /// [`ModelError`] if the modes of the machine cannot be computed.
+    pub fn summary(&self) -> Result<SimulationSummary, ModelError> {
+        let modes = self.system.modes()?;
+        let convention =
+            |c: &mechid_integrate::Convention| SchemeConvention { what: c.what, choice: c.choice };
+        Ok(SimulationSummary {
+            scheme: self.scheme.clone(),
+            conventions: self.conventions.iter().map(convention).collect(),
+            response: self.response_kind.clone(),
+            samples: self.force.len(),
+            periods: self.periods,
+            sample_rate_hz: self.force.sampling().rate_hz(),
+            modes: modes
+                .iter()
+                .map(|mode| SimulatedMode {
+                    natural_frequency_hz: mode.natural_frequency() / TAU,
+                    damping_ratio: mode.damping_ratio(),
+                })
+                .collect(),
+            channels: self.groups().iter().flat_map(SimulatedChannel::of).collect(),
+            instability: self.instability.as_ref().map(FreeGrowth::of),
+            system: SystemMatrices::from(&self.system),
+            nonlinear: self.nonlinear.as_ref().map(SimulatedTerms::of),
+        })
+    }
+
+    pub(super) fn groups(&self) -> [Group<'_>; 4] {
+        let (truth, measured) = (&self.response, &self.measured_response);
+        [
+            ("force", "N", &self.force, &self.measured_force),
+            ("displacement", "m", truth.displacement(), measured.displacement()),
+            ("velocity", "m/s", truth.velocity(), measured.velocity()),
+            ("acceleration", "m/s²", truth.acceleration(), measured.acceleration()),
+        ]
+        .map(|(name, unit, truth, measured)| Group { name, unit, truth, measured })
+    }
+}
+
+impl Group<'_> {
+    /// Returns the name of a column; a degree of freedom has its number where there are several.
+    fn column(&self, dof: usize) -> String {
+        match self.measured.channels() {
+            1 => self.name.to_string(),
+            _ => format!("{}_{}", self.name, dof + 1),
+        }
+    }
+}
+
+impl SimulatedChannel {
+    /// Makes one for each degree of freedom.
+    fn of(group: &Group<'_>) -> Vec<Self> {
+        let Group { unit, truth, measured, .. } = *group;
+        let channel = |dof: usize| {
+            let noise = measured.column(dof) - truth.column(dof);
+            let per_sample = (measured.len() as f64).sqrt();
+            Self {
+                column: group.column(dof),
+                unit,
+                rms: measured.column(dof).norm() / per_sample,
+                noise_rms: noise.norm() / per_sample,
+            }
+        };
+        (0..measured.channels()).map(channel).collect()
+    }
+}
+
+impl FreeGrowth {
+    fn of(instability: &Instability) -> Self {
+        Self {
+            pole: [instability.eigenvalue().re, instability.eigenvalue().im],
+            growth_rate: instability.growth_rate(),
+            doubling_time_s: instability.doubling_time(),
+            text: instability.to_string(),
+        }
+    }
+}
+
+impl SimulatedTerms {
+    fn of(system: &NonlinearSystem) -> Self {
+        Self { terms: system.terms().clone(), coefficients: system.coefficients().to_vec() }
+    }
+
+    fn each(&self) -> impl Iterator<Item = (&Term, &f64)> {
+        self.terms.iter().zip(&self.coefficients)
+    }
+}
+
+impl fmt::Display for SimulationSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let kind = match self.response {
+            ResponseKind::Periodic => "the response that repeats",
+            ResponseKind::FromRest => "from rest",
+            ResponseKind::From(_) => "from a given motion",
+        };
+        let samples = message::count(self.samples, "sample");
+        let periods = message::count(self.periods, "period");
+        writeln!(f, "{samples} at {} Hz, {periods}, {kind}", compact(self.sample_rate_hz, 8))?;
+        writeln!(f, "scheme: {}", self.scheme)?;
+        for SchemeConvention { what, choice } in &self.conventions {
+            writeln!(f, "  {what}: {choice}")?;
+        }
+        for (term, coefficient) in self.nonlinear.iter().flat_map(SimulatedTerms::each) {
+            let value = significant(*coefficient, 6);
+            writeln!(f, "nonlinear term {term}, {} = {value} {}", term.name(), term.unit())?;
+        }
+        let header = |cells: [&str; 3]| cells.map(String::from).to_vec();
+        let mode = match self.nonlinear {
+            Some(_) => "mode of small amplitude",
+            None => "mode",
+        };
+        let mut rows = vec![header([mode, "natural frequency (Hz)", "damping ratio"])];
+        for (number, mode) in (1..).zip(&self.modes) {
+            let cells = [mode.natural_frequency_hz, mode.damping_ratio];
+            let mut row = vec![format!("{number}")];
+            row.extend(cells.map(|v| significant(v, 5)));
+            rows.push(row);
+        }
+        write!(f, "\n{}\n", text_table(&rows))?;
+        let mut rows = vec![header(["column", "RMS", "noise RMS"])];
+        for c in &self.channels {
+            let cells = [c.rms, c.noise_rms].map(|v| format!("{} {}", significant(v, 4), c.unit));
+            let mut row = vec![c.column.clone()];
+            row.extend(cells);
+            rows.push(row);
+        }
+        f.write_str(&text_table(&rows))?;
+        match &self.instability {
+            Some(growth) => writeln!(f, "\nwarning: the machine is unstable, {}", growth.text),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,52 @@
+//! Bearing tests.
+
+use mechid::io::FrequencyResponses;
+use mechid::{BearingData, IdentifyBearing, identify_bearing};
+use pyo3::prelude::*;
+
+use crate::answer::Answer;
+use crate::measurement::Measurement;
+use crate::responses::ResponseTable;
+use crate::{failure, work};
+
+/// Identifies a bearing from records, less baseline records if there are any; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (tests, baseline, settings, threads))]
+pub fn bearing(
+    py: Python<'_>,
+    tests: Vec<PyRef<'_, Measurement>>,
+    baseline: Vec<PyRef<'_, Measurement>>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: IdentifyBearing = failure::settings(py, settings)?;
+    let [tests, baseline] = [tests, baseline].map(|records| {
+        records.iter().map(|record| record.0.clone()).collect::<Vec<mechid::Measurement>>()
+    });
+    let find = move || {
+        let dry = (!baseline.is_empty()).then(|| BearingData::of_records(&baseline, &how));
+        identify_bearing(&BearingData::of_records(&tests, &how)?, dry.transpose()?.as_ref(), &how)
+    };
+    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+}
+
+/// Identifies a bearing from tables of frequency responses likewise.
+#[pyfunction]
+#[pyo3(signature = (tests, baseline, settings, threads))]
+pub fn bearing_of_responses(
+    py: Python<'_>,
+    tests: Vec<PyRef<'_, ResponseTable>>,
+    baseline: Vec<PyRef<'_, ResponseTable>>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: IdentifyBearing = failure::settings(py, settings)?;
+    let [tests, baseline] = [tests, baseline].map(|tables| {
+        tables.iter().map(|table| table.0.clone()).collect::<Vec<FrequencyResponses>>()
+    });
+    let find = move || {
+        let dry = (!baseline.is_empty()).then(|| BearingData::of_responses(&baseline, &how));
+        identify_bearing(&BearingData::of_responses(&tests, &how)?, dry.transpose()?.as_ref(), &how)
+    };
+    work::watched(py, threads, || Ok(()), find).map(Answer::of)
+}

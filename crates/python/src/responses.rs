@@ -1,0 +1,135 @@
+//! Identification from frequency responses that were measured elsewhere.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use mechid::io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid::{IdentifyResponses, ResponseQuantity};
+use nalgebra::Complex;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use crate::machine::Machine;
+use crate::{answer, failure, work};
+
+/// A table of frequency responses.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct ResponseTable(pub FrequencyResponses);
+
+/// Name of a table, measured quantity, and names of points and forces.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Layout {
+    name: String,
+    quantity: ResponseQuantity,
+    points: Vec<String>,
+    forces: Vec<String>,
+}
+
+#[pymethods]
+impl ResponseTable {
+    /// Reads a file.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        work::watched(py, None, || Ok(()), move || FrequencyResponses::read(path)).map(Self)
+    }
+
+    /// Copies responses of frequencies × points × forces, their standard errors, and coherences of
+    /// frequencies × points; what they are of is JSON.
+    #[staticmethod]
+    #[pyo3(signature = (layout, frequency_hz, response, std_error, coherence))]
+    fn from_arrays(
+        py: Python<'_>,
+        layout: &str,
+        frequency_hz: PyReadonlyArray1<'_, f64>,
+        response: PyReadonlyArray3<'_, Complex<f64>>,
+        std_error: Option<PyReadonlyArray3<'_, f64>>,
+        coherence: Option<PyReadonlyArray2<'_, f64>>,
+    ) -> PyResult<Self> {
+        let Layout { name, quantity, points, forces } = failure::settings(py, layout)?;
+        let (response, errors) = (response.as_array(), std_error.as_ref().map(|e| e.as_array()));
+        let lines = frequency_hz.as_array().len();
+        let mut functions = Vec::new();
+        for (i, point) in points.iter().enumerate() {
+            for (j, force) in forces.iter().enumerate() {
+                functions.push(ResponseFunction {
+                    response: point.clone(),
+                    reference: force.clone(),
+                    quantity: Some(quantity),
+                    values: (0..lines).map(|line| response[(line, i, j)]).collect(),
+                    standard_error: errors
+                        .map(|errors| (0..lines).map(|line| errors[(line, i, j)]).collect()),
+                });
+            }
+        }
+        let of_point = |(i, point): (usize, &String)| {
+            let coherence = coherence.as_ref()?.as_array();
+            let values = (0..lines).map(|line| coherence[(line, i)]).collect();
+            Some(CoherenceFunction { response: point.clone(), reference: None, values })
+        };
+        Ok(Self(FrequencyResponses {
+            file: name,
+            frequency_hz: frequency_hz.as_array().to_vec(),
+            coherence: points.iter().enumerate().filter_map(of_point).collect(),
+            functions,
+            remarks: Vec::new(),
+        }))
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.0.file
+    }
+
+    #[getter]
+    fn frequencies(&self) -> usize {
+        self.0.frequency_hz.len()
+    }
+}
+
+/// A machine identified from tables of frequency responses.
+#[pyclass(frozen, module = "mechid._mechid")]
+pub struct IdentifiedResponses(Arc<mechid::IdentifiedResponses>);
+
+/// Identifies the machine behind tables of frequency responses; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (tables, settings, threads))]
+pub fn identify_responses(
+    py: Python<'_>,
+    tables: Vec<PyRef<'_, ResponseTable>>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<IdentifiedResponses> {
+    let how: IdentifyResponses = failure::settings(py, settings)?;
+    let tables: Vec<FrequencyResponses> = tables.iter().map(|table| table.0.clone()).collect();
+    let find = move || mechid::identify_responses(&tables, &how);
+    work::watched(py, threads, || Ok(()), find).map(|found| IdentifiedResponses(Arc::new(found)))
+}
+
+#[pymethods]
+impl IdentifiedResponses {
+    /// The result as the program prints it with `--json`.
+    fn to_json(&self, py: Python<'_>) -> PyResult<String> {
+        failure::json(py, &*self.0)
+    }
+
+    /// The result as a person reads it.
+    fn text(&self) -> String {
+        self.0.to_string()
+    }
+
+    /// The picture of the program, as SVG.
+    fn svg(&self, py: Python<'_>) -> PyResult<String> {
+        answer::svg(py, Arc::clone(&self.0))
+    }
+
+    /// Confidence interval of a parameter.
+    fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
+        work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
+    }
+
+    /// The identified system with the covariance of its parameters.
+    fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
+        work::brief(py, || self.0.machine()).map(Machine)
+    }
+}

@@ -1,0 +1,91 @@
+//! Look of frequency responses.
+
+use mechid_plot::charts::{Quantity, bode};
+use mechid_plot::{Axis, Figure};
+
+use super::trace::Trace;
+
+/// Look of the frequency responses in a figure.
+///
+/// ```
+/// use mechid_report::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
+///
+/// let style = FigureStyle {
+///     phase: PhaseStyle::Continuous,
+///     frequency: Some(FrequencyScale::Logarithmic),
+///     magnitude: MagnitudeScale::Decibel,
+/// };
+/// assert_ne!(style, FigureStyle::default());
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FigureStyle {
+    /// Branch of the phase.
+    pub phase: PhaseStyle,
+    /// Frequency axis; `None`: logarithmic for a machine over its whole range, linear over a band.
+    pub frequency: Option<FrequencyScale>,
+    /// Magnitude axis.
+    pub magnitude: MagnitudeScale,
+}
+
+/// Branch of the phase of a frequency response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PhaseStyle {
+    /// Phase between −180° and 180°; a line breaks where it jumps.
+    #[default]
+    Wrapped,
+    /// Phase without jumps, from the lowest frequency on.
+    Continuous,
+}
+
+/// Scale of a frequency axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrequencyScale {
+    /// Equal distances for equal differences.
+    Linear,
+    /// Equal distances for equal ratios.
+    Logarithmic,
+}
+
+/// Scale of a magnitude axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MagnitudeScale {
+    /// Logarithmic, in the unit of the response.
+    #[default]
+    Logarithmic,
+    /// Decibels relative to one unit of the response.
+    Decibel,
+}
+
+impl FigureStyle {
+    /// Returns the frequency axis in Hz.
+    pub(super) fn frequency_axis(self, usual: FrequencyScale) -> Axis {
+        match self.frequency.unwrap_or(usual) {
+            FrequencyScale::Linear => Axis::linear("Frequency", "Hz"),
+            FrequencyScale::Logarithmic => Axis::log10("Frequency", "Hz"),
+        }
+    }
+
+    /// Returns the axis of a magnitude in this unit.
+    pub(super) fn magnitude_axis(self, magnitude: Quantity<'_>) -> Axis {
+        match self.magnitude {
+            MagnitudeScale::Logarithmic => Axis::log10(magnitude.name, magnitude.unit),
+            MagnitudeScale::Decibel => {
+                Axis::linear(magnitude.name, format!("dB re 1 {}", magnitude.unit))
+            }
+        }
+    }
+
+    /// Draws measured points and fitted lines, magnitude above phase.
+    pub(super) fn chart(
+        self,
+        title: &str,
+        usual: FrequencyScale,
+        magnitude: Quantity<'_>,
+        [measured, fitted]: [&[Trace]; 2],
+    ) -> Figure {
+        let [measured, fitted] =
+            [measured, fitted].map(|all| all.iter().map(Trace::as_response).collect::<Vec<_>>());
+        let axes = (self.frequency_axis(usual), self.magnitude_axis(magnitude));
+        bode(title, axes.0, axes.1, &measured, &fitted)
+    }
+}
