@@ -32,7 +32,7 @@ pub use self::part::{FleetRecord, Part, PartDone};
 pub use self::results::read_results;
 pub use self::summary::FleetSummary;
 pub use self::table::results_as_parquet;
-pub use self::trends::{TrendAxis, TrendPoint, TrendSeries, Trends};
+pub use self::trends::{OUTLIER, TrendAxis, TrendPoint, TrendSeries, Trends};
 use crate::{AnalysisError, SavedAnalysis};
 
 /// Number of records in a part unless it is said.
