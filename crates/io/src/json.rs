@@ -37,15 +37,23 @@ pub(crate) fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, Io
     }
     let wrong = |source| IoError::Json { file: file.into(), field: String::new(), source };
     let mut deserializer = serde_json::Deserializer::from_str(text);
-    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+    let value = deserialized(file, &mut deserializer)?;
+    deserializer.end().map_err(wrong)?;
+    Ok(value)
+}
+
+/// Reads a value from a text or from JSON that was parsed before; `file` is its name in messages.
+pub(crate) fn deserialized<'de, T: Deserialize<'de>>(
+    file: &str,
+    from: impl Deserializer<'de, Error = serde_json::Error>,
+) -> Result<T, IoError> {
+    serde_path_to_error::deserialize(from).map_err(|error| {
         let field = match error.path().to_string() {
             root if root == "." => String::new(),
             field => format!("{field}: "),
         };
         IoError::Json { file: file.into(), field, source: error.into_inner() }
-    })?;
-    deserializer.end().map_err(wrong)?;
-    Ok(value)
+    })
 }
 
 /// Reads a word, one of the variants of an enum. Without this a value of another shape is refused

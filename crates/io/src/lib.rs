@@ -43,8 +43,9 @@ pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
 pub use escape::escaped;
 pub use experiment::{
-    Experiment, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level, LoadBeyond,
-    MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice, SubStepLoad,
+    Experiment, ExperimentStudy, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level,
+    LoadBeyond, MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice,
+    StudyField, StudyRuns, SubStepLoad,
 };
 pub use folder::{FileStamp, create_folder, files_of};
 pub use json::read_json;
@@ -55,7 +56,7 @@ pub use output::{
 };
 #[cfg(feature = "parquet")]
 pub use parquet::{
-    ParquetCell, ParquetColumn, ParquetFile, ParquetValues, RecordRows, parquet_bytes,
+    ParquetCell, ParquetColumn, ParquetFile, ParquetRecordWriter, ParquetValues, RecordRows, parquet_bytes,
     read_parquet_metadata, read_parquet_rows, write_parquet,
 };
 pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};

@@ -82,6 +82,8 @@ pub use mechid_plot as plot;
 #[cfg(feature = "report")]
 pub use mechid_report as report;
 pub use mechid_signal as signal;
+#[cfg(feature = "parquet")]
+pub use simulation::{RunsSummary, simulate_runs};
 pub use simulation::{
     SimulateError, Simulation, SimulationSummary, exact_periodic, respond, simulate, sweep,
 };

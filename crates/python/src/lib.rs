@@ -22,6 +22,7 @@ mod questions;
 mod reconstructed;
 mod responses;
 mod simulated;
+mod trends;
 mod work;
 
 #[pyo3::pymodule(gil_used = false)]
@@ -50,6 +51,8 @@ mod _mechid {
     use super::responses::{IdentifiedResponses, ResponseTable, identify_responses};
     #[pymodule_export]
     use super::simulated::{integrate, multisine, predict, simulate};
+    #[pymodule_export]
+    use super::trends::{fleet_simulate, fleet_trends};
 
     use pyo3::prelude::*;
 

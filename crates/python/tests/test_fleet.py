@@ -216,3 +216,47 @@ def test_a_batch_makes_the_rows_that_a_run_makes(tmp_path: Path) -> None:
     whole = fleet.identify_batch(pa.table(cells), ANALYSIS)
     assert whole["record"].to_pylist() == ["the record"]
     assert whole["value"].to_pylist() == found["value"].to_pylist()[:1]
+
+
+RIG = {
+    "system": {"mass": 25, "damping": 188.5, "stiffness": 142122},
+    "sampling": {"samples": 256, "rate_hz": 128},
+    "excitation": {"lines": "4:60", "amplitude": 2},
+    "periods": 2,
+    "noise": {"displacement": {"fraction_of_rms": 0.01}, "seed": 1},
+}
+OF_RUNS = {**ANALYSIS, "reading": {"record_column": "run"}}
+
+
+def test_a_study_changes_what_it_says(tmp_path: Path) -> None:
+    """Judge: the masses of the study are found again, run by run."""
+    masses = np.array([20.0, 25.0, 30.0])
+    text = fleet.simulate(RIG, tmp_path / "runs.parquet", {"system.mass": masses, "noise.seed": [1, 2, 3]})
+    assert "3 runs, 1536 samples" in text and "system.mass, noise.seed" in text
+    table = pq.read_table(tmp_path / "runs.parquet")
+    assert table.column_names == [
+        "run", "time", "force", "displacement", "velocity", "acceleration", "system.mass", "noise.seed",
+    ]
+    assert table["system.mass"].to_numpy().reshape(3, -1).std(axis=1).max() == 0
+    fleet.run(tmp_path / "runs.parquet", OF_RUNS, tmp_path / "results")
+    found = fleet.trends(tmp_path / "results", title="A study")
+    mass = found.fields["series"][0]
+    values = np.array([point["value"] for point in mass["points"]])
+    errors = np.array([point["standard_error"] for point in mass["points"]])
+    assert mass["name"] == "m" and (np.abs(values - masses) < 4 * errors).all()
+    assert "<title>A study" in found.page and "3 records: 3 identified" in str(found)
+
+
+def test_a_study_that_is_none_is_refused(tmp_path: Path) -> None:
+    for runs, why in [
+        ({"system.mas": [1.0]}, "system"),
+        ({"noise.seed": [1.5]}, "noise.seed"),
+        ({"system.mass": [25.0, np.nan]}, "system.mass"),
+        ({"system.mass": [25.0], "noise.seed": [1, 2]}, "system.mass"),
+        (0, "one run at least"),
+    ]:
+        with pytest.raises(mechid.MechidError, match=why):
+            fleet.simulate(RIG, tmp_path / "runs.parquet", runs)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(mechid.MechidError):
+        fleet.trends(tmp_path / "nowhere")

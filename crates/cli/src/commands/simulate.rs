@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use mechid::SimulationSummary;
-use mechid::io::{CsvFile, Experiment};
+use mechid::io::{CsvFile, Experiment, ExperimentStudy, StudyRuns, Table, output_name};
+use mechid::{RunsSummary, SimulationSummary};
 use serde::Serialize;
 
-use crate::args::{PlotArgs, ReportArgs};
+use crate::args::{PlotArgs, ReportArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -52,11 +52,15 @@ use crate::outcome::{Files, Outcome};
 ///               fraction_of_rms; and a seed
 ///
 /// The picture shows over time what the record holds, noise and all, of up to four degrees of freedom.
+///
+/// Many runs, by --runs or --study, go into one Parquet file: its column run names the run of each row.
+/// mechid fleet identifies them all, and mechid trends shows the results.
 #[derive(Debug, Args)]
 #[command(
     verbatim_doc_comment,
     after_help = "Examples:\n  mechid simulate examples/machine.json --output record.csv\n  \
                   mechid simulate examples/machine.json --output record.csv --plot run.svg\n  \
+                  mechid simulate examples/machine.json --runs 1000 --output runs.parquet\n  \
                   mechid identify record.csv --force force --displacement displacement"
 )]
 pub struct SimulateArgs {
@@ -64,9 +68,19 @@ pub struct SimulateArgs {
     #[arg(value_name = "SYSTEM.json")]
     experiment: PathBuf,
     /// File for the record (-: standard output): columns time, force, displacement, velocity,
-    /// acceleration in SI units; with several degrees of freedom force_1, force_2, …
+    /// acceleration in SI units; with several degrees of freedom force_1, force_2, …; for many runs
+    /// a Parquet file, its name ending in .parquet
     #[arg(long, short, value_name = "RECORD.csv", help_heading = "Output")]
     output: PathBuf,
+    /// Number of runs, each with noise of its own: the seed counts up from the one described
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot",
+          help_heading = "Many runs")]
+    runs: Option<usize>,
+    /// Table of the runs, a row each: its columns are the fields that change, by their paths in the
+    /// description, such as noise.seed, system.damping, excitation.2.amplitude
+    #[arg(long, value_name = "RUNS.csv", conflicts_with_all = ["plot", "runs"],
+          help_heading = "Many runs")]
+    study: Option<PathBuf>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -74,29 +88,56 @@ pub struct SimulateArgs {
 }
 
 #[derive(Debug, Serialize)]
-struct Report {
+struct Report<S> {
     record: String,
     #[serde(flatten)]
-    summary: SimulationSummary,
+    summary: S,
 }
 
 impl SimulateArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
-        Files::default().reads([&self.experiment]).writes([&self.output]).writes(&self.plot.plot)
+        let files = Files::default().reads([&self.experiment]).reads(&self.study);
+        files.writes([&self.output]).writes(&self.plot.plot)
     }
 
-    /// Simulates and hands over the record.
+    /// Simulates and hands over the record, or those of all runs.
     pub fn run(&self) -> Result<Outcome, CliError> {
+        match (self.runs, &self.study) {
+            (None, None) => self.one(),
+            (Some(runs), _) => self.many("--runs", &StudyRuns::Seeds(runs)),
+            (None, Some(table)) => self.many("--study", &StudyRuns::Table(Table::read(table)?)),
+        }
+    }
+
+    fn one(&self) -> Result<Outcome, CliError> {
         let simulation = mechid::simulate(&Experiment::read(&self.experiment)?)?;
         let (names, columns): (Vec<String>, Vec<&[f64]>) = simulation.columns().into_iter().unzip();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         let mut file = CsvFile::begin(&self.output, simulation.force.sampling(), &names)?;
         file.append(&columns)?;
-        let record = mechid::io::output_name(&self.output);
-        let report = Report { record, summary: simulation.summary()? };
+        let report: Report<SimulationSummary> = self.report(simulation.summary()?);
         Outcome::new(format!("{}: {}", report.record, report.summary), &report)?
             .with_begun(file.finish()?)
             .with_plot(&self.plot, || Ok(simulation.figure(&report.record)))
+    }
+
+    fn many(&self, option: &'static str, runs: &StudyRuns) -> Result<Outcome, CliError> {
+        let ending = self.output.extension().and_then(|ending| ending.to_str());
+        if !ending.is_some_and(|ending| ending.eq_ignore_ascii_case("parquet")) {
+            let why = "writes a Parquet file: let the name of --output end in .parquet";
+            return Err(CliError::MisplacedOption { option, why });
+        }
+        let study = ExperimentStudy::read(&self.experiment, runs)?;
+        let mut progress =
+            |done| log::trace!(target: "mechid", "run {done} of {}", study.runs());
+        let (file, summary) = mechid::simulate_runs(&study, &self.output, &mut progress)?;
+        let report: Report<RunsSummary> = self.report(summary);
+        let text = format!("{}: {}", report.record, report.summary);
+        Ok(Outcome::new(text, &report)?.with_begun(file))
+    }
+
+    fn report<S>(&self, summary: S) -> Report<S> {
+        Report { record: output_name(&self.output), summary }
     }
 }

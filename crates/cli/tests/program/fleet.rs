@@ -61,3 +61,62 @@ fn a_record_that_fails_is_told_by_the_exit_code_and_nothing_is_computed_twice() 
     assert_eq!(refused.status.code(), Some(2));
     assert!(!home.path().join("none").exists());
 }
+
+#[test]
+fn a_study_is_simulated_identified_and_shown_side_by_side() {
+    let home = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(home.path().join(name), text).unwrap();
+    write(
+        "rig.json",
+        r#"{ "system": { "mass": 25, "damping": 188.5, "stiffness": 142122 },
+             "sampling": { "samples": 256, "rate_hz": 128 },
+             "excitation": { "lines": "4:60", "amplitude": 2 }, "periods": 2,
+             "noise": { "displacement": { "fraction_of_rms": 0.01 }, "seed": 1 } }"#,
+    );
+    write(
+        "analysis.json",
+        r#"{ "channels": { "force": ["force"], "displacement": ["displacement"] },
+             "reading": { "record_column": "run" }, "window": { "period": 256 },
+             "identify": { "fit": { "domain": "spectra", "method": "maximum-likelihood" } } }"#,
+    );
+    write("runs.csv", "system.mass;noise.seed\n20;1\n25;2\n30;3\n");
+    let json = |arguments: &str| -> Value {
+        let done = program(home.path(), arguments);
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice(&done.stdout).unwrap()
+    };
+    let made = json("simulate rig.json --study runs.csv --output study.parquet --json");
+    assert_eq!((&made["runs"], &made["samples"]), (&3.into(), &1536.into()));
+    assert_eq!(made["fields"], serde_json::json!(["system.mass", "noise.seed"]));
+    json("fleet study.parquet --analysis analysis.json --output study --json");
+    let trends = json("trends study --json");
+    for (point, mass) in trends["series"][0]["points"].as_array().unwrap().iter().zip([20., 25., 30.]) {
+        let (value, error) =
+            (point["value"].as_f64().unwrap(), point["standard_error"].as_f64().unwrap());
+        assert!((value - mass).abs() < 4.0 * error, "{point}");
+    }
+
+    // The spread over the seeds is the standard error of each: of 100 runs, to 7 % (one σ).
+    json("simulate rig.json --runs 100 --output seeds.parquet --json");
+    json("fleet seeds.parquet --analysis analysis.json --output seeds --json");
+    let trends = json("trends seeds --json");
+    assert_eq!(trends["records"], 100);
+    for series in trends["series"].as_array().unwrap() {
+        let ratio =
+            series["spread"].as_f64().unwrap() / series["standard_error"].as_f64().unwrap();
+        assert!((0.7..1.4).contains(&ratio), "{}: {ratio}", series["name"]);
+    }
+
+    for (arguments, expected) in [
+        ("--runs 3 --output runs.csv", "--runs writes a Parquet file"),
+        ("--study runs.csv --output runs.csv", "--study writes a Parquet file"),
+        ("--study rig.json --output a.parquet", "rig.json"),
+        ("--study analysis.csv --output a.parquet", "cannot read analysis.csv"),
+    ] {
+        let refused = program(home.path(), &format!("simulate rig.json {arguments}"));
+        assert_eq!(refused.status.code(), Some(2), "{arguments}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(message.contains(expected), "{arguments}: {message}");
+    }
+    assert!(!home.path().join("a.parquet").exists());
+}

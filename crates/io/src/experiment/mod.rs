@@ -4,6 +4,7 @@ mod excitation;
 mod noise;
 mod response;
 mod scheme;
+mod study;
 
 use std::path::Path;
 
@@ -19,6 +20,7 @@ pub use self::scheme::{
     FirstDisplacements, FirstSteps, HeldOrLinear, LoadBeyond, MiddleLoad, ReturnedAcceleration,
     SchemeChoice, SubStepLoad,
 };
+pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
 use crate::system::{NonlinearDescription, SystemDescription};
 use crate::{IoError, escaped, json};
 

@@ -5,12 +5,14 @@
 
 mod pages;
 mod read;
+mod record_writer;
 mod records;
 mod rows;
 mod write;
 
 pub(crate) use self::read::read;
 pub use self::read::read_parquet_metadata;
+pub use self::record_writer::ParquetRecordWriter;
 pub use self::records::{ParquetFile, RecordRows};
 pub use self::rows::{ParquetCell, read_parquet_rows};
 pub use self::write::{ParquetColumn, ParquetValues, parquet_bytes, write_parquet};

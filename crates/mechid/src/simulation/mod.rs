@@ -2,6 +2,8 @@
 
 #[cfg(feature = "report")]
 mod figure;
+#[cfg(feature = "parquet")]
+mod runs;
 mod schemes;
 mod summary;
 
@@ -18,6 +20,8 @@ use mechid_model::{
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
 
+#[cfg(feature = "parquet")]
+pub use self::runs::{RunsSummary, simulate_runs};
 use self::schemes::{has_given_start, scheme};
 pub use self::summary::{
     FreeGrowth, SchemeConvention, SimulatedChannel, SimulatedMode, SimulatedTerms,

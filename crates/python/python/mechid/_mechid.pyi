@@ -26,7 +26,9 @@ __all__ = [
     "fleet_begin",
     "fleet_part",
     "fleet_rows",
+    "fleet_simulate",
     "fleet_summary",
+    "fleet_trends",
     "frf",
     "identify",
     "identify_responses",
@@ -230,5 +232,13 @@ def fleet_part(records: Sequence[_Place], analysis: str, folder: str) -> str: ..
 def fleet_rows(
     records: Sequence[tuple[str, Sequence[tuple[str, NDArray[np.float64]]]]], analysis: str
 ) -> bytes: ...
+def fleet_simulate(
+    name: str,
+    description: str,
+    runs: int | None,
+    fields: Sequence[tuple[str, NDArray[np.float64]]],
+    out: str,
+) -> tuple[str, str]: ...
+def fleet_trends(folder: str, over_number: bool, title: str) -> tuple[str, str, str]: ...
 def fleet_summary(parts: Sequence[str], folder: str, elapsed_s: float) -> tuple[str, str]: ...
 def program(arguments: Sequence[str]) -> int: ...

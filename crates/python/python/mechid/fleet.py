@@ -20,17 +20,18 @@ from concurrent.futures import Executor, Future, ThreadPoolExecutor, as_complete
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from . import _mechid
+from ._results import description_of
 
 if TYPE_CHECKING:
     import pyarrow
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Failure", "Summary", "identify_batch", "run"]
+__all__ = ["Failure", "Summary", "Trends", "identify_batch", "run", "simulate", "trends"]
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,122 @@ class Summary:
 
     def __str__(self) -> str:
         return self.text
+
+
+@dataclass(frozen=True)
+class Trends:
+    """The results of many records side by side; ``str`` tells them as the program does.
+
+    ``fields`` is what ``mechid trends --json`` prints: ``series`` with ``name``, ``unit``, ``median``,
+    ``spread``, ``standard_error`` and ``points``, ``failures`` and counts. ``page`` is the report, HTML.
+    """
+
+    fields: Mapping[str, Any]
+    text: str
+    page: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        return self.page
+
+
+def simulate(
+    experiment: Mapping[str, Any] | str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    runs: int | Mapping[str, ArrayLike],
+) -> str:
+    """Simulate many runs of a described experiment, into one Parquet file.
+
+    Its column ``run`` tells the runs apart; with ``"record_column": "run"`` in ``reading`` of the
+    analysis, `run` identifies them all.
+
+    Parameters
+    ----------
+    experiment : mapping or path
+        As `mechid.simulate` takes it.
+    out : path
+        The file.
+    runs : int or mapping
+        Number of runs with noise of their own, whose seed counts up from the one described; or the
+        values of the fields that change, a number for each run, such as
+        ``{"system.damping": [1, 2], "noise.seed": [1, 2]}``. List entries are counted from 1:
+        ``excitation.1.amplitude``.
+
+    Returns
+    -------
+    str
+        What was written, as the program tells it.
+
+    Raises
+    ------
+    MechidError
+        If the description is wrong, has no such field, or the file cannot be written.
+
+    Examples
+    --------
+    >>> import tempfile, pathlib
+    >>> from mechid import fleet
+    >>> rig = {"system": {"mass": 25, "damping": 188.5, "stiffness": 142122},
+    ...        "sampling": {"samples": 256, "rate_hz": 128},
+    ...        "excitation": {"lines": "4:60", "amplitude": 2}, "periods": 2,
+    ...        "noise": {"displacement": {"fraction_of_rms": 0.01}, "seed": 1}}
+    >>> analysis = {"channels": {"force": ["force"], "displacement": ["displacement"]},
+    ...             "reading": {"record_column": "run"}, "window": {"period": 256}}
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     records = pathlib.Path(folder) / "runs.parquet"
+    ...     _ = fleet.simulate(rig, records, runs=50)
+    ...     found = fleet.run(records, analysis, pathlib.Path(folder) / "results")
+    ...     mass = fleet.trends(pathlib.Path(folder) / "results").fields["series"][0]
+    >>> found.records, mass["name"], 0.7 < mass["spread"] / mass["standard_error"] < 1.3
+    (50, 'm', True)
+    """
+    described = description_of(experiment)
+    if described is None:
+        raise TypeError("an experiment is a mapping, or the path of a .json file")
+    count: int | None = None
+    fields: list[tuple[str, NDArray[np.float64]]] = []
+    if isinstance(runs, Mapping):
+        fields = [
+            (name, np.ascontiguousarray(values, dtype=np.float64)) for name, values in runs.items()
+        ]
+    else:
+        count = runs
+    return _mechid.fleet_simulate(*described, count, fields, os.fspath(out))[0]
+
+
+def trends(
+    results: str | os.PathLike[str],
+    over: Literal["order", "number"] = "order",
+    *,
+    title: str | None = None,
+) -> Trends:
+    """Read the results of many records, to see them side by side.
+
+    Parameters
+    ----------
+    results : path
+        The folder that `run` or ``mechid fleet`` has written.
+    over : {"order", "number"}
+        Order of the records: as their names sort, or by the last number in the name.
+    title : str, optional
+        Heading of the page; the folder, without.
+
+    Returns
+    -------
+    Trends
+        Parameters, natural frequencies and damping ratios over the records, outliers, failures.
+
+    Raises
+    ------
+    MechidError
+        If there are no results, or they cannot be read.
+    """
+    folder = os.fspath(results)
+    heading = title if title is not None else f"Results in {folder}"
+    text, fields, page = _mechid.fleet_trends(folder, over == "number", heading)
+    return Trends(fields=json.loads(fields), text=text, page=page)
 
 
 def run(

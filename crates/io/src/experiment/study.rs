@@ -1,0 +1,259 @@
+//! One described experiment, and what changes in it from run to run.
+
+use std::path::Path;
+
+use serde_json::{Number, Value};
+
+use crate::{Experiment, IoError, Table, escaped, json};
+
+/// Runs of one experiment that differ in the numbers of some fields: a study of seeds, of parameters, or
+/// of both.
+///
+/// A field is named by its path in the description, list entries counted from 1: `noise.seed`,
+/// `system.damping`, `excitation.2.amplitude`, `system.stiffness.1.2`.
+///
+/// ```
+/// use mechid_io::{ExperimentStudy, StudyRuns, Table};
+///
+/// let experiment = r#"{
+///     "system": { "mass": 10, "damping": 180, "stiffness": 5000 },
+///     "sampling": { "samples": 64, "rate_hz": 100 },
+///     "excitation": [{ "lines": "odd", "amplitude": 50 }],
+///     "noise": { "displacement": { "snr_db": 40 }, "seed": 1 }
+/// }"#;
+/// let table = Table::parse("runs.csv", b"system.mass,noise.seed\n10,1\n12.5,2\n")?;
+/// let study = ExperimentStudy::parse("machine.json", experiment, &StudyRuns::Table(table))?;
+/// assert_eq!(study.runs(), 2);
+/// let second = study.experiment(2)?;
+/// assert_eq!(second.system()?.mass()[(0, 0)], 12.5);
+/// assert_eq!(second.noise.unwrap().seed, 2);
+/// # Ok::<(), mechid_io::IoError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExperimentStudy {
+    file: String,
+    description: Value,
+    fields: Vec<StudyField>,
+    runs: usize,
+}
+
+/// Choice of the runs of a study.
+#[derive(Debug)]
+pub enum StudyRuns {
+    /// So many runs that differ in their noise alone: its seed counts up from the one described.
+    Seeds(usize),
+    /// A row for each run, and a column for each field that changes.
+    Table(Table),
+}
+
+/// A field of the description that changes from run to run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StudyField {
+    /// Path in the description, such as `noise.seed`.
+    pub name: String,
+    /// Number of each run, in the unit of the field.
+    pub values: Vec<f64>,
+}
+
+/// Largest whole number up to which every whole number is an `f64`.
+const LARGEST_WHOLE: u64 = 1 << 53;
+
+impl ExperimentStudy {
+    /// Reads the experiment in a file, or on standard input as `-`.
+    ///
+    /// # Errors
+    /// [`IoError::Read`] if it cannot be read, otherwise as [`ExperimentStudy::parse`].
+    pub fn read(experiment: impl AsRef<Path>, runs: &StudyRuns) -> Result<Self, IoError> {
+        let (file, description) = json::read(experiment.as_ref())?;
+        Self::new(file, description, runs)
+    }
+
+    /// Reads the experiment in a text; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] if a column names no field of the description, there is no run, or seeds
+    /// are to count up where no noise is described; [`IoError::NotJson`] and [`IoError::Json`] if the
+    /// description or its first run is no experiment; those of [`Table::values`].
+    pub fn parse(
+        file: impl Into<String>,
+        text: &str,
+        runs: &StudyRuns,
+    ) -> Result<Self, IoError> {
+        let file = escaped(&file.into()).into_owned();
+        let description = json::parse(&file, text)?;
+        Self::new(file, description, runs)
+    }
+
+    fn new(file: String, description: Value, runs: &StudyRuns) -> Result<Self, IoError> {
+        // What is wrong with the description itself is told as such.
+        let experiment: Experiment = json::deserialized(&file, description.clone())?;
+        let refused = |what: String| IoError::Description { file: file.clone(), what };
+        let fields = match runs {
+            StudyRuns::Seeds(count) => {
+                let noise = experiment.noise.ok_or_else(|| {
+                    refused("without noise all runs would be the same: describe it, with a seed".into())
+                })?;
+                if noise.seed.saturating_add(*count as u64) > LARGEST_WHOLE {
+                    return Err(refused(format!(
+                        "{count} seeds from {} on exceed {LARGEST_WHOLE}: choose a smaller seed",
+                        noise.seed
+                    )));
+                }
+                let values = (noise.seed..).take(*count).map(|seed| seed as f64).collect();
+                vec![StudyField { name: "noise.seed".into(), values }]
+            }
+            StudyRuns::Table(table) => fields(table)?,
+        };
+        let runs = fields.first().map_or(0, |field| field.values.len());
+        if runs == 0 {
+            return Err(refused("a study needs one run at least".into()));
+        }
+        let study = Self { file, description, fields, runs };
+        // A wrong name is wrong in every run.
+        study.experiment(1)?;
+        Ok(study)
+    }
+
+    /// Number of runs.
+    pub fn runs(&self) -> usize {
+        self.runs
+    }
+
+    /// The fields that change, with their numbers.
+    pub fn fields(&self) -> &[StudyField] {
+        &self.fields
+    }
+
+    /// Returns the experiment of a run, counted from 1.
+    ///
+    /// # Errors
+    /// [`IoError::Json`] if its numbers make no experiment.
+    ///
+    /// # Panics
+    /// If there is no such run.
+    pub fn experiment(&self, run: usize) -> Result<Experiment, IoError> {
+        let mut description = self.description.clone();
+        for StudyField { name, values } in &self.fields {
+            let Some(place) = place(&mut description, name) else {
+                let what = format!(
+                    "the study changes \"{}\", which the description does not have: name a field by its \
+                     path, such as system.damping or excitation.1.amplitude",
+                    escaped(name)
+                );
+                return Err(IoError::Description { file: self.file.clone(), what });
+            };
+            *place = number(values[run - 1]);
+        }
+        let file = format!("{}, run {run} of {}", self.file, self.runs);
+        json::deserialized(&file, description).map(|experiment| Experiment { file, ..experiment })
+    }
+}
+
+/// Returns the columns of a table of runs.
+fn fields(table: &Table) -> Result<Vec<StudyField>, IoError> {
+    let columns: Vec<usize> = table.filled_columns().collect();
+    let numbers: Vec<String> = columns.iter().map(|column| (column + 1).to_string()).collect();
+    table.common_length(&numbers)?;
+    let field = |column: &usize| {
+        let name = table.names()[*column].trim().to_owned();
+        Ok(StudyField { name, values: table.values(*column)?.to_vec() })
+    };
+    columns.iter().map(field).collect()
+}
+
+/// Returns the place of a field by its path. The last part may be missing in a description: whether it
+/// has such a field is known when it is read.
+fn place<'a>(description: &'a mut Value, path: &str) -> Option<&'a mut Value> {
+    let (parents, last) = path.rsplit_once('.').map_or((None, path), |(p, l)| (Some(p), l));
+    let mut parent = description;
+    for part in parents.iter().flat_map(|parents| parents.split('.')) {
+        parent = entry(parent, part)?;
+    }
+    if parent.is_object() && !last.is_empty() {
+        return parent.as_object_mut().map(|fields| fields.entry(last).or_insert(Value::Null));
+    }
+    entry(parent, last)
+}
+
+/// Returns a field of an object, or an entry of a list by its number, counted from 1.
+fn entry<'a>(of: &'a mut Value, name: &str) -> Option<&'a mut Value> {
+    match of {
+        Value::Object(fields) => fields.get_mut(name),
+        Value::Array(entries) => entries.get_mut(name.parse::<usize>().ok()?.checked_sub(1)?),
+        _ => None,
+    }
+}
+
+/// Returns a number as JSON has it; whole numbers stay whole, as seeds and counts must be.
+fn number(value: f64) -> Value {
+    let is_whole = value.fract() == 0.0 && (0.0..=LARGEST_WHOLE as f64).contains(&value);
+    match is_whole {
+        true => Value::from(value as u64),
+        false => Number::from_f64(value).map_or(Value::Null, Value::Number),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const EXPERIMENT: &str = r#"{
+        "system": { "mass": [[1, 0], [0, 2]], "damping": [[1, 0], [0, 1]],
+                    "stiffness": [[300, -100], [-100, 100]] },
+        "sampling": { "samples": 16, "rate_hz": 100 },
+        "excitation": [{ "dof": 1, "lines": "odd", "amplitude": 50 },
+                       { "dof": 2, "lines": "odd", "amplitude": 5 }],
+        "noise": { "force": { "standard_deviation": 0.1 }, "seed": 9007199254740980 }
+    }"#;
+
+    fn study(runs: &StudyRuns) -> Result<ExperimentStudy, IoError> {
+        ExperimentStudy::parse("rig.json", EXPERIMENT, runs)
+    }
+
+    fn table(text: &str) -> StudyRuns {
+        StudyRuns::Table(Table::parse("runs.csv", text.as_bytes()).unwrap())
+    }
+
+    #[test]
+    fn a_field_is_named_by_its_path() {
+        let runs = table("system.stiffness.1.2;excitation.2.amplitude;periods\n-50,5;0;1\n-1e2;1;3\n");
+        let study = study(&runs).unwrap();
+        let names: Vec<&str> = study.fields().iter().map(|field| field.name.as_str()).collect();
+        assert_eq!(names, ["system.stiffness.1.2", "excitation.2.amplitude", "periods"]);
+        let first = study.experiment(1).unwrap();
+        assert_eq!(first.system().unwrap().stiffness()[(0, 1)], -50.5);
+        assert!(first.force().unwrap().channel(1).iter().all(|f| *f == 0.0));
+        assert_eq!(study.experiment(2).unwrap().periods, 3);
+        assert_eq!(first.file(), "rig.json, run 1 of 2");
+    }
+
+    #[test]
+    fn seeds_count_up_as_far_as_they_are_whole_numbers() {
+        let study = study(&StudyRuns::Seeds(3)).unwrap();
+        let seeds: Vec<u64> =
+            (1..=3).map(|run| study.experiment(run).unwrap().noise.unwrap().seed).collect();
+        assert_eq!(seeds, [0, 1, 2].map(|more| 9_007_199_254_740_980 + more));
+        let refused = super::tests::study(&StudyRuns::Seeds(100)).unwrap_err().to_string();
+        assert!(refused.contains("100 seeds from 9007199254740980 on exceed"), "{refused}");
+    }
+
+    #[test]
+    fn what_is_no_study_is_refused_by_name() {
+        let refusal = |runs: &StudyRuns| study(runs).unwrap_err().to_string();
+        for (columns, value, expected) in [
+            ("system.masses", "1", "rig.json, run 1 of 1: system"),
+            ("sistem.mass", "1", "the study changes \"sistem.mass\""),
+            ("excitation.0.amplitude", "1", "the study changes \"excitation.0.amplitude\""),
+            ("excitation.3.amplitude", "1", "the study changes \"excitation.3.amplitude\""),
+            ("noise.seed", "-1", "rig.json, run 1 of 1: noise.seed: invalid value"),
+            ("noise.seed", "abc", "runs.csv"),
+        ] {
+            let refused = refusal(&table(&format!("{columns},periods\n{value},1\n")));
+            assert!(refused.contains(expected), "{columns} = {value}: {refused}");
+        }
+        assert!(refusal(&StudyRuns::Seeds(0)).contains("one run at least"));
+        let silent = EXPERIMENT.replace("\"noise\"", "\"nois\"");
+        let refused = ExperimentStudy::parse("rig.json", &silent, &StudyRuns::Seeds(2));
+        assert!(matches!(refused, Err(IoError::Json { .. })), "{refused:?}");
+    }
+}

@@ -1,0 +1,52 @@
+//! Studies by simulation, and the results of many records side by side.
+
+use std::path::PathBuf;
+
+use mechid::analysis::fleet::{TrendAxis, Trends};
+use mechid::io::{ExperimentStudy, StudyRuns, Table, write_all};
+use mechid::report::trends_page;
+use mechid::{SimulateError, simulate_runs};
+use numpy::PyReadonlyArray1;
+use pyo3::prelude::*;
+
+use crate::{failure, work};
+
+/// Simulates the runs of a study into a Parquet file: an experiment (its name in messages, and its JSON),
+/// and so many seeds or the values of some fields. Returns the summary as text and as JSON.
+#[pyfunction]
+pub fn fleet_simulate(
+    py: Python<'_>,
+    name: &str,
+    description: &str,
+    runs: Option<usize>,
+    fields: Vec<(String, PyReadonlyArray1<'_, f64>)>,
+    out: PathBuf,
+) -> PyResult<(String, String)> {
+    let fields = fields.into_iter().map(|(name, values)| (name, values.as_array().to_vec()));
+    let runs = match runs {
+        Some(runs) => StudyRuns::Seeds(runs),
+        None => StudyRuns::Table(Table::from_columns("the study", fields)),
+    };
+    let study = work::brief(py, || ExperimentStudy::parse(name, description, &runs))?;
+    let simulate = move || -> Result<_, SimulateError> {
+        let (file, summary) = simulate_runs(&study, out, &mut |_| ())?;
+        write_all(vec![file], &[])?;
+        Ok(summary)
+    };
+    let summary = work::watched(py, None, || Ok(()), simulate)?;
+    Ok((summary.to_string(), failure::json(py, &summary)?))
+}
+
+/// Reads a folder of results; returns their trends as text, JSON, and a page with this heading.
+#[pyfunction]
+pub fn fleet_trends(
+    py: Python<'_>,
+    folder: PathBuf,
+    over_number: bool,
+    title: &str,
+) -> PyResult<(String, String, String)> {
+    let over = if over_number { TrendAxis::Number } else { TrendAxis::Order };
+    let trends = work::watched(py, None, || Ok(()), move || Trends::read(folder, over))?;
+    let page = work::brief(py, || trends_page(&trends, title))?;
+    Ok((trends.to_string(), failure::json(py, &trends)?, page))
+}
