@@ -43,8 +43,8 @@ pub use csv_text::{CsvFile, csv_text};
 pub use error::IoError;
 pub use escape::escaped;
 pub use experiment::{
-    Experiment, ExperimentStudy, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion, Level,
-    LoadBeyond, MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice,
+    Experiment, ExperimentStudy, FirstDisplacements, FirstSteps, HeldOrLinear, InitialMotion,
+    Level, LoadBeyond, MiddleLoad, Noise, PerDof, ResponseKind, ReturnedAcceleration, SchemeChoice,
     StudyField, StudyRuns, SubStepLoad,
 };
 pub use folder::{FileStamp, create_folder, files_of};
@@ -56,8 +56,8 @@ pub use output::{
 };
 #[cfg(feature = "parquet")]
 pub use parquet::{
-    ParquetCell, ParquetColumn, ParquetFile, ParquetRecordWriter, ParquetValues, RecordRows, parquet_bytes,
-    read_parquet_metadata, read_parquet_rows, write_parquet,
+    ParquetCell, ParquetColumn, ParquetFile, ParquetRecordWriter, ParquetValues, RecordRows,
+    parquet_bytes, read_parquet_metadata, read_parquet_rows, write_parquet,
 };
 pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};

@@ -129,8 +129,7 @@ impl SimulateArgs {
             return Err(CliError::MisplacedOption { option, why });
         }
         let study = ExperimentStudy::read(&self.experiment, runs)?;
-        let mut progress =
-            |done| log::trace!(target: "mechid", "run {done} of {}", study.runs());
+        let mut progress = |done| log::trace!(target: "mechid", "run {done} of {}", study.runs());
         let (file, summary) = mechid::simulate_runs(&study, &self.output, &mut progress)?;
         let report: Report<RunsSummary> = self.report(summary);
         let text = format!("{}: {}", report.record, report.summary);

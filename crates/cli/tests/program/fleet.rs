@@ -90,7 +90,9 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
     assert_eq!(made["fields"], serde_json::json!(["system.mass", "noise.seed"]));
     json("fleet study.parquet --analysis analysis.json --output study --json");
     let trends = json("trends study --json");
-    for (point, mass) in trends["series"][0]["points"].as_array().unwrap().iter().zip([20., 25., 30.]) {
+    for (point, mass) in
+        trends["series"][0]["points"].as_array().unwrap().iter().zip([20., 25., 30.])
+    {
         let (value, error) =
             (point["value"].as_f64().unwrap(), point["standard_error"].as_f64().unwrap());
         assert!((value - mass).abs() < 4.0 * error, "{point}");
@@ -102,14 +104,13 @@ fn a_study_is_simulated_identified_and_shown_side_by_side() {
     let trends = json("trends seeds --json");
     assert_eq!(trends["records"], 100);
     for series in trends["series"].as_array().unwrap() {
-        let ratio =
-            series["spread"].as_f64().unwrap() / series["standard_error"].as_f64().unwrap();
+        let ratio = series["spread"].as_f64().unwrap() / series["standard_error"].as_f64().unwrap();
         assert!((0.7..1.4).contains(&ratio), "{}: {ratio}", series["name"]);
     }
 
     for (arguments, expected) in [
         ("--runs 3 --output runs.csv", "--runs writes a Parquet file"),
-        ("--study runs.csv --output runs.csv", "--study writes a Parquet file"),
+        ("--study runs.csv --output other.csv", "--study writes a Parquet file"),
         ("--study rig.json --output a.parquet", "rig.json"),
         ("--study analysis.csv --output a.parquet", "cannot read analysis.csv"),
     ] {

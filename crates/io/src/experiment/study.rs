@@ -40,7 +40,7 @@ pub struct ExperimentStudy {
 /// Choice of the runs of a study.
 #[derive(Debug)]
 pub enum StudyRuns {
-    /// So many runs that differ in their noise alone: its seed counts up from the one described.
+    /// Number of runs that differ in their noise alone: its seed counts up from the one described.
     Seeds(usize),
     /// A row for each run, and a column for each field that changes.
     Table(Table),
@@ -74,11 +74,7 @@ impl ExperimentStudy {
     /// [`IoError::Description`] if a column names no field of the description, there is no run, or seeds
     /// are to count up where no noise is described; [`IoError::NotJson`] and [`IoError::Json`] if the
     /// description or its first run is no experiment; those of [`Table::values`].
-    pub fn parse(
-        file: impl Into<String>,
-        text: &str,
-        runs: &StudyRuns,
-    ) -> Result<Self, IoError> {
+    pub fn parse(file: impl Into<String>, text: &str, runs: &StudyRuns) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
         let description = json::parse(&file, text)?;
         Self::new(file, description, runs)
@@ -91,7 +87,9 @@ impl ExperimentStudy {
         let fields = match runs {
             StudyRuns::Seeds(count) => {
                 let noise = experiment.noise.ok_or_else(|| {
-                    refused("without noise all runs would be the same: describe it, with a seed".into())
+                    refused(
+                        "without noise all runs would be the same: describe it, with a seed".into(),
+                    )
                 })?;
                 if noise.seed.saturating_add(*count as u64) > LARGEST_WHOLE {
                     return Err(refused(format!(
@@ -216,7 +214,8 @@ mod tests {
 
     #[test]
     fn a_field_is_named_by_its_path() {
-        let runs = table("system.stiffness.1.2;excitation.2.amplitude;periods\n-50,5;0;1\n-1e2;1;3\n");
+        let runs =
+            table("system.stiffness.1.2;excitation.2.amplitude;periods\n-50,5;0;1\n-1e2;1;3\n");
         let study = study(&runs).unwrap();
         let names: Vec<&str> = study.fields().iter().map(|field| field.name.as_str()).collect();
         assert_eq!(names, ["system.stiffness.1.2", "excitation.2.amplitude", "periods"]);
@@ -245,7 +244,7 @@ mod tests {
             ("sistem.mass", "1", "the study changes \"sistem.mass\""),
             ("excitation.0.amplitude", "1", "the study changes \"excitation.0.amplitude\""),
             ("excitation.3.amplitude", "1", "the study changes \"excitation.3.amplitude\""),
-            ("noise.seed", "-1", "rig.json, run 1 of 1: noise.seed: invalid value"),
+            ("noise.seed", "-1", "rig.json, run 1 of 1: noise.seed: invalid type"),
             ("noise.seed", "abc", "runs.csv"),
         ] {
             let refused = refusal(&table(&format!("{columns},periods\n{value},1\n")));

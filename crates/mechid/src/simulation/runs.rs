@@ -46,8 +46,11 @@ pub fn simulate_runs(
         let sampling = simulation.force.sampling();
         let (names, mut columns): (Vec<String>, Vec<&[f64]>) =
             simulation.columns().into_iter().unzip();
-        let constants: Vec<Vec<f64>> =
-            study.fields().iter().map(|field| vec![field.values[run - 1]; sampling.len()]).collect();
+        let constants: Vec<Vec<f64>> = study
+            .fields()
+            .iter()
+            .map(|field| vec![field.values[run - 1]; sampling.len()])
+            .collect();
         columns.extend(constants.iter().map(Vec::as_slice));
         let file = match &mut file {
             Some(file) => file,
