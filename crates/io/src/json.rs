@@ -29,6 +29,14 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<(String, T), IoEr
     }
 }
 
+/// Returns the folder that the paths in a JSON file begin at; of standard input, the current one.
+pub(crate) fn folder(path: &Path) -> &Path {
+    match standard::is_input(path) {
+        true => Path::new(""),
+        false => path.parent().unwrap_or(Path::new("")),
+    }
+}
+
 /// Reads a value from a JSON text; `file` is its name in messages.
 pub(crate) fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, IoError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);

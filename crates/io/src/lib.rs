@@ -27,6 +27,7 @@ mod json;
 mod limits;
 mod line_spec;
 mod mat;
+mod matrix_market;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;
@@ -51,6 +52,7 @@ pub use folder::{FileStamp, create_folder, files_of};
 pub use json::read_json;
 pub use limits::{Limit, Limits, ReadOptions};
 pub use line_spec::LineSpec;
+pub use matrix_market::{parse_matrix_market, read_matrix_market};
 pub use output::{
     BegunFile, OutputFile, refuse_replaced_inputs, remove_unfinished_files, write_all,
 };

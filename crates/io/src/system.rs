@@ -1,15 +1,20 @@
 //! The system of an experiment: matrices, or modal parameters of one degree of freedom.
 
 use std::fmt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use mechid_model::{SecondOrderSystem, Terms};
+use mechid_model::{SecondOrderSystem, SparseSystem, Terms};
 use mechid_signal::message;
 use nalgebra::DMatrix;
+use nalgebra_sparse::csr::CsrMatrix;
 use serde::de::{Deserializer, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
-use crate::{IoError, json};
+use crate::{IoError, Limits, json, read_matrix_market};
+
+/// Number of degrees of freedom up to which a machine described by Matrix Market files is taken as one
+/// described by lists of rows.
+const DENSE_DOF: usize = 64;
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
 /// [`read_system`] reads back.
@@ -44,8 +49,20 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
     struct Described {
         system: SystemDescription,
     }
-    let (file, described) = json::read::<Described>(path.as_ref())?;
-    described.system.system(&file)
+    let (file, mut described) = json::read::<Described>(path.as_ref())?;
+    match described.system.load(&file, json::folder(path.as_ref()))? {
+        None => described.system.system(&file),
+        Some(sparse) => Err(too_many(&file, sparse.dof())),
+    }
+}
+
+/// Refusal of a sparse machine where all entries of its matrices are needed.
+pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
+    let what = format!(
+        "the machine has {dof} degrees of freedom in Matrix Market files: of more than {DENSE_DOF} only \
+         the linear response from a start can be simulated"
+    );
+    IoError::Description { file: file.into(), what }
 }
 
 /// Nonlinear terms beside a system: the `nonlinear` of the report that `mechid identify --json` prints,
@@ -117,6 +134,35 @@ pub(crate) struct SystemDescription {
 }
 
 impl SystemDescription {
+    /// Reads the Matrix Market files that the description names, from `folder` on; returns the machine
+    /// if they make a large one.
+    pub(crate) fn load(
+        &mut self,
+        file: &str,
+        folder: &Path,
+    ) -> Result<Option<SparseSystem>, IoError> {
+        let mut sparse = Vec::new();
+        let named = [&mut self.damping, &mut self.stiffness].into_iter().flatten();
+        for entries in [&mut self.mass].into_iter().chain(named) {
+            if let Entries::File(path) = entries {
+                let read = read_matrix_market(folder.join(path), &Limits::DEFAULT)?;
+                sparse.push(read.nrows());
+                *entries = Entries::Sparse(read);
+            }
+        }
+        if sparse.iter().all(|size| *size <= DENSE_DOF) {
+            return Ok(None);
+        }
+        let (Some(damping), Some(stiffness)) = (&self.damping, &self.stiffness) else {
+            let what = "a machine in Matrix Market files needs mass, damping and stiffness".into();
+            return Err(IoError::Description { file: file.into(), what });
+        };
+        let [mass, damping, stiffness] = [&self.mass, damping, stiffness].map(Entries::sparse);
+        SparseSystem::new(mass, damping, stiffness)
+            .map(Some)
+            .map_err(|source| IoError::Model { file: file.into(), source })
+    }
+
     pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {
         let wrong = |what: &str| IoError::Description { file: file.into(), what: what.into() };
         let mass = self.mass.matrix();
@@ -148,20 +194,36 @@ impl SystemDescription {
     }
 }
 
-/// A number, or a matrix as a list of rows of equal length.
+/// A number, a matrix as a list of rows of equal length, or one in a Matrix Market file.
 #[derive(Debug, Clone, PartialEq)]
 enum Entries {
     Number(f64),
     Rows(Vec<Vec<f64>>),
+    /// Not read yet.
+    File(PathBuf),
+    Sparse(CsrMatrix<f64>),
 }
 
 impl Entries {
+    /// Returns all entries, zeros included.
     fn matrix(&self) -> DMatrix<f64> {
         match self {
+            Entries::File(_) => DMatrix::zeros(0, 0),
+            Entries::Sparse(matrix) => DMatrix::from(matrix),
             Entries::Number(value) => DMatrix::from_element(1, 1, *value),
             Entries::Rows(rows) => {
                 let columns = rows.first().map_or(0, Vec::len);
                 DMatrix::from_fn(rows.len(), columns, |r, c| rows[r][c])
+            }
+        }
+    }
+
+    /// Returns the non-zero entries.
+    fn sparse(&self) -> CsrMatrix<f64> {
+        match self {
+            Entries::Sparse(matrix) => matrix.clone(),
+            Entries::Number(_) | Entries::Rows(_) | Entries::File(_) => {
+                CsrMatrix::from(&self.matrix())
             }
         }
     }
@@ -175,7 +237,9 @@ impl<'de> Deserialize<'de> for Entries {
             type Value = Entries;
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, or a matrix as a list of rows")
+                f.write_str(
+                    "a number, a matrix as a list of rows, or the name of a Matrix Market file",
+                )
             }
 
             fn visit_f64<E: de::Error>(self, value: f64) -> Result<Entries, E> {
@@ -188,6 +252,10 @@ impl<'de> Deserialize<'de> for Entries {
 
             fn visit_u64<E: de::Error>(self, value: u64) -> Result<Entries, E> {
                 Ok(Entries::Number(value as f64))
+            }
+
+            fn visit_str<E: de::Error>(self, path: &str) -> Result<Entries, E> {
+                Ok(Entries::File(path.into()))
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Entries, A::Error> {

@@ -85,7 +85,8 @@ pub use mechid_signal as signal;
 #[cfg(feature = "parquet")]
 pub use simulation::{RunsSummary, simulate_runs};
 pub use simulation::{
-    SimulateError, Simulation, SimulationSummary, exact_periodic, respond, simulate, sweep,
+    SimulateError, SimulatedSystem, Simulation, SimulationSummary, exact_periodic, respond,
+    simulate, sweep,
 };
 #[cfg(feature = "report")]
 pub use stability::stability_figure;

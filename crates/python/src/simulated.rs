@@ -15,9 +15,9 @@ use crate::arrays::{self, Named};
 use crate::machine::Machine;
 use crate::{failure, work};
 
-/// Record of a simulated experiment: scheme, sampling rate, machine, then force and responses as the
+/// Record of a simulated experiment: scheme, sampling rate, machine (none of a sparse one), then force and responses as the
 /// sensors tell them, then without their noise.
-type Simulated<'py> = (String, f64, Machine, Channels<'py>, Channels<'py>);
+type Simulated<'py> = (String, f64, Option<Machine>, Channels<'py>, Channels<'py>);
 
 /// The force, and each kind of response.
 type Channels<'py> = (Bound<'py, PyArray2<f64>>, Vec<Named<'py>>);
@@ -28,7 +28,7 @@ pub fn simulate<'py>(py: Python<'py>, name: &str, description: &str) -> PyResult
     let experiment = work::brief(py, || Experiment::parse(name, description))?;
     let run = work::watched(py, None, || Ok(()), move || mechid::simulate(&experiment))?;
     let fs = run.force.sampling().rate_hz();
-    let machine = Machine(mechid::Machine::known(run.system));
+    let machine = run.system.dense().map(|s| Machine(mechid::Machine::known(s.clone())));
     let measured = (arrays::record(py, run.measured_force)?, responses(py, run.measured_response)?);
     let truth = (arrays::record(py, run.force)?, responses(py, run.response)?);
     Ok((run.scheme, fs, machine, measured, truth))

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use mechid_io::{
     Experiment, IoError, Limits, LineSpec, ReadOptions, RecordFile, Table, TimeAxis, escaped,
-    read_covariance, read_system,
+    parse_matrix_market, read_covariance, read_system,
 };
 use mechid_signal::Sampling;
 
@@ -83,7 +83,7 @@ const JSON: &[&str] = &[
     "[[[[",
 ];
 
-pub const TARGETS: [Target; 6] = [
+pub const TARGETS: [Target; 7] = [
     Target {
         name: "text",
         corpus: "text",
@@ -127,6 +127,23 @@ pub const TARGETS: [Target; 6] = [
         run: descriptions,
     },
     Target {
+        name: "matrix",
+        corpus: "matrix",
+        input: Input::Mutations(&[
+            "%%MatrixMarket matrix coordinate real general\n",
+            "array",
+            "symmetric",
+            "skew-symmetric",
+            "% comment\n",
+            "2000 2000 1\n",
+            "1e308",
+            "nan",
+            "-1",
+        ]),
+        memory: [4 << 20, 200],
+        run: matrix,
+    },
+    Target {
         name: "lines",
         corpus: "lines",
         input: Input::Mutations(&["odd", "even", "all", ":", ","]),
@@ -165,6 +182,15 @@ fn told<T>(result: Result<T, IoError>) -> Result<Option<T>, String> {
 
 fn ensure(holds: bool, what: &str) -> Result<(), String> {
     if holds { Ok(()) } else { Err(what.into()) }
+}
+
+/// Reads a matrix.
+fn matrix(bytes: &[u8]) -> Result<(), String> {
+    let Some(matrix) = told(parse_matrix_market("k\u{1b}.mtx", bytes, &OPTIONS.limits))? else {
+        return Ok(());
+    };
+    ensure(matrix.nrows() == matrix.ncols(), "the matrix is not square")?;
+    ensure(matrix.nnz() <= 2 * bytes.len(), "there are more entries than can stand in the file")
 }
 
 /// Reads a record, and uses all that is known of it.

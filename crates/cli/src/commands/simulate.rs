@@ -15,8 +15,8 @@ use crate::outcome::{Files, Outcome};
 ///
 /// The description is a JSON file with
 ///
-///   system      mass, damping, stiffness (numbers, or matrices as lists of rows), or mass,
-///               natural_frequency_hz, damping_ratio
+///   system      mass, damping, stiffness (numbers, matrices as lists of rows, or names of Matrix
+///               Market files), or mass, natural_frequency_hz, damping_ratio
 ///
 ///   nonlinear   terms beside the system, such as "k3: x1^3, c2: |v1| v1", and coefficients, a
 ///               list, as identify --json prints them
@@ -47,6 +47,9 @@ use crate::outcome::{Files, Outcome};
 ///               "velocity": …}} in m and m/s
 ///
 ///   periods     how many
+///
+///   outputs     degrees of freedom whose response is recorded, counted from 1; without, all, and of
+///               more than 64 in Matrix Market files those that a force acts on
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed

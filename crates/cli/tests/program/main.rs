@@ -6,6 +6,7 @@ mod fleet;
 mod forces;
 mod identification;
 mod info;
+mod large;
 mod lines;
 mod modal;
 mod pictures;

@@ -6,9 +6,10 @@ mod response;
 mod scheme;
 mod study;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
-use mechid_model::{InitialState, NonlinearSystem, SecondOrderSystem};
+use mechid_model::{InitialState, NonlinearSystem, SecondOrderSystem, SparseSystem};
 use mechid_signal::{Record, Sampling, message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
@@ -21,7 +22,7 @@ pub use self::scheme::{
     SchemeChoice, SubStepLoad,
 };
 pub use self::study::{ExperimentStudy, StudyField, StudyRuns};
-use crate::system::{NonlinearDescription, SystemDescription};
+use crate::system::{NonlinearDescription, SystemDescription, too_many};
 use crate::{IoError, escaped, json};
 
 /// A simulated experiment. An unknown field in the file is an error.
@@ -46,6 +47,9 @@ pub struct Experiment {
     #[serde(skip)]
     file: String,
     system: SystemDescription,
+    /// The machine, if it is a large one in Matrix Market files.
+    #[serde(skip)]
+    sparse: Option<SparseSystem>,
     #[serde(default)]
     nonlinear: Option<NonlinearDescription>,
     sampling: SamplingDescription,
@@ -65,6 +69,9 @@ pub struct Experiment {
     pub periods: usize,
     /// Noise added to the records.
     pub noise: Option<Noise>,
+    /// Degrees of freedom whose response is recorded, counted from 1; see [`Experiment::outputs`].
+    #[serde(default)]
+    outputs: Option<Vec<usize>>,
 }
 
 /// Largest number of values in a force record: 800 MB.
@@ -86,19 +93,29 @@ impl Experiment {
     /// Reads the description of an experiment in a file, or on standard input as `-`.
     ///
     /// # Errors
-    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`].
+    /// [`IoError::Read`] if it cannot be read, otherwise as [`Experiment::parse`]; the names of Matrix
+    /// Market files in it begin at its folder.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        json::read::<Self>(path.as_ref()).map(|(file, experiment)| Self { file, ..experiment })
+        let (file, experiment) = json::read::<Self>(path.as_ref())?;
+        experiment.loaded(file, json::folder(path.as_ref()))
     }
 
-    /// Reads the description of an experiment in a text; `file` is its name in messages.
+    /// Reads the description of an experiment in a text; `file` is its name in messages. The names of
+    /// Matrix Market files in it begin at the current folder.
     ///
     /// # Errors
     /// [`IoError::NotJson`] for a text of another kind, [`IoError::Json`] with field, line and column
-    /// for a wrong description.
+    /// for a wrong description; [`IoError::Read`], [`IoError::Malformed`], [`IoError::TooLarge`] and
+    /// [`IoError::Model`] for a Matrix Market file.
     pub fn parse(file: impl Into<String>, text: &str) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
-        json::parse::<Self>(&file, text).map(|experiment| Self { file, ..experiment })
+        json::parse::<Self>(&file, text)?.loaded(file, Path::new(""))
+    }
+
+    /// Takes its name, and reads the matrices that it names, from `folder` on.
+    fn loaded(mut self, file: String, folder: &Path) -> Result<Self, IoError> {
+        self.sparse = self.system.load(&file, folder)?;
+        Ok(Self { file, ..self })
     }
 
     /// Name of the file in messages.
@@ -121,10 +138,79 @@ impl Experiment {
     /// The system described.
     ///
     /// # Errors
-    /// [`IoError::Description`] if parameters are missing or one too many, [`IoError::Model`] if
-    /// they make no system.
+    /// [`IoError::Description`] if parameters are missing or one too many, or the system is
+    /// [sparse](Experiment::sparse_system); [`IoError::Model`] if they make no system.
     pub fn system(&self) -> Result<SecondOrderSystem, IoError> {
-        self.system.system(&self.file)
+        match &self.sparse {
+            None => self.system.system(&self.file),
+            Some(sparse) => Err(too_many(&self.file, sparse.dof())),
+        }
+    }
+
+    /// The system described, if Matrix Market files describe one of more than 64 degrees of freedom.
+    pub fn sparse_system(&self) -> Option<&SparseSystem> {
+        self.sparse.as_ref()
+    }
+
+    /// Number of degrees of freedom of the system.
+    ///
+    /// # Errors
+    /// Those of [`Experiment::system`].
+    pub fn dof(&self) -> Result<usize, IoError> {
+        match &self.sparse {
+            None => Ok(self.system()?.dof()),
+            Some(sparse) => Ok(sparse.dof()),
+        }
+    }
+
+    /// Degrees of freedom, counted from 0, that the channels of the force act on: all; of a sparse
+    /// system those with an excitation, by rising number.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] for a degree of freedom that the system does not have, and those of
+    /// [`Experiment::system`].
+    pub fn forced(&self) -> Result<Vec<usize>, IoError> {
+        let dof = self.dof()?;
+        for excitation in &self.excitation {
+            if !(1..=dof).contains(&excitation.dof) {
+                return Err(self.wrong(format!(
+                    "the excitation drives degree of freedom {}, the system has {dof}",
+                    excitation.dof
+                )));
+            }
+        }
+        if self.sparse.is_none() {
+            return Ok((0..dof).collect());
+        }
+        let driven: BTreeSet<usize> =
+            self.excitation.iter().map(|excitation| excitation.dof - 1).collect();
+        // A force of zero where none is described, so that there is a time axis.
+        Ok(if driven.is_empty() { vec![0] } else { driven.into_iter().collect() })
+    }
+
+    /// Degrees of freedom, counted from 0, whose response is recorded: those described as `outputs`;
+    /// without, all, and of a sparse system those that a force acts on.
+    ///
+    /// # Errors
+    /// [`IoError::Description`] for none at all, one that the system does not have or one named twice,
+    /// and those of [`Experiment::forced`].
+    pub fn outputs(&self) -> Result<Vec<usize>, IoError> {
+        let Some(outputs) = &self.outputs else { return self.forced() };
+        let dof = self.dof()?;
+        if outputs.is_empty() {
+            return Err(self.wrong("outputs names no degree of freedom".into()));
+        }
+        for (place, output) in outputs.iter().enumerate() {
+            if !(1..=dof).contains(output) {
+                return Err(self.wrong(format!(
+                    "outputs names degree of freedom {output}, the system has {dof}"
+                )));
+            }
+            if outputs[..place].contains(output) {
+                return Err(self.wrong(format!("outputs names degree of freedom {output} twice")));
+            }
+        }
+        Ok(outputs.iter().map(|output| output - 1).collect())
     }
 
     /// The system with its nonlinear terms, if it has any.
@@ -139,7 +225,7 @@ impl Experiment {
         system.map(Some).map_err(|source| IoError::Model { file: self.file.clone(), source })
     }
 
-    /// One period of the force: samples × degrees of freedom, in N.
+    /// One period of the force: samples × [forced](Experiment::forced) degrees of freedom, in N.
     ///
     /// # Errors
     /// [`IoError::Description`] for a degree of freedom that the system does not have,
@@ -163,7 +249,7 @@ impl Experiment {
     /// [`IoError::Description`] if it has not one number per degree of freedom, [`IoError::Model`]
     /// for numbers that are not finite, and those of [`Experiment::system`].
     pub fn initial_state(&self) -> Result<InitialState, IoError> {
-        let dof = self.system()?.dof();
+        let dof = self.dof()?;
         let ResponseKind::From(InitialMotion { displacement, velocity }) = &self.response else {
             return Ok(InitialState::rest(dof));
         };
@@ -181,7 +267,7 @@ impl Experiment {
     /// # Errors
     /// [`IoError::Description`] if there are more or fewer, and those of [`Experiment::system`].
     pub fn per_dof(&self, what: &str, given: &PerDof) -> Result<Vec<f64>, IoError> {
-        let dof = self.system()?.dof();
+        let dof = self.dof()?;
         let wrong = |got| {
             let (got, dof) =
                 (message::count(got, "entry"), message::count(dof, "degree of freedom"));
@@ -191,7 +277,7 @@ impl Experiment {
     }
 
     fn sampled(&self, within_step: Option<f64>) -> Result<Record, IoError> {
-        let dof = self.system()?.dof();
+        let (forced, outputs) = (self.forced()?, self.outputs()?);
         let signal = |source| IoError::Signal { file: self.file.clone(), source };
         if self.periods == 0 {
             return Err(self.wrong("periods must be at least 1".into()));
@@ -200,25 +286,22 @@ impl Experiment {
         if !(rate_hz > 0.0 && (1.0 / rate_hz).is_normal()) {
             return Err(IoError::SampleRate { rate_hz });
         }
-        let numbers = samples.saturating_mul(dof).saturating_mul(self.periods);
+        let channels = forced.len().max(outputs.len());
+        let numbers = samples.saturating_mul(channels).saturating_mul(self.periods);
         if numbers > LARGEST {
             return Err(self.wrong(format!(
-                "{samples} samples × {} periods × {dof} degrees of freedom are {numbers} numbers, \
+                "{samples} samples × {} periods × {channels} degrees of freedom are {numbers} numbers, \
                  the limit is {LARGEST}",
                 self.periods
             )));
         }
         let sampling = Sampling::from_rate_hz(rate_hz, samples).map_err(signal)?;
-        let mut force = DMatrix::zeros(samples, dof);
+        let mut force = DMatrix::zeros(samples, forced.len());
         for excitation in &self.excitation {
-            if !(1..=dof).contains(&excitation.dof) {
-                return Err(self.wrong(format!(
-                    "the excitation drives degree of freedom {}, the system has {dof}",
-                    excitation.dof
-                )));
-            }
             let part = excitation.sampled(sampling, within_step, &self.file)?;
-            force.column_mut(excitation.dof - 1).iter_mut().zip(part).for_each(|(f, p)| *f += p);
+            let channel = forced.binary_search(&(excitation.dof - 1));
+            let channel = channel.expect("every driven degree of freedom has a channel");
+            force.column_mut(channel).iter_mut().zip(part).for_each(|(f, p)| *f += p);
         }
         Record::new(sampling, force).map_err(signal)
     }

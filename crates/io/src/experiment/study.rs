@@ -1,6 +1,6 @@
 //! One described experiment, and what changes in it from run to run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Number, Value};
 
@@ -32,6 +32,8 @@ use crate::{Experiment, IoError, Table, escaped, json};
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentStudy {
     file: String,
+    /// Folder at which the names of Matrix Market files begin.
+    folder: PathBuf,
     description: Value,
     fields: Vec<StudyField>,
     runs: usize,
@@ -65,7 +67,7 @@ impl ExperimentStudy {
     /// [`IoError::Read`] if it cannot be read, otherwise as [`ExperimentStudy::parse`].
     pub fn read(experiment: impl AsRef<Path>, runs: &StudyRuns) -> Result<Self, IoError> {
         let (file, description) = json::read(experiment.as_ref())?;
-        Self::new(file, description, runs)
+        Self::new(file, json::folder(experiment.as_ref()), description, runs)
     }
 
     /// Reads the experiment in a text; `file` is its name in messages.
@@ -77,10 +79,15 @@ impl ExperimentStudy {
     pub fn parse(file: impl Into<String>, text: &str, runs: &StudyRuns) -> Result<Self, IoError> {
         let file = escaped(&file.into()).into_owned();
         let description = json::parse(&file, text)?;
-        Self::new(file, description, runs)
+        Self::new(file, Path::new(""), description, runs)
     }
 
-    fn new(file: String, description: Value, runs: &StudyRuns) -> Result<Self, IoError> {
+    fn new(
+        file: String,
+        folder: &Path,
+        description: Value,
+        runs: &StudyRuns,
+    ) -> Result<Self, IoError> {
         // What is wrong with the description itself is told as such.
         let experiment: Experiment = json::deserialized(&file, description.clone())?;
         let refused = |what: String| IoError::Description { file: file.clone(), what };
@@ -106,7 +113,7 @@ impl ExperimentStudy {
         if runs == 0 {
             return Err(refused("a study needs one run at least".into()));
         }
-        let study = Self { file, description, fields, runs };
+        let study = Self { file, folder: folder.into(), description, fields, runs };
         // A wrong name is wrong in every run.
         study.experiment(1)?;
         Ok(study)
@@ -125,7 +132,8 @@ impl ExperimentStudy {
     /// Returns the experiment of a run, counted from 1.
     ///
     /// # Errors
-    /// [`IoError::Json`] if its numbers make no experiment.
+    /// [`IoError::Json`] if its numbers make no experiment, and those of [`Experiment::parse`] for the
+    /// Matrix Market files that it names.
     ///
     /// # Panics
     /// If there is no such run.
@@ -143,7 +151,7 @@ impl ExperimentStudy {
             *place = number(values[run - 1]);
         }
         let file = format!("{}, run {run} of {}", self.file, self.runs);
-        json::deserialized(&file, description).map(|experiment| Experiment { file, ..experiment })
+        json::deserialized::<Experiment>(&file, description)?.loaded(file, &self.folder)
     }
 }
 

@@ -12,13 +12,15 @@ impl Simulation {
     /// Draws the measured record over time: a column of panels for each degree of freedom, the first
     /// four at most, with force (N), displacement (m), velocity (m/s) and acceleration (m/s²).
     pub fn figure(&self, title: &str) -> Figure {
-        let dof = self.measured_force.channels();
-        let shown = dof.min(SHOWN);
-        let mut figure = Figure::new(match shown < dof {
-            true => format!("{title}, degrees of freedom 1 to {SHOWN} of {dof}"),
+        let groups = self.groups();
+        let counts = groups.iter().map(|group| group.dofs.len());
+        let (fewest, most) = (counts.clone().min().unwrap_or(0), counts.max().unwrap_or(0));
+        let shown = fewest.min(SHOWN);
+        let mut figure = Figure::new(match shown < most {
+            true => format!("{title}, the first {shown} of {most} degrees of freedom"),
             false => title.to_owned(),
         });
-        for (group, color) in self.groups().iter().zip(Color::CYCLE) {
+        for (group, color) in groups.iter().zip(Color::CYCLE) {
             for at in 0..shown {
                 figure = figure.panel(panel(group, at, color));
             }
@@ -27,14 +29,11 @@ impl Simulation {
     }
 }
 
-fn panel(group: &Group<'_>, dof: usize, color: Color) -> Panel {
+fn panel(group: &Group<'_>, channel: usize, color: Color) -> Panel {
     let record = group.measured;
-    let mut name = match record.channels() {
-        1 => group.name.to_owned(),
-        _ => format!("{} {}", group.name, dof + 1),
-    };
+    let mut name = group.named(channel, ' ');
     name[..1].make_ascii_uppercase();
     let time: Vec<f64> = record.sampling().times().collect();
     Panel::new(Axis::linear("Time", "s"), Axis::linear(name, group.unit))
-        .curve(Curve::line("", &time, record.channel(dof)).color(color).width(1.2))
+        .curve(Curve::line("", &time, record.channel(channel)).color(color).width(1.2))
 }

@@ -10,12 +10,14 @@ mod summary;
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
-    AllowUnstable, Convention, IntegrateError, SampledForce, Scheme, SystemWithForces, TermForces,
-    integrate, integrate_periodic, periodic_orbit,
+    AllowUnstable, Convention, IntegrateError, SampledForce, Scheme, SelectedDofs,
+    SystemWithForces, TermForces, integrate, integrate_periodic, integrate_selected,
+    periodic_orbit,
 };
 use mechid_io::{Experiment, IoError, Level, ResponseKind};
 use mechid_model::{
     InitialState, Instability, ModelError, NonlinearSystem, Response, SecondOrderSystem,
+    SparseSystem,
 };
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
@@ -32,7 +34,7 @@ pub use self::summary::{
 #[derive(Debug, Clone, PartialEq)]
 pub struct Simulation {
     /// The machine; of a nonlinear one, the linear part.
-    pub system: SecondOrderSystem,
+    pub system: SimulatedSystem,
     /// The machine with its nonlinear terms; `None` of a linear one.
     pub nonlinear: Option<NonlinearSystem>,
     /// Kind of the response: the steady state, or one with a beginning.
@@ -43,16 +45,47 @@ pub struct Simulation {
     pub scheme: String,
     /// The scheme's conventions in force.
     pub conventions: Vec<Convention>,
-    /// The force without noise, in N: samples × degrees of freedom.
+    /// Degrees of freedom, counted from 0, that the channels of the force act on.
+    pub forced: Vec<usize>,
+    /// Degrees of freedom, counted from 0, of the channels of the response.
+    pub outputs: Vec<usize>,
+    /// The force without noise, in N: samples × `forced`.
     pub force: Record,
-    /// The response without noise.
+    /// The response without noise: samples × `outputs`.
     pub response: Response,
     /// The force with its noise.
     pub measured_force: Record,
     /// The response with its noise.
     pub measured_response: Response,
-    /// The fastest growing free response of an unstable machine.
+    /// The fastest growing free response of an unstable machine; of a sparse one it is not computed.
     pub instability: Option<Instability>,
+}
+
+/// M, C and K of a simulated machine, as they are stored.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SimulatedSystem {
+    /// All entries.
+    Dense(SecondOrderSystem),
+    /// The non-zero entries, of a large machine in Matrix Market files.
+    Sparse(SparseSystem),
+}
+
+impl SimulatedSystem {
+    /// Number of degrees of freedom.
+    pub fn dof(&self) -> usize {
+        match self {
+            Self::Dense(system) => system.dof(),
+            Self::Sparse(system) => system.dof(),
+        }
+    }
+
+    /// The system, if all entries of its matrices are stored.
+    pub fn dense(&self) -> Option<&SecondOrderSystem> {
+        match self {
+            Self::Dense(system) => Some(system),
+            Self::Sparse(_) => None,
+        }
+    }
 }
 
 /// Runs an experiment.
@@ -77,6 +110,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let machine = Described::of(experiment)?;
     let instability = machine.instability()?;
     refuse_unstable_periodic(experiment, instability)?;
+    let (forced, outputs) = (experiment.forced()?, experiment.outputs()?);
     let period = experiment.force()?;
     let force = repeated(&period, experiment.periods)?;
     let scheme = scheme(experiment)?;
@@ -104,6 +138,16 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         ResponseKind::Periodic => map(&response, |_, r| repeated(r, experiment.periods))?,
         ResponseKind::FromRest | ResponseKind::From(_) => response,
     };
+    let response = match &machine.linear {
+        // All degrees of freedom were computed.
+        SimulatedSystem::Dense(_) if !outputs.iter().copied().eq(0..response.dof()) => {
+            let selected = |_, r: &Record| {
+                Record::new(r.sampling(), r.data().select_columns(&outputs))
+            };
+            map(&response, selected)?
+        }
+        SimulatedSystem::Dense(_) | SimulatedSystem::Sparse(_) => response,
+    };
     let noise = experiment.noise;
     let add = |record: &Record, stream: u64, level: Option<Level>| match (level, noise) {
         (Some(level), Some(noise)) => {
@@ -124,6 +168,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         nonlinear: machine.nonlinear,
         response_kind: experiment.response.clone(),
         periods: experiment.periods,
+        forced,
+        outputs,
         force,
         response,
         measured_force,
@@ -145,8 +191,8 @@ fn refuse_unstable_periodic(
     }
 }
 
-/// Computes the response of a described machine to `force` (samples × degrees of freedom, in N) in the
-/// place of its excitation, by its scheme and from its start; noise and number of periods do not count.
+/// Computes the response of a described machine to `force` (samples × the degrees of freedom that
+/// [`Experiment::forced`] tells, in N) in the place of its excitation, by its scheme and from its start; noise and number of periods do not count.
 ///
 /// # Errors
 /// As [`simulate`]; [`IntegrateError::MidStepMissing`] if the scheme asks for the exact force between
@@ -167,34 +213,47 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
 
 /// The machine of an experiment.
 struct Described {
-    linear: SecondOrderSystem,
+    linear: SimulatedSystem,
     nonlinear: Option<NonlinearSystem>,
 }
 
 impl Described {
     fn of(experiment: &Experiment) -> Result<Self, SimulateError> {
         let nonlinear = experiment.nonlinear_system()?.filter(|system| !system.terms().is_empty());
-        Ok(Self { linear: experiment.system()?, nonlinear })
+        let linear = match experiment.sparse_system() {
+            Some(sparse) => SimulatedSystem::Sparse(sparse.clone()),
+            None => SimulatedSystem::Dense(experiment.system()?),
+        };
+        Ok(Self { linear, nonlinear })
     }
 
     /// The growth of the free response of a linear machine; that of a nonlinear one may end by itself.
     fn instability(&self) -> Result<Option<Instability>, ModelError> {
-        match &self.nonlinear {
-            None => self.linear.instability(),
-            Some(_) => Ok(None),
+        match (&self.linear, &self.nonlinear) {
+            (SimulatedSystem::Dense(system), None) => system.instability(),
+            (SimulatedSystem::Sparse(_), None) | (_, Some(_)) => Ok(None),
         }
     }
 
     fn exact_periodic(&self, force: &Record) -> Result<Response, SimulateError> {
         match &self.nonlinear {
-            None => Ok(exact_periodic(&self.linear, force)?),
+            None => Ok(exact_periodic(self.dense()?, force)?),
             Some(_) => Err(SimulateError::ExactNonlinear),
         }
     }
 
+    /// M, C and K for a response that needs all their entries.
+    fn dense(&self) -> Result<&SecondOrderSystem, SimulateError> {
+        let sparse = || SimulateError::SparsePeriodic { dof: self.linear.dof() };
+        self.linear.dense().ok_or_else(sparse)
+    }
+
     /// M, C and K with the forces of the terms.
     fn with_forces(&self) -> Result<SystemWithForces<'_>, SimulateError> {
-        let system = SystemWithForces::new(&self.linear);
+        let system = match &self.linear {
+            SimulatedSystem::Dense(system) => SystemWithForces::new(system),
+            SimulatedSystem::Sparse(system) => SystemWithForces::new(system),
+        };
         match &self.nonlinear {
             None => Ok(system),
             Some(nonlinear) => {
@@ -224,7 +283,7 @@ fn stepped(
             Err(SimulateError::GivenStartPeriodic)
         }
         ResponseKind::Periodic => match &machine.nonlinear {
-            None => Ok(integrate_periodic(scheme, &machine.linear, force)?),
+            None => Ok(integrate_periodic(scheme, machine.dense()?, force)?),
             Some(nonlinear) => {
                 let (system, rest) = (machine.with_forces()?, InitialState::rest(nonlinear.dof()));
                 let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)?;
@@ -232,7 +291,17 @@ fn stepped(
             }
         },
         ResponseKind::FromRest | ResponseKind::From(_) => {
-            Ok(integrate(scheme, &machine.with_forces()?, force, &experiment.initial_state()?)?)
+            let initial = experiment.initial_state()?;
+            match &machine.linear {
+                SimulatedSystem::Dense(_) => {
+                    Ok(integrate(scheme, &machine.with_forces()?, force, &initial)?)
+                }
+                SimulatedSystem::Sparse(system) => {
+                    let (forced, observed) = (experiment.forced()?, experiment.outputs()?);
+                    let dofs = SelectedDofs { forced: &forced, observed: &observed };
+                    Ok(integrate_selected(scheme, system, dofs, force, &initial)?)
+                }
+            }
         }
     }
 }
@@ -265,6 +334,15 @@ pub enum SimulateError {
          newmark or runge-kutta-4, and steps that are short against the fastest motion"
     )]
     ExactNonlinear,
+    /// The periodic response of a sparse machine.
+    #[error(
+        "the machine has {dof} degrees of freedom in Matrix Market files: its periodic response is not \
+         computed; choose \"response\": \"from-rest\", and a record that is long against the decay"
+    )]
+    SparsePeriodic {
+        /// Number of degrees of freedom.
+        dof: usize,
+    },
     /// A periodic response has no start.
     #[error(
         "a periodic response has no start: give displacements for Houbolt's first steps only with a \
@@ -405,7 +483,7 @@ mod tests {
                  "scheme": {scheme} }}"#
         );
         let simulation = simulate(&Experiment::parse("test.json", &text).unwrap()).unwrap();
-        let truth = exact_periodic(&simulation.system, &simulation.force).unwrap();
+        let truth = exact_periodic(simulation.system.dense().unwrap(), &simulation.force).unwrap();
         let (truth, found) =
             (truth.displacement().data(), simulation.response.displacement().data());
         (found - truth).amax() / truth.amax()

@@ -26,15 +26,19 @@ pub struct SimulationSummary {
     pub periods: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
-    /// Oscillating modes of the machine, of a nonlinear one at small amplitude, by rising frequency.
+    /// Number of degrees of freedom of the machine.
+    pub degrees_of_freedom: usize,
+    /// Oscillating modes of the machine, of a nonlinear one at small amplitude, by rising frequency;
+    /// none of a sparse machine.
     pub modes: Vec<SimulatedMode>,
     /// Channels of the record, in its order.
     pub channels: Vec<SimulatedChannel>,
     /// The fastest growing free response of an unstable machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instability: Option<FreeGrowth>,
-    /// Mass, damping and stiffness matrix, in SI units.
-    pub system: SystemMatrices,
+    /// Mass, damping and stiffness matrix, in SI units; not those of a sparse machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub system: Option<SystemMatrices>,
     /// Nonlinear terms of the machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<SimulatedTerms>,
@@ -98,19 +102,23 @@ pub struct SimulatedTerms {
 pub(super) struct Group<'a> {
     pub name: &'static str,
     pub unit: &'static str,
+    /// Degree of freedom of each channel, counted from 0.
+    pub dofs: &'a [usize],
     pub truth: &'a Record,
     pub measured: &'a Record,
+    /// Number of degrees of freedom of the machine.
+    dof: usize,
 }
 
 impl Simulation {
-    /// Returns names and samples of the columns of the measured record, in SI units: force,
-    /// displacement, velocity and acceleration of each degree of freedom.
+    /// Returns names and samples of the columns of the measured record, in SI units: force of each
+    /// forced degree of freedom, displacement, velocity and acceleration of each output.
     pub fn columns(&self) -> Vec<(String, &[f64])> {
         let mut columns = Vec::new();
         for group in self.groups() {
             let record = group.measured;
-            columns
-                .extend((0..record.channels()).map(|dof| (group.column(dof), record.channel(dof))));
+            let channel = |at: usize| (group.column(at), record.channel(at));
+            columns.extend((0..record.channels()).map(channel));
         }
         columns
     }
@@ -120,7 +128,7 @@ impl Simulation {
     /// # Errors
     /// [`ModelError`] if the modes of the machine cannot be computed.
     pub fn summary(&self) -> Result<SimulationSummary, ModelError> {
-        let modes = self.system.modes()?;
+        let modes = self.system.dense().map(|system| system.modes()).transpose()?;
         let convention =
             |c: &mechid_integrate::Convention| SchemeConvention { what: c.what, choice: c.choice };
         Ok(SimulationSummary {
@@ -130,8 +138,10 @@ impl Simulation {
             samples: self.force.len(),
             periods: self.periods,
             sample_rate_hz: self.force.sampling().rate_hz(),
+            degrees_of_freedom: self.system.dof(),
             modes: modes
                 .iter()
+                .flat_map(|modes| modes.iter())
                 .map(|mode| SimulatedMode {
                     natural_frequency_hz: mode.natural_frequency() / TAU,
                     damping_ratio: mode.damping_ratio(),
@@ -139,29 +149,44 @@ impl Simulation {
                 .collect(),
             channels: self.groups().iter().flat_map(SimulatedChannel::of).collect(),
             instability: self.instability.as_ref().map(FreeGrowth::of),
-            system: SystemMatrices::from(&self.system),
+            system: self.system.dense().map(SystemMatrices::from),
             nonlinear: self.nonlinear.as_ref().map(SimulatedTerms::of),
         })
     }
 
     pub(super) fn groups(&self) -> [Group<'_>; 4] {
         let (truth, measured) = (&self.response, &self.measured_response);
+        let (forced, outputs, dof) = (&self.forced, &self.outputs, self.system.dof());
         [
-            ("force", "N", &self.force, &self.measured_force),
-            ("displacement", "m", truth.displacement(), measured.displacement()),
-            ("velocity", "m/s", truth.velocity(), measured.velocity()),
-            ("acceleration", "m/s²", truth.acceleration(), measured.acceleration()),
+            ("force", "N", forced, &self.force, &self.measured_force),
+            ("displacement", "m", outputs, truth.displacement(), measured.displacement()),
+            ("velocity", "m/s", outputs, truth.velocity(), measured.velocity()),
+            ("acceleration", "m/s²", outputs, truth.acceleration(), measured.acceleration()),
         ]
-        .map(|(name, unit, truth, measured)| Group { name, unit, truth, measured })
+        .map(|(name, unit, dofs, truth, measured)| Group {
+            name,
+            unit,
+            dofs,
+            truth,
+            measured,
+            dof,
+        })
     }
 }
 
 impl Group<'_> {
-    /// Returns the name of a column; a degree of freedom has its number where there are several.
-    fn column(&self, dof: usize) -> String {
-        match self.measured.channels() {
+    /// Returns the name of the column of a channel, counted from 0; a degree of freedom has its number
+    /// where there are several.
+    fn column(&self, channel: usize) -> String {
+        self.named(channel, '_')
+    }
+
+    /// Returns the name of a channel, counted from 0, with the number of its degree of freedom after
+    /// `separator`.
+    pub fn named(&self, channel: usize, separator: char) -> String {
+        match self.dof {
             1 => self.name.to_string(),
-            _ => format!("{}_{}", self.name, dof + 1),
+            _ => format!("{}{separator}{}", self.name, self.dofs[channel] + 1),
         }
     }
 }
@@ -223,6 +248,13 @@ impl fmt::Display for SimulationSummary {
             let value = significant(*coefficient, 6);
             writeln!(f, "nonlinear term {term}, {} = {value} {}", term.name(), term.unit())?;
         }
+        if self.system.is_none() {
+            writeln!(
+                f,
+                "{} in Matrix Market files",
+                message::count(self.degrees_of_freedom, "degree of freedom")
+            )?;
+        }
         let header = |cells: [&str; 3]| cells.map(String::from).to_vec();
         let mode = match self.nonlinear {
             Some(_) => "mode of small amplitude",
@@ -235,7 +267,10 @@ impl fmt::Display for SimulationSummary {
             row.extend(cells.map(|v| significant(v, 5)));
             rows.push(row);
         }
-        write!(f, "\n{}\n", text_table(&rows))?;
+        match self.system {
+            None => writeln!(f)?,
+            Some(_) => write!(f, "\n{}\n", text_table(&rows))?,
+        }
         let mut rows = vec![header(["column", "RMS", "noise RMS"])];
         for c in &self.channels {
             let cells = [c.rms, c.noise_rms].map(|v| format!("{} {}", significant(v, 4), c.unit));

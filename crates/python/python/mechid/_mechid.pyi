@@ -169,7 +169,7 @@ _Named: TypeAlias = tuple[str, NDArray[np.float64]]
 _Simulated: TypeAlias = tuple[
     str,
     float,
-    Machine,
+    Machine | None,
     tuple[NDArray[np.float64], list[_Named]],
     tuple[NDArray[np.float64], list[_Named]],
 ]

@@ -1002,21 +1002,19 @@ class Simulation:
         How the response was computed.
     fs : float
         Sampling rate, in Hz.
-    machine : Machine
-        The machine.
     force : array
         The force as the sensors tell it, shape (samples, degrees of freedom), in N.
     displacement, velocity, acceleration : array
-        The response as the sensors tell it, in m, m/s and m/s².
+        The response as the sensors tell it, shape (samples, outputs), in m, m/s and m/s².
     truth : mapping
         The four without noise.
     """
 
-    __slots__ = ("acceleration", "displacement", "force", "fs", "machine", "scheme", "truth", "velocity")
+    __slots__ = ("_machine", "acceleration", "displacement", "force", "fs", "scheme", "truth", "velocity")
 
     def __init__(self, found: _mechid._Simulated) -> None:
         self.scheme, self.fs, machine, (force, measured), (true_force, truth) = found
-        self.machine = Machine._of(machine)
+        self._machine = None if machine is None else Machine._of(machine)
         self.force = force
         kinds = dict(measured)
         self.displacement, self.velocity = kinds["displacement"], kinds["velocity"]
@@ -1024,6 +1022,19 @@ class Simulation:
         self.truth: Mapping[str, NDArray[np.float64]] = MappingProxyType(
             {"force": true_force, **dict(truth)}
         )
+
+    @property
+    def machine(self) -> Machine:
+        """The machine.
+
+        Raises
+        ------
+        ValueError
+            If it is a large one in Matrix Market files.
+        """
+        if self._machine is None:
+            raise ValueError("the machine is a large one in Matrix Market files, which hold it")
+        return self._machine
 
     def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
         """Return force and the responses named (the displacement, without) as a record."""

@@ -1,0 +1,113 @@
+//! Machines in Matrix Market files, and the degrees of freedom that are recorded.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use mechid::io::Table;
+
+use super::{mechid, refused};
+
+/// Writes a band matrix.
+fn band(folder: &Path, name: &str, n: usize, diagonal: f64, beside: f64) {
+    let mut text = String::from("%%MatrixMarket matrix coordinate real symmetric\n");
+    let entries = if beside == 0.0 { n } else { 2 * n - 1 };
+    let _ = writeln!(text, "{n} {n} {entries}");
+    for i in 1..=n {
+        let _ = writeln!(text, "{i} {i} {diagonal}");
+        if beside != 0.0 && i < n {
+            let _ = writeln!(text, "{} {i} {beside}", i + 1);
+        }
+    }
+    fs::write(folder.join(name), text).unwrap();
+}
+
+/// A chain of masses on springs, in files of its own folder.
+fn chain(folder: &Path, n: usize, rest: &str) {
+    fs::create_dir_all(folder.join("chain")).unwrap();
+    band(&folder.join("chain"), "m.mtx", n, 1.0, 0.0);
+    band(&folder.join("chain"), "c.mtx", n, 0.2, -0.1);
+    band(&folder.join("chain"), "k.mtx", n, 1800.0, -900.0);
+    let text = format!(
+        r#"{{ "system": {{ "mass": "m.mtx", "damping": "c.mtx", "stiffness": "k.mtx" }},
+             "sampling": {{ "samples": 200, "rate_hz": 100 }},
+             "excitation": [{{ "dof": 2, "kind": "half-sine", "peak": 5, "start_s": 0.1, "duration_s": 0.2 }}],
+             "scheme": {{ "name": "newmark" }}, "response": "from-rest"{rest} }}"#
+    );
+    fs::write(folder.join("chain/chain.json"), text).unwrap();
+}
+
+fn column(folder: &Path, file: &str, name: &str) -> Vec<f64> {
+    Table::read(folder.join(file)).unwrap().column(name).unwrap().to_vec()
+}
+
+/// Judge: the waves from one end have not reached the other when the run ends, so that a chain whose
+/// matrices are lists of rows, short enough to be stepped through densely, moves alike.
+#[test]
+fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
+    let home = tempfile::tempdir().unwrap();
+    chain(home.path(), 5000, r#", "outputs": [2, 1]"#);
+    let told = mechid(home.path(), "simulate chain/chain.json --output large.csv");
+    assert!(told.contains("5000 degrees of freedom in Matrix Market files"), "{told}");
+    let text = fs::read_to_string(home.path().join("large.csv")).unwrap();
+    let header = "time,force_2,displacement_2,displacement_1,velocity_2,velocity_1,\
+                  acceleration_2,acceleration_1\n";
+    assert!(text.starts_with(header), "{}", text.lines().next().unwrap());
+
+    // 64 degrees of freedom are dense; a wave of 30 masses per second goes 60 of them in 2 s.
+    chain(home.path(), 64, r#", "outputs": [2, 1]"#);
+    mechid(home.path(), "simulate chain/chain.json --output small.csv --plot small.svg");
+    for name in ["force_2", "displacement_1", "displacement_2", "velocity_1", "acceleration_2"] {
+        let [large, small] = ["large.csv", "small.csv"].map(|file| column(home.path(), file, name));
+        let size = small.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        assert!(size > 0.0);
+        for (k, (a, b)) in large.iter().zip(&small).enumerate() {
+            assert!((a - b).abs() < 1e-9 * size, "{name}, sample {k}: {a} and {b}");
+        }
+    }
+    // Of a dense machine every force is recorded.
+    assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
+}
+
+#[test]
+fn what_a_large_machine_does_not_have_is_refused() {
+    let home = tempfile::tempdir().unwrap();
+    let refusal = |rest: &str| {
+        chain(home.path(), 100, rest);
+        refused(home.path(), "simulate chain/chain.json --output x.csv")
+    };
+    for (rest, expected) in [
+        (r#", "outputs": []"#, "outputs names no degree of freedom"),
+        (r#", "outputs": [101]"#, "outputs names degree of freedom 101, the system has 100"),
+        (r#", "outputs": [3, 3]"#, "outputs names degree of freedom 3 twice"),
+        (
+            r#", "nonlinear": {"terms": "k3: x1^3", "coefficients": [1]}"#,
+            "only the linear response",
+        ),
+    ] {
+        let refused = refusal(rest);
+        assert!(refused.contains(expected), "{rest}: {refused}");
+    }
+    chain(home.path(), 100, "");
+    let described = fs::read_to_string(home.path().join("chain/chain.json")).unwrap();
+    for (from, to, expected) in [
+        ("\"from-rest\"", "\"periodic\"", "its periodic response is not computed"),
+        ("k.mtx", "lost.mtx", "lost.mtx"),
+        ("\"mass\": \"m.mtx\"", "\"mass\": 3", "100"),
+        ("\"stiffness\": \"k.mtx\"", "\"stiffness\": [[1]]", "the"),
+        (
+            "\"dof\": 2",
+            "\"dof\": 200",
+            "the excitation drives degree of freedom 200, the system has 100",
+        ),
+    ] {
+        assert!(described.contains(from), "{from}");
+        fs::write(home.path().join("chain/chain.json"), described.replace(from, to)).unwrap();
+        let refused = refused(home.path(), "simulate chain/chain.json --output x.csv");
+        assert!(refused.contains(expected), "{to}: {refused}");
+    }
+    fs::write(home.path().join("chain/chain.json"), described).unwrap();
+    let refused = refused(home.path(), "modal chain/chain.json");
+    assert!(refused.contains("100 degrees of freedom in Matrix Market files"), "{refused}");
+    assert!(!home.path().join("x.csv").exists());
+}

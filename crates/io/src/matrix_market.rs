@@ -1,0 +1,356 @@
+//! Matrices in Matrix Market files, the text format of sparse matrices.
+//!
+//! # Source
+//! Boisvert, Pozo & Remington, *The Matrix Market Exchange Formats: Initial Design*, NISTIR 5935 (1996).
+
+use std::io::BufRead as _;
+use std::path::Path;
+
+use fast_float2::parse;
+use mechid_model::triplets;
+use mechid_signal::message;
+use nalgebra_sparse::csr::CsrMatrix;
+
+use crate::contents::Place;
+use crate::table::source::Source;
+use crate::{IoError, Limit, Limits};
+
+/// Numbers that [`Limits::numbers`] allows for each row of a matrix, which a row without entries needs
+/// memory for, too: 2²² rows by default.
+const NUMBERS_PER_ROW: usize = 64;
+
+/// Entries of the other triangle of a matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Symmetry {
+    General,
+    Symmetric,
+    SkewSymmetric,
+}
+
+/// What the first line says.
+#[derive(Debug, Clone, Copy)]
+struct Header {
+    is_coordinate: bool,
+    symmetry: Symmetry,
+}
+
+/// Reads a square matrix in a file, which may be in gzip. Entries at one place are added up.
+///
+/// # Errors
+/// [`IoError::Read`] if it cannot be read, otherwise as [`parse_matrix_market`].
+pub fn read_matrix_market(
+    path: impl AsRef<Path>,
+    limits: &Limits,
+) -> Result<CsrMatrix<f64>, IoError> {
+    matrix(Source::open(path.as_ref())?, limits)
+}
+
+/// Reads a square matrix in the bytes of a file; `file` is its name in messages.
+///
+/// ```
+/// use mechid_io::{Limits, parse_matrix_market};
+///
+/// let text = "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 300\n2 1 -100\n";
+/// let stiffness = parse_matrix_market("k.mtx", text.as_bytes(), &Limits::default())?;
+/// assert_eq!((stiffness.nrows(), stiffness.nnz()), (2, 3));
+/// # Ok::<(), mechid_io::IoError>(())
+/// ```
+///
+/// # Errors
+/// [`IoError::Malformed`] with the line, [`IoError::TooLarge`], [`IoError::Gzip`].
+pub fn parse_matrix_market(
+    file: impl Into<String>,
+    bytes: &[u8],
+    limits: &Limits,
+) -> Result<CsrMatrix<f64>, IoError> {
+    matrix(Source::new(file.into(), bytes)?, limits)
+}
+
+fn matrix(mut source: Source<'_>, limits: &Limits) -> Result<CsrMatrix<f64>, IoError> {
+    let mut lines = Lines { file: source.file.clone(), at: 0, text: Vec::new(), limits: *limits };
+    if !lines.next(&mut source)? {
+        return Err(lines.malformed("it is empty, a Matrix Market file begins with %%MatrixMarket"));
+    }
+    let header = Header::of(&lines)?;
+    if !lines.next_of_data(&mut source)? {
+        return Err(lines.malformed("the line with the size of the matrix is missing"));
+    }
+    let sizes: Vec<Option<usize>> = lines.words().map(whole).collect();
+    let (size, stored) = match (header.is_coordinate, sizes.as_slice()) {
+        (true, [Some(rows), Some(columns), Some(stored)]) if rows == columns => (*rows, *stored),
+        (false, [Some(rows), Some(columns)]) if rows == columns => {
+            (*rows, header.symmetry.stored(*rows))
+        }
+        (true, [Some(_), Some(_), Some(_)]) | (false, [Some(_), Some(_)]) => {
+            return Err(lines.malformed("the matrix of a machine has as many rows as columns"));
+        }
+        (true, _) => return Err(lines.malformed("rows, columns and number of entries are needed")),
+        (false, _) => return Err(lines.malformed("number of rows and columns are needed")),
+    };
+    if size > limits.numbers / NUMBERS_PER_ROW || stored > limits.numbers {
+        return Err(lines.too_large());
+    }
+    // As many as there are, whatever number the file states.
+    let mut entries = Vec::new();
+    let mut place = match header.symmetry {
+        Symmetry::SkewSymmetric => Some((1, 0)),
+        Symmetry::General | Symmetry::Symmetric => Some((0, 0)),
+    };
+    for count in 0..stored {
+        if !lines.next_of_data(&mut source)? {
+            let (count, stored) = (message::count(count, "entry"), message::count(stored, "entry"));
+            return Err(lines.malformed(format!("the file ends after {count} of {stored}")));
+        }
+        let (row, column, value) = match header.is_coordinate {
+            true => lines.entry(size)?,
+            false => {
+                let (row, column) = place.expect("a place is left for each entry");
+                place = header.symmetry.after(row, column, size);
+                (row, column, lines.value()?)
+            }
+        };
+        if value == 0.0 {
+            continue;
+        }
+        let mirrored = match header.symmetry {
+            Symmetry::General => None,
+            Symmetry::Symmetric => Some(value).filter(|_| row != column),
+            Symmetry::SkewSymmetric if row == column => {
+                return Err(lines.malformed("a skew-symmetric matrix has no diagonal"));
+            }
+            Symmetry::SkewSymmetric => Some(-value),
+        };
+        entries.push((row, column, value));
+        entries.extend(mirrored.map(|value| (column, row, value)));
+        if entries.len() > limits.numbers {
+            return Err(lines.too_large());
+        }
+    }
+    match lines.next_of_data(&mut source)? {
+        true => Err(lines.malformed(format!("there are more than the {stored} entries stated"))),
+        false => Ok(triplets(size, entries).expect("every entry was checked to be inside")),
+    }
+}
+
+impl Header {
+    fn of(lines: &Lines) -> Result<Self, IoError> {
+        let words: Vec<String> =
+            lines.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();
+        let words: Vec<&str> = words.iter().map(String::as_str).collect();
+        let [banner, "matrix", format, field, symmetry] = words[..] else {
+            return Err(lines.malformed(
+                "a Matrix Market file begins with a line such as \
+                 %%MatrixMarket matrix coordinate real general",
+            ));
+        };
+        let is_coordinate = match (banner, format) {
+            ("%%matrixmarket", "coordinate") => true,
+            ("%%matrixmarket", "array") => false,
+            _ => return Err(lines.malformed("coordinate and array are the formats that are read")),
+        };
+        if !matches!(field, "real" | "double" | "integer") {
+            return Err(lines.malformed("the matrix of a machine has entries real or integer"));
+        }
+        let symmetry = match symmetry {
+            "general" => Symmetry::General,
+            "symmetric" => Symmetry::Symmetric,
+            "skew-symmetric" => Symmetry::SkewSymmetric,
+            _ => {
+                return Err(lines.malformed(
+                    "general, symmetric and skew-symmetric are the symmetries of real matrices",
+                ));
+            }
+        };
+        Ok(Self { is_coordinate, symmetry })
+    }
+}
+
+impl Symmetry {
+    /// Number of entries in an array of so many rows and columns.
+    fn stored(self, size: usize) -> usize {
+        match self {
+            Self::General => size.saturating_mul(size),
+            Self::Symmetric => size.saturating_mul(size.saturating_add(1)) / 2,
+            Self::SkewSymmetric => size.saturating_mul(size.saturating_sub(1)) / 2,
+        }
+    }
+
+    /// The place that follows in an array: down the columns, of a symmetric matrix from the diagonal on.
+    fn after(self, row: usize, column: usize, size: usize) -> Option<(usize, usize)> {
+        let first = match self {
+            Self::General => 0,
+            Self::Symmetric => column + 1,
+            Self::SkewSymmetric => column + 2,
+        };
+        let next = if row + 1 < size { (row + 1, column) } else { (first, column + 1) };
+        (next.0 < size && next.1 < size).then_some(next)
+    }
+}
+
+/// The lines of a file, one at a time.
+struct Lines {
+    file: String,
+    /// Number of the line, counted from 1.
+    at: u64,
+    text: Vec<u8>,
+    limits: Limits,
+}
+
+impl Lines {
+    /// Reads the next line; `false` at the end of the file.
+    fn next(&mut self, source: &mut Source<'_>) -> Result<bool, IoError> {
+        self.text.clear();
+        self.at += 1;
+        let most = self.limits.row_bytes;
+        let mut line = std::io::Read::take(&mut source.reader, most as u64 + 1);
+        match line.read_until(b'\n', &mut self.text) {
+            Ok(0) => Ok(false),
+            Ok(_) if self.text.len() > most => {
+                let (at, limit) = (Place::Line(self.at), Limit::RowBytes(most));
+                Err(IoError::TooLarge { file: self.file.clone(), at, limit })
+            }
+            Ok(_) => Ok(true),
+            Err(cause) if source.gzip => {
+                Err(IoError::Gzip { file: self.file.clone(), source: cause })
+            }
+            Err(cause) => Err(IoError::Read { file: self.file.clone(), source: cause }),
+        }
+    }
+
+    /// Reads the next line that is neither empty nor a comment.
+    fn next_of_data(&mut self, source: &mut Source<'_>) -> Result<bool, IoError> {
+        while self.next(source)? {
+            if !self.text.starts_with(b"%") && self.words().next().is_some() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn words(&self) -> impl Iterator<Item = &[u8]> {
+        self.text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+    }
+
+    /// Row and column, counted from 0, and value.
+    fn entry(&self, size: usize) -> Result<(usize, usize, f64), IoError> {
+        let mut words = self.words();
+        let (row, column, value) = (words.next(), words.next(), words.next());
+        let (Some(row), Some(column), Some(value), None) =
+            (row.and_then(whole), column.and_then(whole), value, words.next())
+        else {
+            return Err(self.malformed("an entry is its row, its column and its value"));
+        };
+        if row.min(column) < 1 || row.max(column) > size {
+            return Err(self.malformed(format!(
+                "row {row}, column {column}: the matrix has rows and columns 1 to {size}"
+            )));
+        }
+        Ok((row - 1, column - 1, self.number(value)?))
+    }
+
+    /// The only number of the line.
+    fn value(&self) -> Result<f64, IoError> {
+        let mut words = self.words();
+        match (words.next(), words.next()) {
+            (Some(value), None) => self.number(value),
+            _ => Err(self.malformed("an array has one number in a line")),
+        }
+    }
+
+    fn number(&self, word: &[u8]) -> Result<f64, IoError> {
+        match parse::<f64, _>(word) {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(self.malformed(format!(
+                "\"{}\" is not a finite number",
+                crate::escaped(&String::from_utf8_lossy(word))
+            ))),
+        }
+    }
+
+    fn malformed(&self, what: impl Into<String>) -> IoError {
+        IoError::Malformed { file: self.file.clone(), at: Place::Line(self.at), what: what.into() }
+    }
+
+    fn too_large(&self) -> IoError {
+        let (at, limit) = (Place::Line(self.at), Limit::Numbers(self.limits.numbers));
+        IoError::TooLarge { file: self.file.clone(), at, limit }
+    }
+}
+
+/// Returns a whole number.
+fn whole(word: &[u8]) -> Option<usize> {
+    str::from_utf8(word).ok()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, dmatrix};
+
+    use super::*;
+
+    fn matrix(text: &str) -> Result<DMatrix<f64>, IoError> {
+        let sparse = parse_matrix_market("k.mtx", text.as_bytes(), &Limits::default())?;
+        Ok(DMatrix::from(&sparse))
+    }
+
+    /// Judge: the matrices, written by hand as the format says.
+    #[test]
+    fn formats_and_symmetries_are_those_of_the_format() {
+        let general = "%%MatrixMarket matrix coordinate real general\n% a comment\n\n3 3 4\n\
+                       1 1 1.5\n2 3 -2e-3\n3 1 4\n3 1 1\r\n";
+        let expected = dmatrix![1.5, 0.0, 0.0; 0.0, 0.0, -2e-3; 5.0, 0.0, 0.0];
+        assert_eq!(matrix(general).unwrap(), expected);
+        let symmetric =
+            "%%matrixmarket MATRIX coordinate Integer symmetric\n2 2 2\n1 1 3\n2 1 -1\n";
+        assert_eq!(matrix(symmetric).unwrap(), dmatrix![3.0, -1.0; -1.0, 0.0]);
+        let skew = "%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 1\n2 1 7\n";
+        assert_eq!(matrix(skew).unwrap(), dmatrix![0.0, -7.0; 7.0, 0.0]);
+        let array = "%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4\n";
+        assert_eq!(matrix(array).unwrap(), dmatrix![1.0, 3.0; 2.0, 4.0]);
+        let lower = "%%MatrixMarket matrix array real symmetric\n3 3\n1\n2\n3\n4\n5\n6\n";
+        let expected = dmatrix![1.0, 2.0, 3.0; 2.0, 4.0, 5.0; 3.0, 5.0, 6.0];
+        assert_eq!(matrix(lower).unwrap(), expected);
+        let lower = "%%MatrixMarket matrix array real skew-symmetric\n3 3\n1\n2\n3\n";
+        let expected = dmatrix![0.0, -1.0, -2.0; 1.0, 0.0, -3.0; 2.0, 3.0, 0.0];
+        assert_eq!(matrix(lower).unwrap(), expected);
+        let empty = "%%MatrixMarket matrix coordinate real general\n2 2 0\n";
+        assert_eq!(matrix(empty).unwrap(), DMatrix::zeros(2, 2));
+    }
+
+    #[test]
+    fn what_breaks_the_format_is_told_with_its_line() {
+        let banner = "%%MatrixMarket matrix coordinate real general\n";
+        for (text, expected) in [
+            ("".into(), "line 1: it is empty"),
+            ("1 2 3\n".into(), "line 1: a Matrix Market file begins"),
+            ("%%MatrixMarket matrix coordinate complex general\n".into(), "real or integer"),
+            ("%%MatrixMarket matrix coordinate pattern general\n".into(), "real or integer"),
+            ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "symmetries"),
+            (banner.into(), "line 2: the line with the size"),
+            (format!("{banner}2 3 1\n"), "line 2: the matrix of a machine has as many rows"),
+            (format!("{banner}2 2\n"), "line 2: rows, columns and number"),
+            (format!("{banner}2 2 -1\n"), "line 2: rows, columns and number"),
+            (format!("{banner}2 2 1\n3 1 1.0\n"), "line 3: row 3, column 1"),
+            (format!("{banner}2 2 1\n0 1 1.0\n"), "line 3: row 0, column 1"),
+            (format!("{banner}2 2 1\n1 1\n"), "line 3: an entry is"),
+            (format!("{banner}2 2 1\n1 1 nan\n"), "line 3: \"nan\" is not a finite number"),
+            (format!("{banner}2 2 1\n1 1 1e999\n"), "is not a finite number"),
+            (format!("{banner}2 2 2\n1 1 1.0\n"), "line 4: the file ends after 1 entry of 2"),
+            (format!("{banner}2 2 1\n1 1 1.0\n2 2 1.0\n"), "line 4: there are more than the 1"),
+            (format!("{banner}2 2 99999999999999\n"), "there are more than 268435456 numbers"),
+            (format!("{banner}99999999999 99999999999 1\n1 1 1\n"), "more than 268435456 numbers"),
+            ("%%MatrixMarket matrix array real general\n2 2\n1 2\n".into(), "one number in a line"),
+            (
+                "%%MatrixMarket matrix coordinate real skew-symmetric\n1 1 1\n1 1 1\n".into(),
+                "no diagonal",
+            ),
+        ] {
+            let refused = matrix(&text).unwrap_err().to_string();
+            assert!(refused.contains(expected), "{text:?}: {refused}");
+        }
+        let short = Limits { row_bytes: 60, ..Limits::default() };
+        let long = format!("{banner}%{}\n", "x".repeat(100));
+        let refused = parse_matrix_market("k.mtx", long.as_bytes(), &short);
+        assert!(matches!(refused, Err(IoError::TooLarge { .. })), "{refused:?}");
+    }
+}
