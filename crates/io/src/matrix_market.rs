@@ -34,7 +34,8 @@ struct Header {
     symmetry: Symmetry,
 }
 
-/// Reads a square matrix in a file, which may be in gzip. Entries at one place are added up.
+/// Reads a square matrix in a file, which may be in gzip; its entries are in the unit of the file (kg,
+/// N·s/m or N/m), and those at one place are added up.
 ///
 /// # Errors
 /// [`IoError::Read`] if it cannot be read, otherwise as [`parse_matrix_market`].
@@ -45,7 +46,8 @@ pub fn read_matrix_market(
     matrix(Source::open(path.as_ref())?, limits)
 }
 
-/// Reads a square matrix in the bytes of a file; `file` is its name in messages.
+/// Reads a square matrix in the bytes of a file, in the unit of the file (kg, N·s/m or N/m); `file` is
+/// its name in messages.
 ///
 /// ```
 /// use mechid_io::{Limits, parse_matrix_market};

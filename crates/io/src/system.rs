@@ -255,7 +255,12 @@ impl<'de> Deserialize<'de> for Entries {
             }
 
             fn visit_str<E: de::Error>(self, path: &str) -> Result<Entries, E> {
-                Ok(Entries::File(path.into()))
+                let name = path.to_ascii_lowercase();
+                if name.ends_with(".mtx") || name.ends_with(".mtx.gz") {
+                    Ok(Entries::File(path.into()))
+                } else {
+                    Err(E::invalid_value(de::Unexpected::Str(path), &self))
+                }
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Entries, A::Error> {

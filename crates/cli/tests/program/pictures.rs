@@ -169,7 +169,10 @@ fn a_run_is_drawn_as_it_is_written() {
     }
     fs::write(folder.path().join("eight.json"), chain(8, true)).unwrap();
     let svg = drawn(folder.path(), "simulate eight.json --output run.csv");
-    has(&svg, &["run.csv, degrees of freedom 1 to 4 of 8", "Force 1 (N)", "Acceleration 4 (m/s²)"]);
+    has(
+        &svg,
+        &["run.csv, the first 4 of 8 degrees of freedom", "Force 1 (N)", "Acceleration 4 (m/s²)"],
+    );
 }
 
 /// 2 sin(2π·k/50) + 0.5 sin(2π·3k/50) + 1 at 100 Hz, and ten columns more.

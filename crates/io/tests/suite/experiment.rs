@@ -116,7 +116,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(r#"{ "mass": "1 kg", "damping": 1, "stiffness": 2 }"#, FORCE, ""),
-            "expected a number, or a matrix as a list of rows at line 2",
+            "expected a number, a matrix as a list of rows, or the name of a Matrix Market file",
         ),
         (
             description(r#"{ "mass": [[1, 2], [3]], "damping": 1, "stiffness": 2 }"#, FORCE, ""),

@@ -141,9 +141,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let response = match &machine.linear {
         // All degrees of freedom were computed.
         SimulatedSystem::Dense(_) if !outputs.iter().copied().eq(0..response.dof()) => {
-            let selected = |_, r: &Record| {
-                Record::new(r.sampling(), r.data().select_columns(&outputs))
-            };
+            let selected =
+                |_, r: &Record| Record::new(r.sampling(), r.data().select_columns(&outputs));
             map(&response, selected)?
         }
         SimulatedSystem::Dense(_) | SimulatedSystem::Sparse(_) => response,
