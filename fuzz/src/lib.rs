@@ -18,7 +18,7 @@ mod mutation;
 pub mod targets;
 
 use std::fmt::Write as _;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
@@ -129,6 +129,8 @@ pub fn corpus(target: &Target) -> io::Result<Vec<(String, Vec<u8>)>> {
 /// # Panics
 /// If the corpus cannot be read or is empty.
 pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
+    // Without a backtrace, whose memory would count as that of the case.
+    panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
     let corpus = corpus(target).expect("the corpus is in the repository");
     assert!(!corpus.is_empty(), "{} has a corpus", target.name);
     let inputs: Vec<Vec<u8>> = corpus.iter().map(|(_, input)| input.clone()).collect();
