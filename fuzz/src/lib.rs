@@ -21,6 +21,7 @@ use std::fmt::Write as _;
 use std::panic::{self, AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 use std::{fs, io, thread};
 
@@ -31,6 +32,13 @@ use rand_chacha::ChaCha8Rng;
 /// The allocator of this package's programs, which counts.
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
+
+/// Message and place of the last panic.
+static LAST_PANIC: Mutex<String> = Mutex::new(String::new());
+
+fn last_panic() -> MutexGuard<'static, String> {
+    LAST_PANIC.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Something that takes bytes.
 #[derive(Debug, Clone, Copy)]
@@ -129,8 +137,8 @@ pub fn corpus(target: &Target) -> io::Result<Vec<(String, Vec<u8>)>> {
 /// # Panics
 /// If the corpus cannot be read or is empty.
 pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
-    // Without a backtrace, whose memory would count as that of the case.
-    panic::set_hook(Box::new(|panic| eprintln!("{panic}")));
+    // A backtrace would count as memory of the case.
+    panic::set_hook(Box::new(|panic| *last_panic() = panic.to_string()));
     let corpus = corpus(target).expect("the corpus is in the repository");
     assert!(!corpus.is_empty(), "{} has a corpus", target.name);
     let inputs: Vec<Vec<u8>> = corpus.iter().map(|(_, input)| input.clone()).collect();
@@ -197,11 +205,8 @@ pub fn run(target: &Target, cases: &Cases) -> Result<Summary, Failure> {
 fn measured(target: &Target, input: &[u8]) -> (Result<(), String>, usize, Duration) {
     MEMORY.reset_peak_usage();
     let (before, begin) = (MEMORY.current_usage(), Instant::now());
-    let result = catch_unwind(AssertUnwindSafe(|| (target.run)(input))).unwrap_or_else(|panic| {
-        let text = panic.downcast_ref::<String>().cloned();
-        let text = text.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).into()));
-        Err(format!("it panics: {}", text.unwrap_or_default()))
-    });
+    let result = catch_unwind(AssertUnwindSafe(|| (target.run)(input)))
+        .unwrap_or_else(|_| Err(format!("it panics: {}", last_panic())));
     (result, MEMORY.peak_usage().saturating_sub(before), begin.elapsed())
 }
 
