@@ -105,6 +105,43 @@ pub enum IntegrateError {
         /// Smallest pivot of its factorisation, rows divided by the size of their terms.
         smallest: f64,
     },
+    /// The matrix K + σC + σ²M, by which modes are searched for, is singular.
+    #[error(
+        "the dynamic stiffness of the {} at {omega} rad/s is singular (pivot {smallest:.1e} of its terms): \
+         search for modes near another frequency",
+        message::count(*dof, "degree of freedom"), omega = message::number(*omega)
+    )]
+    SingularShift {
+        /// Im σ, in rad/s.
+        omega: f64,
+        /// Smallest pivot of its factorisation, rows divided by the size of their terms (pure number).
+        smallest: f64,
+        /// Degrees of freedom of the system.
+        dof: usize,
+    },
+    /// Fewer modes than wanted were found to rounding.
+    #[error(
+        "{found} of {} converged in a space of {vectors} vectors: ask for fewer, or for those near another \
+         frequency",
+        message::count(*wanted, "mode")
+    )]
+    ModesNotConverged {
+        /// Number of modes wanted.
+        wanted: usize,
+        /// Number of modes that converged.
+        found: usize,
+        /// Number of vectors of the space searched.
+        vectors: usize,
+    },
+    /// Numbers overflow in a search for modes.
+    #[error(
+        "the search for modes overflows in a space of {}: the entries of the matrices are too far apart",
+        message::count(*vectors, "vector")
+    )]
+    ModesOverflow {
+        /// Number of vectors of the space searched.
+        vectors: usize,
+    },
     /// The step makes the free motion of a stable system grow.
     #[error(
         "{scheme} is unstable at Δt = {dt} s: spectral radius {radius}; {}",

@@ -4,7 +4,7 @@
 //! does the integrating. There is no second set of formulas that could be right while the code is
 //! wrong.
 
-mod krylov;
+pub(crate) mod krylov;
 mod passive;
 
 use mechid_model::{Matrix, RealSchur, SecondOrderSystem};

@@ -26,6 +26,16 @@ pub struct Mode {
 }
 
 impl Mode {
+    /// A mode from its eigenvalue λ (rad/s) and its shape, n entries in any scale; of a conjugate pair
+    /// either.
+    pub fn new(eigenvalue: Complex<f64>, shape: DVector<Complex<f64>>) -> Self {
+        let (eigenvalue, shape) = match eigenvalue.im < 0.0 {
+            true => (eigenvalue.conj(), shape.conjugate()),
+            false => (eigenvalue, shape),
+        };
+        Self { eigenvalue, shape: scaled(shape) }
+    }
+
     /// λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
     pub fn eigenvalue(&self) -> Complex<f64> {
         self.eigenvalue
@@ -229,11 +239,16 @@ impl SecondOrderSystem {
             return Ok(None);
         }
         let shape = svd.v_t.as_ref().expect("asked for").row(row).adjoint();
-        let largest = shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
-            if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
-        });
-        Ok(Some(shape / largest))
+        Ok(Some(scaled(shape)))
     }
+}
+
+/// Divides a shape by its largest entry.
+fn scaled(shape: DVector<Complex<f64>>) -> DVector<Complex<f64>> {
+    let largest = shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
+        if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
+    });
+    shape / largest
 }
 
 #[cfg(test)]

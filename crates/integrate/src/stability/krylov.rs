@@ -17,7 +17,12 @@ pub(super) struct Dominant {
 
 /// A vector of norm 1 without structure, the same on every run.
 pub(super) fn scattered(len: usize) -> DVector<f64> {
-    let mut seed = 0x9E37_79B9_7F4A_7C15_u64;
+    scattered_number(len, 0)
+}
+
+/// One of many such vectors, by its number.
+pub(crate) fn scattered_number(len: usize, number: usize) -> DVector<f64> {
+    let mut seed = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(2 * number as u64 + 1);
     let vector = DVector::from_fn(len, |_, _| {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
@@ -64,7 +69,7 @@ pub(super) fn dominant(
     let square = hessenberg.view((0, 0), (size, size)).into_owned();
     let eigenvalues = RealSchur::new(square.clone()).ok()?.eigenvalues();
     let value = eigenvalues.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
-    let coordinates = eigenvector(&square, value)?;
+    let coordinates = eigenvector(&square, value, 0)?;
     let mut vector = DVector::zeros(len);
     for (q, y) in basis.iter().zip(&coordinates) {
         vector.zip_apply(q, |v: &mut Complex<f64>, q| *v += y * q);
@@ -72,14 +77,19 @@ pub(super) fn dominant(
     Some(Dominant { value, vector })
 }
 
-/// The eigenvector of norm 1 of `matrix` to its eigenvalue `value`, by inverse iteration.
-fn eigenvector(matrix: &DMatrix<f64>, value: Complex<f64>) -> Option<DVector<Complex<f64>>> {
+/// The eigenvector of norm 1 of `matrix` to its eigenvalue `value`, by inverse iteration; of a repeated
+/// eigenvalue one for each `number`.
+pub(crate) fn eigenvector(
+    matrix: &DMatrix<f64>,
+    value: Complex<f64>,
+    number: usize,
+) -> Option<DVector<Complex<f64>>> {
     let size = matrix.nrows();
     // Off the eigenvalue by rounding, so that the factors exist.
     let shift = value + Complex::from(f64::EPSILON * matrix.norm().max(f64::MIN_POSITIVE));
     let shifted = matrix.map(Complex::from) - DMatrix::from_diagonal_element(size, size, shift);
     let factored = shifted.lu();
-    let mut vector = scattered(size).map(Complex::from);
+    let mut vector = scattered_number(size, number).map(Complex::from);
     for _ in 0..3 {
         if !factored.solve_mut(&mut vector) {
             return None;

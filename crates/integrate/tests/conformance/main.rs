@@ -5,6 +5,7 @@ mod charts;
 mod common;
 mod definitions;
 mod invariances;
+mod modes;
 mod nonlinear;
 mod orbit;
 mod order;

@@ -1,0 +1,383 @@
+//! Some modes of a sparse system, by Arnoldi's iteration with shift and invert.
+
+use mechid_model::{Matrix, Mode, RealSchur, SparseSystem};
+use nalgebra::{Complex, ComplexField as _, DMatrix, DVector};
+use nalgebra_sparse::csr::CsrMatrix;
+
+use crate::IntegrateError;
+use crate::sparse::{SparseLu, combination};
+use crate::stability::krylov::{eigenvector, scattered_number};
+
+/// The modes of a sparse system that [`sparse_modes`] looks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ModeSearch {
+    /// Those of the lowest natural frequencies |λ|.
+    Lowest,
+    /// Those whose eigenvalues λ lie nearest to iω, with a positive ω in rad/s.
+    NearOmega(f64),
+}
+
+/// A mode of a sparse system, and how well it meets the equation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseMode {
+    /// The mode.
+    pub mode: Mode,
+    /// ‖(λ²M + λC + K) φ‖ / (|λ|²‖M‖ + |λ|‖C‖ + ‖K‖)‖φ‖ in the norm of the largest entry (pure number).
+    pub residual: f64,
+}
+
+/// Number of vectors that the iteration starts from: modes that share an eigenvalue, such as those of a
+/// symmetric rotor in its two planes, are found up to this number.
+const START_VECTORS: usize = 4;
+
+/// Part of itself to which an eigenvalue of the inverted operator must be known.
+const CONVERGED: f64 = 1e-13;
+
+/// Eigenvalues of the inverted operator below this part of the largest count as zero.
+const NEGLIGIBLE: f64 = 1e-14;
+
+/// Difference of two such eigenvalues, relative to their modulus, that rounding makes of one.
+const TWINS: f64 = 1e-9;
+
+/// Number of modes looked at beyond those wanted: the order of the operator's eigenvalues is not quite
+/// that of the search.
+const SPARE_MODES: usize = 8;
+
+/// Largest residual of a mode that is returned.
+const RESIDUAL: f64 = 1e-9;
+
+/// Returns `count` modes of a system, those searched for that come first; fewer if it has no more.
+///
+/// ```
+/// use mechid_integrate::{ModeSearch, sparse_modes};
+/// use mechid_model::{SparseSystem, band};
+///
+/// // A chain of 10,000 masses between walls: ω = 2 √(k/m) sin(π / 2(n + 1)).
+/// let n = 10_000;
+/// let stiffness = band(n, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
+/// let chain = SparseSystem::new(band(n, &[(0, 1.0)]), band(n, &[]), stiffness)?;
+/// let found = sparse_modes(&chain, ModeSearch::Lowest, 2)?;
+/// let omega = 60.0 * (std::f64::consts::PI / (2.0 * (n + 1) as f64)).sin();
+/// assert!((found[0].mode.natural_frequency() / omega - 1.0).abs() < 1e-9);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// The matrix K + σC + σ²M is factored once, with σ = 0 or a small negative number where K is singular,
+/// or σ = iω; a subspace grows until the modes are exact to rounding, to 20 vectors for each at most.
+/// Modes of one eigenvalue are found up to four.
+///
+/// # Errors
+/// [`IntegrateError::Parameter`] for an ω that is not positive and finite, [`IntegrateError::SingularShift`]
+/// if the matrix is singular, [`IntegrateError::ModesNotConverged`].
+///
+/// # Source
+/// Bai, Demmel, Dongarra, Ruhe and van der Vorst, *Templates for the Solution of Algebraic Eigenvalue
+/// Problems* (2000), sections 3.3 and 9.2; Parlett and Saad (1987), Linear Algebra Appl. 88/89, 575–595, for
+/// complex shifts in real arithmetic; Ruhe (1979), Math. Comp. 33, 680–687, for several start vectors.
+pub fn sparse_modes(
+    system: &SparseSystem,
+    search: ModeSearch,
+    count: usize,
+) -> Result<Vec<SparseMode>, IntegrateError> {
+    let len = 2 * system.dof();
+    if count == 0 {
+        return Ok(Vec::new());
+    }
+    let mut inverse = Inverse::of(system, search)?;
+    let most = len.min(20 * count + 100);
+    let mut space = Space::of(len);
+    let mut target = len.min(2 * count + 20);
+    loop {
+        while space.products < target {
+            space.grow(&mut inverse);
+        }
+        let found = space.modes(system, &inverse, search, count)?;
+        // All modes of a system that has no more.
+        let complete = space.products == len;
+        let usable = found.iter().take(count).filter(|found| found.converged).count();
+        if usable == count || (complete && usable == found.len()) {
+            let found = found.into_iter().take(count);
+            return Ok(found.map(|found| found.mode).collect());
+        }
+        if target == most {
+            return Err(IntegrateError::ModesNotConverged {
+                wanted: count,
+                found: usable,
+                vectors: most,
+            });
+        }
+        target = most.min(target + (target / 4).max(10));
+    }
+}
+
+/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ].
+struct Inverse<'a> {
+    system: &'a SparseSystem,
+    shift: Complex<f64>,
+    /// Factors of Q = K + σC + σ²M, or of [Re Q, −Im Q; Im Q, Re Q] if σ is not real.
+    factors: SparseLu,
+    right: Vec<f64>,
+}
+
+impl<'a> Inverse<'a> {
+    fn of(system: &'a SparseSystem, search: ModeSearch) -> Result<Self, IntegrateError> {
+        let n = system.dof();
+        let factored = |shift: Complex<f64>| {
+            let (matrix, sizes) = dynamic_stiffness(system, shift);
+            let right = vec![0.0; matrix.nrows()];
+            SparseLu::new(&matrix, &sizes)
+                .map(|factors| Self { system, shift, factors, right })
+                .map_err(|smallest| IntegrateError::SingularShift {
+                    omega: shift.im,
+                    smallest,
+                    dof: n,
+                })
+        };
+        match search {
+            ModeSearch::Lowest => factored(Complex::from(0.0)).or_else(|_| {
+                // A machine that is free to drift.
+                let [mass, stiffness] = [Matrix::Mass, Matrix::Stiffness]
+                    .map(|which| largest_row(system.matrix(which)));
+                let omega = if stiffness > 0.0 { (stiffness / mass).sqrt() } else { 1.0 };
+                factored(Complex::from(-1e-3 * omega))
+            }),
+            ModeSearch::NearOmega(omega) if omega > 0.0 && omega.is_finite() => {
+                factored(Complex::new(0.0, omega))
+            }
+            ModeSearch::NearOmega(value) => Err(IntegrateError::Parameter {
+                scheme: "modes near a frequency",
+                parameter: "omega",
+                least: f64::MIN_POSITIVE,
+                most: f64::MAX,
+                value,
+            }),
+        }
+    }
+
+    /// With Q y = −(M v + (C + σM) x), w = x + σ y: the real parts of y and w.
+    fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
+        let n = self.system.dof();
+        let (x, v) = z.as_slice().split_at(n);
+        self.right.fill(0.0);
+        let (re, im) = self.right.split_at_mut(n);
+        subtract(self.system.matrix(Matrix::Mass), v, 1.0, re);
+        subtract(self.system.matrix(Matrix::Damping), x, 1.0, re);
+        subtract(self.system.matrix(Matrix::Mass), x, self.shift.re, re);
+        if self.shift.im != 0.0 {
+            subtract(self.system.matrix(Matrix::Mass), x, self.shift.im, im);
+        }
+        self.factors.solve(&mut self.right);
+        let (re, im) = self.right.split_at(n);
+        let imaginary = |i: usize| im.get(i).copied().unwrap_or(0.0);
+        DVector::from_fn(2 * n, |i, _| match i.checked_sub(n) {
+            None => re[i],
+            Some(i) => x[i] + self.shift.re * re[i] - self.shift.im * imaginary(i),
+        })
+    }
+
+    /// The eigenvalue of the system that belongs to `theta` of the operator: of two the nearer one to
+    /// `about`.
+    fn eigenvalue(&self, theta: Complex<f64>, about: Complex<f64>) -> Complex<f64> {
+        let omega = self.shift.im;
+        if omega == 0.0 {
+            return self.shift + theta.inv();
+        }
+        // θ = λ / (λ² + ω²).
+        let root = (Complex::from(1.0) - theta * theta * (4.0 * omega * omega)).sqrt();
+        let pair = [1.0, -1.0].map(|sign| (root * sign + 1.0) / (theta * 2.0));
+        if (pair[0] - about).norm() < (pair[1] - about).norm() { pair[0] } else { pair[1] }
+    }
+}
+
+/// y ← y − scale · A x.
+fn subtract(matrix: &CsrMatrix<f64>, x: &[f64], scale: f64, y: &mut [f64]) {
+    if scale == 0.0 {
+        return;
+    }
+    for (y, row) in y.iter_mut().zip(matrix.row_iter()) {
+        let sum: f64 = row.col_indices().iter().zip(row.values()).map(|(j, a)| a * x[*j]).sum();
+        *y -= scale * sum;
+    }
+}
+
+/// K + σC + σ²M and the sizes of the sums' terms row by row; in real form if σ is not real.
+fn dynamic_stiffness(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec<f64>) {
+    let square = shift * shift;
+    let part = |k: f64, c: f64, m: f64| {
+        combination(&[
+            (k, system.matrix(Matrix::Stiffness)),
+            (c, system.matrix(Matrix::Damping)),
+            (m, system.matrix(Matrix::Mass)),
+        ])
+    };
+    let (real, sizes) = part(1.0, shift.re, square.re);
+    if shift.im == 0.0 {
+        return (real, sizes);
+    }
+    let (imaginary, more) = part(0.0, shift.im, square.im);
+    let n = system.dof();
+    let entries = real
+        .triplet_iter()
+        .flat_map(|(i, j, v)| [(i, j, *v), (n + i, n + j, *v)])
+        .chain(imaginary.triplet_iter().flat_map(|(i, j, v)| [(i, n + j, -*v), (n + i, j, *v)]));
+    let matrix = mechid_model::triplets(2 * n, entries).expect("rows and columns are below 2n");
+    let sizes: Vec<f64> = sizes.iter().zip(&more).map(|(a, b)| a + b).collect();
+    (matrix, [&sizes[..], &sizes[..]].concat())
+}
+
+/// Largest sum of moduli of a row.
+fn largest_row(matrix: &CsrMatrix<f64>) -> f64 {
+    let sums = matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum());
+    sums.fold(0.0, f64::max)
+}
+
+/// An orthonormal basis of the vectors reached so far, and the operator in it.
+struct Space {
+    basis: Vec<DVector<f64>>,
+    /// Column j: products of the operator's j-th image with the basis.
+    columns: Vec<Vec<f64>>,
+    /// Number of images.
+    products: usize,
+    /// Number of vectors without structure that were added.
+    added: usize,
+}
+
+impl Space {
+    fn of(len: usize) -> Self {
+        let mut space = Self { basis: vec![], columns: vec![], products: 0, added: 0 };
+        (0..START_VECTORS.min(len)).for_each(|_| space.add(len));
+        space
+    }
+
+    /// Adds a vector without structure, if there is a direction left.
+    fn add(&mut self, len: usize) {
+        while self.basis.len() < len && self.added < 10 * len {
+            let mut vector = scattered_number(len, self.added);
+            self.added += 1;
+            let before = vector.norm();
+            self.orthogonalise(&mut vector);
+            let norm = vector.norm();
+            if norm > 1e-8 * before {
+                self.basis.push(vector / norm);
+                return;
+            }
+        }
+    }
+
+    /// Takes the parts along the basis out of `vector`; returns them.
+    fn orthogonalise(&self, vector: &mut DVector<f64>) -> Vec<f64> {
+        let mut parts = vec![0.0; self.basis.len()];
+        for _ in 0..2 {
+            for (q, sum) in self.basis.iter().zip(&mut parts) {
+                let part = q.dot(vector);
+                vector.axpy(-part, q, 1.0);
+                *sum += part;
+            }
+        }
+        parts
+    }
+
+    /// Applies the operator to the next vector of the basis.
+    fn grow(&mut self, inverse: &mut Inverse<'_>) {
+        let mut image = inverse.apply(&self.basis[self.products]);
+        let before = image.norm();
+        let mut parts = self.orthogonalise(&mut image);
+        let norm = image.norm();
+        let len = image.len();
+        if norm > 1e-13 * before && self.basis.len() < len {
+            parts.push(norm);
+            self.basis.push(image / norm);
+        }
+        self.columns.push(parts);
+        self.products += 1;
+        if self.products == self.basis.len() {
+            self.add(len);
+        }
+    }
+
+    /// Approximate modes in the order of the search, each with whether it has converged.
+    fn modes(
+        &self,
+        system: &SparseSystem,
+        inverse: &Inverse<'_>,
+        search: ModeSearch,
+        count: usize,
+    ) -> Result<Vec<Found>, IntegrateError> {
+        let (m, n) = (self.products, system.dof());
+        let overflow = || IntegrateError::ModesOverflow { vectors: m };
+        let entry = |i: usize, j: usize| self.columns[j].get(i).copied().unwrap_or(0.0);
+        let square = DMatrix::from_fn(m, m, entry);
+        if square.iter().any(|v| !v.is_finite()) {
+            return Err(overflow());
+        }
+        let rest = DMatrix::from_fn(self.basis.len() - m, m, |i, j| entry(m + i, j));
+        let mut thetas = RealSchur::new(square.clone())?.eigenvalues();
+        thetas.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+        let largest = thetas.first().map_or(0.0, |theta| theta.norm());
+        // Of zero θ the eigenvalue is infinite; a conjugate pair has one mode. The largest come first.
+        thetas.retain(|theta| theta.im >= 0.0 && theta.norm() > NEGLIGIBLE * largest);
+        thetas.truncate(count + SPARE_MODES);
+        let mut found: Vec<Found> = Vec::new();
+        let mut known: Vec<(Complex<f64>, DVector<Complex<f64>>)> = Vec::new();
+        for theta in thetas {
+            let twins = || known.iter().filter(|(t, _)| (t - theta).norm() <= TWINS * theta.norm());
+            let number = twins().count();
+            let Some(mut coordinates) = eigenvector(&square, theta, number) else {
+                return Err(overflow());
+            };
+            // Those of one eigenvalue may be any vectors of their space: independent ones, if it has them.
+            let mut apart = coordinates.clone();
+            for (_, twin) in twins() {
+                let part = twin.dotc(&apart);
+                apart.axpy(-part, twin, Complex::from(1.0));
+            }
+            if number > 0 && apart.norm() > 1e-6 {
+                coordinates = apart.normalize();
+            }
+            known.push((theta, coordinates.clone()));
+            let missed = (rest.map(Complex::from) * &coordinates).norm() / theta.norm();
+            let mut z = DVector::<Complex<f64>>::zeros(2 * n);
+            for (q, y) in self.basis.iter().zip(&coordinates) {
+                z.zip_apply(q, |z: &mut Complex<f64>, q| *z += y * q);
+            }
+            let shape = z.rows(0, n).into_owned();
+            let about = shape.dotc(&z.rows(n, n)) / Complex::from(shape.norm_squared());
+            let value = inverse.eigenvalue(theta, about);
+            if !(value.re.is_finite() && value.im.is_finite()) || shape.camax() == 0.0 {
+                continue;
+            }
+            let residual = residual(system, value, &shape);
+            let mode = SparseMode { mode: Mode::new(value, shape), residual };
+            found.push(Found { mode, converged: missed <= CONVERGED && residual <= RESIDUAL });
+        }
+        let distance = |found: &Found| {
+            let value = found.mode.mode.eigenvalue();
+            match search {
+                ModeSearch::Lowest => value.norm(),
+                ModeSearch::NearOmega(omega) => (value - Complex::new(0.0, omega)).norm(),
+            }
+        };
+        found.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        Ok(found)
+    }
+}
+
+struct Found {
+    mode: SparseMode,
+    converged: bool,
+}
+
+/// ‖(λ²M + λC + K) φ‖ relative to the size of its terms.
+fn residual(system: &SparseSystem, value: Complex<f64>, shape: &DVector<Complex<f64>>) -> f64 {
+    let mut sum = DVector::<Complex<f64>>::zeros(shape.len());
+    let mut size = 0.0;
+    let factors = [value * value, value, Complex::from(1.0)];
+    for (which, factor) in Matrix::ALL.into_iter().zip(factors) {
+        let matrix = system.matrix(which);
+        size += factor.norm() * largest_row(matrix);
+        for (i, j, entry) in matrix.triplet_iter() {
+            sum[i] += factor * shape[j] * *entry;
+        }
+    }
+    sum.camax() / (size * shape.camax())
+}

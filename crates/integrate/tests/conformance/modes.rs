@@ -1,0 +1,154 @@
+//! Some modes of sparse systems, against closed forms and all modes of dense ones.
+
+use std::f64::consts::PI;
+
+use mechid_integrate::{IntegrateError, ModeSearch, SparseMode, sparse_modes};
+use mechid_model::{Mode, SecondOrderSystem, SparseSystem, band, lumped, triplets};
+use nalgebra::DMatrix;
+
+/// Masses of 2 kg between springs of 800 N/m, fixed at both ends or free.
+fn chain(n: usize, fixed: bool) -> SparseSystem {
+    let mut stiffness = vec![1600.0; n];
+    if !fixed {
+        (stiffness[0], stiffness[n - 1]) = (800.0, 800.0);
+    }
+    let between = (0..n - 1).flat_map(|i| [(i, i + 1, -800.0), (i + 1, i, -800.0)]);
+    let own = (0..n).map(|i| (i, i, stiffness[i]));
+    let stiffness = triplets(n, own.chain(between)).unwrap();
+    SparseSystem::new(band(n, &[(0, 2.0)]), band(n, &[]), stiffness).unwrap()
+}
+
+/// Judge: ω = 2 √(k/m) sin(r π / 2(n + 1)), shape sin(r π i / (n + 1)).
+#[test]
+fn a_chain_has_the_frequencies_of_its_closed_form() {
+    let n = 2000;
+    let exact = |r: usize| 40.0 * (r as f64 * PI / (2.0 * (n + 1) as f64)).sin();
+    let system = chain(n, true);
+    for (k, found) in sparse_modes(&system, ModeSearch::Lowest, 6).unwrap().iter().enumerate() {
+        let omega = exact(k + 1);
+        assert!((found.mode.natural_frequency() / omega - 1.0).abs() < 1e-9, "{k}: {found:?}");
+        assert!(found.residual < 1e-12, "{k}: {:e}", found.residual);
+        let angle = |i: usize| ((k + 1) as f64 * PI * (i + 1) as f64 / (n + 1) as f64).sin();
+        let largest =
+            (0..n).map(angle).fold(0.0, |most: f64, v| if v.abs() > most.abs() { v } else { most });
+        for i in (0..n).step_by(37) {
+            let entry = found.mode.shape()[i];
+            // The largest entry of a symmetric shape may be either of two.
+            let gap = (entry.re.abs() - (angle(i) / largest).abs()).abs() + entry.im.abs();
+            assert!(gap < 1e-6, "mode {k}, entry {i}: {entry} {}", angle(i) / largest);
+        }
+    }
+    // In the middle of the band, between modes 1000 and 1001.
+    let about = 0.5 * (exact(1000) + exact(1001)) + 0.1 * (exact(1001) - exact(1000));
+    let found = sparse_modes(&system, ModeSearch::NearOmega(about), 3).unwrap();
+    for (found, r) in found.iter().zip([1001, 1000, 1002]) {
+        let value = found.mode.eigenvalue();
+        assert!((value.im / exact(r) - 1.0).abs() < 1e-10 && value.re.abs() < 1e-8, "{r}: {value}");
+    }
+}
+
+/// Chain in two planes, coupled by gyroscopic forces, with damping and cross-coupled stiffness that are not
+/// symmetric.
+fn rotor(stations: usize) -> SecondOrderSystem {
+    let n = 2 * stations;
+    let mut mass = DMatrix::zeros(n, n);
+    let mut damping = DMatrix::zeros(n, n);
+    let mut stiffness = DMatrix::zeros(n, n);
+    for i in 0..stations {
+        let (x, y) = (2 * i, 2 * i + 1);
+        for at in [x, y] {
+            mass[(at, at)] = 1.0 + 0.2 * (i % 4) as f64;
+            damping[(at, at)] = 0.3 + 0.05 * (at % 3) as f64;
+            stiffness[(at, at)] += 1500.0 + 40.0 * (at % 2) as f64;
+            if i + 1 < stations {
+                stiffness[(at, at + 2)] -= 700.0;
+                stiffness[(at + 2, at)] -= 700.0;
+            }
+        }
+        (damping[(x, y)], damping[(y, x)]) = (2.0, -2.0);
+        (stiffness[(x, y)], stiffness[(y, x)]) = (15.0, -11.0);
+    }
+    SecondOrderSystem::new(mass, damping, stiffness).unwrap()
+}
+
+fn assert_same(found: &[SparseMode], expected: &[&Mode]) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        let (value, truth) = (found.mode.eigenvalue(), expected.eigenvalue());
+        assert!((value - truth).norm() < 1e-9 * truth.norm(), "{value} {truth}");
+        assert!(found.residual < 1e-12, "{:e}", found.residual);
+        let (a, b) = (found.mode.shape(), expected.shape());
+        let along = a.dotc(b).norm() / (a.norm() * b.norm());
+        assert!((along - 1.0).abs() < 1e-8, "{along}");
+    }
+}
+
+/// Judge: all modes by the dense QR iteration.
+#[test]
+fn a_gyroscopic_system_has_the_modes_of_its_dense_form() {
+    let dense = rotor(30);
+    let (sparse, all) = (SparseSystem::from(&dense), dense.modes().unwrap());
+    assert_eq!(all.len(), 60);
+    let lowest: Vec<&Mode> = all.iter().take(8).collect();
+    assert_same(&sparse_modes(&sparse, ModeSearch::Lowest, 8).unwrap(), &lowest);
+    let omega = all[31].damped_frequency() + 0.01;
+    let mut near: Vec<&Mode> = all.iter().collect();
+    let distance = |mode: &Mode| (mode.eigenvalue() - nalgebra::Complex::new(0.0, omega)).norm();
+    near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    near.truncate(5);
+    assert_same(&sparse_modes(&sparse, ModeSearch::NearOmega(omega), 5).unwrap(), &near);
+    // All of a small system.
+    let dense = rotor(3);
+    let all = dense.modes().unwrap();
+    let found = sparse_modes(&SparseSystem::from(&dense), ModeSearch::Lowest, 20).unwrap();
+    assert_same(&found, &all.iter().collect::<Vec<_>>());
+}
+
+/// The same chain in two planes that know nothing of one another: every frequency twice.
+#[test]
+fn repeated_frequencies_have_independent_shapes() {
+    let n = 200;
+    let stiffness = band(n, &[(-2, -800.0), (0, 1600.0), (2, -800.0)]);
+    let system = SparseSystem::new(band(n, &[(0, 2.0)]), band(n, &[]), stiffness).unwrap();
+    let found = sparse_modes(&system, ModeSearch::Lowest, 6).unwrap();
+    for (k, pair) in found.chunks(2).enumerate() {
+        let omega = 40.0 * ((k + 1) as f64 * PI / 202.0).sin();
+        for one in pair {
+            assert!((one.mode.natural_frequency() / omega - 1.0).abs() < 1e-9, "{k}");
+            assert!(one.residual < 1e-11);
+        }
+        let [a, b] = [0, 1].map(|i| pair[i].mode.shape());
+        let along = a.dotc(b).norm() / (a.norm() * b.norm());
+        assert!(along < 0.99, "the shapes of pair {k} are the same: {along}");
+    }
+}
+
+/// Judge: ω = 2 √(k/m) sin(r π / 2n), from r = 0, the drift.
+#[test]
+fn a_free_chain_drifts_and_oscillates() {
+    let n = 300;
+    let found = sparse_modes(&chain(n, false), ModeSearch::Lowest, 6).unwrap();
+    let oscillating: Vec<f64> =
+        found.iter().map(|m| m.mode.natural_frequency()).filter(|omega| *omega > 1e-3).collect();
+    assert!(found[0].mode.natural_frequency() < 1e-4);
+    assert!(oscillating.len() >= 4, "{oscillating:?}");
+    for (r, omega) in (1..).zip(oscillating) {
+        let exact = 40.0 * (f64::from(r) * PI / (2.0 * n as f64)).sin();
+        assert!((omega / exact - 1.0).abs() < 1e-7, "{r}: {omega} {exact}");
+    }
+}
+
+#[test]
+fn what_cannot_be_searched_is_refused() {
+    let system = chain(5, true);
+    for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let refused = sparse_modes(&system, ModeSearch::NearOmega(omega), 1).unwrap_err();
+        assert!(matches!(refused, IntegrateError::Parameter { .. }), "{refused}");
+    }
+    assert_eq!(sparse_modes(&system, ModeSearch::Lowest, 0).unwrap(), []);
+    // One undamped oscillator, searched at its natural frequency.
+    let one = || lumped(&[4.0]);
+    let system = SparseSystem::new(lumped(&[1.0]), lumped(&[0.0]), one()).unwrap();
+    let refused = sparse_modes(&system, ModeSearch::NearOmega(2.0), 1).unwrap_err();
+    assert!(matches!(refused, IntegrateError::SingularShift { .. }), "{refused}");
+}
