@@ -1,11 +1,13 @@
 //! Some modes of a sparse system, by Arnoldi's iteration with shift and invert.
 
-use mechid_model::{Matrix, Mode, RealSchur, SparseSystem};
+use mechid_model::{EIGENVALUE_ROUNDING, Matrix, Mode, RealSchur, SparseSystem};
 use nalgebra::{Complex, ComplexField as _, DMatrix, DVector};
+use nalgebra_sparse::coo::CooMatrix;
+use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::IntegrateError;
-use crate::sparse::{SparseLu, combination};
+use crate::sparse::{GeneralLu, SparseLu, combination};
 use crate::stability::krylov::{eigenvector, scattered_number};
 
 /// The modes of a sparse system that [`sparse_modes`] looks for.
@@ -24,14 +26,16 @@ pub struct SparseMode {
     pub mode: Mode,
     /// ‖(λ²M + λC + K) φ‖ / (|λ|²‖M‖ + |λ|‖C‖ + ‖K‖)‖φ‖ in the norm of the largest entry (pure number).
     pub residual: f64,
+    /// `true` for a motion without restoring force: the eigenvalue is zero to rounding.
+    pub is_rigid_body: bool,
 }
 
 /// Number of vectors that the iteration starts from: modes that share an eigenvalue, such as those of a
 /// symmetric rotor in its two planes, are found up to this number.
 const START_VECTORS: usize = 4;
 
-/// Part of itself to which an eigenvalue of the inverted operator must be known.
-const CONVERGED: f64 = 1e-13;
+/// Largest part of itself by which an eigenvalue of the inverted operator may miss its equation.
+const CONVERGED: f64 = 1e-8;
 
 /// Eigenvalues of the inverted operator below this part of the largest count as zero.
 const NEGLIGIBLE: f64 = 1e-14;
@@ -44,7 +48,7 @@ const TWINS: f64 = 1e-9;
 const SPARE_MODES: usize = 8;
 
 /// Largest residual of a mode that is returned.
-const RESIDUAL: f64 = 1e-9;
+const RESIDUAL: f64 = 1e-12;
 
 /// Returns `count` modes of a system, those searched for that come first; fewer if it has no more.
 ///
@@ -63,7 +67,7 @@ const RESIDUAL: f64 = 1e-9;
 /// ```
 ///
 /// The matrix K + σC + σ²M is factored once, with σ = 0 or a small negative number where K is singular,
-/// or σ = iω; a subspace grows until the modes are exact to rounding, to 20 vectors for each at most.
+/// or σ = iω; a subspace grows until the modes are exact to rounding, to 20 vectors for each and 100 at most.
 /// Modes of one eigenvalue are found up to four.
 ///
 /// # Errors
@@ -114,35 +118,43 @@ pub fn sparse_modes(
 struct Inverse<'a> {
     system: &'a SparseSystem,
     shift: Complex<f64>,
-    /// Factors of Q = K + σC + σ²M, or of [Re Q, −Im Q; Im Q, Re Q] if σ is not real.
-    factors: SparseLu,
-    right: Vec<f64>,
+    factors: Factors,
+}
+
+/// Factors of Q = K + σC + σ²M.
+enum Factors {
+    Real(SparseLu),
+    Complex(Box<GeneralLu<Complex<f64>>>),
 }
 
 impl<'a> Inverse<'a> {
     fn of(system: &'a SparseSystem, search: ModeSearch) -> Result<Self, IntegrateError> {
-        let n = system.dof();
-        let factored = |shift: Complex<f64>| {
-            let (matrix, sizes) = dynamic_stiffness(system, shift);
-            let right = vec![0.0; matrix.nrows()];
-            SparseLu::new(&matrix, &sizes)
-                .map(|factors| Self { system, shift, factors, right })
-                .map_err(|smallest| IntegrateError::SingularShift {
-                    omega: shift.im,
-                    smallest,
-                    dof: n,
-                })
+        let singular = |shift: Complex<f64>, smallest: f64| IntegrateError::SingularShift {
+            omega: shift.im,
+            smallest,
+            dof: system.dof(),
+        };
+        let real = |shift: f64| {
+            let (matrix, sizes) = real_part(system, shift.into());
+            let factors = SparseLu::new(&matrix, &sizes)
+                .map_err(|smallest| singular(shift.into(), smallest))?;
+            Ok(Self { system, shift: shift.into(), factors: Factors::Real(factors) })
         };
         match search {
-            ModeSearch::Lowest => factored(Complex::from(0.0)).or_else(|_| {
+            ModeSearch::Lowest => real(0.0).or_else(|_: IntegrateError| {
                 // A machine that is free to drift.
-                let [mass, stiffness] = [Matrix::Mass, Matrix::Stiffness]
-                    .map(|which| largest_row(system.matrix(which)));
-                let omega = if stiffness > 0.0 { (stiffness / mass).sqrt() } else { 1.0 };
-                factored(Complex::from(-1e-3 * omega))
+                let omega = match fastest(system) {
+                    0.0 => 1.0,
+                    omega => omega,
+                };
+                real(-1e-3 * omega)
             }),
             ModeSearch::NearOmega(omega) if omega > 0.0 && omega.is_finite() => {
-                factored(Complex::new(0.0, omega))
+                let shift = Complex::new(0.0, omega);
+                let (matrix, sizes) = dynamic_stiffness(system, shift);
+                let factors =
+                    GeneralLu::new(matrix, &sizes).map_err(|smallest| singular(shift, smallest))?;
+                Ok(Self { system, shift, factors: Factors::Complex(Box::new(factors)) })
             }
             ModeSearch::NearOmega(value) => Err(IntegrateError::Parameter {
                 scheme: "modes near a frequency",
@@ -158,21 +170,30 @@ impl<'a> Inverse<'a> {
     fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         let (x, v) = z.as_slice().split_at(n);
-        self.right.fill(0.0);
-        let (re, im) = self.right.split_at_mut(n);
-        subtract(self.system.matrix(Matrix::Mass), v, 1.0, re);
-        subtract(self.system.matrix(Matrix::Damping), x, 1.0, re);
-        subtract(self.system.matrix(Matrix::Mass), x, self.shift.re, re);
-        if self.shift.im != 0.0 {
-            subtract(self.system.matrix(Matrix::Mass), x, self.shift.im, im);
+        let mut right = vec![0.0; n];
+        subtract(self.system.matrix(Matrix::Mass), v, 1.0, &mut right);
+        subtract(self.system.matrix(Matrix::Damping), x, 1.0, &mut right);
+        subtract(self.system.matrix(Matrix::Mass), x, self.shift.re, &mut right);
+        let mut image = DVector::zeros(2 * n);
+        match &mut self.factors {
+            Factors::Real(factors) => {
+                factors.solve(&mut right);
+                for (i, y) in right.iter().enumerate() {
+                    (image[i], image[n + i]) = (*y, x[i] + self.shift.re * y);
+                }
+            }
+            Factors::Complex(factors) => {
+                let mut imaginary = vec![0.0; n];
+                subtract(self.system.matrix(Matrix::Mass), x, self.shift.im, &mut imaginary);
+                let parts = right.iter().zip(&imaginary);
+                let mut y: Vec<_> = parts.map(|(re, im)| Complex::new(*re, *im)).collect();
+                factors.solve(&mut y);
+                for (i, y) in y.iter().enumerate() {
+                    (image[i], image[n + i]) = (y.re, x[i] + (self.shift * y).re);
+                }
+            }
         }
-        self.factors.solve(&mut self.right);
-        let (re, im) = self.right.split_at(n);
-        let imaginary = |i: usize| im.get(i).copied().unwrap_or(0.0);
-        DVector::from_fn(2 * n, |i, _| match i.checked_sub(n) {
-            None => re[i],
-            Some(i) => x[i] + self.shift.re * re[i] - self.shift.im * imaginary(i),
-        })
+        image
     }
 
     /// The eigenvalue of the system that belongs to `theta` of the operator: of two the nearer one to
@@ -200,29 +221,37 @@ fn subtract(matrix: &CsrMatrix<f64>, x: &[f64], scale: f64, y: &mut [f64]) {
     }
 }
 
-/// K + σC + σ²M and the sizes of the sums' terms row by row; in real form if σ is not real.
-fn dynamic_stiffness(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec<f64>) {
-    let square = shift * shift;
-    let part = |k: f64, c: f64, m: f64| {
-        combination(&[
-            (k, system.matrix(Matrix::Stiffness)),
-            (c, system.matrix(Matrix::Damping)),
-            (m, system.matrix(Matrix::Mass)),
-        ])
-    };
-    let (real, sizes) = part(1.0, shift.re, square.re);
-    if shift.im == 0.0 {
-        return (real, sizes);
-    }
-    let (imaginary, more) = part(0.0, shift.im, square.im);
+/// The real part of K + σC + σ²M, and the sizes of the sums' terms row by row.
+fn real_part(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec<f64>) {
+    combination(&[
+        (1.0, system.matrix(Matrix::Stiffness)),
+        (shift.re, system.matrix(Matrix::Damping)),
+        ((shift * shift).re, system.matrix(Matrix::Mass)),
+    ])
+}
+
+/// K + σC + σ²M, and the sizes of the sums' terms row by row.
+fn dynamic_stiffness(
+    system: &SparseSystem,
+    shift: Complex<f64>,
+) -> (CscMatrix<Complex<f64>>, Vec<f64>) {
+    let (real, sizes) = real_part(system, shift);
+    let (imaginary, more) = combination(&[
+        (shift.im, system.matrix(Matrix::Damping)),
+        ((shift * shift).im, system.matrix(Matrix::Mass)),
+    ]);
     let n = system.dof();
-    let entries = real
-        .triplet_iter()
-        .flat_map(|(i, j, v)| [(i, j, *v), (n + i, n + j, *v)])
-        .chain(imaginary.triplet_iter().flat_map(|(i, j, v)| [(i, n + j, -*v), (n + i, j, *v)]));
-    let matrix = mechid_model::triplets(2 * n, entries).expect("rows and columns are below 2n");
-    let sizes: Vec<f64> = sizes.iter().zip(&more).map(|(a, b)| a + b).collect();
-    (matrix, [&sizes[..], &sizes[..]].concat())
+    let mut sum = CooMatrix::new(n, n);
+    real.triplet_iter().for_each(|(i, j, v)| sum.push(i, j, Complex::new(*v, 0.0)));
+    imaginary.triplet_iter().for_each(|(i, j, v)| sum.push(i, j, Complex::new(0.0, *v)));
+    (CscMatrix::from(&sum), sizes.iter().zip(&more).map(|(a, b)| a + b).collect())
+}
+
+/// √(‖K‖ / ‖M‖) (rad/s), the size of the highest natural frequency.
+fn fastest(system: &SparseSystem) -> f64 {
+    let [mass, stiffness] =
+        [Matrix::Mass, Matrix::Stiffness].map(|which| largest_row(system.matrix(which)));
+    (stiffness / mass).sqrt()
 }
 
 /// Largest sum of moduli of a row.
@@ -347,7 +376,8 @@ impl Space {
                 continue;
             }
             let residual = residual(system, value, &shape);
-            let mode = SparseMode { mode: Mode::new(value, shape), residual };
+            let is_rigid_body = value.norm() <= EIGENVALUE_ROUNDING * fastest(system);
+            let mode = SparseMode { mode: Mode::new(value, shape), residual, is_rigid_body };
             found.push(Found { mode, converged: missed <= CONVERGED && residual <= RESIDUAL });
         }
         let distance = |found: &Found| {

@@ -63,5 +63,7 @@ pub use parquet::{
 };
 pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 pub use standard::{input_name, is_standard_output, output_name};
-pub use system::{NonlinearDescription, SystemMatrices, read_nonlinear, read_system};
+pub use system::{
+    NonlinearDescription, SystemMatrices, read_nonlinear, read_sparse_system, read_system,
+};
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

@@ -45,10 +45,6 @@ impl From<&SecondOrderSystem> for SystemMatrices {
 /// # Errors
 /// [`IoError::Read`], [`IoError::NotJson`], [`IoError::Json`], [`IoError::Description`], [`IoError::Model`].
 pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError> {
-    #[derive(Deserialize)]
-    struct Described {
-        system: SystemDescription,
-    }
     let (file, mut described) = json::read::<Described>(path.as_ref())?;
     match described.system.load(&file, json::folder(path.as_ref()))? {
         None => described.system.system(&file),
@@ -56,11 +52,29 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
     }
 }
 
+/// Reads the system in a JSON file, as [`read_system`] does, in sparse form and of any size.
+///
+/// # Errors
+/// As [`read_system`].
+pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoError> {
+    let (file, mut described) = json::read::<Described>(path.as_ref())?;
+    match described.system.load(&file, json::folder(path.as_ref()))? {
+        None => Ok(SparseSystem::from(&described.system.system(&file)?)),
+        Some(sparse) => Ok(sparse),
+    }
+}
+
+/// A file with a system in it.
+#[derive(Deserialize)]
+struct Described {
+    system: SystemDescription,
+}
+
 /// Refusal of a sparse machine where all entries of its matrices are needed.
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in Matrix Market files: of more than {DENSE_DOF} only \
-         the linear response from a start can be simulated"
+         the linear response from a start can be simulated, and some of the modes found"
     );
     IoError::Description { file: file.into(), what }
 }

@@ -31,11 +31,13 @@
 //! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
 //! | [`excitation`] | multisines for a test with one or several inputs, and how good they are |
 //! | [`simulation`] | the record that a described experiment gives, and its summary |
+//! | [`modes`] | some of the modes of a large machine |
 //! | [`stability`] | time-stepping schemes side by side |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
 
 pub mod excitation;
+pub mod modes;
 pub mod simulation;
 pub mod stability;
 

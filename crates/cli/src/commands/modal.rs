@@ -1,9 +1,13 @@
 //! `mechid modal`: frequencies, damping ratios and shapes of a machine.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use clap::Args;
 use mechid::analysis::{Machine, ModalSummary};
+use mechid::integrate::ModeSearch;
+use mechid::io::{input_name, read_sparse_system};
+use mechid::modes::SelectedModes;
 use mechid::report::ToFigure as _;
 
 use crate::args::{PlotArgs, ReportArgs, StyleArgs};
@@ -19,16 +23,28 @@ use crate::outcome::{Files, Outcome};
 /// every pair of motion and force, of more where motion and force share their place, up to six of
 /// them. Of a machine whose nonlinear terms were identified the frequency of each mode over its
 /// amplitude is told and drawn instead, as far as the data reached.
+///
+/// A large machine, up to some 100,000 degrees of freedom in Matrix Market files, has too many modes
+/// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency. They
+/// have no standard errors and no picture; --json has their shapes.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
   mechid modal found.json
   mechid identify rotor.csv --force fx,fy --displacement x,y --json | mechid modal -
-  mechid modal examples/machine.json --plot modes.svg")]
+  mechid modal examples/machine.json --plot modes.svg
+  mechid modal casing.json --modes 10
+  mechid modal casing.json --modes 4 --near-hz 50")]
 pub struct ModalArgs {
     /// JSON with a `system`: mass, damping and stiffness in kg, N·s/m and N/m (-: on standard input)
     #[arg(value_name = "SYSTEM.json")]
     system: PathBuf,
+    /// Find only this many modes, those of the lowest natural frequencies
+    #[arg(long, value_name = "COUNT", conflicts_with = "plot")]
+    modes: Option<usize>,
+    /// With --modes: find those nearest to this frequency, in Hz
+    #[arg(long, value_name = "HZ", requires = "modes")]
+    near_hz: Option<f64>,
     #[command(flatten)]
     plot: PlotArgs,
     #[command(flatten)]
@@ -45,6 +61,13 @@ impl ModalArgs {
 
     /// Reads the machine and finds its modes.
     pub fn run(&self) -> Result<Outcome, CliError> {
+        if let Some(count) = self.modes {
+            let machine = read_sparse_system(&self.system)?;
+            let search =
+                self.near_hz.map_or(ModeSearch::Lowest, |hz| ModeSearch::NearOmega(TAU * hz));
+            let found = SelectedModes::of(input_name(&self.system), &machine, search, count)?;
+            return Outcome::new(found.to_string(), &found);
+        }
         let machine = Machine::read(&self.system)?;
         let modes = ModalSummary::of(&machine)?;
         Outcome::new(modes.to_string(), &modes)?

@@ -58,6 +58,11 @@ impl Ordering {
         }
     }
 
+    /// Number of diagonals that hold entries, at most.
+    pub(crate) fn diagonals(&self, pattern: &SparsityPattern) -> usize {
+        2 * self.width(pattern) + 1
+    }
+
     /// Largest distance of an entry from the diagonal.
     fn width(&self, pattern: &SparsityPattern) -> usize {
         let places = self.places(pattern.major_dim());

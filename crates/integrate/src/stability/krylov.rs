@@ -22,11 +22,7 @@ pub(super) fn scattered(len: usize) -> DVector<f64> {
 
 /// One of many such vectors, by its number.
 pub(crate) fn scattered_number(len: usize, number: usize) -> DVector<f64> {
-    let mut seed = 0x9E37_79B9_7F4A_7C15_u64.wrapping_mul(2 * number as u64 + 1);
-    let vector = DVector::from_fn(len, |_, _| {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    });
+    let vector = DVector::from_iterator(len, crate::sparse::scattered(number).take(len));
     vector.normalize()
 }
 

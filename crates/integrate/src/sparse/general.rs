@@ -1,0 +1,116 @@
+//! LU factors of any sparse matrix, real or complex, by the crate `faer`.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+use nalgebra::ComplexField;
+use nalgebra_sparse::csc::CscMatrix;
+
+use super::scattered;
+
+/// Solutions from which the smallest singular value is judged.
+const INVERSE_STEPS: usize = 4;
+
+/// Factors of a matrix whose columns are put in the order of little fill-in (COLAMD) and whose rows, scaled
+/// by the sizes of their terms, are exchanged for stability.
+pub(crate) struct GeneralLu<T> {
+    symbolic: SymbolicLu<usize>,
+    numeric: NumericLu<usize, T>,
+    /// 1 / the size of each row's terms.
+    scales: Vec<f64>,
+    scratch: MemBuffer,
+}
+
+impl<T> GeneralLu<T>
+where
+    T: ComplexField<RealField = f64> + faer::traits::ComplexField,
+{
+    /// Factors `matrix`; its reciprocal condition, roughly, if that is no more than rounding. The rows are
+    /// sums of terms of the given `sizes`.
+    pub(crate) fn new(mut matrix: CscMatrix<T>, sizes: &[f64]) -> Result<Self, f64> {
+        if sizes.iter().any(|size| !(*size > 0.0 && size.is_finite())) {
+            return Err(0.0);
+        }
+        let scales: Vec<f64> = sizes.iter().map(|size| size.recip()).collect();
+        for (i, _, value) in matrix.triplet_iter_mut() {
+            *value *= T::from_real(scales[i]);
+        }
+        let pattern = pattern(&matrix);
+        let view = SparseColMatRef::new(pattern, matrix.values());
+        let symbolic = factorize_symbolic_lu(pattern, Default::default()).map_err(|_| 0.0)?;
+        let workspace = symbolic.factorize_numeric_lu_scratch::<T>(Par::Seq, Default::default());
+        let mut workspace = MemBuffer::try_new(workspace).map_err(|_| 0.0)?;
+        let mut numeric = NumericLu::new();
+        symbolic
+            .factorize_numeric_lu(
+                &mut numeric,
+                view,
+                Par::Seq,
+                MemStack::new(&mut workspace),
+                Default::default(),
+            )
+            .map_err(|_| 0.0)?;
+        let scratch = symbolic.solve_in_place_scratch::<T>(1, Par::Seq);
+        let scratch = MemBuffer::try_new(scratch).map_err(|_| 0.0)?;
+        let mut factors = Self { symbolic, numeric, scales, scratch };
+        match factors.reciprocal_condition() {
+            // NaN (from a pivot of zero) fails the test too.
+            reciprocal if reciprocal > f64::EPSILON => Ok(factors),
+            reciprocal => Err(reciprocal),
+        }
+    }
+
+    /// Solves for `b`, in place.
+    pub(crate) fn solve(&mut self, b: &mut [T]) {
+        b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= T::from_real(*scale));
+        self.solve_scaled(b);
+    }
+
+    fn solve_scaled(&mut self, b: &mut [T]) {
+        let n = b.len();
+        LuRef::new_unchecked(&self.symbolic, &self.numeric).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(b, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
+
+    /// Smallest shrinking of a vector by the matrix of scaled rows, whose largest entry is 1 at most, that
+    /// some inverse iteration finds.
+    fn reciprocal_condition(&mut self) -> f64 {
+        let n = self.scales.len();
+        let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
+        let mut growth = 0.0_f64;
+        for _ in 0..INVERSE_STEPS {
+            let before = largest(&vector);
+            vector.iter_mut().for_each(|v| *v /= T::from_real(before));
+            self.solve_scaled(&mut vector);
+            let after = largest(&vector);
+            if !after.is_finite() {
+                return 0.0;
+            }
+            growth = growth.max(after);
+        }
+        growth.recip()
+    }
+}
+
+/// Returns whether the symmetric `matrix` has a Cholesky factor.
+pub(super) fn has_cholesky_factor(matrix: &CscMatrix<f64>) -> bool {
+    SparseColMatRef::new(pattern(matrix), matrix.values()).sp_cholesky(Side::Lower).is_ok()
+}
+
+fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, usize> {
+    let (offsets, rows) = (matrix.col_offsets(), matrix.row_indices());
+    SymbolicSparseColMatRef::new_checked(matrix.nrows(), matrix.ncols(), offsets, None, rows)
+}
+
+/// Largest modulus; NaN if there is one.
+fn largest<T: ComplexField<RealField = f64>>(vector: &[T]) -> f64 {
+    vector
+        .iter()
+        .map(|v| v.clone().modulus())
+        .fold(0.0, |most: f64, v| if v <= most { most } else { v })
+}
