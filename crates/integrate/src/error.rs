@@ -119,6 +119,15 @@ pub enum IntegrateError {
         /// Degrees of freedom of the system.
         dof: usize,
     },
+    /// Modes are searched for near a frequency that none has.
+    #[error(
+        "modes are searched for near a positive frequency, got {omega} rad/s",
+        omega = message::number(*omega)
+    )]
+    SearchFrequency {
+        /// The frequency given, in rad/s.
+        omega: f64,
+    },
     /// Fewer modes than wanted were found to rounding.
     #[error(
         "{found} of {} converged in a space of {vectors} vectors: ask for fewer, or for those near another \

@@ -34,6 +34,9 @@ pub struct SparseMode {
 /// symmetric rotor in its two planes, are found up to this number.
 const START_VECTORS: usize = 4;
 
+/// Steps by which the lowest natural frequency is guessed.
+const LOWEST_STEPS: usize = 3;
+
 /// Largest part of itself by which an eigenvalue of the inverted operator may miss its equation.
 const CONVERGED: f64 = 1e-8;
 
@@ -71,7 +74,7 @@ const RESIDUAL: f64 = 1e-12;
 /// Modes of one eigenvalue are found up to four.
 ///
 /// # Errors
-/// [`IntegrateError::Parameter`] for an ω that is not positive and finite, [`IntegrateError::SingularShift`]
+/// [`IntegrateError::SearchFrequency`] for an ω that is not positive and finite, [`IntegrateError::SingularShift`]
 /// if the matrix is singular, [`IntegrateError::ModesNotConverged`].
 ///
 /// # Source
@@ -114,10 +117,12 @@ pub fn sparse_modes(
     }
 }
 
-/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ].
+/// x ↦ Re (A − σB)⁻¹B x for the first-order form A z = λ B z of the equation of motion, z = [φ; λφ / s].
 struct Inverse<'a> {
     system: &'a SparseSystem,
     shift: Complex<f64>,
+    /// s, a frequency (rad/s) of the modes searched for: both halves of their z are then of one size.
+    scale: f64,
     factors: Factors,
 }
 
@@ -138,7 +143,16 @@ impl<'a> Inverse<'a> {
             let (matrix, sizes) = real_part(system, shift.into());
             let factors = SparseLu::new(&matrix, &sizes)
                 .map_err(|smallest| singular(shift.into(), smallest))?;
-            Ok(Self { system, shift: shift.into(), factors: Factors::Real(factors) })
+            let mut inverse = Self {
+                system,
+                shift: shift.into(),
+                scale: -shift,
+                factors: Factors::Real(factors),
+            };
+            if shift == 0.0 {
+                inverse.scale = inverse.lowest();
+            }
+            Ok(inverse)
         };
         match search {
             ModeSearch::Lowest => real(0.0).or_else(|_: IntegrateError| {
@@ -154,24 +168,39 @@ impl<'a> Inverse<'a> {
                 let (matrix, sizes) = dynamic_stiffness(system, shift);
                 let factors =
                     GeneralLu::new(matrix, &sizes).map_err(|smallest| singular(shift, smallest))?;
-                Ok(Self { system, shift, factors: Factors::Complex(Box::new(factors)) })
+                let factors = Factors::Complex(Box::new(factors));
+                Ok(Self { system, shift, scale: omega, factors })
             }
-            ModeSearch::NearOmega(value) => Err(IntegrateError::Parameter {
-                scheme: "modes near a frequency",
-                parameter: "omega",
-                least: f64::MIN_POSITIVE,
-                most: f64::MAX,
-                value,
-            }),
+            ModeSearch::NearOmega(omega) => Err(IntegrateError::SearchFrequency { omega }),
         }
     }
 
-    /// With Q y = −(M v + (C + σM) x), w = x + σ y: the real parts of y and w.
+    /// Roughly the lowest natural frequency (rad/s) without damping, by steps of x ← K⁻¹M x.
+    fn lowest(&mut self) -> f64 {
+        let n = self.system.dof();
+        let Factors::Real(factors) = &mut self.factors else { return 1.0 };
+        let mut x = scattered_number(n, 0);
+        let mut growth = 1.0;
+        for _ in 0..LOWEST_STEPS {
+            let mut next = vec![0.0; n];
+            subtract(self.system.matrix(Matrix::Mass), x.as_slice(), 1.0, &mut next);
+            factors.solve(&mut next);
+            let next = DVector::from_vec(next);
+            growth = next.norm();
+            if !(growth > 0.0 && growth.is_finite()) {
+                return 1.0;
+            }
+            x = next / growth;
+        }
+        growth.sqrt().recip()
+    }
+
+    /// With Q y = −(M v + (C + σM) x), w = x + σ y: the real parts of y and w, v and w in units of s.
     fn apply(&mut self, z: &DVector<f64>) -> DVector<f64> {
         let n = self.system.dof();
         let (x, v) = z.as_slice().split_at(n);
         let mut right = vec![0.0; n];
-        subtract(self.system.matrix(Matrix::Mass), v, 1.0, &mut right);
+        subtract(self.system.matrix(Matrix::Mass), v, self.scale, &mut right);
         subtract(self.system.matrix(Matrix::Damping), x, 1.0, &mut right);
         subtract(self.system.matrix(Matrix::Mass), x, self.shift.re, &mut right);
         let mut image = DVector::zeros(2 * n);
@@ -179,7 +208,7 @@ impl<'a> Inverse<'a> {
             Factors::Real(factors) => {
                 factors.solve(&mut right);
                 for (i, y) in right.iter().enumerate() {
-                    (image[i], image[n + i]) = (*y, x[i] + self.shift.re * y);
+                    (image[i], image[n + i]) = (*y, (x[i] + self.shift.re * y) / self.scale);
                 }
             }
             Factors::Complex(factors) => {
@@ -189,7 +218,7 @@ impl<'a> Inverse<'a> {
                 let mut y: Vec<_> = parts.map(|(re, im)| Complex::new(*re, *im)).collect();
                 factors.solve(&mut y);
                 for (i, y) in y.iter().enumerate() {
-                    (image[i], image[n + i]) = (y.re, x[i] + (self.shift * y).re);
+                    (image[i], image[n + i]) = (y.re, (x[i] + (self.shift * y).re) / self.scale);
                 }
             }
         }
@@ -370,7 +399,7 @@ impl Space {
                 z.zip_apply(q, |z: &mut Complex<f64>, q| *z += y * q);
             }
             let shape = z.rows(0, n).into_owned();
-            let about = shape.dotc(&z.rows(n, n)) / Complex::from(shape.norm_squared());
+            let about = shape.dotc(&z.rows(n, n)) * inverse.scale / shape.norm_squared();
             let value = inverse.eigenvalue(theta, about);
             if !(value.re.is_finite() && value.im.is_finite()) || shape.camax() == 0.0 {
                 continue;

@@ -46,7 +46,11 @@ fn a_step_of_a_large_system_allocates_nothing() {
     let shuffled = |i: usize| i * 7 % n;
     let scattered =
         triplets(n, stiffness.triplet_iter().map(|(i, j, v)| (shuffled(i), shuffled(j), *v)));
-    for stiffness in [stiffness.clone(), scattered.unwrap()] {
+    // Without an order of a narrow band.
+    let far = (0..n).flat_map(|i| [(i, (i * i + 1) % n), (i, (7 * i + 3) % n)]);
+    let far = far.flat_map(|(i, j)| [(i, j, -300.0), (j, i, -300.0)]);
+    let wide = triplets(n, far.chain((0..n).map(|i| (i, i, 4000.0)))).unwrap();
+    for stiffness in [stiffness.clone(), scattered.unwrap(), wide] {
         let (mass, damping) = (band(n, &[(0, 1.0)]), &stiffness * 1e-4);
         let linear = SparseSystem::new(mass, damping, stiffness).unwrap();
         let film = ForceFunction::new(vec![4, 9], |t, x, v, g| {

@@ -1,5 +1,6 @@
 //! Machines in Matrix Market files, and the degrees of freedom that are recorded.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -67,6 +68,37 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
     }
     // Of a dense machine every force is recorded.
     assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
+}
+
+/// Judge: ω = 2 √(k/m) sin(r π / 2(n + 1)); the damping is that part of K.
+#[test]
+fn some_modes_of_a_large_machine_are_found() {
+    let home = tempfile::tempdir().unwrap();
+    let n = 3000;
+    chain(home.path(), n, "");
+    let exact = |r: usize| 60.0 * (r as f64 * PI / (2.0 * (n + 1) as f64)).sin();
+    let told = mechid(home.path(), "modal chain/chain.json --modes 3");
+    assert!(told.contains("3000 degrees of freedom, 3 modes of lowest frequency"), "{told}");
+    let hz = exact(1000) / TAU;
+    let command = format!("modal chain/chain.json --modes 1 --near-hz {hz} --json");
+    for (command, number) in [("modal chain/chain.json --modes 3 --json", 1), (&command, 1000)] {
+        let told: serde_json::Value = serde_json::from_str(&mechid(home.path(), command)).unwrap();
+        let mode = &told["modes"][0];
+        let frequency = mode["natural_frequency_hz"].as_f64().unwrap() * TAU;
+        assert!((frequency / exact(number) - 1.0).abs() < 1e-9, "{command}: {frequency}");
+        // C = K / 9,000: ζ = ω / 18,000.
+        let damping = mode["damping_ratio"].as_f64().unwrap();
+        assert!((damping * 18_000.0 / exact(number) - 1.0).abs() < 1e-6, "{command}: {damping}");
+        assert_eq!(mode["shape"].as_array().unwrap().len(), n);
+    }
+    for (rest, expected) in [
+        ("--near-hz 3", "--modes"),
+        ("--modes 2 --near-hz 0", "near a positive frequency"),
+        ("--modes 2 --plot x.svg", "--plot"),
+    ] {
+        let refused = refused(home.path(), &format!("modal chain/chain.json {rest}"));
+        assert!(refused.contains(expected), "{rest}: {refused}");
+    }
 }
 
 #[test]

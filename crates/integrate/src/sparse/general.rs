@@ -114,3 +114,98 @@ fn largest<T: ComplexField<RealField = f64>>(vector: &[T]) -> f64 {
         .map(|v| v.clone().modulus())
         .fold(0.0, |most: f64, v| if v <= most { most } else { v })
 }
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::linear_algebra::hermitian_eigen;
+    use mechid_model::triplets;
+    use nalgebra::{Complex, DMatrix, DVector};
+    use nalgebra_sparse::csr::CsrMatrix;
+
+    use super::super::{Ordering, SparseLu, WIDEST_BAND, is_positive_definite};
+    use super::*;
+
+    /// Every degree of freedom bound to a few others far away, so that no order makes a narrow band; weak
+    /// diagonal entries ask for exchanges of rows.
+    fn wide(n: usize, diagonal: f64, skew: f64) -> CsrMatrix<f64> {
+        let links = (0..n).flat_map(|i| [(i, (i * i + 1) % n), (i, (7 * i + 3) % n)]);
+        let entries = links.flat_map(|(i, j)| [(i, j, -1.0 - skew), (j, i, -1.0 + skew)]);
+        let own = (0..n).map(|i| (i, i, diagonal + 0.01 * (i % 13) as f64));
+        triplets(n, own.chain(entries)).unwrap()
+    }
+
+    fn sizes(matrix: &CsrMatrix<f64>) -> Vec<f64> {
+        matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
+    }
+
+    #[test]
+    fn solutions_of_wide_matrices_are_the_dense_ones() {
+        for (diagonal, skew) in [(9.0, 0.0), (9.0, 0.4), (0.02, 0.4)] {
+            let matrix = wide(700, diagonal, skew);
+            let ordering = Ordering::narrowing(matrix.pattern());
+            assert!(ordering.diagonals(matrix.pattern()) > WIDEST_BAND);
+            let x = DVector::from_fn(700, |i, _| (i as f64).sin());
+            let b = &DMatrix::from(&matrix) * &x;
+            let mut found = b.clone();
+            let mut factors = SparseLu::new(&matrix, &sizes(&matrix)).unwrap();
+            factors.solve(found.as_mut_slice());
+            let residual = (&DMatrix::from(&matrix) * &found - b).amax();
+            assert!(residual < 1e-12 * found.amax(), "{diagonal} {skew}: {residual:e}");
+            if diagonal > 1.0 {
+                assert!((found - x).amax() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn complex_solutions_are_the_dense_ones() {
+        let matrix = wide(150, 4.0, 0.3);
+        let dense = DMatrix::from(&matrix).map(|v| Complex::new(v, 0.3 * v * v));
+        let x = DVector::from_fn(150, |i, _| Complex::new((i as f64).sin(), (i as f64).cos()));
+        let mut found = &dense * &x;
+        let sizes: Vec<f64> =
+            dense.row_iter().map(|row| row.iter().map(|v| v.norm()).sum()).collect();
+        let mut factors = GeneralLu::new(CscMatrix::from(&dense), &sizes).unwrap();
+        factors.solve(found.as_mut_slice());
+        assert!((found - x).camax() < 1e-12);
+    }
+
+    #[test]
+    fn singular_wide_matrices_are_refused() {
+        // Laplacian of the links: the same everywhere costs nothing.
+        let n = 700;
+        let links = wide(n, 0.0, 0.0);
+        let degree = |i: usize| -links.row(i).values().iter().sum::<f64>();
+        let free = triplets(
+            n,
+            links
+                .triplet_iter()
+                .map(|(i, j, v)| (i, j, *v))
+                .chain((0..n).map(|i| (i, i, degree(i)))),
+        )
+        .unwrap();
+        assert!(SparseLu::new(&free, &sizes(&free)).is_err_and(|reciprocal| reciprocal < 1e-15));
+        // A row and a column without entries.
+        let empty = triplets(
+            n,
+            wide(n, 9.0, 0.0)
+                .triplet_iter()
+                .filter_map(|(i, j, v)| (i != 5 && j != 5).then_some((i, j, *v))),
+        );
+        let empty = empty.unwrap();
+        let mut row_sizes = sizes(&empty);
+        assert!(SparseLu::new(&empty, &row_sizes).is_err());
+        row_sizes[5] = 1.0;
+        assert!(SparseLu::new(&empty, &row_sizes).is_err());
+    }
+
+    #[test]
+    fn definiteness_of_wide_matrices_is_that_of_their_eigenvalues() {
+        for (diagonal, definite) in [(9.0, true), (3.0, false)] {
+            let matrix = wide(500, diagonal, 0.0);
+            let lowest = hermitian_eigen(DMatrix::from(&matrix)).unwrap().eigenvalues.min();
+            assert_eq!(lowest > 0.0, definite, "{lowest}");
+            assert_eq!(is_positive_definite(&matrix), definite);
+        }
+    }
+}

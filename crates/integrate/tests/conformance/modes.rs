@@ -144,7 +144,7 @@ fn what_cannot_be_searched_is_refused() {
     let system = chain(5, true);
     for omega in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let refused = sparse_modes(&system, ModeSearch::NearOmega(omega), 1).unwrap_err();
-        assert!(matches!(refused, IntegrateError::Parameter { .. }), "{refused}");
+        assert!(matches!(refused, IntegrateError::SearchFrequency { .. }), "{refused}");
     }
     assert_eq!(sparse_modes(&system, ModeSearch::Lowest, 0).unwrap(), []);
     // One undamped oscillator, searched at its natural frequency.
@@ -152,4 +152,33 @@ fn what_cannot_be_searched_is_refused() {
     let system = SparseSystem::new(lumped(&[1.0]), lumped(&[0.0]), one()).unwrap();
     let refused = sparse_modes(&system, ModeSearch::NearOmega(2.0), 1).unwrap_err();
     assert!(matches!(refused, IntegrateError::SingularShift { .. }), "{refused}");
+}
+
+/// A cube of masses: by symmetry its frequencies come in threes and sixes.
+#[test]
+fn a_cube_has_the_frequencies_of_its_closed_form() {
+    let w = 8;
+    let at = |x: usize, y: usize, z: usize| (z * w + y) * w + x;
+    let mut entries = vec![];
+    for (x, y, z) in (0..w).flat_map(|x| (0..w).flat_map(move |y| (0..w).map(move |z| (x, y, z)))) {
+        entries.push((at(x, y, z), at(x, y, z), 5400.0));
+        let next = [(x + 1, y, z), (x, y + 1, z), (x, y, z + 1)];
+        for (i, j, k) in next.into_iter().filter(|(i, j, k)| *i < w && *j < w && *k < w) {
+            entries
+                .extend([(at(x, y, z), at(i, j, k), -900.0), (at(i, j, k), at(x, y, z), -900.0)]);
+        }
+    }
+    let stiffness = triplets(w * w * w, entries).unwrap();
+    let n = w * w * w;
+    let system = SparseSystem::new(band(n, &[(0, 1.0)]), band(n, &[(0, 0.3)]), stiffness).unwrap();
+    let part = |r: usize| 1800.0 - 1800.0 * (r as f64 * PI / (w + 1) as f64).cos();
+    let mut exact = vec![];
+    for (a, b, c) in (1..5).flat_map(|a| (1..5).flat_map(move |b| (1..5).map(move |c| (a, b, c)))) {
+        exact.push((part(a) + part(b) + part(c)).sqrt());
+    }
+    exact.sort_by(f64::total_cmp);
+    let found = sparse_modes(&system, ModeSearch::Lowest, 10).unwrap();
+    for (found, omega) in found.iter().zip(exact) {
+        assert!((found.mode.natural_frequency() / omega - 1.0).abs() < 1e-9, "{omega}: {found:?}");
+    }
 }
