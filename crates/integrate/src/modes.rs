@@ -13,9 +13,9 @@ use crate::stability::krylov::{eigenvector, scattered_number};
 /// The modes of a sparse system that [`sparse_modes`] looks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ModeSearch {
-    /// Those of the lowest natural frequencies |λ|.
+    /// Modes of the lowest natural frequencies |λ|.
     Lowest,
-    /// Those whose eigenvalues λ lie nearest to iω, with a positive ω in rad/s.
+    /// Modes whose eigenvalues λ lie nearest to iω, with a positive ω in rad/s.
     NearOmega(f64),
 }
 
