@@ -4,6 +4,7 @@ use mechid_model::{Matrix, Parameter};
 use mechid_signal::message;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
+use crate::covariance::{Covariance, Product};
 use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, finite, size, solve_compressed};
@@ -115,12 +116,12 @@ impl EquationOfMotion {
         Estimate::new(self.findings(unknowns)?.0)
     }
 
-    /// The estimate to be, and for every parameter how it follows from the right-hand side of its
-    /// equation: parameters × rows of the compressed data.
+    /// The estimate to be, and the factors of its covariance: how every parameter follows from the
+    /// right-hand side of its equation, and what that misses.
     pub(crate) fn findings(
         &self,
         unknowns: &Unknowns,
-    ) -> Result<(Findings, DMatrix<f64>), EstimateError> {
+    ) -> Result<(Findings, Product), EstimateError> {
         size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         let free = unknowns.free();
         if free.is_empty() {
@@ -143,18 +144,17 @@ impl EquationOfMotion {
                 residual_nrmse[*equation] = *nrmse;
             }
         }
-        let rows: Vec<_> =
-            places.iter().map(|p| p.group.solution.inverse.row(p.row).into_owned()).collect();
+        let product = product(&groups, &places, self.dof);
         let findings = Findings {
             values: values.collect(),
-            covariance: covariance(&places),
+            covariance: Covariance::Product(product.clone()),
             degrees_of_freedom: minimum(&groups),
             residual_nrmse,
             condition: groups.iter().map(|g| g.solution.condition).fold(1.0, f64::max),
             undetermined: groups.iter().flat_map(|g| g.undetermined(&free)).collect(),
             unknowns: unknowns.clone(),
         };
-        Ok((findings, DMatrix::from_rows(&rows)))
+        Ok((findings, product))
     }
 
     /// Rows \[ẍ | ẋ | x | F\] that stand for `rows` original ones with the same Gram matrix.
@@ -236,33 +236,55 @@ impl EquationOfMotion {
 /// Position of a free parameter among the solutions.
 struct Place<'a> {
     group: &'a Group,
+    /// Number of unknowns in the groups before.
+    first: usize,
     row: usize,
+    equation: usize,
     target: usize,
 }
 
 impl<'a> Place<'a> {
     fn of(parameter: &Parameter, groups: &'a [Group]) -> Self {
+        let equation = parameter.row();
+        let mut first = 0;
         let at = |group: &'a Group| {
-            let target = group.equations.iter().position(|e| *e == parameter.row())?;
+            let before = first;
+            first += group.columns.len();
+            let target = group.equations.iter().position(|e| *e == equation)?;
             let column = (parameter.matrix(), parameter.column());
             let row = group.columns.iter().position(|c| *c == column)?;
-            Some(Self { group, row, target })
+            Some(Self { group, first: before, row, equation, target })
         };
         groups.iter().find_map(at).expect("every free parameter is in a group")
     }
 }
 
-/// Cov(θ_p, θ_q) = S_ij · h_p·h_q, with S the residual covariance between the equations i and j
-/// of the two parameters and h the rows of the pseudo-inverses.
-fn covariance(places: &[Place<'_>]) -> DMatrix<f64> {
-    DMatrix::from_fn(places.len(), places.len(), |p, q| {
-        let (p, q) = (&places[p], &places[q]);
-        let (left, right) = (&p.group.solution, &q.group.solution);
-        let spare = left.degrees_of_freedom as f64 * right.degrees_of_freedom as f64;
-        let residual = left.residuals.column(p.target).dot(&right.residuals.column(q.target));
-        let variance = if spare > 0.0 { residual / spare.sqrt() } else { f64::INFINITY };
-        variance * left.inverse.row(p.row).dot(&right.inverse.row(q.row))
-    })
+/// The factors of the covariance.
+fn product(groups: &[Group], places: &[Place<'_>], dof: usize) -> Product {
+    let mut residual = DMatrix::zeros(dof, dof);
+    let solved = || {
+        groups.iter().flat_map(|group| {
+            let solution = &group.solution;
+            let residuals = solution.residuals.column_iter();
+            let freedom = solution.degrees_of_freedom as f64;
+            group.equations.iter().zip(residuals).map(move |(i, residual)| (*i, residual, freedom))
+        })
+    };
+    for (i, left, spare) in solved() {
+        for (j, right, other) in solved() {
+            let spare = spare * other;
+            residual[(i, j)] =
+                if spare > 0.0 { left.dot(&right) / spare.sqrt() } else { f64::INFINITY };
+        }
+    }
+    let inverses: Vec<_> =
+        groups.iter().flat_map(|group| group.solution.inverse.row_iter()).collect();
+    Product {
+        residual,
+        rows: DMatrix::from_rows(&inverses),
+        places: places.iter().map(|place| (place.equation, place.first + place.row)).collect(),
+        open: vec![false; places.len()],
+    }
 }
 
 fn minimum(groups: &[Group]) -> usize {

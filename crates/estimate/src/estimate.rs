@@ -7,6 +7,7 @@ use mechid_signal::message;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
+use crate::covariance::Covariance;
 use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::{EstimateError, Unknowns};
 
@@ -19,7 +20,7 @@ pub struct Estimate {
     unknowns: Unknowns,
     parameters: Vec<Parameter>,
     values: Vec<f64>,
-    covariance: DMatrix<f64>,
+    covariance: Covariance,
     degrees_of_freedom: usize,
     residual_nrmse: Vec<f64>,
     condition: f64,
@@ -30,7 +31,7 @@ pub struct Estimate {
 pub(crate) struct Findings {
     pub(crate) unknowns: Unknowns,
     pub(crate) values: Vec<f64>,
-    pub(crate) covariance: DMatrix<f64>,
+    pub(crate) covariance: Covariance,
     pub(crate) degrees_of_freedom: usize,
     pub(crate) residual_nrmse: Vec<f64>,
     pub(crate) condition: f64,
@@ -69,9 +70,7 @@ impl Estimate {
             for (parameter, _) in &undetermined.terms {
                 let Some(at) = parameters.iter().position(|p| p == parameter) else { continue };
                 findings.values[at] = f64::NAN;
-                findings.covariance.row_mut(at).fill(f64::NAN);
-                findings.covariance.column_mut(at).fill(f64::NAN);
-                findings.covariance[(at, at)] = f64::INFINITY;
+                findings.covariance.leave_open(at);
             }
         }
         let open = |p: &Parameter| {
@@ -79,7 +78,7 @@ impl Estimate {
         };
         for (at, p) in parameters.iter().enumerate().filter(|(_, p)| !open(p)) {
             let unbounded =
-                !findings.values[at].is_finite() || !findings.covariance[(at, at)].is_finite();
+                !findings.values[at].is_finite() || !findings.covariance.of(at).is_finite();
             if unbounded && findings.degrees_of_freedom > 0 {
                 return Err(EstimateError::Unbounded { parameter: p.to_string() });
             }
@@ -111,7 +110,7 @@ impl Estimate {
         self.parameters.iter().enumerate().map(|(at, parameter)| Estimated {
             parameter: *parameter,
             value: self.values[at],
-            standard_error: self.covariance[(at, at)].sqrt(),
+            standard_error: self.covariance.of(at).sqrt(),
             degrees_of_freedom: self.degrees_of_freedom,
         })
     }
@@ -133,7 +132,14 @@ impl Estimate {
     /// the two parameters' units (kg, N·s/m, N/m).
     ///
     /// An undetermined parameter has an infinite variance and NaN covariances.
-    pub fn covariance(&self) -> &DMatrix<f64> {
+    /// Least squares on the equations of motion keep its factors only: each call multiplies them out, and
+    /// n degrees of freedom have (3n²)² entries.
+    pub fn covariance(&self) -> DMatrix<f64> {
+        self.covariance.full()
+    }
+
+    /// Covariance in the form that the estimator found it in.
+    pub(crate) fn spread(&self) -> &Covariance {
         &self.covariance
     }
 
@@ -173,7 +179,7 @@ impl Estimate {
     /// As [`Estimate::system`]; [`EstimateError::Model`] if the covariance is not finite, which it is
     /// not with as many unknowns as equations.
     pub fn uncertain_system(&self) -> Result<UncertainSystem, EstimateError> {
-        let covariance = self.covariance.clone();
+        let covariance = self.covariance();
         Ok(UncertainSystem::new(self.system()?, self.parameters.clone(), covariance)?)
     }
 

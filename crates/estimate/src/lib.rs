@@ -25,6 +25,7 @@
 //! and records are those of `mechid-signal`.
 
 pub mod checks;
+mod covariance;
 pub mod derivatives;
 mod equation_of_motion;
 mod error;

@@ -6,6 +6,7 @@ use mechid_model::{
 };
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::covariance::Covariance;
 use crate::estimate::student_interval;
 use crate::{Estimate, EstimateError};
 
@@ -110,7 +111,7 @@ impl Estimate {
     /// here bordered and with damping.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, EstimateError> {
         let parameters: Vec<Parameter> = self.parameters().map(|p| p.parameter).collect();
-        modes(&self.system()?, &parameters, self.covariance(), self.degrees_of_freedom())
+        modes(&self.system()?, &parameters, self.spread(), self.degrees_of_freedom())
     }
 }
 
@@ -126,13 +127,14 @@ pub fn identified_modes(
     machine: &UncertainSystem,
     degrees_of_freedom: usize,
 ) -> Result<Vec<IdentifiedMode>, EstimateError> {
-    modes(machine.system(), machine.parameters(), machine.covariance(), degrees_of_freedom)
+    let covariance = Covariance::Full(machine.covariance().clone());
+    modes(machine.system(), machine.parameters(), &covariance, degrees_of_freedom)
 }
 
 fn modes(
     system: &SecondOrderSystem,
     parameters: &[Parameter],
-    covariance: &DMatrix<f64>,
+    covariance: &Covariance,
     degrees_of_freedom: usize,
 ) -> Result<Vec<IdentifiedMode>, EstimateError> {
     let spread = Spread { covariance, degrees_of_freedom };
@@ -177,7 +179,7 @@ fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
 
 /// Scatter of the parameters.
 struct Spread<'a> {
-    covariance: &'a DMatrix<f64>,
+    covariance: &'a Covariance,
     degrees_of_freedom: usize,
 }
 
@@ -258,7 +260,7 @@ impl Spread<'_> {
         if gradient.iter().any(|g| !g.is_finite()) {
             return f64::INFINITY;
         }
-        gradient.dot(&(self.covariance * gradient)).max(0.0).sqrt()
+        self.covariance.variance(gradient).max(0.0).sqrt()
     }
 }
 

@@ -206,10 +206,11 @@ fn in_order(fit: &OutputErrorFit, mass: &Matrix2<f64>) -> (DVector<f64>, DMatrix
     let mut values = DVector::zeros(3 * EACH);
     values.rows_mut(2 * EACH, EACH).copy_from_slice(&row_by_row(mass));
     let mut covariance = DMatrix::zeros(3 * EACH, 3 * EACH);
+    let found = estimate.covariance();
     for (from, (p, to)) in estimate.parameters().zip(&places).enumerate() {
         values[*to] = p.value;
         for (other, column) in places.iter().enumerate() {
-            covariance[(*to, *column)] = estimate.covariance()[(from, other)];
+            covariance[(*to, *column)] = found[(from, other)];
         }
     }
     (values, covariance)

@@ -343,5 +343,5 @@ fn covariance(fitted: &Fitted) -> ParameterCovariance {
         return ParameterCovariance::new(names, all.estimate.covariance(), freedom);
     }
     let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
-    ParameterCovariance::new(names, estimate.covariance(), estimate.degrees_of_freedom())
+    ParameterCovariance::new(names, &estimate.covariance(), estimate.degrees_of_freedom())
 }

@@ -121,7 +121,7 @@ pub fn identify_responses(
         system: SystemMatrices::from(&system),
         covariance: ParameterCovariance::new(
             names,
-            estimate.covariance(),
+            &estimate.covariance(),
             estimate.degrees_of_freedom(),
         ),
         analysis: how.clone(),

@@ -207,7 +207,7 @@ fn assemble(
     Estimate::new(Findings {
         unknowns: unknowns.clone(),
         values: places.iter().map(|(equation, at)| equation.values[*at]).collect(),
-        covariance,
+        covariance: covariance.into(),
         degrees_of_freedom: solved.clone().map(Equation::degrees_of_freedom).min().unwrap_or(0),
         residual_nrmse: equations.iter().map(|e| e.residual_nrmse).collect(),
         condition: solved.map(|e| e.condition).fold(1.0, f64::max),

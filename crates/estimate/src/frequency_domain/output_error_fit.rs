@@ -155,7 +155,7 @@ pub(super) fn finish(
     let estimate = Estimate::new(Findings {
         unknowns: unknowns.clone(),
         values: entries.to_vec(),
-        covariance: covariance * scale.level,
+        covariance: (covariance * scale.level).into(),
         degrees_of_freedom,
         residual_nrmse,
         condition,

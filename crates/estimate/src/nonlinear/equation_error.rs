@@ -176,7 +176,7 @@ impl Fit {
         let linear = Estimate::new(Findings {
             unknowns: equations.unknowns.clone(),
             values: self.coefficients[..free].to_vec(),
-            covariance: covariance.view((0, 0), (free, free)).into_owned(),
+            covariance: covariance.view((0, 0), (free, free)).into_owned().into(),
             degrees_of_freedom: freedom,
             residual_nrmse: self.nrmse.clone(),
             condition: condition.max(self.condition),

@@ -280,7 +280,7 @@ impl<'a> Problem<'a> {
         let linear = Estimate::new(Findings {
             unknowns: self.unknowns.clone(),
             values: theta.as_slice()[..free].to_vec(),
-            covariance: covariance.view((0, 0), (free, free)).into_owned(),
+            covariance: covariance.view((0, 0), (free, free)).into_owned().into(),
             degrees_of_freedom: freedom,
             residual_nrmse: unexplained.clone(),
             condition: start.linear().condition(),

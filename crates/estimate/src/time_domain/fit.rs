@@ -6,6 +6,7 @@ use nalgebra::{DMatrix, RowDVector};
 
 use super::Transitions;
 use super::continuous::Continuous;
+use crate::covariance::Product;
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, size, solve_compressed};
 use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
@@ -48,7 +49,7 @@ impl TimeDomainFit {
         let fitted = Fitted { rows, regression, continuous };
         let (mut findings, sensitivities) = fitted.parameters(unknowns)?;
         let [mass, _, _] = unknowns.assemble(&findings.values);
-        findings.covariance = fitted.covariance(&mass, &sensitivities)?;
+        findings.covariance = fitted.covariance(&mass, &sensitivities)?.into();
         let n = rows.dof();
         findings.residual_nrmse = fitted.regression.solution.residual_nrmse[n..].to_vec();
         findings.degrees_of_freedom = fitted.regression.solution.degrees_of_freedom;
@@ -238,7 +239,7 @@ impl Fitted<'_> {
         let findings = Findings {
             unknowns: unknowns.clone(),
             values: free.iter().map(|p| force[(p.row(), place(p))]).collect(),
-            covariance: DMatrix::zeros(0, 0),
+            covariance: DMatrix::zeros(0, 0).into(),
             degrees_of_freedom: 0,
             residual_nrmse: Vec::new(),
             condition: 1.0,
@@ -287,11 +288,11 @@ impl Fitted<'_> {
         }
         let parts = [acceleration.as_view(), v, x, f];
         let equations = EquationOfMotion::from_compressed(n, parts, rows.rows())?;
-        let (findings, inverse) = equations.findings(unknowns)?;
+        let (findings, Product { rows: inverse, places, .. }) = equations.findings(unknowns)?;
         let motion = equations.motion_and_force();
         let sensitivity = |(at, p): (usize, &Parameter)| {
             // Back from the order ẋ, x, F to x, ẋ, and the forces that act.
-            let all = inverse.row(at) * motion;
+            let all = inverse.row(places[at].1) * motion;
             let order =
                 (n..2 * n).chain(0..n).chain(self.regression.forces.iter().map(|j| 2 * n + j));
             let weight: Vec<f64> = order.map(|column| all[column]).collect();

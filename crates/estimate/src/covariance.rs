@@ -1,0 +1,127 @@
+//! Covariance of estimated parameters, every entry of it or the factors of a product.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Covariance of parameters θ.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Covariance {
+    /// Every entry.
+    Full(DMatrix<f64>),
+    /// Of equations that were solved one by one: n equations of 3n unknowns each have (3n²)² covariances,
+    /// but not many more than (3n)² numbers in them.
+    Product(Product),
+}
+
+/// Cov(θ_p, θ_q) = S_ij h_p·h_q, with S the residual covariance between the equations i and j of the two
+/// parameters and h the rows of the pseudo-inverses, which equations of the same regressors share.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Product {
+    /// S, equations × equations.
+    pub(crate) residual: DMatrix<f64>,
+    /// The different rows h, one below the other.
+    pub(crate) rows: DMatrix<f64>,
+    /// For every parameter the number of its equation, and that of its row h.
+    pub(crate) places: Vec<(usize, usize)>,
+    /// Whether the data leave it open.
+    pub(crate) open: Vec<bool>,
+}
+
+impl From<DMatrix<f64>> for Covariance {
+    fn from(all: DMatrix<f64>) -> Self {
+        Self::Full(all)
+    }
+}
+
+impl Covariance {
+    /// The variance of one parameter.
+    pub(crate) fn of(&self, at: usize) -> f64 {
+        match self {
+            Self::Full(all) => all[(at, at)],
+            Self::Product(product) if product.open[at] => f64::INFINITY,
+            Self::Product(Product { residual, rows, places, .. }) => {
+                let (i, h) = places[at];
+                residual[(i, i)] * rows.row(h).dot(&rows.row(h))
+            }
+        }
+    }
+
+    /// Says that the data leave a parameter open: its variance is infinite, its covariances are NaN.
+    pub(crate) fn leave_open(&mut self, at: usize) {
+        match self {
+            Self::Full(all) => {
+                all.row_mut(at).fill(f64::NAN);
+                all.column_mut(at).fill(f64::NAN);
+                all[(at, at)] = f64::INFINITY;
+            }
+            Self::Product(product) => product.open[at] = true,
+        }
+    }
+
+    /// All entries, parameters × parameters.
+    pub(crate) fn full(&self) -> DMatrix<f64> {
+        match self {
+            Self::Full(all) => all.clone(),
+            Self::Product(Product { residual, rows, places, open }) => {
+                let count = rows.nrows();
+                let across = DMatrix::from_fn(count, count, |h, k| rows.row(h).dot(&rows.row(k)));
+                DMatrix::from_fn(places.len(), places.len(), |p, q| {
+                    let ((i, h), (j, k)) = (places[p], places[q]);
+                    match open[p] || open[q] {
+                        false => residual[(i, j)] * across[(h, k)],
+                        true if p == q => f64::INFINITY,
+                        true => f64::NAN,
+                    }
+                })
+            }
+        }
+    }
+
+    /// gᵀ Σ g, the variance of gᵀθ.
+    pub(crate) fn variance(&self, gradient: &DVector<f64>) -> f64 {
+        match self {
+            Self::Full(all) => gradient.dot(&(all * gradient)),
+            Self::Product(Product { residual, rows, places, .. }) => {
+                // Σ_ij S_ij y_i·y_j with y_i the rows of the parameters of equation i, added up.
+                let mut sums = DMatrix::zeros(rows.ncols(), residual.nrows());
+                for (weight, (i, h)) in gradient.iter().zip(places) {
+                    sums.column_mut(*i).axpy(*weight, &rows.row(*h).transpose(), 1.0);
+                }
+                sums.tr_mul(&sums).dot(residual)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_product_is_the_sum_of_its_entries() {
+        let number = |i: usize, j: usize| ((3 * i + 5 * j + 1) as f64).sin();
+        let root = DMatrix::from_fn(3, 3, number);
+        let mut product = Covariance::Product(Product {
+            residual: &root * root.transpose(),
+            rows: DMatrix::from_fn(4, 6, number),
+            places: vec![(0, 0), (0, 1), (1, 0), (1, 1), (2, 2), (2, 3)],
+            open: vec![false; 6],
+        });
+        let full = product.full();
+        assert!((&full - full.transpose()).amax() < 1e-15);
+        for at in 0..6 {
+            assert_eq!(product.of(at), full[(at, at)]);
+        }
+        let gradient = DVector::from_fn(6, |at, _| number(at, 2));
+        let expected = gradient.dot(&(&full * &gradient));
+        let mut full = Covariance::Full(full);
+        for covariance in [&mut product, &mut full] {
+            assert!((covariance.variance(&gradient) / expected - 1.0).abs() < 1e-13);
+            covariance.leave_open(3);
+            assert_eq!(covariance.of(3), f64::INFINITY);
+        }
+        let (product, full) = (product.full(), full.full());
+        for (p, q) in product.iter().zip(&full) {
+            assert!(p == q || p.is_nan() && q.is_nan());
+        }
+    }
+}
