@@ -26,6 +26,16 @@ pub struct Mode {
 }
 
 impl Mode {
+    /// Makes a mode of λ, in rad/s, and any multiple of its shape, one entry per degree of freedom; `None`
+    /// unless Im λ ≥ 0 and all are finite and not all of the shape zero.
+    pub fn new(eigenvalue: Complex<f64>, shape: &DVector<Complex<f64>>) -> Option<Self> {
+        let largest = largest_entry(shape);
+        let finite = |z: &Complex<f64>| z.re.is_finite() && z.im.is_finite();
+        let sound = finite(&eigenvalue) && eigenvalue.im >= 0.0 && largest.norm() > 0.0;
+        let shape = shape / largest;
+        (sound && shape.iter().all(finite)).then_some(Self { eigenvalue, shape })
+    }
+
     /// λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
     pub fn eigenvalue(&self) -> Complex<f64> {
         self.eigenvalue
@@ -63,6 +73,12 @@ impl Mode {
     pub fn oscillates(&self) -> bool {
         self.eigenvalue.im > 0.0
     }
+}
+
+fn largest_entry(shape: &DVector<Complex<f64>>) -> Complex<f64> {
+    shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
+        if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
+    })
 }
 
 /// A growing free response exp(λt), Re λ > 0.
@@ -229,10 +245,7 @@ impl SecondOrderSystem {
             return Ok(None);
         }
         let shape = svd.v_t.as_ref().expect("asked for").row(row).adjoint();
-        let largest = shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
-            if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
-        });
-        Ok(Some(shape / largest))
+        Ok(Some(&shape / largest_entry(&shape)))
     }
 }
 
