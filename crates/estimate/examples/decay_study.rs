@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             100.0 * outcome.alarms as f64 / outcome.tested as f64,
         );
     }
-    for coloured in [false, true] {
+    for coloured in [false, true].into_iter().filter(|_| only.is_empty()) {
         for channels in [1, 4] {
             let found = found_in_noise(channels, coloured, runs as u64);
             let noise = if coloured { "AR(0.9)" } else { "white" };

@@ -71,16 +71,21 @@ impl Autoregression {
     /// Returns the prediction errors of `values` from sample `before` on, all of one variance; the first
     /// of the values is sample `first` of the record.
     pub(super) fn whitened(&self, values: &[f64], first: usize, before: usize) -> Vec<f64> {
-        if self.order() == 0 {
-            return values[before..].to_vec();
+        let mut errors = values[before..].to_vec();
+        let order = self.order();
+        // The first samples have fewer before them.
+        let ramp = order.saturating_sub(first + before).min(errors.len());
+        for (at, error) in errors.iter_mut().enumerate().take(ramp) {
+            let of = first + before + at;
+            let past = values[..before + at].iter().rev();
+            let predicted: f64 = self.predictors[of].iter().zip(past).map(|(a, v)| a * v).sum();
+            *error = (*error - predicted) / self.deviations[of];
         }
-        let error = |at: usize| {
-            let order = self.order().min(first + at);
-            let past = values[at - order..at].iter().rev();
-            let predicted: f64 = self.predictors[order].iter().zip(past).map(|(a, v)| a * v).sum();
-            (values[at] - predicted) / self.deviations[order]
-        };
-        (before..values.len()).map(error).collect()
+        for (lag, a) in (1..).zip(self.predictors.last().into_iter().flatten()) {
+            let past = &values[before + ramp - lag..];
+            errors[ramp..].iter_mut().zip(past).for_each(|(e, v)| *e -= a * v);
+        }
+        errors
     }
 }
 
@@ -115,6 +120,7 @@ mod tests {
         let whole = noise.whitened(&x, 0, 0);
         let later = noise.whitened(&x[100 - noise.order()..], 100 - noise.order(), noise.order());
         assert_eq!(whole[100..], later);
+        assert!(noise.order() > 0);
         // The first sample has the variance of the noise, 1/(1 − 0.9²), the others that of the errors.
         assert!((whole[0] / x[0] - (1.0f64 - 0.81).sqrt()).abs() < 0.05);
     }

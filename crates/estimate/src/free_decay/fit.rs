@@ -1,6 +1,6 @@
 //! The poles that make a record most likely, their number and the colour of the noise being given.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::autoregression::Autoregression;
 use super::poles::{Pole, columns, linear_columns};
@@ -10,8 +10,10 @@ use crate::triangular::TriangularFactor;
 const CHUNK: usize = 4096;
 /// Steps of a search.
 pub(super) const MAX_STEPS: usize = 50;
-/// Decrease of minus twice the log likelihood that ends a search.
-const TOLERANCE: f64 = 1e-7;
+/// Decrease of minus twice the log likelihood that ends the last search …
+pub(super) const FINE: f64 = 1e-7;
+/// … and one of those that compare numbers of modes.
+pub(super) const COARSE: f64 = 1e-2;
 /// Damping at which no descent is to be had.
 const MAX_DAMPING: f64 = 1e8;
 /// Residual over the RMS of a channel below which it is rounding.
@@ -96,12 +98,17 @@ impl Data {
             let end = self.len().min(first + CHUNK);
             let before = noise.order().min(first);
             let basis = columns(poles, self.constant, first - before, end, self.len());
-            let own = channels.iter().map(|c| self.samples.column(*c));
-            let own: Vec<_> = own.map(|c| c.rows_range(first - before..end).into_owned()).collect();
-            let all = basis.column_iter().map(|c| c.into_owned()).chain(own);
-            let all = all.flat_map(|c| noise.whitened(c.as_slice(), first - before, before));
-            let rows = DMatrix::from_iterator(end - first, width, all);
-            if !factor.push(&[rows.as_view()]) {
+            let rows = first - before..end;
+            let own = channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
+            let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
+            parts.extend(own);
+            let white: Vec<DMatrix<f64>>;
+            if noise.order() > 0 {
+                white =
+                    parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();
+                parts = white.iter().map(DMatrix::as_view).collect();
+            }
+            if !factor.push(&parts) {
                 return None;
             }
         }
@@ -146,12 +153,18 @@ impl Data {
         Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
     }
 
-    /// Searches the most likely poles from a start, the colour of the noise being given.
+    /// Searches the most likely poles from a start, the colour of the noise being given, until a step
+    /// decreases minus twice the log likelihood by less than `tolerance`.
     ///
     /// # Source
     /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of Kaufman
     /// (1975), BIT 15, 49–57; damping after Levenberg and Marquardt.
-    pub(super) fn refined(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Fit> {
+    pub(super) fn refined(
+        &self,
+        poles: &[Pole],
+        noise: &[Autoregression],
+        tolerance: f64,
+    ) -> Option<Fit> {
         let mut fit = self.at(poles, noise)?;
         let mut cost = fit.misfit(self.len());
         let mut damping = 0.0;
@@ -166,7 +179,7 @@ impl Data {
                 let Some((step, promised)) = damped_step(&scaled, &side, damping) else {
                     return None;
                 };
-                if promised < TOLERANCE || damping > MAX_DAMPING {
+                if promised < tolerance || damping > MAX_DAMPING {
                     return Some(fit);
                 }
                 let moved = fit.poles.iter().enumerate().map(|(at, pole)| Pole {
@@ -180,7 +193,7 @@ impl Data {
                     let gained = cost - less;
                     (fit, cost) = (trial, less);
                     damping = if damping < 1e-4 { 0.0 } else { damping / 10.0 };
-                    if gained < TOLERANCE {
+                    if gained < tolerance {
                         return Some(fit);
                     }
                     break;
@@ -212,6 +225,20 @@ impl Fit {
         }
         (jacobian, side)
     }
+}
+
+/// Prediction errors of columns from row `before` on; the first row is sample `first` of the record.
+fn whitened(
+    noise: &Autoregression,
+    columns: &DMatrixView<'_, f64>,
+    first: usize,
+    before: usize,
+) -> DMatrix<f64> {
+    let mut white = DMatrix::zeros(columns.nrows() - before, columns.ncols());
+    for (mut target, column) in white.column_iter_mut().zip(columns.column_iter()) {
+        target.copy_from_slice(&noise.whitened(column.as_slice(), first, before));
+    }
+    white
 }
 
 /// Matrix that makes of the columns times k/N the derivatives of a channel with respect to growth and turn

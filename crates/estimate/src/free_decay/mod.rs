@@ -123,7 +123,8 @@ pub fn free_decay(
         return Err(EstimateError::NoDecay { samples, gained: search.first_gain(&alone), needed });
     }
     let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
-    let found = estimate::estimate(record, &data, &best.fit, &scale).ok_or(failed)??;
+    let fit = data.refined(&best.fit.poles, &best.fit.noise, fit::FINE).ok_or(failed.clone())?;
+    let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
     for mode in found.modes() {
         let growth = &mode.mode.growth_rate;
         if mode.energy_share > 0.5 && growth.value > SURE * growth.standard_error {

@@ -2,10 +2,13 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::DMatrix;
+use nalgebra::{Complex, DMatrix};
 
 /// Growth over the record from which on a mode is written from its end backwards.
 const FROM_THE_END: f64 = 3.0;
+
+/// Samples after which an exponential is computed afresh, not from the sample before.
+const AFRESH: usize = 32;
 
 /// exp(λ k) at sample k, λ = `growth` + i `turn`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,15 +71,19 @@ pub(super) fn columns(
     let mut columns = DMatrix::zeros(end - first, linear + 2 * poles.len());
     for (at, pole) in poles.iter().enumerate() {
         let origin = pole.origin(len) as f64;
+        let step = Complex::from_polar(pole.growth.exp(), pole.turn);
+        let mut value = Complex::default();
         for row in 0..end - first {
             let k = (first + row) as f64;
-            let size = (pole.growth * (k - origin)).exp();
-            let (sin, cos) = (pole.turn * k).sin_cos();
-            let (cos, sin, share) = (size * cos, size * sin, k / len as f64);
-            columns[(row, 2 * at)] = cos;
-            columns[(row, 2 * at + 1)] = sin;
-            columns[(row, linear + 2 * at)] = share * cos;
-            columns[(row, linear + 2 * at + 1)] = share * sin;
+            value = match row % AFRESH {
+                0 => Complex::from_polar((pole.growth * (k - origin)).exp(), pole.turn * k),
+                _ => value * step,
+            };
+            let share = k / len as f64;
+            columns[(row, 2 * at)] = value.re;
+            columns[(row, 2 * at + 1)] = value.im;
+            columns[(row, linear + 2 * at)] = share * value.re;
+            columns[(row, linear + 2 * at + 1)] = share * value.im;
         }
     }
     if constant {

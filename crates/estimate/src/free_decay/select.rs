@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::autoregression::Autoregression;
-use super::fit::{Data, Fit};
+use super::fit::{COARSE, Data, Fit};
 use super::poles::{Pole, linear_columns};
 use super::start::{Subspace, strongest};
 
@@ -66,7 +66,7 @@ impl<'a> Search<'a> {
 
     /// Noise alone.
     pub(super) fn nothing(&self) -> Option<Candidate> {
-        self.candidate(&[], &self.white())
+        Some(self.candidate(self.data.refined(&[], &self.white(), COARSE)?))
     }
 
     /// The number of decays of least cost, of at most `most`.
@@ -126,10 +126,20 @@ impl<'a> Search<'a> {
                 starts.push((subspace.poles(wanted), &last.fit.noise));
             }
         }
-        let candidates = starts.into_iter().filter_map(|(poles, noise)| {
-            let poles = self.completed(poles, noise, wanted)?;
-            self.candidate(&poles, noise)
-        });
+        // Of the starts with either noise the best goes on.
+        let mut fits: [Option<Fit>; 2] = [None, None];
+        for (poles, noise) in starts {
+            let fit = self.completed(poles, noise, wanted);
+            let fit = fit.and_then(|poles| self.data.refined(&poles, noise, COARSE));
+            let best = &mut fits[usize::from(!std::ptr::eq(noise, &white[..]))];
+            let misfit = |fit: &Option<Fit>| {
+                fit.as_ref().map_or(f64::INFINITY, |fit| fit.misfit(self.data.len()))
+            };
+            if misfit(&fit) < misfit(best) {
+                *best = fit;
+            }
+        }
+        let candidates = fits.into_iter().flatten().map(|fit| self.candidate(fit));
         candidates.min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
@@ -141,16 +151,15 @@ impl<'a> Search<'a> {
         wanted: usize,
     ) -> Option<Vec<Pole>> {
         while poles.len() < wanted {
-            let fit = self.data.refined(&poles, noise)?;
+            let fit = self.data.refined(&poles, noise, COARSE)?;
             poles = fit.poles.clone();
             poles.push(strongest(&normalised(&self.data.residual(&fit), noise))?);
         }
         Some(poles)
     }
 
-    /// Fit from a start, with the colour that its residual has.
-    fn candidate(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Candidate> {
-        let mut fit = self.data.refined(poles, noise)?;
+    /// A fit, or better one with the colour that its residual has.
+    fn candidate(&self, mut fit: Fit) -> Candidate {
         let mut best = self.rated(&fit);
         for _ in 0..COLOUR_ROUNDS {
             let residual = self.data.residual(&fit);
@@ -159,7 +168,7 @@ impl<'a> Search<'a> {
             if noise == fit.noise {
                 break;
             }
-            let Some(next) = self.data.refined(&fit.poles, &noise) else { break };
+            let Some(next) = self.data.refined(&fit.poles, &noise, COARSE) else { break };
             let rated = self.rated(&next);
             let gain = best.cost - rated.cost;
             if rated.cost < best.cost {
@@ -170,7 +179,7 @@ impl<'a> Search<'a> {
                 break;
             }
         }
-        Some(best)
+        best
     }
 
     fn rated(&self, fit: &Fit) -> Candidate {

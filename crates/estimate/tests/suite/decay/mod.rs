@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use mechid_estimate::{DecayMode, EstimateError, FreeDecay, free_decay};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix, DVector};
-use rand::{Rng, RngExt, SeedableRng};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 
