@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let runs: usize = arguments.next().map_or(Ok(200), |runs| runs.parse())?;
     let only = arguments.next().unwrap_or_default();
     println!(
-        "| Case | right number | too few | too many | coverage f, ζ, shape | scatter f, ζ | not white |"
+        "| Case | right number | too few | too many | coverage f, ζ, shape | scatter f, ζ | alarms: colour, onset |"
     );
     println!("|---|---|---|---|---|---|---|");
     let separate =
@@ -47,18 +47,19 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for case in cases.iter().filter(|case| case.name().starts_with(&only)) {
         let outcome = case.run(runs);
         let ([f, z, s], [sf, sz]) = (outcome.coverage(), outcome.scatter());
+        let [white, onset] = outcome.alarm_rates();
         println!(
-            "| {} | {:.1} % | {} | {} | {f:.1} %, {z:.1} %, {s:.1} % | {sf:.3}, {sz:.3} | {:.1} % |",
+            "| {} | {:.1} % | {} | {} | {f:.1} %, {z:.1} %, {s:.1} % | {sf:.3}, {sz:.3} | {white:.1} %, {onset:.1} % |",
             case.name(),
             outcome.right(),
             outcome.too_few,
             outcome.too_many,
-            100.0 * outcome.alarms as f64 / outcome.tested as f64,
         );
     }
     for coloured in [false, true].into_iter().filter(|_| only.is_empty()) {
         for channels in [1, 4] {
-            let found = found_in_noise(channels, coloured, runs as u64);
+            let runs = 5 * runs as u64;
+            let found = found_in_noise(channels, coloured, runs);
             let noise = if coloured { "AR(0.9)" } else { "white" };
             println!("modes in {noise} noise alone, {channels} channels: {found} of {runs}");
         }

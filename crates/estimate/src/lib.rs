@@ -49,7 +49,7 @@ mod unknowns;
 pub use equation_of_motion::EquationOfMotion;
 pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
-pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, free_decay};
+pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
 pub use frf::{Frf, FrfAverage, FrfEstimator, Segments, Window};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use mechid_model::Mode;
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::fit::{Data, Fit};
 use super::poles::{Pole, linear_columns};
@@ -13,6 +14,10 @@ use crate::{EstimateError, IdentifiedMode, Uncertain};
 
 /// Lags over which a residual is tested for being white.
 const LAGS: usize = 20;
+/// Number of samples over that of the first ones, which are compared with the others.
+const ONSET_SHARE: usize = 50;
+/// Least number of first samples.
+const LEAST_ONSET: usize = 10;
 
 /// A mode of a free response.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,6 +53,32 @@ pub struct DecayChannel {
     pub explained: f64,
     /// Autocorrelation of the residual that the autoregression leaves.
     pub whiteness: Correlation,
+    /// Residual of the first samples, where a force may still act.
+    pub onset: Onset,
+}
+
+/// Residual of the first samples against that of the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Onset {
+    /// Number of the first samples.
+    pub samples: usize,
+    /// Their mean square residual over that of the others, a ratio.
+    pub ratio: f64,
+    /// Probability that noise has a larger ratio, a pure number.
+    pub p_value: f64,
+}
+
+impl Onset {
+    /// Tests a residual that should be white.
+    fn of(residual: &[f64]) -> Self {
+        let samples = (residual.len() / ONSET_SHARE).max(LEAST_ONSET).min(residual.len() / 2);
+        let (first, others) = residual.split_at(samples);
+        let mean_square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64;
+        let ratio = mean_square(first) / mean_square(others);
+        let distribution = FisherSnedecor::new(first.len() as f64, others.len() as f64);
+        let p_value = distribution.map_or(1.0, |f| f.sf(ratio));
+        Self { samples, ratio, p_value }
+    }
 }
 
 /// Modes found in a free response.
@@ -166,11 +197,17 @@ pub(super) fn estimate(
     scale: &[f64],
 ) -> Option<Result<FreeDecayEstimate, EstimateError>> {
     let spread = Spread::of(data, fit)?;
-    let energies = energies(data, fit, scale);
+    // Squares of the unit itself may be beyond the largest number.
+    let unit = scale.iter().copied().fold(0.0, f64::max);
+    let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
+    let energies = energies(data, fit, &relative);
     let total: f64 = energies.iter().sum();
     let mut modes = Vec::new();
     for (at, energy) in energies.iter().enumerate() {
-        modes.push(mode(&spread, record, at, scale, energy / total)?);
+        let mut mode = mode(&spread, record, at, &relative, energy / total)?;
+        mode.amplitude.value *= unit;
+        mode.amplitude.standard_error *= unit;
+        modes.push(mode);
     }
     modes.sort_by(|a: &DecayMode, b| {
         let frequency = |of: &DecayMode| of.mode.natural_frequency_hz.value;
@@ -191,22 +228,22 @@ pub(super) fn estimate(
     }))
 }
 
-/// Sum of squares of each mode over samples and channels, relative to the largest unit of a channel.
+/// Sum of squares of each mode over samples and channels.
 fn energies(data: &Data, fit: &Fit, scale: &[f64]) -> Vec<f64> {
-    let largest = scale.iter().copied().fold(0.0, f64::max);
     let mut energies = vec![0.0; fit.poles.len()];
     for basis in data.chunks(&fit.poles) {
         for (mode, energy) in energies.iter_mut().enumerate() {
             for (channel, scale) in fit.channels.iter().zip(scale) {
                 let [cos, sin] = [0, 1].map(|part| channel.linear[2 * mode + part]);
                 let response = basis.column(2 * mode) * cos + basis.column(2 * mode + 1) * sin;
-                *energy += response.norm_squared() * (scale / largest).powi(2);
+                *energy += response.norm_squared() * scale.powi(2);
             }
         }
     }
     energies
 }
 
+/// A mode, its amplitude in the unit of `scale`.
 fn mode(
     spread: &Spread<'_>,
     record: &Record,
@@ -273,12 +310,14 @@ fn channel(
     let square: f64 = residual.iter().map(|e| e * e).sum();
     let len = data.len() as f64;
     let lags = LAGS.min(data.len() / 4).max(1);
+    let white = noise.whitened(residual, 0, 0);
     Ok(DecayChannel {
         offset: if data.constant { scale * linear[linear.len() - 1] } else { 0.0 },
         noise: scale * (square / len).sqrt(),
         noise_order: noise.order(),
         // Channels have unit variance.
         explained: 1.0 - square / len,
-        whiteness: whiteness(&noise.whitened(residual, 0, 0), lags)?,
+        whiteness: whiteness(&white, lags)?,
+        onset: Onset::of(&white),
     })
 }

@@ -176,9 +176,7 @@ impl Data {
                 jacobian[(i, j)] / scale[j]
             });
             loop {
-                let Some((step, promised)) = damped_step(&scaled, &side, damping) else {
-                    return None;
-                };
+                let (step, promised) = damped_step(&scaled, &side, damping)?;
                 if promised < tolerance || damping > MAX_DAMPING {
                     return Some(fit);
                 }

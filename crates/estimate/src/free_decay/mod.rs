@@ -11,7 +11,7 @@ use mechid_signal::Record;
 use mechid_signal::measures::{peak, power_of_two};
 use nalgebra::DMatrix;
 
-pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate};
+pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
 use self::fit::Data;
 use self::select::Search;
 use crate::EstimateError;
@@ -41,7 +41,7 @@ const MOST_MODES: usize = 40;
 /// Samples that each of the poles needs.
 const SAMPLES_PER_MODE: usize = 12;
 /// Largest number of samples that are fitted.
-const MOST_SAMPLES: usize = 1 << 20;
+const MOST_SAMPLES: usize = 1 << 18;
 /// Standard errors by which a growth rate above zero is no scatter.
 const SURE: f64 = 4.0;
 
@@ -112,16 +112,21 @@ pub fn free_decay(
     let most = asked.min(samples / SAMPLES_PER_MODE);
     let failed = EstimateError::NotConverged { searches: 1, steps: fit::MAX_STEPS };
     let search = Search::new(&data);
-    let nothing = search.nothing().ok_or(failed.clone())?;
-    let alone = nothing.clone();
     let best = match settings.modes {
-        Some(modes) => search.exactly(nothing, modes).ok_or(failed.clone())?,
-        None => search.best(nothing, most),
+        Some(modes) => search.exactly(modes).ok_or(failed.clone())?,
+        None => {
+            let selected = search.best(most).ok_or(failed.clone())?;
+            if selected.best.fit.poles.is_empty() {
+                let needed = select::least_gain(samples, record.channels());
+                return Err(EstimateError::NoDecay {
+                    samples,
+                    gained: selected.first_gain,
+                    needed,
+                });
+            }
+            selected.best
+        }
     };
-    if best.fit.poles.is_empty() {
-        let needed = select::least_gain(samples, record.channels());
-        return Err(EstimateError::NoDecay { samples, gained: search.first_gain(&alone), needed });
-    }
     let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
     let fit = data.refined(&best.fit.poles, &best.fit.noise, fit::FINE).ok_or(failed.clone())?;
     let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;

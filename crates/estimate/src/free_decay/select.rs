@@ -46,6 +46,32 @@ pub(super) struct Candidate {
     pub cost: f64,
 }
 
+/// Fits with one number of decays, side by side: a colour of high order can pass for decays that are not
+/// found yet, and then hide them.
+#[derive(Debug, Clone)]
+struct Pair {
+    white: Candidate,
+    coloured: Candidate,
+}
+
+impl Pair {
+    fn decays(&self) -> usize {
+        self.white.fit.poles.len()
+    }
+
+    fn better(&self) -> &Candidate {
+        if self.coloured.cost < self.white.cost { &self.coloured } else { &self.white }
+    }
+}
+
+/// Result of a search.
+#[derive(Debug)]
+pub(super) struct Selected {
+    pub best: Candidate,
+    /// Decrease of minus twice the log likelihood by the first decay.
+    pub first_gain: f64,
+}
+
 /// Search for the number of decays.
 pub(super) struct Search<'a> {
     data: &'a Data,
@@ -64,83 +90,79 @@ impl<'a> Search<'a> {
         Self { data, raw: Subspace::of(&centred) }
     }
 
-    /// Noise alone.
-    pub(super) fn nothing(&self) -> Option<Candidate> {
-        Some(self.candidate(self.data.refined(&[], &self.white(), COARSE)?))
-    }
-
     /// The number of decays of least cost, of at most `most`.
-    pub(super) fn best(&self, nothing: Candidate, most: usize) -> Candidate {
+    pub(super) fn best(&self, most: usize) -> Option<Selected> {
         let per_decay = least_gain(self.data.len(), self.data.channels());
         let cost = |of: &Candidate| of.cost + per_decay * of.fit.poles.len() as f64;
-        let (mut best, mut last, mut idle) = (nothing.clone(), nothing, 0);
-        while last.fit.poles.len() < most && idle < PATIENCE {
+        let nothing = self.nothing()?;
+        let (mut last, mut best) = (nothing.clone(), nothing.clone());
+        let (mut idle, mut first_gain) = ([0; 2], 0.0);
+        while last.decays() < most && idle.iter().any(|idle| *idle < PATIENCE) {
             let Some(next) = self.one_more(&last) else { break };
-            if cost(&next) < cost(&best) {
-                (best, idle) = (next.clone(), 0);
-            } else {
-                idle += 1;
+            if last.decays() == 0 {
+                first_gain = nothing.better().cost - next.better().cost;
+            }
+            let tracks = [(&next.white, &mut best.white), (&next.coloured, &mut best.coloured)];
+            for ((next, best), idle) in tracks.into_iter().zip(&mut idle) {
+                match cost(next) < cost(best) {
+                    true => (*best, *idle) = (next.clone(), 0),
+                    false => *idle += 1,
+                }
             }
             last = next;
         }
-        best
-    }
-
-    /// Decrease of minus twice the log likelihood that one decay brings, from noise alone of cost `alone`.
-    pub(super) fn first_gain(&self, nothing: &Candidate) -> f64 {
-        self.one_more(nothing).map_or(0.0, |one| nothing.cost - one.cost)
+        let Pair { white, coloured } = best;
+        let best = if cost(&coloured) < cost(&white) { coloured } else { white };
+        Some(Selected { best, first_gain })
     }
 
     /// So many decays.
-    pub(super) fn exactly(&self, nothing: Candidate, decays: usize) -> Option<Candidate> {
-        let mut last = nothing;
-        while last.fit.poles.len() < decays {
+    pub(super) fn exactly(&self, decays: usize) -> Option<Candidate> {
+        let mut last = self.nothing()?;
+        while last.decays() < decays {
             last = self.one_more(&last)?;
         }
-        Some(last)
+        Some(last.better().clone())
+    }
+
+    fn nothing(&self) -> Option<Pair> {
+        let fit = self.data.refined(&[], &self.white(), COARSE)?;
+        Some(Pair { white: self.rated(&fit), coloured: self.candidate(fit) })
     }
 
     fn white(&self) -> Vec<Autoregression> {
         vec![Autoregression::default(); self.data.channels()]
     }
 
-    /// The most likely fit with one decay more: from the poles there are with the strongest decay in the
+    /// The most likely fits with one decay more: from the poles there are with the strongest decay in the
     /// residual, and from the Hankel matrix; both as the record is and with its noise made white.
-    fn one_more(&self, last: &Candidate) -> Option<Candidate> {
-        let wanted = last.fit.poles.len() + 1;
-        let residual = self.data.residual(&last.fit);
-        let white = self.white();
-        let coloured = last.fit.noise.iter().any(|noise| noise.order() > 0);
-        let mut starts: Vec<(Vec<Pole>, &[Autoregression])> = Vec::new();
-        for noise in [&white, &last.fit.noise].into_iter().take(1 + usize::from(coloured)) {
-            if let Some(pole) = strongest(&normalised(&residual, noise)) {
-                starts.push(([&last.fit.poles[..], &[pole]].concat(), noise));
+    fn one_more(&self, last: &Pair) -> Option<Pair> {
+        let wanted = last.decays() + 1;
+        let raw = self.raw.as_ref().map(|raw| raw.poles(wanted));
+        let white = self.rated(&self.extended(&last.white.fit, raw)?);
+        let mut coloured = self.candidate(white.fit.clone());
+        if last.coloured.fit.noise.iter().any(|noise| noise.order() > 0) {
+            let samples = scaled(&self.data.samples, &last.coloured.fit, self.data.constant);
+            let hankel = Subspace::of(&samples).map(|subspace| subspace.poles(wanted));
+            let other = self.extended(&last.coloured.fit, hankel).map(|fit| self.candidate(fit));
+            if let Some(other) = other.filter(|other| other.cost < coloured.cost) {
+                coloured = other;
             }
         }
-        if let Some(raw) = &self.raw {
-            starts.push((raw.poles(wanted), &white));
-        }
-        if coloured {
-            let samples = scaled(&self.data.samples, &last.fit, self.data.constant);
-            if let Some(subspace) = Subspace::of(&samples) {
-                starts.push((subspace.poles(wanted), &last.fit.noise));
-            }
-        }
-        // Of the starts with either noise the best goes on.
-        let mut fits: [Option<Fit>; 2] = [None, None];
-        for (poles, noise) in starts {
-            let fit = self.completed(poles, noise, wanted);
-            let fit = fit.and_then(|poles| self.data.refined(&poles, noise, COARSE));
-            let best = &mut fits[usize::from(!std::ptr::eq(noise, &white[..]))];
-            let misfit = |fit: &Option<Fit>| {
-                fit.as_ref().map_or(f64::INFINITY, |fit| fit.misfit(self.data.len()))
-            };
-            if misfit(&fit) < misfit(best) {
-                *best = fit;
-            }
-        }
-        let candidates = fits.into_iter().flatten().map(|fit| self.candidate(fit));
-        candidates.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        Some(Pair { white, coloured })
+    }
+
+    /// The most likely fit with one decay more than `last` and its noise, from the strongest decay in its
+    /// residual or from `poles`.
+    fn extended(&self, last: &Fit, poles: Option<Vec<Pole>>) -> Option<Fit> {
+        let wanted = last.poles.len() + 1;
+        let starts = [Some(last.poles.clone()), poles].into_iter().flatten();
+        let fits = starts.filter_map(|poles| {
+            let poles = self.completed(poles, &last.noise, wanted)?;
+            self.data.refined(&poles, &last.noise, COARSE)
+        });
+        let misfit = |fit: &Fit| fit.misfit(self.data.len());
+        fits.min_by(|a, b| misfit(a).total_cmp(&misfit(b)))
     }
 
     /// Adds the strongest decays of the residual until there are as many as wanted.

@@ -42,9 +42,9 @@ pub struct Outcome {
     pub errors: [Vec<f64>; 2],
     /// Intervals that hold the truth, and all: of frequencies, damping ratios and parts of shapes.
     pub held: [[usize; 2]; 3],
-    /// Residuals tested, and those that are not white with p < 0.01.
+    /// Residuals tested; those that are not white, and those larger at the beginning, with p < 0.01.
     pub tested: usize,
-    pub alarms: usize,
+    pub alarms: [usize; 2],
 }
 
 /// A sum of decays: λ of each mode, and its complex amplitude in each channel.
@@ -79,7 +79,7 @@ impl Case {
             sum.too_few += one.too_few;
             sum.too_many += one.too_many;
             sum.tested += one.tested;
-            sum.alarms += one.alarms;
+            sum.alarms = [0, 1].map(|i| sum.alarms[i] + one.alarms[i]);
             for (sum, one) in sum.errors.iter_mut().zip(one.errors) {
                 sum.extend(one);
             }
@@ -109,7 +109,10 @@ impl Case {
             Err(other) => panic!("{}, seed {seed}: {other}", self.name()),
         };
         outcome.tested = found.channels().len();
-        outcome.alarms = found.channels().iter().filter(|c| c.whiteness.p_value < 0.01).count();
+        for channel in found.channels() {
+            outcome.alarms[0] += usize::from(channel.whiteness.p_value < 0.01);
+            outcome.alarms[1] += usize::from(channel.onset.p_value < 0.01);
+        }
         outcome.too_few = usize::from(found.modes().len() < self.modes);
         outcome.too_many = usize::from(found.modes().len() > self.modes);
         if found.modes().len() == self.modes {
@@ -314,6 +317,11 @@ impl Outcome {
     /// Share of the intervals that hold the truth, in %: of frequency, damping ratio and shape.
     pub fn coverage(&self) -> [f64; 3] {
         self.held.map(|[held, all]| 100.0 * held as f64 / all as f64)
+    }
+
+    /// Share of the residuals that are not white, and that are larger at the beginning, in %.
+    pub fn alarm_rates(&self) -> [f64; 2] {
+        self.alarms.map(|alarms| 100.0 * alarms as f64 / self.tested as f64)
     }
 
     /// Root mean square of the errors over the bound, of frequency and damping ratio.
