@@ -18,16 +18,27 @@ use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
 
 /// Settings of an analysis of a free decay.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct DecaySettings {
     /// Beginning of the decay, in s from the first sample of the window; `None`: found in the record.
     pub from_s: Option<f64>,
     /// End of what is used, in s from the first sample of the window; `None`: the end of the window.
     pub to_s: Option<f64>,
-    /// Number of modes and constants.
-    #[serde(flatten)]
-    pub fit: FreeDecay,
+    /// Number of modes; `None`: as many as the record shows.
+    pub modes: Option<usize>,
+    /// Largest number of modes to look for where the number is not given.
+    pub max_modes: usize,
+    /// Whether each channel has an unknown constant.
+    pub offset: bool,
+}
+
+impl Default for DecaySettings {
+    /// Everything is found in the record; at most ten modes.
+    fn default() -> Self {
+        let FreeDecay { modes, max_modes, offset } = FreeDecay::default();
+        Self { from_s: None, to_s: None, modes, max_modes, offset }
+    }
 }
 
 /// Modes of a free response, and the response beside that of the modes.
@@ -71,7 +82,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
         None => release(record),
     };
     let record = record.window(release, record.len() - release)?;
-    let estimate = free_decay(&record, &how.fit)?;
+    let estimate = free_decay(&record, &how.fit())?;
     let first_sample = whole.first_sample + release;
     let summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
     let predicted = estimate.fitted().clone();
@@ -105,6 +116,10 @@ fn responses_of(
 }
 
 impl DecaySettings {
+    fn fit(&self) -> FreeDecay {
+        FreeDecay { modes: self.modes, max_modes: self.max_modes, offset: self.offset }
+    }
+
     /// The part of a record between beginning and end.
     fn part(&self, measurement: &Measurement) -> Result<Measurement, AnalysisError> {
         if measurement.window_settings().period.is_some() {
