@@ -93,11 +93,10 @@ fn what_speaks_against_a_fit_is_told() {
     let from_s = Some(RELEASE);
     // A mode too few is a coloured residual: an autoregression can pass for it.
     told(DecaySettings { modes: Some(1), from_s, ..DecaySettings::default() }, "coloured");
-    // A hundredth of a second before the release.
-    told(
-        DecaySettings { from_s: Some(RELEASE - 0.01), ..DecaySettings::default() },
-        "first samples",
-    );
+    // A hundredth of a second before the release: a mode that is none, or what the right modes leave.
+    let early = DecaySettings { from_s: Some(RELEASE - 0.01), ..DecaySettings::default() };
+    told(early, "hardly an oscillation");
+    told(DecaySettings { modes: Some(2), ..early }, "first samples");
     // Less than two cycles.
     let how = DecaySettings {
         from_s,

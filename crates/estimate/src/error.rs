@@ -193,7 +193,7 @@ pub enum EstimateError {
     SilentChannel {
         /// Channel, counted from 0.
         channel: usize,
-        /// Its value, in the unit of the record.
+        /// Value of all its samples, in the unit of the record.
         value: f64,
     },
     /// No, or too many, modes were asked for.
@@ -206,7 +206,8 @@ pub enum EstimateError {
     },
     /// No oscillation was found in a free response.
     #[error(
-        "no oscillation exceeds the noise in {}: the best one raises twice the log likelihood by {gained:.1},          noise alone by up to {needed:.1}. Use the part of the record in which the response decays",
+        "no oscillation exceeds the noise in {}: the best one raises twice the log likelihood by {gained:.1}, \
+         noise alone by up to {needed:.1}. Use the part of the record in which the response decays",
         message::count(*samples, "sample")
     )]
     NoDecay {
@@ -219,7 +220,8 @@ pub enum EstimateError {
     },
     /// A free response grows.
     #[error(
-        "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: an          unstable system, a force that still acts, or a record that begins before the release"
+        "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: an \
+         unstable system, a force that still acts, or a record that begins before the release"
     )]
     Grows {
         /// Frequency, in Hz.

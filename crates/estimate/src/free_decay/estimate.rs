@@ -62,7 +62,7 @@ pub struct DecayChannel {
 pub struct Onset {
     /// Number of the first samples.
     pub samples: usize,
-    /// Their mean square residual over that of the others, a ratio.
+    /// Mean square of their residual over that of the others, a ratio.
     pub ratio: f64,
     /// Probability that noise has a larger ratio, a pure number.
     pub p_value: f64,

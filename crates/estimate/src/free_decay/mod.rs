@@ -25,7 +25,7 @@ pub struct FreeDecay {
     pub modes: Option<usize>,
     /// Largest number of modes to look for where the number is not given.
     pub max_modes: usize,
-    /// Whether each channel has an unknown constant.
+    /// `true` if each channel has an unknown constant.
     pub offset: bool,
 }
 

@@ -116,13 +116,15 @@ impl<'a> Search<'a> {
         Some(Selected { best, first_gain })
     }
 
-    /// So many decays.
+    /// So many decays, those of the record as it is: with the number given, an autoregression must not
+    /// stand for some of them.
     pub(super) fn exactly(&self, decays: usize) -> Option<Candidate> {
-        let mut last = self.nothing()?;
-        while last.decays() < decays {
-            last = self.one_more(&last)?;
+        let raw = |wanted: usize| self.raw.as_ref().map(|raw| raw.poles(wanted));
+        let mut fit = self.data.refined(&[], &self.white(), COARSE)?;
+        while fit.poles.len() < decays {
+            fit = self.extended(&fit, raw(fit.poles.len() + 1))?;
         }
-        Some(last.better().clone())
+        Some(self.candidate(fit))
     }
 
     fn nothing(&self) -> Option<Pair> {
