@@ -189,7 +189,7 @@ impl Truth {
         let (poles, own) = (2 * modes, 2 * modes + 1);
         let all = poles + own * channels;
         let mut information = DMatrix::zeros(all, all);
-        for c in 0..channels {
+        for (c, level) in levels.iter().enumerate() {
             let mut rows = DMatrix::<f64>::zeros(LEN, poles + own);
             for k in 0..LEN {
                 let t = k as f64 * DT;
@@ -210,7 +210,7 @@ impl Truth {
                     column[k] = (column[k] - COLOUR * column[k - 1]) / error;
                 }
             }
-            let products = rows.tr_mul(&rows) / (levels[c] * levels[c]);
+            let products = rows.tr_mul(&rows) / (level * level);
             let place = |at: usize| if at < poles { at } else { at + own * c };
             for i in 0..poles + own {
                 for j in 0..poles + own {
