@@ -33,6 +33,7 @@
 //! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
 //! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
+//! | How does the structure vibrate when left alone? | [`decay()`] | [`DecaySettings`] | [`Decayed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
 //! | What are the machines behind these records? | [`SavedAnalysis::row`] | [`SavedAnalysis`] | [`ResultRow`] |
@@ -43,6 +44,7 @@
 
 pub mod batch;
 pub mod bearing;
+pub mod decay;
 mod error;
 pub mod extremes;
 #[cfg(feature = "parquet")]
@@ -62,6 +64,7 @@ pub mod text;
 
 pub use batch::{ResultRow, SavedAnalysis};
 pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
+pub use decay::{DecaySettings, DecaySummary, Decayed, decay};
 pub use error::AnalysisError;
 pub use frf::{FrfSettings, FrfTable, Segmentation, frf};
 pub use identify::{

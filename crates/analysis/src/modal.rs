@@ -128,7 +128,7 @@ impl Machine {
 }
 
 impl ShapedMode {
-    fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
+    pub(crate) fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
         let eigenvalue = mode.mode.eigenvalue();
         let entries = mode.mode.shape().iter().zip(mode.shape_standard_error.iter());
         Self {
@@ -166,7 +166,10 @@ impl ModalSummary {
             small.collect::<String>(),
             self.mode_table(),
             self.instability(),
-            self.shape_table()
+            shape_table(&self.modes.iter().collect::<Vec<_>>(), |at| format!(
+                "direction {}",
+                at + 1
+            ))
         ) + &self.backbone_table()
     }
 
@@ -216,27 +219,28 @@ impl ModalSummary {
         rows.extend(mode_cells(&modes, true));
         text_table(&rows)
     }
+}
 
-    fn shape_table(&self) -> String {
-        let header = ["shape", "modulus", "phase, °", "real part", "±", "imaginary part", "±"];
-        let mut rows = vec![header.map(String::from).to_vec()];
-        for (number, mode) in (1..).zip(&self.modes) {
-            for (dof, entry) in (1..).zip(&mode.shape) {
-                let [re, im] = entry.value;
-                let error = |part: usize| {
-                    entry.standard_error.map_or("–".into(), |e| significant(e[part], 2))
-                };
-                rows.push(vec![
-                    format!("{number} direction {dof}"),
-                    significant(re.hypot(im), 5),
-                    format!("{:.1}", im.atan2(re).to_degrees()),
-                    format!("{re:.5}"),
-                    error(0),
-                    format!("{im:.5}"),
-                    error(1),
-                ]);
-            }
+/// Entries of shapes as a table; `name` tells the channel of an entry, counted from 0.
+pub(crate) fn shape_table(modes: &[&ShapedMode], name: impl Fn(usize) -> String) -> String {
+    let header = ["shape", "modulus", "phase, °", "real part", "±", "imaginary part", "±"];
+    let mut rows = vec![header.map(String::from).to_vec()];
+    for (number, mode) in (1..).zip(modes) {
+        for (at, entry) in mode.shape.iter().enumerate() {
+            let [re, im] = entry.value;
+            let error = |part: usize| {
+                entry.standard_error.map_or("–".into(), |e| significant(e[part], 2))
+            };
+            rows.push(vec![
+                format!("{number} {}", name(at)),
+                significant(re.hypot(im), 5),
+                format!("{:.1}", im.atan2(re).to_degrees()),
+                format!("{re:.5}"),
+                error(0),
+                format!("{im:.5}"),
+                error(1),
+            ]);
         }
-        text_table(&rows)
     }
+    text_table(&rows)
 }

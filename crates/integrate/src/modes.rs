@@ -401,12 +401,10 @@ impl Space {
             let shape = z.rows(0, n).into_owned();
             let about = shape.dotc(&z.rows(n, n)) * inverse.scale / shape.norm_squared();
             let value = inverse.eigenvalue(theta, about);
-            if !(value.re.is_finite() && value.im.is_finite()) || shape.camax() == 0.0 {
-                continue;
-            }
+            let Some(mode) = Mode::new(value, &shape) else { continue };
             let residual = residual(system, value, &shape);
             let is_rigid_body = value.norm() <= EIGENVALUE_ROUNDING * fastest(system);
-            let mode = SparseMode { mode: Mode::new(value, shape), residual, is_rigid_body };
+            let mode = SparseMode { mode, residual, is_rigid_body };
             found.push(Found { mode, converged: missed <= CONVERGED && residual <= RESIDUAL });
         }
         let distance = |found: &Found| {

@@ -66,11 +66,11 @@ pub use mechid_analysis as analysis;
 pub use mechid_analysis::identify::LineChoice;
 pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, MaximumLikelihood};
 pub use mechid_analysis::{
-    BearingData, Channels, Detrend, FrfSettings, Identified, IdentifiedBearing,
-    IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses, InspectSettings, Machine,
-    Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed, ResultRow, SavedAnalysis,
-    Segmentation, Window, frf, identify, identify_bearing, identify_responses, inspect, predict,
-    reconstruct,
+    BearingData, Channels, DecaySettings, Decayed, Detrend, FrfSettings, Identified,
+    IdentifiedBearing, IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses,
+    InspectSettings, Machine, Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed,
+    ResultRow, SavedAnalysis, Segmentation, Window, decay, frf, identify, identify_bearing,
+    identify_responses, inspect, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -26,14 +26,18 @@ pub struct Mode {
 }
 
 impl Mode {
-    /// A mode from its eigenvalue λ (rad/s) and its shape, n entries in any scale; of a conjugate pair
-    /// either.
-    pub fn new(eigenvalue: Complex<f64>, shape: DVector<Complex<f64>>) -> Self {
+    /// Makes a mode of λ, in rad/s, and any multiple of its shape, one entry per degree of freedom; of a
+    /// conjugate pair either. `None` unless all are finite and not all of the shape zero.
+    pub fn new(eigenvalue: Complex<f64>, shape: &DVector<Complex<f64>>) -> Option<Self> {
+        let largest = largest_entry(shape);
+        let finite = |z: &Complex<f64>| z.re.is_finite() && z.im.is_finite();
+        let sound = finite(&eigenvalue) && largest.norm() > 0.0;
+        let shape = shape / largest;
         let (eigenvalue, shape) = match eigenvalue.im < 0.0 {
             true => (eigenvalue.conj(), shape.conjugate()),
             false => (eigenvalue, shape),
         };
-        Self { eigenvalue, shape: scaled(shape) }
+        (sound && shape.iter().all(finite)).then_some(Self { eigenvalue, shape })
     }
 
     /// λ, in rad/s, with Im λ ≥ 0; its conjugate belongs to the conjugate shape.
@@ -73,6 +77,12 @@ impl Mode {
     pub fn oscillates(&self) -> bool {
         self.eigenvalue.im > 0.0
     }
+}
+
+fn largest_entry(shape: &DVector<Complex<f64>>) -> Complex<f64> {
+    shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
+        if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
+    })
 }
 
 /// A growing free response exp(λt), Re λ > 0.
@@ -239,16 +249,8 @@ impl SecondOrderSystem {
             return Ok(None);
         }
         let shape = svd.v_t.as_ref().expect("asked for").row(row).adjoint();
-        Ok(Some(scaled(shape)))
+        Ok(Some(&shape / largest_entry(&shape)))
     }
-}
-
-/// Divides a shape by its largest entry.
-fn scaled(shape: DVector<Complex<f64>>) -> DVector<Complex<f64>> {
-    let largest = shape.iter().fold(Complex::from(0.0), |largest: Complex<f64>, z| {
-        if z.norm_sqr() > largest.norm_sqr() { *z } else { largest }
-    });
-    shape / largest
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
-//! The questions whose answers are told and drawn: frequency responses, sweeps, inspection.
+//! The questions whose answers are told and drawn: frequency responses, free decays, sweeps, inspection.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mechid::FrfSettings;
 use mechid::analysis::sweep::{SweepSettings, sweep_record};
 use mechid::analysis::{InspectSettings, RecordPlan};
 use mechid::io::Experiment;
+use mechid::{DecaySettings, FrfSettings};
 use pyo3::prelude::*;
 
 use crate::answer::Answer;
@@ -26,6 +26,20 @@ pub fn frf(
     let how: FrfSettings = failure::settings(py, settings)?;
     let record = record.0.clone();
     work::watched(py, threads, || Ok(()), move || mechid::frf(&record, &how)).map(Answer::of)
+}
+
+/// Finds the modes of a free decay; settings are JSON.
+#[pyfunction]
+#[pyo3(signature = (record, settings, threads))]
+pub fn decay(
+    py: Python<'_>,
+    record: PyRef<'_, Measurement>,
+    settings: &str,
+    threads: Option<usize>,
+) -> PyResult<Answer> {
+    let how: DecaySettings = failure::settings(py, settings)?;
+    let record = record.0.clone();
+    work::watched(py, threads, || Ok(()), move || mechid::decay(&record, &how)).map(Answer::of)
 }
 
 /// Inspects the file of a saved plan; plan and settings are JSON.

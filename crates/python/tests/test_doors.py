@@ -56,6 +56,32 @@ def test_frequency_responses_are_those_of_the_program(
         found.response(2, 1)
 
 
+@pytest.mark.parametrize("options", [{}, {"modes": 2}, {"from_s": 0.3, "to_s": 2.0, "max_modes": 4}])
+def test_a_free_decay_is_that_of_the_program(program: Callable[..., str], options: dict[str, Any]) -> None:
+    file = "examples/decay.csv"
+    channels = {"acceleration": ["a1", "a2", "a3"]}
+    spelled = {name.removesuffix("_s"): value for name, value in options.items()}
+    told = program("decay", file, *words({**channels, **spelled}), "--json")
+    found = mechid.decay(file, **channels, **options)
+    assert found.to_json() + "\n" == told
+    assert len(found.modes) == options.get("modes", 3) == len(found.amplitudes) == len(found.decays)
+    assert found.modes[0].shape.shape == (3,) and found.explained.shape == (3,)
+    assert found.energy_shares.sum() == pytest.approx(1)
+
+
+def test_a_free_decay_of_arrays_is_found() -> None:
+    t = np.arange(800) / 200
+    omega, zeta = 2 * np.pi * 7, 0.01
+    x = np.exp(-zeta * omega * t) * np.cos(omega * np.sqrt(1 - zeta**2) * t)
+    noise = np.random.default_rng(1).normal(scale=0.01, size=(800, 2))
+    found = mechid.decay(displacement=np.column_stack([x, -0.5 * x]) + noise, fs=200, from_s=0)
+    (mode,) = found.modes
+    low, high = mode.natural_frequency_hz.interval or (0, 0)
+    assert low < 7.002 and high > 6.998 and abs(mode.shape[1] + 0.5) < 0.01
+    again = mechid.decay(displacement=np.column_stack([x, -0.5 * x]) + noise, fs=200, settings=found.settings)
+    assert again.to_json() == found.to_json()
+
+
 RIG = {"force": ["fx", "fy"], "acceleration": ["ax", "ay"], "displacement": ["dx", "dy"]}
 
 

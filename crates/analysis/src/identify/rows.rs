@@ -204,6 +204,15 @@ impl Uncertain {
         Ok(Self::new(uncertain.value, uncertain.standard_error, uncertain.interval(CONFIDENCE)?))
     }
 
+    /// Returns a pure number in per cent.
+    pub(crate) fn percent(&self) -> Self {
+        Self {
+            value: 100.0 * self.value,
+            standard_error: self.standard_error.map(|error| 100.0 * error),
+            interval: self.interval.map(|interval| interval.map(|limit| 100.0 * limit)),
+        }
+    }
+
     /// Returns a value that was given.
     pub(crate) fn known(value: f64) -> Self {
         Self { value, standard_error: None, interval: None }

@@ -7,6 +7,7 @@
 
 mod bearing;
 mod completions;
+mod decay;
 mod fleet;
 mod force;
 mod frf;
@@ -52,6 +53,7 @@ pub struct Cli {
 pub enum Command {
     Bearing(bearing::BearingArgs),
     Completions(completions::CompletionsArgs),
+    Decay(decay::DecayArgs),
     Fleet(fleet::FleetArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
@@ -74,6 +76,7 @@ impl Command {
         match self {
             Command::Bearing(args) => args.run(),
             Command::Completions(args) => args.run(),
+            Command::Decay(args) => args.run(),
             Command::Fleet(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
@@ -95,6 +98,7 @@ impl Command {
         match self {
             Command::Bearing(args) => args.files(),
             Command::Completions(_) => Files::default(),
+            Command::Decay(args) => args.files(),
             Command::Fleet(args) => args.files(),
             Command::Force(args) => args.files(),
             Command::Frf(args) => args.files(),
@@ -130,6 +134,7 @@ impl Command {
         match self {
             Command::Bearing(args) => &args.report,
             Command::Completions(args) => &args.report,
+            Command::Decay(args) => &args.report,
             Command::Fleet(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,

@@ -31,6 +31,7 @@ impl Session {
             "bearing-dry.csv",
             "hammer-1.csv",
             "hammer-2.csv",
+            "decay.csv",
         ] {
             let name = Path::new("examples").join(file);
             fs::copy(root.join(&name), folder.join(&name)).unwrap();

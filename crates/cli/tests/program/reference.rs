@@ -63,6 +63,7 @@ fn every_field_of_every_report_is_in_the_reference() {
         "bearing-dry.csv",
         "hammer-1.csv",
         "hammer-2.csv",
+        "decay.csv",
     ] {
         fs::copy(examples.join(file), folder.path().join(file)).unwrap();
     }
@@ -95,6 +96,7 @@ fn every_field_of_every_report_is_in_the_reference() {
          --displacement dx,dy --stator-mass 20 --rotation-hz 50 --period 256 --load 2500 --clearance \
          100e-6 --diameter 0.1 --length 0.05 --viscosity 0.02"
             .into(),
+        "decay decay.csv --acceleration a1,a2,a3".into(),
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
         "modal found.json".into(),

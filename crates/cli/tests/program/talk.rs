@@ -6,8 +6,9 @@ use std::process::Command;
 
 use super::{mechid, refused, run};
 
-const SUBCOMMANDS: [&str; 11] = [
+const SUBCOMMANDS: [&str; 12] = [
     "completions",
+    "decay",
     "force",
     "frf",
     "identify",

@@ -5,10 +5,12 @@
 mod channel_checks;
 mod checks;
 mod common;
+mod decay;
 mod derivatives;
 mod equation_error;
 mod equation_of_motion;
 mod extremes;
+mod free_decay;
 mod frequency_invariance;
 mod frf;
 mod logarithm;

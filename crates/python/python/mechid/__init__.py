@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ._doors import bearing as bearing
+    from ._doors import decay as decay
     from ._doors import frf as frf
     from ._doors import identify as identify
     from ._doors import identify_responses as identify_responses
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from ._mechid import __version__ as __version__
     from ._records import Measurement as Measurement
     from ._records import ResponseTable as ResponseTable
+    from ._results import Decayed as Decayed
     from ._results import Finding as Finding
     from ._results import FrequencyResponses as FrequencyResponses
     from ._results import Identified as Identified
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 # Where each name is: imported when it is used, so that the program starts without NumPy.
 _HOMES = {
     "bearing": "_doors",
+    "decay": "_doors",
     "frf": "_doors",
     "identify": "_doors",
     "identify_responses": "_doors",
@@ -66,6 +69,7 @@ _HOMES = {
     "__version__": "_mechid",
     "Measurement": "_records",
     "ResponseTable": "_records",
+    "Decayed": "_results",
     "Finding": "_results",
     "FrequencyResponses": "_results",
     "Identified": "_results",
@@ -86,6 +90,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Decayed",
     "Finding",
     "FrequencyResponses",
     "Identified",
@@ -108,6 +113,7 @@ __all__ = [
     "Validation",
     "__version__",
     "bearing",
+    "decay",
     "frf",
     "identify",
     "identify_responses",

@@ -24,6 +24,7 @@ from ._records import (
     reading_of,
 )
 from ._results import (
+    Decayed,
     FrequencyResponses,
     Identified,
     IdentifiedBearing,
@@ -464,6 +465,61 @@ def frf(
             "exponential_percent": exponential_percent,
         }
     return FrequencyResponses(_mechid.frf(found._inner, json.dumps(settings), threads))
+
+
+def decay(
+    *sources: object,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    modes: int | None = None,
+    max_modes: int = 10,
+    offset: bool = True,
+    settings: dict[str, Any] | None = None,
+    threads: int | None = None,
+    **record: Unpack[RecordOptions],
+) -> Decayed:
+    """Find natural frequencies, damping ratios and shapes in a response without force.
+
+    For a structure that was plucked or struck, or whose shaker was switched off.
+
+    Parameters
+    ----------
+    *sources, **record
+        The record: a file, table or `Measurement` with columns of one kind of response and no force.
+        Arrays are given by keyword: ``acceleration=a, fs=…``.
+    from_s, to_s : float, optional
+        Beginning of the decay and end of what is used, in s from the first sample of the window; the
+        beginning is found, and the end is that of the window, without.
+    modes : int, optional
+        Number of modes; as many as the record shows, without.
+    max_modes : int
+        Largest number of modes to look for.
+    offset : bool
+        Whether each channel has an unknown constant.
+    settings : dict, optional
+        ``settings`` of another result, instead of the options above.
+    threads : int, optional
+        Number of threads.
+
+    Returns
+    -------
+    Decayed
+
+    Raises
+    ------
+    MechidError
+        If the record cannot be read, has no decaying oscillation, or grows.
+    """
+    found = one(sources, "decay", record)
+    if settings is None:
+        settings = {
+            "from_s": None if from_s is None else float(from_s),
+            "to_s": None if to_s is None else float(to_s),
+            "modes": None if modes is None else _index("modes", modes),
+            "max_modes": _index("max_modes", max_modes),
+            "offset": bool(offset),
+        }
+    return Decayed(_mechid.decay(found._inner, json.dumps(settings), threads))
 
 
 def reconstruct(

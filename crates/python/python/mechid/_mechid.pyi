@@ -23,6 +23,7 @@ __all__ = [
     "__version__",
     "bearing",
     "bearing_of_responses",
+    "decay",
     "fleet_begin",
     "fleet_part",
     "fleet_rows",
@@ -189,6 +190,7 @@ class Predicted:
 
 def predict_record(record: Measurement, machine: Machine, settings: str) -> Predicted: ...
 def frf(record: Measurement, settings: str, threads: int | None) -> Answer: ...
+def decay(record: Measurement, settings: str, threads: int | None) -> Answer: ...
 def bearing(
     tests: Sequence[Measurement], baseline: Sequence[Measurement], settings: str, threads: int | None
 ) -> Answer: ...

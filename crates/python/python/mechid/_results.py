@@ -851,6 +851,50 @@ class Inspected(Drawn):
 
 
 @final
+class Decayed(Drawn):
+    """Modes of a free response."""
+
+    _inner: _mechid.Answer
+
+    def __init__(self, inner: _mechid.Answer) -> None:
+        self.__dict__["_inner"] = inner
+
+    @property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes by rising frequency; the entries of a shape are the channels."""
+        return tuple(_mode(row) for row in self._told["modes"])
+
+    @property
+    def amplitudes(self) -> tuple[Uncertain, ...]:
+        """Amplitude of each mode at the first sample used, where its shape is largest, in SI units."""
+        return tuple(_uncertain(row["amplitude"]) for row in self._told["modes"])
+
+    @property
+    def energy_shares(self) -> NDArray[np.float64]:
+        """Part of the sum of squares of all modes that each mode has."""
+        return np.array([row["energy_share"] for row in self._told["modes"]], dtype=np.float64)
+
+    @property
+    def decays(self) -> tuple[bool, ...]:
+        """Whether the growth rate of each mode is below zero with its 95 % interval."""
+        return tuple(bool(row["decays"]) for row in self._told["modes"])
+
+    @property
+    def explained(self) -> NDArray[np.float64]:
+        """Share of the variance of each channel that the modes explain."""
+        return np.array([row["explained"] for row in self._told["channels"]], dtype=np.float64)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What to know of the numbers."""
+        return tuple(self._told["remarks"])
+
+    def __repr__(self) -> str:
+        found = ", ".join(f"{mode.natural_frequency_hz.value:.5g} Hz" for mode in self.modes)
+        return f"<Decayed {self._told['file']!r}: {found}>"
+
+
+@final
 class Sweep(Drawn):
     """Estimates and errors at many sampling steps."""
 

@@ -19,7 +19,7 @@ use mechid_analysis::bearing::BearingTable;
 #[cfg(feature = "parquet")]
 use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
-    FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
+    Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
     Reconstructed, SweepSummary,
 };
 use mechid_estimate::frequency_domain::FrequencyData;
@@ -78,7 +78,7 @@ impl ToFigure for Identified {
                     None => drawn,
                 })
             }
-            None => Ok(motion::motion(&title, &self.compared()?[0])),
+            None => Ok(motion::motion(&title, &self.compared()?[0], "predicted")),
         }
     }
 }
@@ -109,6 +109,14 @@ impl ToFigure for FrfTable {
     /// Draws magnitude, phase and coherence.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         Ok(frf::figure(self, style))
+    }
+}
+
+impl ToFigure for Decayed {
+    /// Draws the response from the beginning of the decay on, measured and fitted, and what is left.
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
+        let title = format!("{}: free decay", self.summary().file);
+        Ok(motion::motion(&title, self.compared(), "fitted"))
     }
 }
 

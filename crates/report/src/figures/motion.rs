@@ -1,4 +1,4 @@
-//! Measured and predicted motion over time, and what is left.
+//! Measured and computed motion over time, and what is left.
 
 use mechid_analysis::identify::prediction::Compared;
 use mechid_plot::{Axis, Color, Curve, Figure, Panel};
@@ -6,9 +6,9 @@ use mechid_plot::{Axis, Color, Curve, Figure, Panel};
 /// Samples that a picture shows at most: more than it has dots.
 const SHOWN: usize = 4000;
 
-/// The first kind of motion, measured and predicted, above the residual, for every degree of
-/// freedom.
-pub fn motion(title: &str, compared: &Compared) -> Figure {
+/// The first kind of motion, measured and computed, above the residual, for every degree of freedom;
+/// `computed` says how, such as predicted.
+pub fn motion(title: &str, compared: &Compared, computed: &str) -> Figure {
     let (measured, predicted) = (&compared.measured, &compared.predicted);
     let shown = measured.len().min(SHOWN);
     let time: Vec<f64> = measured.sampling().times().take(shown).collect();
@@ -32,7 +32,7 @@ pub fn motion(title: &str, compared: &Compared) -> Figure {
             .panel(
                 Panel::new(axis(), Axis::linear(format!("{name}{number}"), unit))
                     .curve(Curve::line("measured", &time, x).color(Color::GREY).width(2.4))
-                    .curve(Curve::line("predicted", &time, model).color(Color::VERMILION)),
+                    .curve(Curve::line(computed, &time, model).color(Color::VERMILION)),
             )
             .panel(
                 Panel::new(axis(), Axis::linear(format!("Residual{number}"), unit))

@@ -1,0 +1,188 @@
+//! Modes of a free response: a record in which no force acts.
+
+mod release;
+pub mod summary;
+
+use std::fmt;
+use std::ops::Range;
+
+use mechid_estimate::{FreeDecay, FreeDecayEstimate, free_decay};
+use mechid_model::ResponseQuantity;
+use mechid_signal::Record;
+use serde::{Deserialize, Serialize, Serializer};
+
+use self::release::release;
+pub use self::summary::DecaySummary;
+use crate::AnalysisError;
+use crate::identify::prediction::Compared;
+use crate::measurement::{Block, Measurement, Window};
+
+/// Settings of an analysis of a free decay.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DecaySettings {
+    /// Beginning of the decay, in s from the first sample of the window; `None`: found in the record.
+    pub from_s: Option<f64>,
+    /// End of what is used, in s from the first sample of the window; `None`: the end of the window.
+    pub to_s: Option<f64>,
+    /// Number of modes; `None`: as many as the record shows.
+    pub modes: Option<usize>,
+    /// Largest number of modes to look for where the number is not given.
+    pub max_modes: usize,
+    /// `true` if each channel has an unknown constant.
+    pub offset: bool,
+}
+
+impl Default for DecaySettings {
+    /// Everything is found in the record; at most ten modes.
+    fn default() -> Self {
+        let FreeDecay { modes, max_modes, offset } = FreeDecay::default();
+        Self { from_s: None, to_s: None, modes, max_modes, offset }
+    }
+}
+
+/// Modes of a free response, and the response beside that of the modes.
+///
+/// [`Display`](fmt::Display) gives the result as a person reads it, `serde` the same for programs.
+#[derive(Debug)]
+pub struct Decayed {
+    summary: DecaySummary,
+    estimate: FreeDecayEstimate,
+    compared: Compared,
+}
+
+/// Finds natural frequencies, damping ratios and shapes in a record without force: a structure that was
+/// plucked or struck, or whose shaker was switched off.
+///
+/// The record needs no force column, and one that is named is not read. All channels are of one kind of
+/// response. Unless its beginning is given, the decay begins with the last sample at which the sum of the
+/// squares of all channels, each over its own power, is at least 80 % of the largest.
+///
+/// ```
+/// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
+///
+/// let rig = concat!(env!("CARGO_MANIFEST_DIR"), "/../../examples/decay.csv");
+/// let channels = Channels::of_responses(ResponseQuantity::Acceleration, "a1,a2,a3");
+/// let found = decay(&Measurement::open(rig, &channels)?, &DecaySettings::default())?;
+/// assert_eq!(found.estimate().modes().len(), 3);
+/// println!("{found}");
+/// # Ok::<(), mechid_analysis::AnalysisError>(())
+/// ```
+///
+/// # Errors
+/// [`AnalysisError::NoMotion`] without a response, [`AnalysisError::Setting`] for several kinds of response, a
+/// period, or a beginning or end outside the window, [`AnalysisError::Window`], those of
+/// [`free_decay`], and if the file cannot be read again.
+pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, AnalysisError> {
+    let kind = kind_of(measurement)?;
+    let whole = how.part(measurement)?.whole_block()?;
+    let (_, record) = responses_of(&whole, kind)?;
+    let release = match how.from_s {
+        Some(_) => 0,
+        None => release(record),
+    };
+    let record = record.window(release, record.len() - release)?;
+    let estimate = free_decay(&record, &how.fit())?;
+    let first_sample = whole.first_sample + release;
+    let summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
+    let predicted = estimate.fitted().clone();
+    Ok(Decayed { summary, estimate, compared: Compared { kind, measured: record, predicted } })
+}
+
+/// The one kind of response that a record has columns of.
+fn kind_of(measurement: &Measurement) -> Result<ResponseQuantity, AnalysisError> {
+    let channels = measurement.channels();
+    let named = |kind: &ResponseQuantity| !channels.response(*kind).is_empty();
+    let kinds: Vec<ResponseQuantity> = ResponseQuantity::ALL.into_iter().filter(named).collect();
+    match kinds[..] {
+        [] => Err(AnalysisError::NoMotion),
+        [kind] => Ok(kind),
+        [first, second, ..] => {
+            let why = format!(
+                "a free decay is fitted to one kind of response: name the columns of {first} or those of \
+                 {second}"
+            );
+            Err(AnalysisError::Setting { setting: "response", why })
+        }
+    }
+}
+
+fn responses_of(
+    block: &Block,
+    kind: ResponseQuantity,
+) -> Result<(ResponseQuantity, &Record), AnalysisError> {
+    let found = block.responses().into_iter().find(|(own, _)| *own == kind);
+    found.ok_or(AnalysisError::NoMotion)
+}
+
+impl DecaySettings {
+    fn fit(&self) -> FreeDecay {
+        FreeDecay { modes: self.modes, max_modes: self.max_modes, offset: self.offset }
+    }
+
+    /// The part of a record between beginning and end.
+    fn part(&self, measurement: &Measurement) -> Result<Measurement, AnalysisError> {
+        if measurement.window_settings().period.is_some() {
+            let why = "a free decay has no period: choose `from` and `to`".into();
+            return Err(AnalysisError::Setting { setting: "period", why });
+        }
+        let (start, len) = measurement.span()?;
+        let Range { start: first, end } = self.samples(len, measurement.sampling().dt())?;
+        let window =
+            Window { start: start + first + 1, period: Some(end - first), periods: Some(1) };
+        measurement.clone().window(window)
+    }
+
+    /// Samples between beginning and end, of a window of `len` samples `dt` seconds apart.
+    fn samples(&self, len: usize, dt: f64) -> Result<Range<usize>, AnalysisError> {
+        let at = |setting: &'static str, seconds: f64| {
+            let sample = (seconds / dt).round();
+            match (0.0..=len as f64).contains(&sample) {
+                true => Ok(sample as usize),
+                false => {
+                    let whole = len as f64 * dt;
+                    let why = format!("{seconds} s is not in the window of {whole} s");
+                    Err(AnalysisError::Setting { setting, why })
+                }
+            }
+        };
+        let first = self.from_s.map_or(Ok(0), |seconds| at("from", seconds))?;
+        let end = self.to_s.map_or(Ok(len), |seconds| at("to", seconds))?;
+        match first < end {
+            true => Ok(first..end),
+            false => {
+                let why = "it must be after `from`".into();
+                Err(AnalysisError::Setting { setting: "to", why })
+            }
+        }
+    }
+}
+
+impl Decayed {
+    /// Returns the numbers and remarks.
+    pub fn summary(&self) -> &DecaySummary {
+        &self.summary
+    }
+
+    /// Returns the estimate.
+    pub fn estimate(&self) -> &FreeDecayEstimate {
+        &self.estimate
+    }
+
+    /// Returns the response from the beginning of the decay on, measured and fitted.
+    pub fn compared(&self) -> &Compared {
+        &self.compared
+    }
+}
+
+impl fmt::Display for Decayed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for Decayed {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}

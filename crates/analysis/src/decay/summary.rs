@@ -1,0 +1,321 @@
+//! The result of an analysis of a free decay.
+
+use std::fmt::{self, Write as _};
+
+use mechid_estimate::checks::thresholds::SIGNIFICANCE;
+use mechid_estimate::{DecayChannel, DecayMode, FreeDecayEstimate, IdentifiedMode};
+use mechid_model::ResponseQuantity;
+use mechid_signal::message;
+use serde::Serialize;
+
+use super::DecaySettings;
+use crate::AnalysisError;
+use crate::identify::rows::{CONFIDENCE, ModeRow, Uncertain};
+use crate::measurement::{Block, Measurement};
+use crate::modal::{ShapedMode, shape_table};
+use crate::text::{compact, significant, text_table};
+
+/// Cycles in the record below which frequency and damping of a mode are hardly known.
+const FEW_CYCLES: f64 = 2.0;
+/// Frequency over half the sampling rate above which a mode may be the image of a higher one.
+const HIGH: f64 = 0.8;
+/// Damping ratio above which a mode hardly oscillates.
+const HEAVY: f64 = 0.5;
+/// Share of the variance of a channel below which a remark tells how much the modes explain.
+const EXPLAINED: f64 = 0.9;
+
+/// Modes of a free response: numbers and remarks.
+#[derive(Debug, Serialize)]
+pub struct DecaySummary {
+    /// The record.
+    pub file: String,
+    /// Kind of response.
+    pub quantity: ResponseQuantity,
+    /// SI unit of the response.
+    pub unit: &'static str,
+    /// First sample used, counted from 1.
+    pub first_sample: usize,
+    /// Last sample used, counted from 1.
+    pub last_sample: usize,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+    /// `true` if the beginning was found in the record, not given.
+    pub release_found: bool,
+    /// Level of the confidence intervals, a pure number such as 0.95.
+    pub confidence: f64,
+    /// Modes by rising frequency.
+    pub modes: Vec<DecayModeRow>,
+    /// Channels, one each.
+    pub channels: Vec<DecayChannelRow>,
+    /// Remarks to read before using the numbers.
+    pub remarks: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: DecaySettings,
+}
+
+/// One mode of a free response.
+#[derive(Debug, Serialize)]
+pub struct DecayModeRow {
+    /// Frequencies, damping, pole and shape.
+    #[serde(flatten)]
+    pub mode: ShapedMode,
+    /// Amplitude at the first sample where the shape is largest, in the unit of the response.
+    pub amplitude: Uncertain,
+    /// Phase there, in degrees.
+    pub phase_deg: f64,
+    /// Part of the sum of squares of all modes, a ratio.
+    pub energy_share: f64,
+    /// `false` if the interval of the growth rate does not lie below zero.
+    pub decays: bool,
+}
+
+/// Fit of one channel.
+#[derive(Debug, Serialize)]
+pub struct DecayChannelRow {
+    /// Name of the column.
+    pub column: String,
+    /// Share of the variance that the modes explain, a ratio.
+    pub explained: f64,
+    /// Standard deviation of the residual, in the unit of the response.
+    pub noise: f64,
+    /// Order of the autoregression of the noise, 0 for white noise.
+    pub noise_order: usize,
+    /// Constant, in the unit of the response.
+    pub offset: f64,
+    /// Probability of a residual that is less white, adjusted for the number of tests.
+    pub whiteness_p_value: f64,
+    /// Mean square residual of the first samples over that of the others, a ratio.
+    pub onset_ratio: f64,
+    /// Probability of a larger ratio, adjusted for the number of tests.
+    pub onset_p_value: f64,
+}
+
+impl DecaySummary {
+    /// Sums up an estimate that begins with `first_sample` of the record, counted from 1.
+    pub(super) fn new(
+        measurement: &Measurement,
+        whole: &Block,
+        kind: ResponseQuantity,
+        first_sample: usize,
+        estimate: &FreeDecayEstimate,
+        how: &DecaySettings,
+    ) -> Result<Self, AnalysisError> {
+        let identified: Vec<IdentifiedMode> =
+            estimate.modes().iter().map(|mode| mode.mode.clone()).collect();
+        let rows = ModeRow::all(&identified, false)?;
+        let modes = rows.into_iter().zip(estimate.modes()).map(|(row, mode)| {
+            Ok(DecayModeRow {
+                mode: ShapedMode::of(row, &mode.mode, false),
+                amplitude: Uncertain::of(&mode.amplitude)?,
+                phase_deg: mode.phase.to_degrees(),
+                energy_share: mode.energy_share,
+                decays: mode.decays(),
+            })
+        });
+        let columns = measurement.channels().response(kind);
+        let mut summary = Self {
+            file: whole.file.clone(),
+            quantity: kind,
+            unit: kind.unit(),
+            first_sample,
+            last_sample: first_sample + estimate.fitted().len() - 1,
+            sample_rate_hz: measurement.sampling().rate_hz(),
+            release_found: how.from_s.is_none(),
+            confidence: CONFIDENCE,
+            modes: modes.collect::<Result<_, AnalysisError>>()?,
+            channels: channel_rows(columns, estimate.channels()),
+            remarks: whole.unit_remarks.clone(),
+            analysis: *how,
+        };
+        summary.remarks.extend(summary.of_channels());
+        for (number, mode) in (1..).zip(estimate.modes()) {
+            summary.remarks.extend(summary.of_mode(number, mode));
+        }
+        Ok(summary)
+    }
+
+    /// What speaks against the fit of the channels.
+    fn of_channels(&self) -> Vec<String> {
+        let mut remarks = Vec::new();
+        for channel in &self.channels {
+            let column = &channel.column;
+            if channel.whiteness_p_value < SIGNIFICANCE {
+                remarks.push(format!(
+                    "the residual of {column} is not white (p = {}): its standard errors are not \
+                     reliable. Possible causes: a missing mode (`modes`), a nonlinearity, a force that \
+                     still acts (begin later with `from`)",
+                    significant(channel.whiteness_p_value, 2)
+                ));
+            }
+            if channel.onset_p_value < SIGNIFICANCE {
+                remarks.push(format!(
+                    "the first samples of {column} leave a residual of {} × the power of the others (p = \
+                     {}): a force may still act there; begin later with `from`",
+                    significant(channel.onset_ratio, 3),
+                    significant(channel.onset_p_value, 2)
+                ));
+            }
+            if channel.explained < EXPLAINED {
+                remarks.push(format!(
+                    "the modes explain {} % of the variance of {column}; the rest is noise, or a response \
+                     that is no decaying oscillation",
+                    significant(100.0 * channel.explained, 3)
+                ));
+            }
+        }
+        let coloured = self.channels.iter().filter(|c| c.noise_order > 0);
+        let names = message::list(coloured.map(|c| &c.column), ", ", 6);
+        if !names.is_empty() {
+            remarks.push(format!(
+                "the noise of {names} is coloured; the fit and the standard errors take it as an \
+                 autoregression"
+            ));
+        }
+        remarks
+    }
+
+    /// What speaks against a mode.
+    fn of_mode(&self, number: usize, mode: &DecayMode) -> Vec<String> {
+        let (hz, growth) = (mode.mode.damped_frequency_hz.value, mode.mode.growth_rate);
+        let name = format!("mode {number} ({} Hz)", significant(hz, 4));
+        let mut remarks = Vec::new();
+        if !mode.decays() {
+            remarks.push(format!(
+                "{name} does not decay: its growth rate is {} ± {} 1/s. A steady disturbance (mains, a \
+                 running machine), a lightly damped mode in a short record, or a force that still acts",
+                significant(growth.value, 2),
+                significant(growth.standard_error, 2)
+            ));
+        }
+        let samples = self.last_sample + 1 - self.first_sample;
+        let cycles = hz * samples as f64 / self.sample_rate_hz;
+        if cycles < FEW_CYCLES {
+            remarks.push(format!(
+                "{name} has {} cycles in the record: it may be a drift, or a motion that does not oscillate",
+                significant(cycles, 2)
+            ));
+        }
+        if hz > 0.5 * HIGH * self.sample_rate_hz {
+            remarks.push(format!(
+                "{name} is near half the sampling rate, {} Hz: it may be the image of a higher mode",
+                compact(0.5 * self.sample_rate_hz, 6)
+            ));
+        }
+        let zeta = mode.mode.damping_ratio.value;
+        if zeta > HEAVY {
+            remarks.push(format!(
+                "{name} has a damping ratio of {}: hardly an oscillation, it may stand for an overdamped \
+                 mode, which is not part of the model",
+                significant(zeta, 2)
+            ));
+        }
+        remarks
+    }
+
+    fn mode_table(&self) -> String {
+        let header = [
+            "mode",
+            "frequency (Hz)",
+            "±",
+            "damping ratio (%)",
+            "±",
+            "energy (%)",
+            &format!("amplitude ({})", self.unit),
+        ];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for (number, row) in (1..).zip(&self.modes) {
+            let [frequency, frequency_error, _] = row.mode.row.natural_frequency_hz.cells();
+            let [damping, damping_error, _] = row.mode.row.damping_ratio.percent().cells();
+            let [amplitude, ..] = row.amplitude.cells();
+            let energy = significant(100.0 * row.energy_share, 3);
+            let cells = [frequency, frequency_error, damping, damping_error, energy, amplitude];
+            rows.push([vec![number.to_string()], cells.to_vec()].concat());
+        }
+        text_table(&rows)
+    }
+
+    fn channel_table(&self) -> String {
+        let header =
+            ["channel", "explained (%)", &format!("noise ({})", self.unit), "order of its colour"];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        rows.extend(self.channels.iter().map(|channel| {
+            let order = match channel.noise_order {
+                0 => "white".into(),
+                order => order.to_string(),
+            };
+            let explained = significant(100.0 * channel.explained, 4);
+            vec![channel.column.clone(), explained, significant(channel.noise, 3), order]
+        }));
+        text_table(&rows)
+    }
+
+    /// Returns the result as a person reads it.
+    fn text(&self) -> String {
+        let mut text = format!(
+            "{}: {} of {}, samples {} to {} at {} Hz",
+            self.file,
+            self.quantity,
+            message::count(self.channels.len(), "channel"),
+            self.first_sample,
+            self.last_sample,
+            compact(self.sample_rate_hz, 8)
+        );
+        if self.release_found {
+            let seconds = (self.first_sample - 1) as f64 / self.sample_rate_hz;
+            let _ = write!(text, "; the decay begins at {} s", compact(seconds, 5));
+        }
+        let modes = message::count(self.modes.len(), "mode");
+        let _ = write!(text, "\n{modes}; ± is one standard error\n\n{}\n", self.mode_table());
+        let shaped: Vec<&ShapedMode> = self.modes.iter().map(|row| &row.mode).collect();
+        if self.channels.len() > 1 {
+            let columns: Vec<&str> = self.channels.iter().map(|c| c.column.as_str()).collect();
+            let name = |at: usize| columns.get(at).map_or(String::new(), |c| (*c).to_owned());
+            let _ = writeln!(text, "{}", shape_table(&shaped, name));
+        }
+        text += &self.channel_table();
+        let notes: String = self.remarks.iter().map(|remark| format!("note: {remark}\n")).collect();
+        if !notes.is_empty() {
+            let _ = write!(text, "\n{notes}");
+        }
+        text
+    }
+}
+
+fn channel_rows(columns: &[String], channels: &[DecayChannel]) -> Vec<DecayChannelRow> {
+    // One family of tests: Holm's adjustment.
+    let raw = channels.iter().flat_map(|c| [c.whiteness.p_value, c.onset.p_value]);
+    let adjusted = adjusted(&raw.collect::<Vec<f64>>());
+    let rows = columns.iter().zip(channels).zip(adjusted.chunks_exact(2));
+    let row = |((column, channel), p_values): ((&String, &DecayChannel), &[f64])| DecayChannelRow {
+        column: column.clone(),
+        explained: channel.explained,
+        noise: channel.noise,
+        noise_order: channel.noise_order,
+        offset: channel.offset,
+        whiteness_p_value: p_values[0],
+        onset_ratio: channel.onset.ratio,
+        onset_p_value: p_values[1],
+    };
+    rows.map(row).collect()
+}
+
+/// Probabilities adjusted for their number.
+///
+/// # Source
+/// Holm (1979), Scandinavian Journal of Statistics 6, 65–70.
+fn adjusted(raw: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..raw.len()).collect();
+    order.sort_by(|a, b| raw[*a].total_cmp(&raw[*b]));
+    let (mut adjusted, mut least) = (vec![1.0; raw.len()], 0.0_f64);
+    for (rank, at) in order.into_iter().enumerate() {
+        least = least.max((raw.len() - rank) as f64 * raw[at]).min(1.0);
+        adjusted[at] = least;
+    }
+    adjusted
+}
+
+impl fmt::Display for DecaySummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text())
+    }
+}

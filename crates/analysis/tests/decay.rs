@@ -1,0 +1,131 @@
+//! Free decays from record to result, judged by an exact sum of decays.
+
+use std::f64::consts::TAU;
+
+use mechid_analysis::{
+    AnalysisError, Channels, DecaySettings, Decayed, Measurement, ResponseQuantity, Window, decay,
+};
+use mechid_signal::{Sampling, noise};
+use serde_json::Value;
+
+const RELEASE: f64 = 0.5;
+
+/// Two channels at 500 Hz, pulled until [`RELEASE`], then decays of 6 Hz and 1 % and of 30 Hz and 2 %.
+fn record() -> (Sampling, [Vec<f64>; 2]) {
+    let sampling = Sampling::from_rate_hz(500.0, 2000).unwrap();
+    let noise = noise::white(sampling, 2, 2e-6, 4).unwrap();
+    let channel = |at: usize, sizes: [f64; 2]| {
+        let value = |(k, t): (usize, f64)| {
+            let t = (t - RELEASE).max(0.0);
+            let mode = |hz: f64, zeta: f64| {
+                let (decay, omega) = (zeta * TAU * hz, TAU * hz * (1.0 - zeta * zeta).sqrt());
+                (-decay * t).exp() * ((omega * t).cos() + decay / omega * (omega * t).sin())
+            };
+            let clean = sizes[0] * mode(6.0, 0.01) + sizes[1] * mode(30.0, 0.02);
+            1e-3 + clean + noise.channel(at)[k]
+        };
+        sampling.times().enumerate().map(value).collect()
+    };
+    (sampling, [channel(0, [4e-4, 1e-4]), channel(1, [-2e-4, 1.5e-4])])
+}
+
+fn measurement() -> Measurement {
+    let (sampling, [x, y]) = record();
+    let channels = Channels::of_responses(ResponseQuantity::Displacement, "x,y");
+    let columns = [("x", x.as_slice()), ("y", y.as_slice())];
+    Measurement::from_columns(sampling, &columns, &channels).unwrap()
+}
+
+fn found(how: &DecaySettings) -> Decayed {
+    decay(&measurement(), how).unwrap()
+}
+
+fn first_hz(found: &Decayed) -> f64 {
+    found.summary().modes[0].mode.row.natural_frequency_hz.value
+}
+
+#[test]
+fn modes_and_their_release_are_found() {
+    let found = found(&DecaySettings::default());
+    let summary = found.summary();
+    assert_eq!(summary.modes.len(), 2);
+    let begins = (summary.first_sample - 1) as f64 / summary.sample_rate_hz;
+    assert!((RELEASE..RELEASE + 0.2).contains(&begins), "{begins}");
+    for (row, (hz, zeta)) in summary.modes.iter().zip([(6.0, 0.01), (30.0, 0.02)]) {
+        let [frequency, damping] = [row.mode.row.natural_frequency_hz, row.mode.row.damping_ratio];
+        assert!((frequency.value - hz).abs() < 4.0 * frequency.standard_error.unwrap());
+        assert!((damping.value - zeta).abs() < 4.0 * damping.standard_error.unwrap());
+        assert!(row.decays);
+    }
+    assert!((summary.modes[0].mode.shape[1].value[0] + 0.5).abs() < 0.01);
+    assert!((summary.channels[0].offset - 1e-3).abs() < 1e-6);
+    assert!(summary.channels.iter().all(|c| c.explained > 0.99 && c.noise_order == 0));
+    assert!(summary.remarks.is_empty(), "{:?}", summary.remarks);
+    let text = found.to_string();
+    assert!(text.contains("2 modes; ± is one standard error"), "{text}");
+}
+
+/// The settings that a result carries repeat it, and unknown ones are refused.
+#[test]
+fn settings_are_saved_and_read_back() {
+    let how = DecaySettings { from_s: Some(0.6), to_s: Some(3.0), ..DecaySettings::default() };
+    let found = found(&how);
+    let json: Value = serde_json::to_value(&found).unwrap();
+    assert_eq!(json["first_sample"], 301);
+    assert_eq!(json["last_sample"], 1500);
+    let again: DecaySettings = serde_json::from_value(json["analysis"].clone()).unwrap();
+    assert_eq!(again, how);
+    assert!(serde_json::from_str::<DecaySettings>(r#"{"mode": 2}"#).is_err());
+    assert_eq!(serde_json::from_str::<DecaySettings>("{}").unwrap(), DecaySettings::default());
+    // The window counts first.
+    let window = Window { start: 101, ..Window::default() };
+    let later = measurement().window(window).unwrap();
+    let how = DecaySettings { from_s: Some(0.4), to_s: Some(2.8), ..DecaySettings::default() };
+    assert_eq!(first_hz(&decay(&later, &how).unwrap()), first_hz(&found));
+}
+
+#[test]
+fn what_speaks_against_a_fit_is_told() {
+    let told = |how: DecaySettings, what: &str| {
+        let remarks = found(&how).summary().remarks.clone();
+        assert!(remarks.iter().any(|remark| remark.contains(what)), "{what}: {remarks:?}");
+    };
+    let from_s = Some(RELEASE);
+    // A mode too few is a coloured residual: an autoregression can pass for it.
+    told(DecaySettings { modes: Some(1), from_s, ..DecaySettings::default() }, "coloured");
+    // A hundredth of a second before the release: a mode that is none, or what the right modes leave.
+    let early = DecaySettings { from_s: Some(RELEASE - 0.01), ..DecaySettings::default() };
+    told(early, "hardly an oscillation");
+    told(DecaySettings { modes: Some(2), ..early }, "first samples");
+    // Less than two cycles.
+    let how = DecaySettings {
+        from_s,
+        to_s: Some(RELEASE + 0.25),
+        modes: Some(2),
+        ..DecaySettings::default()
+    };
+    told(how, "cycles in the record");
+}
+
+#[test]
+fn what_cannot_be_analysed_is_refused() {
+    let refused = |how: DecaySettings| decay(&measurement(), &how).unwrap_err().to_string();
+    let default = DecaySettings::default();
+    let outside = refused(DecaySettings { from_s: Some(9.0), ..default });
+    assert_eq!(outside, "`from`: 9 s is not in the window of 4 s");
+    let nothing = refused(DecaySettings { from_s: Some(1.0), to_s: Some(1.0), ..default });
+    assert_eq!(nothing, "`to`: it must be after `from`");
+    assert!(refused(DecaySettings { from_s: Some(f64::NAN), ..default }).contains("NaN"));
+    let period = decay(&measurement().period(100).unwrap(), &default);
+    assert!(matches!(period, Err(AnalysisError::Setting { setting: "period", .. })));
+
+    let (sampling, [x, y]) = record();
+    let columns = [("x", x.as_slice()), ("v", y.as_slice())];
+    let both = Channels::of_responses(ResponseQuantity::Displacement, "x")
+        .and(ResponseQuantity::Velocity, "v");
+    let both = Measurement::from_columns(sampling, &columns, &both).unwrap();
+    let mixed = decay(&both, &default);
+    assert!(matches!(mixed, Err(AnalysisError::Setting { setting: "response", .. })));
+    let none = Measurement::from_columns(sampling, &columns, &Channels::default()).unwrap();
+    assert!(matches!(decay(&none, &default), Err(AnalysisError::NoMotion)));
+}

@@ -1,0 +1,127 @@
+//! Noise whose samples depend on those before: its prediction errors are white.
+
+/// Largest order that is tried.
+const MOST_ORDER: usize = 20;
+
+/// Samples that each order needs.
+const SAMPLES_PER_ORDER: usize = 20;
+
+/// Noise of one channel as an autoregression; of order 0 it is white.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Autoregression {
+    /// Coefficients of the best predictions from the last 1, 2 … samples, the latest sample first.
+    predictors: Vec<Vec<f64>>,
+    /// Deviation of the error of each prediction from 0, 1 … samples over that of the last.
+    deviations: Vec<f64>,
+}
+
+impl Autoregression {
+    /// Returns the noise of least Bayesian information criterion.
+    ///
+    /// # Source
+    /// Burg (1975), *Maximum Entropy Spectral Analysis*, thesis, Stanford; Schwarz (1978), Annals of
+    /// Statistics 6, 461–464.
+    pub(super) fn of(noise: &[f64]) -> Self {
+        let len = noise.len();
+        let most = MOST_ORDER.min(len / SAMPLES_PER_ORDER);
+        let (mut forward, mut backward) = (noise.to_vec(), noise.to_vec());
+        let mut variances = vec![noise.iter().map(|e| e * e).sum::<f64>() / len as f64];
+        let mut predictors: Vec<Vec<f64>> = vec![Vec::new()];
+        for order in 1..=most {
+            let pairs = || forward[order..].iter().zip(&backward[order - 1..len - 1]);
+            let product: f64 = pairs().map(|(f, b)| f * b).sum();
+            let power: f64 = pairs().map(|(f, b)| f * f + b * b).sum();
+            let reflection = 2.0 * product / power;
+            let variance = variances[order - 1] * (1.0 - reflection * reflection);
+            if !(variance > 0.0 && variance.is_finite()) {
+                break;
+            }
+            let last = &predictors[order - 1];
+            let turned = last.iter().zip(last.iter().rev()).map(|(a, r)| a - reflection * r);
+            predictors.push(turned.chain([reflection]).collect());
+            variances.push(variance);
+            for k in (order..len).rev() {
+                let (f, b) = (forward[k], backward[k - 1]);
+                forward[k] = f - reflection * b;
+                backward[k] = b - reflection * f;
+            }
+        }
+        let per_order = (len as f64).ln();
+        let cost = |order: usize| {
+            len as f64 * variances[order].max(f64::MIN_POSITIVE).ln() + order as f64 * per_order
+        };
+        let orders = 0..variances.len();
+        let order = orders.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(0);
+        predictors.truncate(order + 1);
+        let deviation = |variance: &f64| (variance / variances[order]).sqrt();
+        let deviations = variances[..=order].iter().map(deviation).collect();
+        Self { predictors, deviations }
+    }
+
+    /// Number of samples that each sample depends on.
+    pub(super) fn order(&self) -> usize {
+        self.predictors.len().saturating_sub(1)
+    }
+
+    /// Minus twice the logarithm of the determinant by which whitening multiplies volumes.
+    pub(super) fn log_volume(&self) -> f64 {
+        2.0 * self.deviations.iter().map(|d| d.ln()).sum::<f64>()
+    }
+
+    /// Returns the prediction errors of `values` from sample `before` on, all of one variance; the first
+    /// of the values is sample `first` of the record.
+    pub(super) fn whitened(&self, values: &[f64], first: usize, before: usize) -> Vec<f64> {
+        let mut errors = values[before..].to_vec();
+        let order = self.order();
+        // The first samples have fewer before them.
+        let ramp = order.saturating_sub(first + before).min(errors.len());
+        for (at, error) in errors.iter_mut().enumerate().take(ramp) {
+            let of = first + before + at;
+            let past = values[..before + at].iter().rev();
+            let predicted: f64 = self.predictors[of].iter().zip(past).map(|(a, v)| a * v).sum();
+            *error = (*error - predicted) / self.deviations[of];
+        }
+        for (lag, a) in (1..).zip(self.predictors.last().into_iter().flatten()) {
+            let past = &values[before + ramp - lag..];
+            errors[ramp..].iter_mut().zip(past).for_each(|(e, v)| *e -= a * v);
+        }
+        errors
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::{Sampling, noise};
+
+    use super::*;
+
+    fn first_order(len: usize, seed: u64) -> Vec<f64> {
+        let white = noise::white(Sampling::new(1.0, len + 200).unwrap(), 1, 1.0, seed).unwrap();
+        let mut x = white.channel(0).to_vec();
+        for k in 1..x.len() {
+            x[k] += 0.9 * x[k - 1];
+        }
+        x[200..].to_vec()
+    }
+
+    #[test]
+    fn the_order_and_the_coefficient_are_found() {
+        let found = Autoregression::of(&first_order(4000, 1));
+        assert_eq!(found.order(), 1);
+        assert!((found.predictors[1][0] - 0.9).abs() < 0.03);
+        let white = noise::white(Sampling::new(1.0, 4000).unwrap(), 1, 1.0, 2).unwrap();
+        assert_eq!(Autoregression::of(white.channel(0)).order(), 0);
+    }
+
+    #[test]
+    fn whitening_in_pieces_is_whitening_at_once() {
+        let x = first_order(300, 3);
+        let noise = Autoregression::of(&x);
+        let whole = noise.whitened(&x, 0, 0);
+        let later = noise.whitened(&x[100 - noise.order()..], 100 - noise.order(), noise.order());
+        assert_eq!(whole[100..], later);
+        assert!(noise.order() > 0);
+        // The first sample has the variance of the noise, 1/(1 − 0.9²), the others that of the errors.
+        assert!((whole[0] / x[0] - (1.0f64 - 0.81).sqrt()).abs() < 0.05);
+    }
+}

@@ -1,0 +1,275 @@
+//! The poles that make a record most likely, their number and the colour of the noise being given.
+
+use nalgebra::{DMatrix, DMatrixView, DVector};
+
+use super::autoregression::Autoregression;
+use super::poles::{Pole, columns, linear_columns};
+use crate::triangular::TriangularFactor;
+
+/// Rows made at a time.
+const CHUNK: usize = 4096;
+/// Steps of a search.
+pub(super) const MAX_STEPS: usize = 50;
+/// Decrease of minus twice the log likelihood that ends the last search …
+pub(super) const FINE: f64 = 1e-7;
+/// … and one of those that compare numbers of modes.
+pub(super) const COARSE: f64 = 1e-2;
+/// Damping at which no descent is to be had.
+const MAX_DAMPING: f64 = 1e8;
+/// Residual over the RMS of a channel below which it is rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// Samples × channels, each of unit RMS about its mean, and whether each has a constant.
+#[derive(Debug)]
+pub(super) struct Data {
+    pub samples: DMatrix<f64>,
+    pub constant: bool,
+}
+
+/// Decays fitted to a record.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub poles: Vec<Pole>,
+    /// Noise of each channel.
+    pub noise: Vec<Autoregression>,
+    /// What follows from the poles for each channel.
+    pub channels: Vec<ChannelFit>,
+}
+
+/// Linear unknowns of a channel, and what the record says of the poles through it.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelFit {
+    /// Amplitudes of cosine and sine of each pole, then the constant.
+    pub linear: DVector<f64>,
+    /// Sum of squares of the whitened residual.
+    pub square: f64,
+    /// Triangle of the linear columns.
+    pub own: DMatrix<f64>,
+    /// Derivatives with respect to growth and turn of each pole, times the samples: their part along the
+    /// linear columns …
+    pub along: DMatrix<f64>,
+    /// … and across.
+    pub across: DMatrix<f64>,
+    /// Residual along those derivatives.
+    pub side: DVector<f64>,
+}
+
+impl Data {
+    pub(super) fn len(&self) -> usize {
+        self.samples.nrows()
+    }
+
+    pub(super) fn channels(&self) -> usize {
+        self.samples.ncols()
+    }
+
+    /// Columns of poles, some rows at a time.
+    pub(super) fn chunks(&self, poles: &[Pole]) -> impl Iterator<Item = DMatrix<f64>> {
+        let chunk = |first: usize| {
+            let end = self.len().min(first + CHUNK);
+            columns(poles, self.constant, first, end, self.len())
+        };
+        (0..self.len()).step_by(CHUNK).map(chunk)
+    }
+
+    /// Residual of each channel, samples × channels.
+    pub(super) fn residual(&self, fit: &Fit) -> DMatrix<f64> {
+        let mut residual = self.samples.clone();
+        let linear = linear_columns(&fit.poles, self.constant);
+        for (at, basis) in self.chunks(&fit.poles).enumerate() {
+            for (channel, of) in fit.channels.iter().enumerate() {
+                let mut rows = residual.view_mut((at * CHUNK, channel), (basis.nrows(), 1));
+                rows -= basis.columns(0, linear) * &of.linear;
+            }
+        }
+        residual
+    }
+
+    /// Triangle of \[linear columns | those times k/N | channels\] after whitening.
+    fn triangle(
+        &self,
+        poles: &[Pole],
+        noise: &Autoregression,
+        channels: &[usize],
+    ) -> Option<DMatrix<f64>> {
+        let width = linear_columns(poles, self.constant) + 2 * poles.len() + channels.len();
+        let mut factor = TriangularFactor::new(width);
+        for first in (0..self.len()).step_by(CHUNK) {
+            let end = self.len().min(first + CHUNK);
+            let before = noise.order().min(first);
+            let basis = columns(poles, self.constant, first - before, end, self.len());
+            let rows = first - before..end;
+            let own = channels.iter().map(|c| self.samples.view((rows.start, *c), (rows.len(), 1)));
+            let mut parts: Vec<DMatrixView<'_, f64>> = vec![basis.as_view()];
+            parts.extend(own);
+            let white: Vec<DMatrix<f64>>;
+            if noise.order() > 0 {
+                white =
+                    parts.iter().map(|part| whitened(noise, part, rows.start, before)).collect();
+                parts = white.iter().map(DMatrix::as_view).collect();
+            }
+            if !factor.push(&parts) {
+                return None;
+            }
+        }
+        Some(factor.r().clone())
+    }
+
+    /// `None` where the poles are impossible or too near to one another.
+    fn at(&self, poles: &[Pole], noise: &[Autoregression]) -> Option<Fit> {
+        if !poles.iter().all(|pole| pole.is_possible(self.len())) {
+            return None;
+        }
+        let (linear, nonlinear) = (linear_columns(poles, self.constant), 2 * poles.len());
+        let mut fits: Vec<Option<ChannelFit>> = vec![None; self.channels()];
+        while let Some(first) = fits.iter().position(Option::is_none) {
+            // Channels of white noise share their columns.
+            let shared = |c: &usize| *c == first || noise[*c].order() + noise[first].order() == 0;
+            let group: Vec<usize> =
+                (first..self.channels()).filter(|c| fits[*c].is_none()).filter(shared).collect();
+            let upper = self.triangle(poles, &noise[first], &group)?;
+            let own = upper.view((0, 0), (linear, linear)).into_owned();
+            for (place, channel) in group.into_iter().enumerate() {
+                let column = upper.column(linear + nonlinear + place);
+                let right = column.rows(0, linear).into_owned();
+                let solved = own.solve_upper_triangular(&right)?;
+                if solved.iter().any(|v| !v.is_finite()) {
+                    return None;
+                }
+                let turned = slopes(&solved, nonlinear);
+                let square = column.rows_range(linear..).norm_squared();
+                let floor = (ROUNDING * ROUNDING) * self.len() as f64;
+                fits[channel] = Some(ChannelFit {
+                    square: square + floor,
+                    along: upper.view((0, linear), (linear, nonlinear)) * &turned,
+                    across: upper.view((linear, linear), (nonlinear, nonlinear)) * &turned,
+                    side: column.rows(linear, nonlinear).into_owned(),
+                    linear: solved,
+                    own: own.clone(),
+                });
+            }
+        }
+        let channels = fits.into_iter().collect::<Option<Vec<_>>>()?;
+        Some(Fit { poles: poles.to_vec(), noise: noise.to_vec(), channels })
+    }
+
+    /// Searches the most likely poles from a start, the colour of the noise being given, until a step
+    /// decreases minus twice the log likelihood by less than `tolerance`.
+    ///
+    /// # Source
+    /// Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432, with the Jacobian of Kaufman
+    /// (1975), BIT 15, 49–57; damping after Levenberg and Marquardt.
+    pub(super) fn refined(
+        &self,
+        poles: &[Pole],
+        noise: &[Autoregression],
+        tolerance: f64,
+    ) -> Option<Fit> {
+        let mut fit = self.at(poles, noise)?;
+        let mut cost = fit.misfit(self.len());
+        let mut damping = 0.0;
+        for _ in 0..MAX_STEPS {
+            let (jacobian, side) = fit.weighted(self.len());
+            let scale: Vec<f64> =
+                jacobian.column_iter().map(|c| c.norm().max(f64::MIN_POSITIVE)).collect();
+            let scaled = DMatrix::from_fn(jacobian.nrows(), jacobian.ncols(), |i, j| {
+                jacobian[(i, j)] / scale[j]
+            });
+            loop {
+                let (step, promised) = damped_step(&scaled, &side, damping)?;
+                if promised < tolerance || damping > MAX_DAMPING {
+                    return Some(fit);
+                }
+                let moved = fit.poles.iter().enumerate().map(|(at, pole)| Pole {
+                    growth: pole.growth + step[2 * at] / (scale[2 * at] * self.len() as f64),
+                    turn: pole.turn + step[2 * at + 1] / (scale[2 * at + 1] * self.len() as f64),
+                });
+                let moved: Vec<Pole> = moved.collect();
+                let trial = self.at(&moved, noise);
+                let trial = trial.map(|trial| (trial.misfit(self.len()), trial));
+                if let Some((less, trial)) = trial.filter(|(less, _)| *less < cost) {
+                    let gained = cost - less;
+                    (fit, cost) = (trial, less);
+                    damping = if damping < 1e-4 { 0.0 } else { damping / 10.0 };
+                    if gained < tolerance {
+                        return Some(fit);
+                    }
+                    break;
+                }
+                damping = f64::max(10.0 * damping, 1e-3);
+            }
+        }
+        Some(fit)
+    }
+}
+
+impl Fit {
+    /// Minus twice the log likelihood, but for a constant; the levels of the noise are the most likely ones.
+    pub(super) fn misfit(&self, len: usize) -> f64 {
+        let level = |of: &ChannelFit| len as f64 * (of.square / len as f64).ln();
+        self.channels.iter().map(level).sum::<f64>()
+            + self.noise.iter().map(Autoregression::log_volume).sum::<f64>()
+    }
+
+    /// Derivatives with respect to the poles and residual of all channels, over the deviation of the noise.
+    fn weighted(&self, len: usize) -> (DMatrix<f64>, DVector<f64>) {
+        let columns = 2 * self.poles.len();
+        let mut jacobian = DMatrix::zeros(columns * self.channels.len(), columns);
+        let mut side = DVector::zeros(columns * self.channels.len());
+        for (at, of) in self.channels.iter().enumerate() {
+            let deviation = (of.square / len as f64).sqrt();
+            jacobian.rows_mut(at * columns, columns).copy_from(&(&of.across / deviation));
+            side.rows_mut(at * columns, columns).copy_from(&(&of.side / deviation));
+        }
+        (jacobian, side)
+    }
+}
+
+/// Prediction errors of columns from row `before` on; the first row is sample `first` of the record.
+fn whitened(
+    noise: &Autoregression,
+    columns: &DMatrixView<'_, f64>,
+    first: usize,
+    before: usize,
+) -> DMatrix<f64> {
+    let mut white = DMatrix::zeros(columns.nrows() - before, columns.ncols());
+    for (mut target, column) in white.column_iter_mut().zip(columns.column_iter()) {
+        target.copy_from_slice(&noise.whitened(column.as_slice(), first, before));
+    }
+    white
+}
+
+/// Matrix that makes of the columns times k/N the derivatives of a channel with respect to growth and turn
+/// of each pole, times N.
+fn slopes(linear: &DVector<f64>, nonlinear: usize) -> DMatrix<f64> {
+    let mut slopes = DMatrix::zeros(nonlinear, nonlinear);
+    for at in (0..nonlinear).step_by(2) {
+        let (cos, sin) = (linear[at], linear[at + 1]);
+        slopes[(at, at)] = cos;
+        slopes[(at + 1, at)] = sin;
+        slopes[(at, at + 1)] = sin;
+        slopes[(at + 1, at + 1)] = -cos;
+    }
+    slopes
+}
+
+/// The minimiser y of ‖J y − r‖² + damping·‖y‖² and the decrease of ‖J y − r‖² that it promises.
+fn damped_step(
+    jacobian: &DMatrix<f64>,
+    side: &DVector<f64>,
+    damping: f64,
+) -> Option<(DVector<f64>, f64)> {
+    let (rows, columns) = jacobian.shape();
+    let mut stacked = DMatrix::zeros(rows + columns, columns + 1);
+    stacked.view_mut((0, 0), (rows, columns)).copy_from(jacobian);
+    stacked.view_mut((0, columns), (rows, 1)).copy_from(side);
+    // A little keeps the diagonal away from zero.
+    for j in 0..columns {
+        stacked[(rows + j, j)] = damping.max(1e-14).sqrt();
+    }
+    let upper = stacked.qr().unpack_r();
+    let right = upper.column(columns).rows(0, columns).into_owned();
+    let step = upper.view((0, 0), (columns, columns)).solve_upper_triangular(&right)?;
+    let promised = side.norm_squared() - (side - jacobian * &step).norm_squared();
+    step.iter().all(|v| v.is_finite()).then_some((step, promised))
+}

@@ -1,0 +1,98 @@
+//! Poles of a free decay, and the functions of time that belong to them.
+
+use std::f64::consts::PI;
+
+use nalgebra::{Complex, DMatrix};
+
+/// Growth over the record from which on a mode is written from its end backwards.
+const FROM_THE_END: f64 = 3.0;
+
+/// Samples after which an exponential is computed afresh, not from the sample before.
+const AFRESH: usize = 32;
+
+/// exp(λ k) at sample k, λ = `growth` + i `turn`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pole {
+    /// Re λ Δt, negative of a decay; nepers per sample.
+    pub growth: f64,
+    /// Im λ Δt, in rad per sample.
+    pub turn: f64,
+}
+
+/// Fastest decay, in nepers per sample.
+pub(super) const FASTEST_DECAY: f64 = 1.5;
+/// Largest growth over a record, in nepers.
+pub(super) const MOST_GROWTH: f64 = 30.0;
+/// Largest damping ratio.
+const MOST_DAMPING: f64 = 0.9;
+/// Highest frequency over half the sampling rate.
+const HIGHEST: f64 = 0.98;
+
+/// Lowest and highest turn in a record of `len` samples, in rad per sample: half a cycle in the record,
+/// and nearly half the sampling rate.
+pub(super) fn turns(len: usize) -> [f64; 2] {
+    [PI / len as f64, HIGHEST * PI]
+}
+
+impl Pole {
+    /// Returns whether a record of `len` samples can tell of it.
+    pub(super) fn is_possible(&self, len: usize) -> bool {
+        let [low, high] = turns(len);
+        (low..=high).contains(&self.turn)
+            && (-FASTEST_DECAY..=MOST_GROWTH / len as f64).contains(&self.growth)
+            && -self.growth <= MOST_DAMPING * self.growth.hypot(self.turn)
+    }
+
+    /// Returns the nearest one that is possible.
+    pub(super) fn possible(self, len: usize) -> Self {
+        let [low, high] = turns(len);
+        let turn = self.turn.clamp(low, high);
+        let most_decay = turn * MOST_DAMPING / (1.0 - MOST_DAMPING * MOST_DAMPING).sqrt();
+        let least = -FASTEST_DECAY.min(0.999 * most_decay);
+        Self { growth: self.growth.clamp(least, MOST_GROWTH / len as f64), turn }
+    }
+
+    /// Sample at which its amplitude is taken.
+    pub(super) fn origin(&self, len: usize) -> usize {
+        if self.growth * len as f64 > FROM_THE_END { len - 1 } else { 0 }
+    }
+}
+
+/// Returns the columns e^{σk} cos ωk and e^{σk} sin ωk of each pole, then the constant if there is one, then
+/// both of each pole times k/N; rows are the samples `first` … `end − 1` of N = `len`.
+pub(super) fn columns(
+    poles: &[Pole],
+    constant: bool,
+    first: usize,
+    end: usize,
+    len: usize,
+) -> DMatrix<f64> {
+    let linear = linear_columns(poles, constant);
+    let mut columns = DMatrix::zeros(end - first, linear + 2 * poles.len());
+    for (at, pole) in poles.iter().enumerate() {
+        let origin = pole.origin(len) as f64;
+        let step = Complex::from_polar(pole.growth.exp(), pole.turn);
+        let mut value = Complex::default();
+        for row in 0..end - first {
+            let k = (first + row) as f64;
+            value = match row % AFRESH {
+                0 => Complex::from_polar((pole.growth * (k - origin)).exp(), pole.turn * k),
+                _ => value * step,
+            };
+            let share = k / len as f64;
+            columns[(row, 2 * at)] = value.re;
+            columns[(row, 2 * at + 1)] = value.im;
+            columns[(row, linear + 2 * at)] = share * value.re;
+            columns[(row, linear + 2 * at + 1)] = share * value.im;
+        }
+    }
+    if constant {
+        columns.column_mut(2 * poles.len()).fill(1.0);
+    }
+    columns
+}
+
+/// Number of linear unknowns of a channel.
+pub(super) fn linear_columns(poles: &[Pole], constant: bool) -> usize {
+    2 * poles.len() + usize::from(constant)
+}

@@ -1,0 +1,165 @@
+//! Poles from which a search starts.
+
+use std::f64::consts::{PI, TAU};
+
+use mechid_model::RealSchur;
+use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_signal::transform;
+use nalgebra::{Complex, DMatrix};
+
+use super::poles::{FASTEST_DECAY, Pole, turns};
+
+/// Rows of the Hankel matrix, whatever the number of samples.
+const HANKEL_ROWS: usize = 160;
+/// Share of the power that may lie above half the rate at which the Hankel matrix is read.
+const ALIASED: f64 = 0.01;
+/// Decays over the record that a peak is looked for with, in nepers; each is that much faster than the
+/// last.
+const FIRST_DECAY: f64 = 2.0;
+const FASTER: f64 = 3.0;
+/// Growth over the record that a peak is looked for with, in nepers.
+const GROWTH: f64 = 6.0;
+
+/// The decay that a residual of unit variance (samples × channels) holds most of: the peak of the matched
+/// filters of a number of decays.
+pub(super) fn strongest(residual: &DMatrix<f64>) -> Option<Pole> {
+    let len = residual.nrows();
+    let padded = 2 * len.next_power_of_two();
+    let plan = transform::forward(padded);
+    let (mut samples, mut lines) = (plan.make_input_vec(), plan.make_output_vec());
+    let [low, high] = turns(len);
+    let decays = std::iter::successors(Some(FIRST_DECAY), |decay| Some(decay * FASTER))
+        .map(|decay| -decay / len as f64)
+        .take_while(|growth| -growth < 0.5 * FASTEST_DECAY);
+    let mut best: Option<(f64, Pole)> = None;
+    for growth in [GROWTH / len as f64, 0.0].into_iter().chain(decays) {
+        let origin = if growth > 0.0 { len - 1 } else { 0 } as f64;
+        let weights: Vec<f64> = (0..len).map(|k| (growth * (k as f64 - origin)).exp()).collect();
+        let energy = 0.5 * weights.iter().map(|w| w * w).sum::<f64>();
+        let mut power = vec![0.0; lines.len()];
+        for channel in residual.column_iter() {
+            samples.fill(0.0);
+            for ((sample, value), weight) in samples.iter_mut().zip(channel).zip(&weights) {
+                *sample = value * weight;
+            }
+            plan.process(&mut samples, &mut lines).ok()?;
+            power.iter_mut().zip(&lines).for_each(|(p, x)| *p += x.norm_sqr() / energy);
+        }
+        for (line, power) in power.into_iter().enumerate() {
+            let pole = Pole { growth, turn: TAU * line as f64 / padded as f64 };
+            if (low..=high).contains(&pole.turn) && best.as_ref().is_none_or(|(p, _)| power > *p) {
+                best = Some((power, pole));
+            }
+        }
+    }
+    best.map(|(_, pole)| pole.possible(len))
+}
+
+/// What a record says of the poles of any number of decays: the vectors that span its Hankel matrix, the
+/// strongest first.
+#[derive(Debug)]
+pub(super) struct Subspace {
+    vectors: DMatrix<f64>,
+    channels: usize,
+    /// Samples from one row of a channel to the next.
+    stride: usize,
+    len: usize,
+}
+
+impl Subspace {
+    /// Decomposes the Hankel matrix of samples × channels whose noise has about the same level in all
+    /// channels; `None` of a record too short for it or of too many channels.
+    ///
+    /// The matrix has at most [`HANKEL_ROWS`] rows and its products alone are held. A record with nothing
+    /// but low frequencies is read at a lower rate.
+    pub(super) fn of(samples: &DMatrix<f64>) -> Option<Self> {
+        let (len, channels) = samples.shape();
+        let rows = (HANKEL_ROWS / channels).min(len / 3);
+        let stride = stride(samples)?.min(len / (3 * rows.max(1))).max(1);
+        if rows < 3 {
+            return None;
+        }
+        let columns = len - (rows - 1) * stride;
+        let mut products = DMatrix::zeros(rows * channels, rows * channels);
+        for c in 0..channels {
+            for d in 0..=c {
+                let (x, y) = (samples.column(c), samples.column(d));
+                let sum = |i: usize, j: usize, from: usize, count: usize| {
+                    x.rows(i * stride + from, count).dot(&y.rows(j * stride + from, count))
+                };
+                // Along a diagonal the sums move on by one stride.
+                for diagonal in 0..rows {
+                    for (i0, j0) in [(diagonal, 0), (0, diagonal)] {
+                        let mut value = sum(i0, j0, 0, columns);
+                        for step in 0..rows - diagonal {
+                            let (i, j) = (i0 + step, j0 + step);
+                            products[(c * rows + i, d * rows + j)] = value;
+                            products[(d * rows + j, c * rows + i)] = value;
+                            if step + 1 < rows - diagonal {
+                                value += sum(i, j, columns, stride) - sum(i, j, 0, stride);
+                            }
+                        }
+                    }
+                }
+            }
+        }
+        let eigen = hermitian_eigen(products).ok()?;
+        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        let vectors = eigen.eigenvectors.select_columns(&order);
+        Some(Self { vectors, channels, stride, len })
+    }
+
+    /// Poles of so many decays; fewer where real numbers are among them.
+    ///
+    /// # Source
+    /// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627; Roy & Kailath (1989),
+    /// IEEE Transactions on Acoustics, Speech, and Signal Processing 37, 984–995.
+    pub(super) fn poles(&self, decays: usize) -> Vec<Pole> {
+        let rows = self.vectors.nrows() / self.channels;
+        let order = 2 * decays;
+        if order > self.channels * (rows - 1) || order > self.vectors.ncols() {
+            return Vec::new();
+        }
+        let part = |from: usize| {
+            DMatrix::from_fn(self.channels * (rows - 1), order, |row, column| {
+                let (channel, at) = (row / (rows - 1), row % (rows - 1));
+                self.vectors[(channel * rows + at + from, column)]
+            })
+        };
+        let qr = part(0).qr();
+        let Some(shift) = qr.r().solve_upper_triangular(&(qr.q().transpose() * part(1))) else {
+            return Vec::new();
+        };
+        let Ok(schur) = RealSchur::new(shift) else { return Vec::new() };
+        let pole = |z: &Complex<f64>| {
+            let log = z.ln() / self.stride as f64;
+            Pole { growth: log.re, turn: log.im }.possible(self.len)
+        };
+        schur.eigenvalues().iter().filter(|z| z.im > 0.0).map(pole).collect()
+    }
+}
+
+/// Samples to step on by, so that hardly any power is above half the rate; a power of two.
+fn stride(samples: &DMatrix<f64>) -> Option<usize> {
+    let len = samples.nrows();
+    let plan = transform::forward(len);
+    let (mut input, mut lines) = (plan.make_input_vec(), plan.make_output_vec());
+    let mut power = vec![0.0; lines.len()];
+    for channel in samples.column_iter() {
+        input.copy_from_slice(channel.as_slice());
+        plan.process(&mut input, &mut lines).ok()?;
+        power.iter_mut().zip(&lines).for_each(|(p, x)| *p += x.norm_sqr());
+    }
+    let total: f64 = power.iter().sum();
+    let mut stride = 1;
+    loop {
+        let turn = PI / (2 * stride) as f64;
+        let first = (turn * len as f64 / TAU) as usize;
+        let above: f64 = power[first.min(power.len())..].iter().sum();
+        if above > ALIASED * total || 8 * stride > len {
+            return Some(stride);
+        }
+        stride *= 2;
+    }
+}
