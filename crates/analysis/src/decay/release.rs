@@ -30,7 +30,7 @@ pub(super) fn release(record: &Record) -> usize {
         }
     }
     let largest = sums.iter().copied().fold(0.0, f64::max);
-    sums.iter().rposition(|sum| *sum >= LEVEL * largest).unwrap_or(0)
+    sums.iter().rposition(|sum| *sum > 0.0 && *sum >= LEVEL * largest).unwrap_or(0)
 }
 
 #[cfg(test)]
