@@ -1,6 +1,6 @@
 //! Covariance of estimated parameters, every entry of it or the factors of a product.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 
 /// Covariance of parameters θ.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,15 +76,53 @@ impl Covariance {
         }
     }
 
+    /// The covariance of sums f_i = Σ w_p θ_p over the parameters p of equation i: 2n×2n, real parts first.
+    pub(crate) fn of_sums(
+        &self,
+        weights: &[Complex<f64>],
+        equations: &[usize],
+        n: usize,
+    ) -> DMatrix<f64> {
+        let parts = || weights.iter().map(|w| [w.re, w.im]).zip(equations).enumerate();
+        match self {
+            Self::Full(all) => {
+                let mut sums = DMatrix::zeros(2 * n, 2 * n);
+                for (q, (right, j)) in parts() {
+                    for (p, (left, i)) in parts() {
+                        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                            sums[(a * n + i, b * n + j)] += left[a] * right[b] * all[(p, q)];
+                        }
+                    }
+                }
+                sums
+            }
+            Self::Product(Product { residual, rows, places, .. }) => {
+                let by_row = rows.transpose();
+                let mut sums = DMatrix::zeros(by_row.nrows(), 2 * n);
+                for ((_, (weight, i)), (_, h)) in parts().zip(places) {
+                    for (a, weight) in weight.into_iter().enumerate() {
+                        sums.column_mut(a * n + i).axpy(weight, &by_row.column(*h), 1.0);
+                    }
+                }
+                let mut sums = sums.tr_mul(&sums);
+                for (i, j) in (0..2 * n).flat_map(|i| (0..2 * n).map(move |j| (i, j))) {
+                    sums[(i, j)] *= residual[(i % n, j % n)];
+                }
+                sums
+            }
+        }
+    }
+
     /// gᵀ Σ g, the variance of gᵀθ.
     pub(crate) fn variance(&self, gradient: &DVector<f64>) -> f64 {
         match self {
             Self::Full(all) => gradient.dot(&(all * gradient)),
             Self::Product(Product { residual, rows, places, .. }) => {
                 // Σ_ij S_ij y_i·y_j with y_i the rows of the parameters of equation i, added up.
+                let by_row = rows.transpose();
                 let mut sums = DMatrix::zeros(rows.ncols(), residual.nrows());
                 for (weight, (i, h)) in gradient.iter().zip(places) {
-                    sums.column_mut(*i).axpy(*weight, &rows.row(*h).transpose(), 1.0);
+                    sums.column_mut(*i).axpy(*weight, &by_row.column(*h), 1.0);
                 }
                 sums.tr_mul(&sums).dot(residual)
             }
@@ -113,7 +151,20 @@ mod tests {
         }
         let gradient = DVector::from_fn(6, |at, _| number(at, 2));
         let expected = gradient.dot(&(&full * &gradient));
+        let weight = |at: usize| Complex::new(number(at, 1), number(at, 7));
+        let weights: Vec<_> = (0..6).map(weight).collect();
+        let equations = [0, 0, 1, 1, 2, 2];
+        let sums = DMatrix::from_fn(6, 6, |row, at| match equations[at] == row % 3 {
+            true if row < 3 => weights[at].re,
+            true => weights[at].im,
+            false => 0.0,
+        });
+        let expected_sums = &sums * &full * sums.transpose();
         let mut full = Covariance::Full(full);
+        for covariance in [&product, &full] {
+            let sums = covariance.of_sums(&weights, &equations, 3);
+            assert!((sums - &expected_sums).amax() < 1e-13 * expected_sums.amax());
+        }
         for covariance in [&mut product, &mut full] {
             assert!((covariance.variance(&gradient) / expected - 1.0).abs() < 1e-13);
             covariance.leave_open(3);

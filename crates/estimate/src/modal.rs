@@ -137,7 +137,8 @@ fn modes(
     covariance: &Covariance,
     degrees_of_freedom: usize,
 ) -> Result<Vec<IdentifiedMode>, EstimateError> {
-    let spread = Spread { covariance, degrees_of_freedom };
+    let equations: Vec<usize> = parameters.iter().map(Parameter::row).collect();
+    let spread = Spread { covariance, equations: &equations, degrees_of_freedom };
     let modes = system.modes()?;
     let partners = partners(&modes);
     let sensitivities: Vec<Sensitivity> =
@@ -180,6 +181,8 @@ fn partners(modes: &[Mode]) -> Vec<Option<usize>> {
 /// Scatter of the parameters.
 struct Spread<'a> {
     covariance: &'a Covariance,
+    /// Equation of motion of each of them.
+    equations: &'a [usize],
     degrees_of_freedom: usize,
 }
 
@@ -231,10 +234,6 @@ impl Spread<'_> {
             },
             false => self.uncertain(size / tau, &(growth / tau)),
         };
-        let shape = sensitivity.shape.row_iter().map(|row| {
-            let row = row.transpose();
-            Complex::new(self.deviation(&row.map(|d| d.re)), self.deviation(&row.map(|d| d.im)))
-        });
         IdentifiedMode {
             growth_rate: self.uncertain(lambda.re, &own.map(|d| d.re)),
             damped_frequency_hz: self
@@ -244,7 +243,7 @@ impl Spread<'_> {
             squared_frequency,
             partner: partner.map(|(at, ..)| at),
             is_rigid_body,
-            shape_standard_error: DVector::from_iterator(mode.shape().len(), shape),
+            shape_standard_error: self.of_shape(sensitivity),
             mode: mode.clone(),
         }
     }
@@ -253,6 +252,26 @@ impl Spread<'_> {
         let (standard_error, degrees_of_freedom) =
             (self.deviation(gradient), self.degrees_of_freedom);
         Uncertain { value, standard_error, degrees_of_freedom }
+    }
+
+    /// Standard errors of real and imaginary parts of dφ = −U f, f being what the parameters change in the
+    /// equations of motion.
+    fn of_shape(&self, sensitivity: &Sensitivity) -> DVector<Complex<f64>> {
+        let answers = &sensitivity.answers;
+        let n = answers.ncols();
+        if sensitivity.push.iter().any(|p| !(p.re.is_finite() && p.im.is_finite())) {
+            return DVector::from_element(n, Complex::new(f64::INFINITY, f64::INFINITY));
+        }
+        let of_push = self.covariance.of_sums(&sensitivity.push, self.equations, n);
+        let deviation = |weights: DVector<f64>| weights.dot(&(&of_push * &weights)).max(0.0).sqrt();
+        DVector::from_fn(n, |entry, _| {
+            let answer = |i: usize| answers[(entry, i % n)];
+            let re = |i: usize, _| if i < n { answer(i).re } else { -answer(i).im };
+            let im = |i: usize, _| if i < n { answer(i).im } else { answer(i).re };
+            let deviations =
+                [DVector::from_fn(2 * n, re), DVector::from_fn(2 * n, im)].map(deviation);
+            Complex::new(deviations[0], deviations[1])
+        })
     }
 
     /// √(gᵀ Σ g).
@@ -268,8 +287,10 @@ impl Spread<'_> {
 struct Sensitivity {
     /// dλ, one per parameter.
     eigenvalue: DVector<Complex<f64>>,
-    /// dφ, degrees of freedom × parameters.
-    shape: DMatrix<Complex<f64>>,
+    /// Change of the equation of motion of each parameter by its own, at fixed λ.
+    push: Vec<Complex<f64>>,
+    /// U of dφ = −U f for changes f of the equations of motion, n×n.
+    answers: DMatrix<Complex<f64>>,
 }
 
 impl Sensitivity {
@@ -296,23 +317,22 @@ impl Sensitivity {
         // Entry (i, j) of a matrix acts on equation i alone: n right-hand sides serve all.
         let mut unit = DMatrix::identity(n + 1, n);
         let regular = bordered.lu().solve_mut(&mut unit);
-        let mut derivatives = Self {
-            eigenvalue: DVector::zeros(parameters.len()),
-            shape: DMatrix::zeros(n, parameters.len()),
-        };
-        for (at, parameter) in parameters.iter().enumerate() {
+        let push = |parameter: &Parameter| {
             let power = match parameter.matrix() {
                 Matrix::Mass => lambda * lambda,
                 Matrix::Damping => lambda,
                 Matrix::Stiffness => Complex::from(1.0),
             };
-            let push =
-                if regular { power * shape[parameter.column()] } else { Complex::from(f64::NAN) };
-            let answer = unit.column(parameter.row()) * -push;
-            derivatives.eigenvalue[at] = answer[n];
-            derivatives.shape.column_mut(at).copy_from(&answer.rows(0, n));
+            if regular { power * shape[parameter.column()] } else { Complex::from(f64::NAN) }
+        };
+        let push: Vec<Complex<f64>> = parameters.iter().map(push).collect();
+        let of_eigenvalue =
+            parameters.iter().zip(&push).map(|(p, push)| unit[(n, p.row())] * -push);
+        Self {
+            eigenvalue: DVector::from_iterator(parameters.len(), of_eigenvalue),
+            answers: unit.rows(0, n).into_owned(),
+            push,
         }
-        derivatives
     }
 }
 
