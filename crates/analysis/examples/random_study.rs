@@ -94,7 +94,7 @@ fn one(system: &SecondOrderSystem, seed: u64, how: &Identify) -> Option<Run> {
         let truth = system.matrix(p.parameter.matrix())[(p.parameter.row(), p.parameter.column())];
         p.interval(0.95).is_ok_and(|[low, high]| (low..=high).contains(&truth))
     });
-    let ratio = |identified: &Identified| identified.summary().modes[0].damping_ratio.value;
+    let ratio = |identified: &Identified| identified.summary().modes[0].row.damping_ratio.value;
     let truth = system.modes().ok()?[0].damping_ratio();
     Some(Run {
         holding: holds.count() as f64 / count,

@@ -5,6 +5,7 @@ use mechid_io::escaped;
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
+use crate::identify::Unscaled;
 use crate::text::significant;
 
 /// A failure of an analysis.
@@ -408,6 +409,12 @@ pub enum AnalysisError {
         setting: &'static str,
         /// The reason.
         why: String,
+    },
+    /// M, C and K have no scale: the data give the modes alone.
+    #[error("{unscaled}")]
+    Unscaled {
+        /// Equations that are not given.
+        unscaled: Unscaled,
     },
     /// The identification failed.
     #[error(transparent)]

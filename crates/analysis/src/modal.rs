@@ -75,14 +75,12 @@ impl ModalSummary {
     pub fn of(machine: &Machine) -> Result<Self, AnalysisError> {
         let known = machine.is_exact();
         let modes = machine.modes()?;
-        let rows = ModeRow::all(&modes, known)?.into_iter().zip(&modes);
-        let rows = rows.map(|(row, mode)| ShapedMode::of(row, mode, known));
         Ok(Self {
             file: machine.name.clone(),
             degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
             nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system().terms().clone()),
-            modes: rows.collect(),
+            modes: ShapedMode::all(&modes, known)?,
             backbone: machine.backbone()?,
             system: SystemMatrices::from(machine.system()),
         })
@@ -128,6 +126,17 @@ impl Machine {
 }
 
 impl ShapedMode {
+    /// Returns the modes of an identified system, or of one that is exactly `known`.
+    pub(crate) fn all(modes: &[IdentifiedMode], known: bool) -> Result<Vec<Self>, AnalysisError> {
+        let rows = ModeRow::all(modes, known)?.into_iter().zip(modes);
+        Ok(rows.map(|(row, mode)| Self::of(row, mode, known)).collect())
+    }
+
+    /// Returns frequencies, damping and poles of modes, without their shapes.
+    pub fn rows(modes: &[Self]) -> Vec<ModeRow> {
+        modes.iter().map(|mode| mode.row.clone()).collect()
+    }
+
     pub(crate) fn of(row: ModeRow, mode: &IdentifiedMode, known: bool) -> Self {
         let eigenvalue = mode.mode.eigenvalue();
         let entries = mode.mode.shape().iter().zip(mode.shape_standard_error.iter());
@@ -166,10 +175,7 @@ impl ModalSummary {
             small.collect::<String>(),
             self.mode_table(),
             self.instability(),
-            shape_table(&self.modes.iter().collect::<Vec<_>>(), |at| format!(
-                "direction {}",
-                at + 1
-            ))
+            shape_table(&self.modes, |at| format!("direction {}", at + 1))
         ) + &self.backbone_table()
     }
 
@@ -215,14 +221,16 @@ impl ModalSummary {
         let interval = format!("{} % interval", compact(100.0 * self.confidence, 3));
         let header = ["mode", "value", "standard error", &interval, "unit"];
         let mut rows = vec![header.map(String::from).to_vec()];
-        let modes: Vec<ModeRow> = self.modes.iter().map(|mode| mode.row.clone()).collect();
-        rows.extend(mode_cells(&modes, true));
+        rows.extend(mode_cells(&ShapedMode::rows(&self.modes), true));
         text_table(&rows)
     }
 }
 
 /// Entries of shapes as a table; `name` tells the channel of an entry, counted from 0.
-pub(crate) fn shape_table(modes: &[&ShapedMode], name: impl Fn(usize) -> String) -> String {
+pub(crate) fn shape_table<'a>(
+    modes: impl IntoIterator<Item = &'a ShapedMode>,
+    name: impl Fn(usize) -> String,
+) -> String {
     let header = ["shape", "modulus", "phase, °", "real part", "±", "imaginary part", "±"];
     let mut rows = vec![header.map(String::from).to_vec()];
     for (number, mode) in (1..).zip(modes) {

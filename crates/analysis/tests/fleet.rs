@@ -80,7 +80,7 @@ fn a_row_is_the_identification_of_its_record() {
     assert_eq!(row.covariance.as_ref(), Some(&found.summary().covariance));
     assert_eq!(
         row.modes[0].natural_frequency_hz,
-        found.summary().modes[0].natural_frequency_hz.value
+        found.summary().modes[0].row.natural_frequency_hz.value
     );
     let codes: Vec<&str> = row.findings.iter().map(|finding| finding.code.as_str()).collect();
     assert!(

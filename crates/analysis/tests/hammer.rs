@@ -82,7 +82,7 @@ fn a_roving_hammer_finds_the_machine() {
                 total += 1;
             }
             for (mode, ratio) in found.summary().modes.iter().zip([0.01, 0.015]) {
-                assert!((mode.damping_ratio.value / ratio - 1.0).abs() < 0.02, "{found}");
+                assert!((mode.row.damping_ratio.value / ratio - 1.0).abs() < 0.02, "{found}");
             }
             warned += usize::from(found.checks().iter().any(|check| check.is_conspicuous()));
         }

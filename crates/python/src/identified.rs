@@ -135,7 +135,13 @@ impl Identified {
                     Err(_) => return Err(AnalysisError::NoReceptance),
                 },
             };
-            let (n, models) = (data.dof(), identified.system()?.receptances(data.omega())?);
+            let (n, model) = (data.dof(), identified.estimate().system()?);
+            let models = model.receptances(data.omega())?;
+            // Without scale only the responses to the forces that acted are known.
+            let unknown: &[usize] = match &identified.summary().unscaled {
+                Some(unscaled) => &unscaled.degrees_of_freedom,
+                None => &[],
+            };
             let none = Complex::new(f64::NAN, f64::NAN);
             let measured = DMatrix::from_fn(data.len(), n * n, |row, at| match at % n {
                 force if acts_alone(&data, row, force) => {
@@ -143,8 +149,9 @@ impl Identified {
                 }
                 _ => none,
             });
-            let model =
-                DMatrix::from_fn(data.len(), n * n, |row, at| models[row][(at / n, at % n)]);
+            let model = DMatrix::from_fn(data.len(), n * n, |row, at| {
+                if unknown.contains(&(at % n + 1)) { none } else { models[row][(at / n, at % n)] }
+            });
             Ok((data.omega().to_vec(), measured, model))
         };
         let (omega, measured, model) = work::watched(py, None, || Ok(()), compare)?;

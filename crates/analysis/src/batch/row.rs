@@ -180,7 +180,7 @@ impl ResultRow {
             last_sample: Some(last_sample),
             parameters: entries.chain(terms).collect(),
             covariance: Some(identification.covariance.clone()),
-            modes: identification.modes.iter().map(ModeCell::of).collect(),
+            modes: identification.modes.iter().map(|mode| ModeCell::of(&mode.row)).collect(),
             nrmse: Some(nrmse),
             unexplained_motion,
             misfit_ratio,

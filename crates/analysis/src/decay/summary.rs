@@ -266,11 +266,10 @@ impl DecaySummary {
         }
         let modes = message::count(self.modes.len(), "mode");
         let _ = write!(text, "\n{modes}; ± is one standard error\n\n{}\n", self.mode_table());
-        let shaped: Vec<&ShapedMode> = self.modes.iter().map(|row| &row.mode).collect();
         if self.channels.len() > 1 {
             let columns: Vec<&str> = self.channels.iter().map(|c| c.column.as_str()).collect();
             let name = |at: usize| columns.get(at).map_or(String::new(), |c| (*c).to_owned());
-            let _ = writeln!(text, "{}", shape_table(&shaped, name));
+            let _ = writeln!(text, "{}", shape_table(self.modes.iter().map(|row| &row.mode), name));
         }
         text += &self.channel_table();
         let notes: String = self.remarks.iter().map(|remark| format!("note: {remark}\n")).collect();

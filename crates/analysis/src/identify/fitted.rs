@@ -25,7 +25,8 @@ pub struct Fitted {
     pub estimator: &'static str,
     /// The checks after the fit see the bias of least squares, which another method does not have.
     pub least_squares: bool,
-    /// Estimate with its uncertainty; with nonlinear terms, of the linear part.
+    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. Where equations have no scale
+    /// ([`Unscaled`](super::Unscaled)), of one of the systems with the same modes.
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,
@@ -125,7 +126,7 @@ impl SampleResidual {
 }
 
 impl Fitted {
-    /// Returns the identified system.
+    /// Returns the system that was fitted, which has the responses to the forces that acted.
     ///
     /// # Errors
     /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.

@@ -13,6 +13,7 @@
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
 pub mod checks;
@@ -31,6 +32,7 @@ mod samples;
 pub(crate) mod spectra;
 pub mod summary;
 pub mod tables;
+mod unscaled;
 pub mod validation;
 
 use std::fmt;
@@ -55,6 +57,7 @@ pub use self::options::{
 use self::prediction::{Compared, Model, Prediction};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
+pub use self::unscaled::Unscaled;
 pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
 use crate::hits;
@@ -93,10 +96,14 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         let cut = hits::cut(&records, rule)?;
         (records, hits) = (cut.hits, cut.rows);
     }
-    let fitted = how
-        .fitted(&records, &unknowns, period_given)
-        .map_err(|error| explained(error, &records))?;
-    let summary = IdentificationSummary::new(&records, &fitted, hits, how)?;
+    let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given);
+    let driven: Vec<usize> = records.iter().flat_map(|r| r.held.driven.iter().copied()).collect();
+    let fitted = match how.finds_modes_alone() {
+        true => Unscaled::or_fitted(&unknowns, &driven, fit),
+        false => fit(&unknowns).map(|fitted| (fitted, None)),
+    };
+    let (fitted, unscaled) = fitted.map_err(|error| explained(error, &records))?;
+    let summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
     Ok(Identified {
         measurements: measurements.to_vec(),
         records,
@@ -129,6 +136,12 @@ impl Identify {
             Fit::Responses(how) => how.segments.hold(),
             Fit::Samples(how) => how.hold(),
         }
+    }
+
+    /// Returns whether modes are found where M, C and K have no scale: those of linear systems, from spectra
+    /// and frequency responses.
+    fn finds_modes_alone(&self) -> bool {
+        self.nonlinear.is_none() && !matches!(self.fit, Fit::Samples(_))
     }
 
     /// Refuses what hits are not fitted with.
@@ -212,7 +225,8 @@ impl Identified {
     }
 
     /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part,
-    /// whose modes are those of small amplitudes.
+    /// whose modes are those of small amplitudes. Where equations have no scale
+    /// ([`IdentificationSummary::unscaled`]), those of one of the systems with the same modes.
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate
     }
@@ -225,17 +239,24 @@ impl Identified {
     /// Returns the identified system with its nonlinear terms, if it has any.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    /// As [`Identified::system`].
     pub fn model(&self) -> Result<Model, AnalysisError> {
+        self.check_scale()?;
         self.fitted.model()
     }
 
     /// Returns the identified system; with nonlinear terms, its linear part.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined, [`AnalysisError::Unscaled`] if
+    /// they give its modes alone.
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
+        self.check_scale()?;
         Ok(self.fitted.estimate.system()?)
+    }
+
+    fn check_scale(&self) -> Result<(), AnalysisError> {
+        Unscaled::check(self.summary.unscaled.as_ref())
     }
 
     /// Returns the identified system with the covariance of its parameters, for the reconstruction of
@@ -244,6 +265,7 @@ impl Identified {
     /// # Errors
     /// As [`Identified::system`].
     pub fn machine(&self) -> Result<Machine, AnalysisError> {
+        self.check_scale()?;
         Ok(Machine {
             nonlinear: self.fitted.nonlinear_part()?,
             ..Machine::of_estimate(&self.fitted.estimate)?
@@ -272,7 +294,8 @@ impl Identified {
     ///
     /// # Errors
     /// [`AnalysisError::DegreesOfFreedom`] if the record has another number of them,
-    /// [`AnalysisError::Diverges`] if the identified system is unstable.
+    /// [`AnalysisError::Diverges`] if the identified system is unstable, [`AnalysisError::Unscaled`] if a
+    /// force acts there to which the response is not known.
     pub fn add_validation(&mut self, other: &Measurement) -> Result<(), AnalysisError> {
         let (validation, held) = self.predict(other)?;
         let of_other = held.unit_remarks.iter().filter(|_| held.file != self.summary.file);
@@ -299,7 +322,10 @@ impl Identified {
             let file = record.held.file.clone();
             return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
         }
-        let validation = Validation::of(&record, &self.model()?, prediction)?;
+        if let Some(unscaled) = &self.summary.unscaled {
+            unscaled.check_forces(&record.held.driven)?;
+        }
+        let validation = Validation::of(&record, &self.fitted.model()?, prediction)?;
         Ok((validation, record.into_held()))
     }
 
@@ -336,7 +362,7 @@ impl Identified {
     /// # Errors
     /// [`AnalysisError::Diverges`] if the identified system is unstable.
     pub fn compared(&self) -> Result<Vec<Compared>, AnalysisError> {
-        self.fitted.prediction.predict(&self.model()?, &self.records[0].held)
+        self.fitted.prediction.predict(&self.fitted.model()?, &self.records[0].held)
     }
 
     /// Returns how the response of the identified system to a record is predicted.

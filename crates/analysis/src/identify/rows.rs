@@ -1,9 +1,11 @@
 //! Rows of the tables that a result is made of: samples and lines used, parameters, modes.
 
 use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
+use mechid_io::ParameterCovariance;
 use mechid_model::{EIGENVALUE_ROUNDING, Parameter};
 use serde::Serialize;
 
+use super::Unscaled;
 use crate::AnalysisError;
 use crate::measurement::Block;
 use crate::text::{compact, significant, text_table};
@@ -238,13 +240,18 @@ fn digits(value: f64, error: f64) -> usize {
     if ratio.is_finite() { (ratio.floor() as i32 + 3).clamp(3, 12) as usize } else { 6 }
 }
 
-pub(super) fn parameters(estimate: &Estimate) -> Result<Vec<ParameterRow>, AnalysisError> {
+/// Returns the entries of M, C and K, but for those of equations without scale.
+pub(super) fn parameters(
+    estimate: &Estimate,
+    unscaled: Option<&Unscaled>,
+) -> Result<Vec<ParameterRow>, AnalysisError> {
     let mut rows = Vec::new();
+    let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
     let estimated = |parameter: Parameter| {
         let at = estimate.parameters().position(|p| p.parameter == parameter);
         at.and_then(|at| estimate.parameters().nth(at))
     };
-    for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
+    for parameter in Unknowns::unknown_mass(estimate.dof())?.free().into_iter().filter(is_given) {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
         let value = match estimated(parameter) {
             Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
@@ -263,6 +270,19 @@ pub(super) fn parameters(estimate: &Estimate) -> Result<Vec<ParameterRow>, Analy
         });
     }
     Ok(rows)
+}
+
+/// Returns the covariance of the estimated entries of M, C and K, but for those of equations without scale.
+pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> ParameterCovariance {
+    let all: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();
+    let is_given = |at: &usize| unscaled.is_none_or(|unscaled| !unscaled.hides(all[*at].row()));
+    let given: Vec<usize> = (0..all.len()).filter(is_given).collect();
+    let names = given.iter().map(|at| all[*at].to_string()).collect();
+    let mut covariance = estimate.covariance();
+    if given.len() < all.len() {
+        covariance = covariance.select_rows(&given).select_columns(&given);
+    }
+    ParameterCovariance::new(names, &covariance, estimate.degrees_of_freedom())
 }
 
 /// Returns the header of a table of estimates.

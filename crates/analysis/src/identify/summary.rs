@@ -16,12 +16,14 @@ use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::Identify;
 use super::prediction::Prediction;
 use super::rows::{
-    CONFIDENCE, LinesUsed, ModeRow, ParameterRow, WindowRow, header, mode_table, parameters,
+    self, CONFIDENCE, LinesUsed, ParameterRow, WindowRow, header, mode_table, parameters,
 };
+use super::unscaled::Unscaled;
 use super::validation::Validation;
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
 use crate::measurement::{Block, Windowed};
+use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant, text_table};
 
 /// Result of an identification: numbers, checks and remarks.
@@ -42,13 +44,16 @@ pub struct IdentificationSummary {
     pub lines: Option<LinesUsed>,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each.
+    /// Parameters, one each, but for those of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
+    /// Equations of motion without scale, whose parameters do not follow from the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unscaled: Option<Unscaled>,
     /// Nonlinear terms, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<NonlinearSummary>,
     /// Modes, by rising frequency; with nonlinear terms, of small amplitudes.
-    pub modes: Vec<ModeRow>,
+    pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
     /// Every record, the first included; of a hammer test every hit that was used.
@@ -62,9 +67,10 @@ pub struct IdentificationSummary {
     pub validation: Option<Validation>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them back.
-    pub system: SystemMatrices,
-    /// Covariance of the parameters, for what is derived from them.
+    /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub system: Option<SystemMatrices>,
+    /// Covariance of the parameters that were estimated, for what is derived from them.
     pub covariance: ParameterCovariance,
     /// The settings, which repeat the analysis.
     pub analysis: Identify,
@@ -108,6 +114,7 @@ impl IdentificationSummary {
     pub(super) fn new(
         records: &[Windowed],
         fitted: &Fitted,
+        unscaled: Option<Unscaled>,
         hits: Vec<HitRow>,
         how: &Identify,
     ) -> Result<Self, AnalysisError> {
@@ -124,9 +131,9 @@ impl IdentificationSummary {
             repeats: fitted.prediction == Prediction::Steady,
             lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
             confidence: CONFIDENCE,
-            parameters: parameters(estimate)?,
+            parameters: parameters(estimate, unscaled.as_ref())?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
-            modes: ModeRow::all(&estimate.modes()?, false)?,
+            modes: ShapedMode::all(&estimate.modes()?, false)?,
             fit: FitRow {
                 nrmse: match fitted.is_weighted() {
                     true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
@@ -147,8 +154,9 @@ impl IdentificationSummary {
             checks: checks::rows(fitted, &records)?,
             validation: None,
             remarks: Vec::new(),
-            system: SystemMatrices::from(&system),
-            covariance: covariance(fitted),
+            system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
+            covariance: covariance(fitted, unscaled.as_ref()),
+            unscaled,
             analysis: how.clone(),
         };
         let looked_at = records.iter().filter_map(|record| {
@@ -160,7 +168,12 @@ impl IdentificationSummary {
         });
         let of_method = of_least_squares(fitted, &summary.checks);
         let of_units = records.iter().flat_map(|record| record.unit_remarks.iter().cloned());
-        let remarks = of_units.chain(fitted.remarks.iter().cloned()).chain(looked_at);
+        let of_scale = summary.unscaled.as_ref().map(Unscaled::to_string);
+        let remarks = of_scale
+            .into_iter()
+            .chain(of_units)
+            .chain(fitted.remarks.iter().cloned())
+            .chain(looked_at);
         summary.remarks = remarks.chain(summary.doubts()).chain(of_method).collect();
         Ok(summary)
     }
@@ -197,14 +210,21 @@ impl IdentificationSummary {
     fn text(&self) -> String {
         let mut text = self.heading();
         text.push('\n');
-        text += &self.parameter_table();
-        text.push('\n');
+        if !self.parameters.is_empty() {
+            text += &self.parameter_table();
+            text.push('\n');
+        }
         if let Some(nonlinear) = &self.nonlinear {
             text += &nonlinear.text();
             text.push('\n');
         }
         text += &self.mode_table();
         text.push('\n');
+        if self.unscaled.is_some() {
+            // No system is written that they could be computed from.
+            text += &shape_table(&self.modes, |at| format!("degree of freedom {}", at + 1));
+            text.push('\n');
+        }
         text += &self.fit_lines();
         if let Some(validation) = &self.validation {
             text += &format!("\n{}", validation.text());
@@ -223,7 +243,8 @@ impl IdentificationSummary {
     /// Returns the title of a figure: the record and its modes.
     pub fn title(&self) -> String {
         let name = Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy();
-        let once = self.modes.iter().enumerate().filter(|(at, mode)| !mode.is_told_before(*at));
+        let rows = self.modes.iter().map(|mode| &mode.row).enumerate();
+        let once = rows.filter(|(at, mode)| !mode.is_told_before(*at));
         let modes: Vec<String> = once
             .map(|(_, mode)| {
                 let (hz, ratio) = (mode.natural_frequency_hz.value, mode.damping_ratio.value);
@@ -278,7 +299,7 @@ impl IdentificationSummary {
     fn mode_table(&self) -> String {
         let small = self.nonlinear.is_some();
         let what = if small { "mode of small amplitude" } else { "mode" };
-        mode_table(what, &self.modes)
+        mode_table(what, &ShapedMode::rows(&self.modes))
     }
 
     fn fit_lines(&self) -> String {
@@ -335,13 +356,12 @@ pub(crate) fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<S
     })
 }
 
-fn covariance(fitted: &Fitted) -> ParameterCovariance {
+fn covariance(fitted: &Fitted, unscaled: Option<&Unscaled>) -> ParameterCovariance {
     let estimate = &fitted.estimate;
     if let Some(all) = &fitted.nonlinear {
         let names = all.estimate.parameters().iter().map(|p| p.name.clone()).collect();
         let freedom = estimate.degrees_of_freedom();
         return ParameterCovariance::new(names, all.estimate.covariance(), freedom);
     }
-    let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
-    ParameterCovariance::new(names, &estimate.covariance(), estimate.degrees_of_freedom())
+    rows::covariance(estimate, unscaled)
 }

@@ -17,11 +17,12 @@ use serde::{Deserialize, Serialize};
 
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
-use super::rows::{CONFIDENCE, ModeRow, ParameterRow, header, mode_table, parameters};
+use super::rows::{CONFIDENCE, ParameterRow, covariance, header, mode_table, parameters};
 use super::summary::{FitRow, verdict};
-use super::{Band, KnownMass, Method};
+use super::{Band, KnownMass, Method, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
+use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, text_table};
 
 /// Settings of an identification from tables of frequency responses.
@@ -67,9 +68,13 @@ pub fn identify_responses(
     for other in &measured[1..] {
         data = data.and(&other.data)?;
     }
+    let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
+    let fit = |unknowns: &Unknowns| {
+        let fit = Fit::of(&data, unknowns, &measured, how.method)?;
+        Ok((fit, before_spectral_fit(&data, unknowns)?))
+    };
     let unknowns = how.mass.unknowns(data.dof())?;
-    let fit = Fit::of(&data, &unknowns, &measured, how.method)?;
-    let before = before_spectral_fit(&data, &unknowns)?;
+    let ((fit, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
         before.into_iter().map(|finding| (When::Before, None, finding)).collect();
     for (table, measured) in tables.iter().zip(&measured) {
@@ -86,7 +91,6 @@ pub fn identify_responses(
     let estimate = &fit.estimate;
     let system = estimate.system()?;
     let each = estimate.residual_nrmse();
-    let names = estimate.parameters().map(|p| p.parameter.to_string()).collect();
     let hz = |rows: &mut dyn Iterator<Item = f64>| rows.map(|omega| omega / TAU).collect();
     let frequencies: Vec<f64> = hz(&mut first.data.omega().iter().copied());
     let summary = ResponseSummary {
@@ -101,8 +105,8 @@ pub fn identify_responses(
             last_hz: frequencies.iter().copied().fold(0.0, f64::max),
         },
         confidence: CONFIDENCE,
-        parameters: parameters(estimate)?,
-        modes: ModeRow::all(&estimate.modes()?, false)?,
+        parameters: parameters(estimate, unscaled.as_ref())?,
+        modes: ShapedMode::all(&estimate.modes()?, false)?,
         fit: FitRow {
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
             unexplained_motion: unexplained_motion(&data, &system)?,
@@ -113,17 +117,15 @@ pub fn identify_responses(
             unknowns: estimate.parameters().len(),
         },
         checks,
-        remarks: tables
+        remarks: unscaled
             .iter()
-            .flat_map(|table| table.remarks.iter().cloned())
+            .map(Unscaled::to_string)
+            .chain(tables.iter().flat_map(|table| table.remarks.iter().cloned()))
             .chain(fit.misfit.map(|misfit| misfit.to_string()))
             .collect(),
-        system: SystemMatrices::from(&system),
-        covariance: ParameterCovariance::new(
-            names,
-            &estimate.covariance(),
-            estimate.degrees_of_freedom(),
-        ),
+        system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
+        covariance: covariance(estimate, unscaled.as_ref()),
+        unscaled,
         analysis: how.clone(),
     };
     Ok(IdentifiedResponses { estimate: fit.estimate, data, summary })
@@ -156,19 +158,23 @@ pub struct ResponseSummary {
     pub frequencies: FrequencyRow,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Parameters, one each.
+    /// Parameters, one each, but for those of [`unscaled`](Self::unscaled) equations.
     pub parameters: Vec<ParameterRow>,
+    /// Equations of motion without scale, whose parameters do not follow from the data.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unscaled: Option<Unscaled>,
     /// Modes, by rising frequency.
-    pub modes: Vec<ModeRow>,
+    pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
-    /// M, C and K, as `mechid force --system` and others read them back.
-    pub system: SystemMatrices,
-    /// Covariance of the parameters, for what is derived from them.
+    /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub system: Option<SystemMatrices>,
+    /// Covariance of the parameters that were estimated, for what is derived from them.
     pub covariance: ParameterCovariance,
     /// The settings, which repeat the analysis.
     pub analysis: IdentifyResponses,
@@ -186,7 +192,8 @@ pub struct FrequencyRow {
 }
 
 impl IdentifiedResponses {
-    /// Returns the estimate of M, C and K with its covariance.
+    /// Returns the estimate of M, C and K with its covariance; where equations have no scale
+    /// ([`ResponseSummary::unscaled`]), of one of the systems with the same modes.
     pub fn estimate(&self) -> &Estimate {
         &self.estimate
     }
@@ -194,9 +201,15 @@ impl IdentifiedResponses {
     /// Returns the identified system.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined, [`AnalysisError::Unscaled`] if
+    /// they give its modes alone.
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
+        self.check_scale()?;
         Ok(self.estimate.system()?)
+    }
+
+    fn check_scale(&self) -> Result<(), AnalysisError> {
+        Unscaled::check(self.summary.unscaled.as_ref())
     }
 
     /// Returns the frequency responses that were fitted: unit forces and displacements, with the noise
@@ -213,8 +226,9 @@ impl IdentifiedResponses {
     /// Returns the identified system with the covariance of its parameters.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if the data leave a parameter undetermined.
+    /// As [`IdentifiedResponses::system`].
     pub fn machine(&self) -> Result<Machine, AnalysisError> {
+        self.check_scale()?;
         Machine::of_estimate(&self.estimate)
     }
 }
@@ -242,10 +256,15 @@ impl fmt::Display for IdentifiedResponses {
                 count => format!("{count} frequencies"),
             },
         )?;
-        let mut rows = vec![header("parameter")];
-        rows.extend(s.parameters.iter().map(ParameterRow::cells));
-        writeln!(f, "{}", text_table(&rows))?;
-        writeln!(f, "{}", mode_table("mode", &s.modes))?;
+        if !s.parameters.is_empty() {
+            let mut rows = vec![header("parameter")];
+            rows.extend(s.parameters.iter().map(ParameterRow::cells));
+            writeln!(f, "{}", text_table(&rows))?;
+        }
+        writeln!(f, "{}", mode_table("mode", &ShapedMode::rows(&s.modes)))?;
+        if s.unscaled.is_some() {
+            writeln!(f, "{}", shape_table(&s.modes, |at| s.points[at].clone()))?;
+        }
         writeln!(f, "{}", s.fit.lines("linear model"))?;
         f.write_str(&verdict(&s.checks))?;
         f.write_str(&paragraph(s.remarks.iter().map(|remark| format!("note: {remark}"))))

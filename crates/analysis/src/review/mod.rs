@@ -65,7 +65,7 @@ impl<'a> Review<'a> {
             .map(|at| RecordReview::of(identified, at, reconstruct_force))
             .collect::<Result<Vec<_>, _>>()?;
         let validation = match identified.validated() {
-            Some(other) => identified.prediction().predict(&identified.model()?, other)?,
+            Some(other) => identified.prediction().predict(&identified.fitted().model()?, other)?,
             None => Vec::new(),
         };
         let receptance = Receptance::of(identified, &records).map_err(|reason| reason.to_string());

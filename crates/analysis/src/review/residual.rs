@@ -55,7 +55,7 @@ impl Residual {
         at: usize,
         mean: Option<&Block>,
     ) -> Result<Self, AnalysisError> {
-        let model = identified.model()?;
+        let model = identified.fitted().model()?;
         let prediction = identified.fitted().prediction;
         let compared = prediction.predict(&model, &identified.records()[at].held)?;
         let mean = mean.map(|mean| prediction.predict(&model, mean)).transpose()?;

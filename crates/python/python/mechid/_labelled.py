@@ -68,9 +68,10 @@ def identified(found: Identified) -> xarray.Dataset:
         coordinates["frequency"] = _frequency(table.frequency_hz)
         for name, responses in (("frf", table.measured), ("frf_model", table.model)):
             data[name] = (("frequency", "motion", "driven"), responses, {"units": "m/N"})
-    dofs = np.arange(1, len(found.mass) + 1)
-    for name, unit in _MATRICES.items():
-        data[name] = (("row", "column"), getattr(found, name), {"units": unit})
+    dofs = np.arange(1, len(found.modes[0].shape) + 1)
+    if found.unscaled is None:
+        for name, unit in _MATRICES.items():
+            data[name] = (("row", "column"), getattr(found, name), {"units": unit})
     parameters = [found.parameters[name] for name in found.estimated]
     data["value"] = ("parameter", np.array([p.value for p in parameters]))
     errors = [np.nan if p.std_error is None else p.std_error for p in parameters]

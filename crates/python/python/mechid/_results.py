@@ -281,9 +281,22 @@ class Estimated(Drawn):
 
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Entries of M, C and K by name, with standard errors."""
+        """Entries of M, C and K by name, with standard errors.
+
+        Those of equations of motion whose scale the data leave open are left out; see `unscaled`.
+        """
         rows = self._told["parameters"]
         return MappingProxyType({row["name"]: self._parameter(row) for row in rows})
+
+    @property
+    def unscaled(self) -> Mapping[str, Any] | None:
+        """Degrees of freedom without force and known mass, and equations that are not given.
+
+        Keys ``degrees_of_freedom`` and ``equations``, counted from 1. None where M, C and K are known;
+        otherwise the modes are all that follows from the data.
+        """
+        told = self._told.get("unscaled")
+        return None if told is None else MappingProxyType(told)
 
     def _parameter(self, row: dict[str, Any]) -> Parameter:
         return Parameter(
@@ -301,22 +314,29 @@ class Estimated(Drawn):
     @property
     def mass(self) -> NDArray[np.float64]:
         """M, in kg, shape (degrees of freedom, degrees of freedom)."""
-        return _array(self._told["system"]["mass"])
+        return self._matrix("mass")
 
     @property
     def damping(self) -> NDArray[np.float64]:
         """C, in N·s/m, likewise."""
-        return _array(self._told["system"]["damping"])
+        return self._matrix("damping")
 
     @property
     def stiffness(self) -> NDArray[np.float64]:
         """K, in N/m, likewise."""
-        return _array(self._told["system"]["stiffness"])
+        return self._matrix("stiffness")
+
+    def _matrix(self, name: str) -> NDArray[np.float64]:
+        if "system" not in self._told:
+            # Says why there is none.
+            self.machine()
+        return _array(self._told["system"][name])
 
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the estimated parameters, in the order of `estimated`."""
-        return _array(self._told["covariance"]["matrix"])
+        count = len(self.estimated)
+        return _array(self._told["covariance"]["matrix"]).reshape(count, count)
 
     @property
     def estimated(self) -> tuple[str, ...]:
@@ -326,7 +346,7 @@ class Estimated(Drawn):
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """Modes by rising frequency, with standard errors."""
-        return self.machine().modes
+        return tuple(_mode(row) for row in self._told["modes"])
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
@@ -355,7 +375,13 @@ class Estimated(Drawn):
         return MappingProxyType(self._told["fit"])
 
     def machine(self) -> Machine:
-        """Return M, C and K with the covariance of their entries."""
+        """Return M, C and K with the covariance of their entries.
+
+        Raises
+        ------
+        MechidError
+            If the data give the modes alone; see `unscaled`.
+        """
         return Machine._of(self._inner.machine())
 
     def _values(self) -> str:
@@ -437,7 +463,7 @@ class Identified(Estimated):
             If the records show none.
         """
         omega, measured, model = self._inner.receptances()
-        n = len(self.mass)
+        n = len(self.modes[0].shape)
         arrays = (omega / (2 * np.pi), measured.reshape(-1, n, n), model.reshape(-1, n, n))
         for array in arrays:
             array.setflags(write=False)

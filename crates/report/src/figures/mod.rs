@@ -19,8 +19,8 @@ use mechid_analysis::bearing::BearingTable;
 #[cfg(feature = "parquet")]
 use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
-    Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses, Inspected, Machine,
-    Reconstructed, SweepSummary,
+    AnalysisError, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
+    Inspected, Machine, Reconstructed, SweepSummary,
 };
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
@@ -72,7 +72,10 @@ impl ToFigure for Identified {
         }
         match self.spectra() {
             Some(data) => {
-                let drawn = receptance_or_responses(&title, data, &self.system()?, style)?;
+                let drawn = {
+                    let system = self.estimate().system().map_err(AnalysisError::from)?;
+                    receptance_or_responses(&title, data, &system, style)?
+                };
                 Ok(match &self.fitted().coherence {
                     Some(coherence) => drawn.panel(receptance::coherence(coherence, style)),
                     None => drawn,
@@ -87,7 +90,8 @@ impl ToFigure for IdentifiedResponses {
     /// Draws measured and identified receptance.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
-        receptance_or_responses(&title, self.data(), &self.system()?, style)
+        let system = self.estimate().system().map_err(AnalysisError::from)?;
+        receptance_or_responses(&title, self.data(), &system, style)
     }
 }
 

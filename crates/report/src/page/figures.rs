@@ -1,5 +1,6 @@
 //! The pictures of the report.
 
+use mechid_analysis::AnalysisError;
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::prediction::Compared;
 use mechid_analysis::measurement::Block;
@@ -129,7 +130,8 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
 /// # Errors
 /// [`ReportError::NothingToDraw`].
 pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
-    let (system, origin) = (identified.system()?, &measured.origin);
+    let system = identified.estimate().system().map_err(AnalysisError::from)?;
+    let origin = &measured.origin;
     let style = FigureStyle::default();
     let (figure, caption) = match picture::receptance("", &measured.data, &system, style)? {
         Some(figure) => {

@@ -13,6 +13,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use mechid_analysis::identify::Identified;
 use mechid_analysis::identify::rows::ModeRow;
+use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::review::{RecordReview, Review, judgement};
 use mechid_analysis::text::significant;
 
@@ -173,7 +174,8 @@ const SUMMARISED: usize = 8;
 
 fn heading(contents: &Contents<'_>) -> Markup {
     let report = contents.review.identified.summary();
-    let modes = ModeRow::quantities(&report.modes, false).into_iter().take(SUMMARISED);
+    let modes =
+        ModeRow::quantities(&ShapedMode::rows(&report.modes), false).into_iter().take(SUMMARISED);
     html! {
         header {
             h1 { (contents.title) }

@@ -3,18 +3,17 @@
 use std::f64::consts::TAU;
 
 use maud::{Markup, html};
-use mechid_analysis::AnalysisError;
 use mechid_analysis::identify::checks::When;
 use mechid_analysis::identify::rows::{ModeRow, ParameterRow, Uncertain};
 use mechid_analysis::identify::summary::IdentificationSummary;
 use mechid_analysis::identify::validation::Share;
+use mechid_analysis::modal::ShapedMode;
 use mechid_analysis::review::channels::Channel;
 use mechid_analysis::review::excitation::{DROP_DB, Excitation};
 use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Residual, sizes};
 use mechid_analysis::review::{RecordReview, judgement};
 use mechid_analysis::text::{compact, significant};
-use mechid_model::Mode;
 use mechid_signal::message;
 
 use super::tables::Table;
@@ -183,17 +182,19 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         .collect();
     let modes_of = if report.nonlinear.is_some() { "Modes of small amplitude" } else { "Modes" };
     let restoring = figures::restoring(contents.review.identified)?;
-    let modes = ModeRow::quantities(&report.modes, true).into_iter();
+    let modes = ModeRow::quantities(&ShapedMode::rows(&report.modes), true).into_iter();
     let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
     let matrices = matrices(&report.parameters);
     let dofs = contents.review.identified.estimate().dof();
-    let shapes = shapes(contents)?;
+    let shapes = shapes(&report.modes);
     let numbered: Vec<String> = (1..=dofs).map(|dof| dof.to_string()).collect();
     let columns: Vec<&str> =
         std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
     Ok(html! {
         div.tables {
-            (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
+            @if !report.parameters.is_empty() {
+                (Table { caption: "Parameters", header: &header("parameter"), numbers_from: 1, rows: parameters }.html())
+            }
             (Table { caption: modes_of, header: &header("mode"), numbers_from: 1, rows: modes }.html())
             (Table { caption: "The fit", header: &[], numbers_from: 9, rows: fit_rows(contents) }.html())
         }
@@ -205,6 +206,7 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
                 (shapes)
             }
         }
+        @if let Some(unscaled) = &report.unscaled { p.note { (unscaled) "." } }
         @if let Some(drawn) = &restoring { div.figures { (figure(drawn)) } }
         @for remark in &contents.review.identified.fitted().remarks { p.note { "How it was done: " (remark) "." } }
     })
@@ -232,24 +234,23 @@ fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
 }
 
 /// Shapes of the modes, modulus and phase of each degree of freedom.
-fn shapes(contents: &Contents<'_>) -> Result<Markup, ReportError> {
-    let system = contents.review.identified.system()?;
-    let modes = system.modes().map_err(AnalysisError::from)?;
-    let name = |(number, mode): (usize, &Mode)| {
-        format!("mode {number}, {} Hz", significant(mode.natural_frequency() / TAU, 4))
+fn shapes(modes: &[ShapedMode]) -> Markup {
+    let name = |(number, mode): (usize, &ShapedMode)| {
+        let [re, im] = mode.eigenvalue;
+        format!("mode {number}, {} Hz", significant(re.hypot(im) / TAU, 4))
     };
-    let names: Vec<String> = (1..).zip(&modes).map(name).collect();
+    let names: Vec<String> = (1..).zip(modes).map(name).collect();
     let header: Vec<&str> = std::iter::once("").chain(names.iter().map(String::as_str)).collect();
     let row = |dof: usize| -> Vec<String> {
         let cells = modes.iter().map(|mode| {
-            let entry = mode.shape()[dof];
-            format!("{} ∠ {:.1}°", significant(entry.norm(), 4), entry.arg().to_degrees())
+            let [re, im] = mode.shape[dof].value;
+            format!("{} ∠ {:.1}°", significant(re.hypot(im), 4), im.atan2(re).to_degrees())
         });
         std::iter::once((dof + 1).to_string()).chain(cells).collect()
     };
-    let rows = (0..system.dof()).map(row).collect();
+    let rows = (0..modes.first().map_or(0, |mode| mode.shape.len())).map(row).collect();
     let caption = "Mode shapes, modulus and phase by degree of freedom; the largest entry is 1";
-    Ok(Table { caption, header: &header, numbers_from: 1, rows }.html())
+    Table { caption, header: &header, numbers_from: 1, rows }.html()
 }
 
 fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {

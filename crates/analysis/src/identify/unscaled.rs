@@ -1,0 +1,124 @@
+//! Equations of motion that the data fix up to factors only, though they fix the modes.
+
+use std::fmt;
+
+use mechid_estimate::{EstimateError, Unknowns};
+use mechid_model::Matrix;
+use serde::Serialize;
+
+use crate::AnalysisError;
+
+/// Equations of motion whose entries of M, C and K do not follow from the data, though the modes do.
+///
+/// Where no force acts on a degree of freedom and no entry of its equation is known, the equation may be
+/// multiplied by any number, and added to any other one whose mass is free in that column: the responses to
+/// the forces that act stay as they are, and with them poles and shapes.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Unscaled {
+    /// Degrees of freedom without force and without known entry in their equation, counted from 1.
+    pub degrees_of_freedom: Vec<usize>,
+    /// Equations, rows of M, C and K, that are not given, counted from 1.
+    pub equations: Vec<usize>,
+}
+
+impl Unscaled {
+    /// Fits the modes of such equations where `fit` refuses them, from forces on the degrees of freedom
+    /// `driven`, counted from 0.
+    ///
+    /// # Errors
+    /// Those of `fit`.
+    pub(super) fn or_fitted<T>(
+        unknowns: &Unknowns,
+        driven: &[usize],
+        fit: impl Fn(&Unknowns) -> Result<T, AnalysisError>,
+    ) -> Result<(T, Option<Self>), AnalysisError> {
+        match fit(unknowns) {
+            Err(refused @ AnalysisError::Estimate(EstimateError::OnlyRatios { .. })) => {
+                match Self::normalised(unknowns, driven)? {
+                    Some((unscaled, normalised)) => Ok((fit(&normalised)?, Some(unscaled))),
+                    None => Err(refused),
+                }
+            }
+            fitted => Ok((fitted?, None)),
+        }
+    }
+
+    /// Finds the equations and the unknowns of one of the systems that have the same modes: that with unit
+    /// masses where no force acts, and no mass that couples other equations to these. `None` if every
+    /// equation has a force or a known entry.
+    fn normalised(
+        unknowns: &Unknowns,
+        driven: &[usize],
+    ) -> Result<Option<(Self, Unknowns)>, AnalysisError> {
+        let dofs = unknowns.dof();
+        let entries =
+            || Matrix::ALL.into_iter().flat_map(|matrix| (0..dofs).map(move |j| (matrix, j)));
+        let is_free = |row: &usize| {
+            let known = |(matrix, column)| unknowns.fixed(matrix, *row, column);
+            !driven.contains(row) && entries().filter_map(known).all(|value| value == 0.0)
+        };
+        let free: Vec<usize> = (0..dofs).filter(is_free).collect();
+        if free.is_empty() {
+            return Ok(None);
+        }
+        let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
+        for row in 0..dofs {
+            for &column in &free {
+                if unknowns.fixed(Matrix::Mass, row, column).is_none() {
+                    let value = if row == column { 1.0 } else { 0.0 };
+                    normalised = normalised.fix(Matrix::Mass, row, column, value)?;
+                    equations.push(row + 1);
+                }
+            }
+        }
+        equations.dedup();
+        let degrees_of_freedom = free.iter().map(|dof| dof + 1).collect();
+        Ok(Some((Self { degrees_of_freedom, equations }, normalised)))
+    }
+
+    /// Returns whether an equation, counted from 0, is not given.
+    pub(super) fn hides(&self, equation: usize) -> bool {
+        self.equations.contains(&(equation + 1))
+    }
+
+    /// Refuses a system that has no scale.
+    pub(super) fn check(unscaled: Option<&Self>) -> Result<(), AnalysisError> {
+        match unscaled {
+            Some(unscaled) => Err(AnalysisError::Unscaled { unscaled: unscaled.clone() }),
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses forces, on degrees of freedom counted from 0, to which the response is not known.
+    pub(super) fn check_forces(&self, driven: &[usize]) -> Result<(), AnalysisError> {
+        let is_unknown = |dof: &usize| self.degrees_of_freedom.contains(&(dof + 1));
+        Self::check(driven.iter().any(is_unknown).then_some(self))
+    }
+}
+
+impl fmt::Display for Unscaled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let numbers = |all: &[usize], one: &str, several: &str| {
+            let listed: Vec<String> = all.iter().map(usize::to_string).collect();
+            match &listed[..] {
+                [number] => format!("{one} {number}"),
+                [first @ .., last] => format!("{several} {} and {last}", first.join(", ")),
+                [] => String::new(),
+            }
+        };
+        let (dofs, equations) = (&self.degrees_of_freedom, &self.equations);
+        let forced = numbers(dofs, "degree of freedom", "degrees of freedom");
+        let (their, there) = match dofs.len() {
+            1 => ("its mass is not known", "there"),
+            _ => ("their masses are not known", "on each of them"),
+        };
+        let rows = numbers(equations, "row", "rows");
+        let (have, they) =
+            if equations.len() == 1 { ("has", "it is") } else { ("have", "they are") };
+        write!(
+            f,
+            "no force acts on {forced}, and {their}: the modes do not depend on that, but {rows} of M, C and K \
+             {have} no scale then, and {they} not given; state masses (`mass`), or apply a force {there}"
+        )
+    }
+}
