@@ -90,6 +90,13 @@ pub(crate) struct Cut {
     pub rows: Vec<HitRow>,
 }
 
+impl Cut {
+    /// Returns the number of hits of a record that are used.
+    pub fn used_of(&self, record: &str) -> usize {
+        self.rows.iter().filter(|row| row.used && row.record == record).count()
+    }
+}
+
 /// Cuts records that are held as a whole into their hits.
 ///
 /// # Errors

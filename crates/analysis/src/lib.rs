@@ -66,7 +66,7 @@ pub use batch::{ResultRow, SavedAnalysis};
 pub use bearing::{BearingData, IdentifiedBearing, IdentifyBearing, identify_bearing};
 pub use decay::{DecaySettings, DecaySummary, Decayed, decay};
 pub use error::AnalysisError;
-pub use frf::{FrfSettings, FrfTable, Segmentation, frf};
+pub use frf::{FrfSettings, FrfTable, Segmentation, frf, frf_of_records};
 pub use identify::{
     Identified, IdentifiedResponses, Identify, IdentifyResponses, identify, identify_responses,
 };

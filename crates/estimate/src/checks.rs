@@ -41,7 +41,7 @@ pub use power::power;
 pub use range::{clipped_channels, constant_channels, quantised_channels, spiked_channels};
 pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
-pub use spectral::{before_spectral_fit, coherence, fitted_band, steady_periods};
+pub use spectral::{before_spectral_fit, coherence, fitted_band, fitted_step, steady_periods};
 pub use spectral_residual::{AfterSpectralFit, SpectralResidual, after_spectral_fit};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.

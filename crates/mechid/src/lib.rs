@@ -69,8 +69,8 @@ pub use mechid_analysis::{
     BearingData, Channels, DecaySettings, Decayed, Detrend, FrfSettings, Identified,
     IdentifiedBearing, IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses,
     InspectSettings, Machine, Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed,
-    ResultRow, SavedAnalysis, Segmentation, Window, decay, frf, identify, identify_bearing,
-    identify_responses, inspect, predict, reconstruct,
+    ResultRow, SavedAnalysis, Segmentation, Window, decay, frf, frf_of_records, identify,
+    identify_bearing, identify_responses, inspect, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -45,26 +45,65 @@ pub struct FrfSettings {
 /// no chosen line carries force, [`AnalysisError::Estimate`] if the segments are too few or too long,
 /// and if a file cannot be read again.
 pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, AnalysisError> {
+    frf_of_records(std::slice::from_ref(measurement), how)
+}
+
+/// Estimates the frequency responses and the coherence of one or several records of the same machine, which
+/// are averaged together: auto- and cross-spectra of the segments of all of them.
+///
+/// The records need the same columns and time step, and periods or segments of the same length; one may be
+/// longer than another. Each force need act in one of them only.
+///
+/// # Errors
+/// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the records
+/// do not belong together.
+pub fn frf_of_records(
+    measurements: &[Measurement],
+    how: &FrfSettings,
+) -> Result<FrfTable, AnalysisError> {
+    let hold = if how.hits.is_some() { Hold::Whole } else { how.segments.hold() };
+    let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
     let lines = LineRule { choice: &how.lines, without: &how.without };
     if let Some(rule) = &how.hits {
-        if measurement.window_settings().period.is_some() {
+        if period_given {
             let why = "hits have no `period`: leave one of them out".into();
             return Err(AnalysisError::Setting { setting: "hits", why });
         }
-        let recorded = measurement.hold(Hold::Whole)?;
-        let averaged = of_hits::of_hits(&recorded, rule, lines, how)?;
-        return Ok(FrfTable::of_hits(&recorded.held, averaged, how));
+        let records = held_of(measurements, hold)?;
+        let averaged = of_hits::of_hits(&records, rule, lines, how)?;
+        return Ok(FrfTable::of_hits(&records, averaged, how));
     }
     if how.exponential_percent.is_some() {
         let why = "an exponential window is for `hits`".into();
         return Err(AnalysisError::Setting { setting: "exponential_percent", why });
     }
-    let recorded = measurement.hold(how.segments.hold())?;
-    if let Some(parts) = interleaved(&recorded, how, lines)? {
-        return Ok(FrfTable::interleaved(&recorded.held, &parts, how));
+    let records = held_of(measurements, hold)?;
+    if let [recorded] = &records[..]
+        && let Some(parts) = interleaved(recorded, how, lines)?
+    {
+        return Ok(FrfTable::interleaved(&records, &parts, how));
     }
-    let responses = Responses::of(&recorded, &how.segments, how.estimator, lines)?;
-    Ok(FrfTable::new(&recorded.held, &responses, how))
+    let responses = Responses::of(&records, &how.segments, how.estimator, lines)?;
+    Ok(FrfTable::new(&records, &responses, how))
+}
+
+/// Returns the records with what must be held of each; one at least, with as many forces in each.
+fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, AnalysisError> {
+    let records = measurements.iter().map(|measured| measured.hold(hold));
+    let records: Vec<Windowed> = records.collect::<Result<_, _>>()?;
+    let dofs = records.first().ok_or(AnalysisError::NoRecord)?.held.force.channels();
+    for Windowed { held, .. } in &records {
+        let got = held.force.channels();
+        if got != dofs {
+            return Err(AnalysisError::DegreesOfFreedom { file: held.file.clone(), got, dofs });
+        }
+        let [kind, first] = [held, &records[0].held].map(|held| held.response().1);
+        if kind != first {
+            let why = format!("{} has a {kind}, the first record a {first}", held.file);
+            return Err(AnalysisError::Setting { setting: "response", why });
+        }
+    }
+    Ok(records)
 }
 
 /// Amplitude of the other forces over that of the one that drives a line, below which they are idle there.
@@ -105,7 +144,8 @@ fn interleaved(
         let lines = Lines::new(sampling, of_force.map(|(line, _)| *line))?;
         let average = average_of(recorded, &lines, segments, &[*dof])?;
         let frf = average.frf(how.estimator.estimator())?;
-        Ok(Responses { frf, lines, driven: vec![*dof], segments })
+        let counts = vec![average.pieces()];
+        Ok(Responses { frf, lines, driven: vec![*dof], idle: Vec::new(), segments, counts })
     });
     each.collect::<Result<_, AnalysisError>>().map(Some)
 }
@@ -229,30 +269,65 @@ pub(crate) struct Responses {
     pub lines: Lines,
     /// Degrees of freedom a force acts on, counted from 0.
     pub driven: Vec<usize>,
+    /// Degrees of freedom whose force channels show noise only, counted from 0.
+    pub idle: Vec<usize>,
     pub segments: Segments,
+    /// Number of segments of each record.
+    pub counts: Vec<usize>,
 }
 
 impl Responses {
-    /// Estimates them from the forces that act to the first kind of response measured, on the lines that `rule`
-    /// finds in a segment of the force.
+    /// Estimates them from the forces that act in one of the records to the first kind of response measured, on
+    /// the lines that `rule` finds in a segment of a force.
     pub fn of(
-        recorded: &Windowed,
+        records: &[Windowed],
         segments: &Segmentation,
         estimator: Estimator,
         rule: LineRule<'_>,
     ) -> Result<Self, AnalysisError> {
-        let held = &recorded.held;
+        let held = &records[0].held;
         let segments = segments.segments(held.period)?;
-        let (force, driven) = (&held.force, held.driven.clone());
         let len = segments.samples();
-        let chosen = match segments {
-            Segments::Periods(period) => rule.lines(force, period)?,
-            Segments::Windowed { len, .. } => rule.lines(&force.window(0, len)?, len)?,
-        };
-        let lines = Lines::new(force.sampling().with_len(len)?, chosen)?;
-        let average = average(recorded, &lines, segments)?;
-        let frf = average.frf(estimator.estimator())?;
-        Ok(Self { frf, lines, driven, segments })
+        let (mut driven, mut chosen) = (Vec::new(), Vec::new());
+        for Windowed { held, .. } in records {
+            driven.extend(&held.driven);
+            chosen.extend(match segments {
+                Segments::Periods(period) => rule.lines(&held.force, period)?,
+                Segments::Windowed { len, .. } => rule.lines(&held.force.window(0, len)?, len)?,
+            });
+        }
+        for all in [&mut driven, &mut chosen] {
+            all.sort_unstable();
+            all.dedup();
+        }
+        let lines = Lines::new(held.force.sampling().with_len(len)?, chosen)?;
+        let mut average = average_of(&records[0], &lines, segments, &driven)?;
+        let mut counts = vec![average.pieces()];
+        for recorded in &records[1..] {
+            let next = average_of(recorded, &lines, segments, &driven)?;
+            counts.push(next.pieces());
+            average.merge(&next)?;
+        }
+        let noise = average.idle_inputs();
+        let acting: Vec<usize> = (0..driven.len()).filter(|at| !noise.contains(at)).collect();
+        let frf = average.of_inputs(&acting).frf(estimator.estimator())?;
+        let [driven, idle] =
+            [acting, noise].map(|all| all.iter().map(|input| driven[*input]).collect());
+        Ok(Self { frf, lines, driven, idle, segments, counts })
+    }
+
+    /// Returns the remark on force channels that show noise only, of a record that is named or not.
+    pub fn of_idle(&self, record: Option<&str>) -> Option<String> {
+        let listed: Vec<String> = self.idle.iter().map(|dof| (dof + 1).to_string()).collect();
+        let of_record = record.map(|record| format!("{record}: ")).unwrap_or_default();
+        let forces = if listed.len() == 1 { "force" } else { "forces" };
+        (!listed.is_empty()).then(|| {
+            format!(
+                "{of_record}{forces} {} taken as noise of the channel: weak, and without coherence with \
+                 the other forces and the response",
+                listed.join(", ")
+            )
+        })
     }
 }
 

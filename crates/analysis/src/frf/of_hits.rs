@@ -30,7 +30,7 @@ pub(super) struct OfHits {
     pub remarks: Vec<String>,
 }
 
-/// Averages the responses to all good hits of a record, each cut to the length of the shortest.
+/// Averages the responses to all good hits of some records, each cut to the length of the shortest.
 ///
 /// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM and
 /// K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the machine at
@@ -39,14 +39,16 @@ pub(super) struct OfHits {
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
 pub(super) fn of_hits(
-    recorded: &Windowed,
+    records: &[Windowed],
     rule: &HitRule,
     lines: LineRule<'_>,
     how: &FrfSettings,
 ) -> Result<OfHits, AnalysisError> {
-    let cut = cut(std::slice::from_ref(recorded), rule)?;
+    let cut = cut(records, rule)?;
     let first = &cut.hits[0].held;
-    let driven = first.driven.clone();
+    let mut driven: Vec<usize> = cut.hits.iter().flat_map(|h| h.held.driven.clone()).collect();
+    driven.sort_unstable();
+    driven.dedup();
     let (kind, outputs) = (first.response().1, first.response().0.channels());
     let len = cut.hits.iter().map(|hit| hit.held.force.len()).min().unwrap_or(0);
     let sampling = first.force.sampling().with_len(len)?;
@@ -71,13 +73,13 @@ pub(super) fn of_hits(
         Record::new(sampling, data)
     };
     let segments = Segments::Periods(len);
-    let mut average = FrfAverage::new(lines.clone(), [1, outputs], kind, segments)?;
+    let mut average = FrfAverage::new(lines.clone(), [driven.len(), outputs], kind, segments)?;
     let all: Vec<usize> = (0..outputs).collect();
     let (mut left, mut before) = (0.0_f64, 0.0_f64);
     for hit in &cut.hits {
         let force = weighted(&hit.held.force, &driven)?;
         let response = weighted(hit.held.response().0, &all)?;
-        let pulse = force.channel(0).iter().position(|f| *f != 0.0).unwrap_or(0);
+        let pulse = force.data().row_iter().position(|row| row.amax() > 0.0).unwrap_or(0);
         before = before.max(over_largest(&response, 0..pulse));
         left = left.max(over_largest(&response, len - len.div_ceil(PARTS)..len));
         average.push(&force, &response)?;
@@ -107,7 +109,8 @@ pub(super) fn of_hits(
             significant(rate / std::f64::consts::TAU, 4)
         ));
     }
-    let responses = Responses { frf, lines, driven, segments };
+    let counts = records.iter().map(|record| cut.used_of(&record.held.file)).collect();
+    let responses = Responses { frf, lines, driven, idle: Vec::new(), segments, counts };
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 

@@ -14,7 +14,7 @@ use super::of_hits::OfHits;
 use super::{FrfSettings, Responses};
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
-use crate::measurement::Block;
+use crate::measurement::Windowed;
 use crate::text::{compact, paragraph, significant, text_table};
 
 /// Frequency responses with coherence and standard errors.
@@ -28,6 +28,8 @@ pub struct FrfTable {
     pub last_sample: usize,
     /// Sampling rate, in Hz.
     pub sample_rate_hz: f64,
+    /// Every record, the first included.
+    pub records: Vec<AveragedRecord>,
     /// Name of the estimator.
     pub estimator: &'static str,
     /// Segments that were averaged.
@@ -54,6 +56,19 @@ pub struct FrfTable {
     pub analysis: FrfSettings,
 }
 
+/// One of the records that were averaged.
+#[derive(Debug, Serialize)]
+pub struct AveragedRecord {
+    /// The record.
+    pub file: String,
+    /// First sample used, counted from 1.
+    pub first_sample: usize,
+    /// Last sample used, counted from 1.
+    pub last_sample: usize,
+    /// Number of its segments, periods or hits.
+    pub segments: usize,
+}
+
 /// Segments of a record.
 #[derive(Debug, Serialize)]
 pub struct SegmentRow {
@@ -63,6 +78,8 @@ pub struct SegmentRow {
     pub hop: usize,
     /// `None` for whole periods.
     pub window: Option<&'static str>,
+    /// Number of segments, of all records together.
+    pub count: usize,
     /// Equivalent number of independent averages, a pure number.
     pub averages: f64,
 }
@@ -98,8 +115,8 @@ pub struct Coherence {
 }
 
 impl FrfTable {
-    pub(super) fn new(measured: &Block, averaged: &Responses, how: &FrfSettings) -> Self {
-        let n = measured.force.channels();
+    pub(super) fn new(records: &[Windowed], averaged: &Responses, how: &FrfSettings) -> Self {
+        let n = records[0].held.force.channels();
         let mut responses = Vec::new();
         for motion in 0..n {
             for (input, dof) in averaged.driven.iter().enumerate() {
@@ -108,12 +125,12 @@ impl FrfTable {
         }
         let coherence = (0..n).map(|motion| Coherence::of(averaged, motion)).collect();
         let omega = averaged.frf.omega().to_vec();
-        Self::of(measured, averaged, how, omega, responses, coherence)
+        Self::of(records, averaged, how, omega, responses, coherence)
     }
 
     /// Makes the table over the hits of a hammer.
-    pub(super) fn of_hits(measured: &Block, averaged: OfHits, how: &FrfSettings) -> Self {
-        let mut table = Self::new(measured, &averaged.responses, how);
+    pub(super) fn of_hits(records: &[Windowed], averaged: OfHits, how: &FrfSettings) -> Self {
+        let mut table = Self::new(records, &averaged.responses, how);
         table.hits = averaged.cut.rows;
         table.added_decay = averaged.added_decay;
         table.remarks.extend(averaged.remarks);
@@ -121,8 +138,12 @@ impl FrfTable {
     }
 
     /// Makes the table of forces each of which has lines of its own.
-    pub(super) fn interleaved(measured: &Block, parts: &[Responses], how: &FrfSettings) -> Self {
-        let n = measured.force.channels();
+    pub(super) fn interleaved(
+        records: &[Windowed],
+        parts: &[Responses],
+        how: &FrfSettings,
+    ) -> Self {
+        let n = records[0].held.force.channels();
         let all = parts.iter().enumerate().flat_map(|(part, averaged)| {
             averaged.frf.omega().iter().enumerate().map(move |(at, omega)| (*omega, part, at))
         });
@@ -145,7 +166,7 @@ impl FrfTable {
         });
         let coherence = coherence.collect();
         let omega = places.iter().map(|(omega, ..)| *omega).collect();
-        let mut table = Self::of(measured, &parts[0], how, omega, responses, coherence);
+        let mut table = Self::of(records, &parts[0], how, omega, responses, coherence);
         table.remarks.push(
             "every force has lines of its own: the responses to it are those on its lines alone"
                 .into(),
@@ -154,7 +175,7 @@ impl FrfTable {
     }
 
     fn of(
-        measured: &Block,
+        records: &[Windowed],
         averaged: &Responses,
         how: &FrfSettings,
         omega: Vec<f64>,
@@ -162,11 +183,21 @@ impl FrfTable {
         coherence: Vec<Coherence>,
     ) -> Self {
         let kind = averaged.frf.measured();
+        let measured = &records[0].held;
+        let row = |(recorded, segments): (&Windowed, &usize)| AveragedRecord {
+            file: recorded.held.file.clone(),
+            first_sample: recorded.held.first_sample,
+            last_sample: recorded.held.last_sample(),
+            segments: *segments,
+        };
+        let remarks =
+            records.iter().flat_map(|recorded| recorded.held.unit_remarks.iter().cloned());
         Self {
             file: measured.file.clone(),
             first_sample: measured.first_sample,
             last_sample: measured.last_sample(),
             sample_rate_hz: measured.force.sampling().rate_hz(),
+            records: records.iter().zip(&averaged.counts).map(row).collect(),
             estimator: how.estimator.name(),
             segments: SegmentRow::of(averaged),
             hits: Vec::new(),
@@ -180,7 +211,7 @@ impl FrfTable {
             frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence,
-            remarks: measured.unit_remarks.clone(),
+            remarks: remarks.chain(averaged.of_idle(None)).collect(),
             analysis: how.clone(),
         }
     }
@@ -190,13 +221,25 @@ impl FrfTable {
         let s = &self.segments;
         let cut = match s.window {
             None if !self.hits.is_empty() => {
-                format!("hits of {}", message::count(s.samples, "sample"))
+                format!(
+                    "{} of {}",
+                    message::count(s.count, "hit"),
+                    message::count(s.samples, "sample")
+                )
             }
-            None => format!("periods of {}", message::count(s.samples, "sample")),
+            None => {
+                let samples = message::count(s.samples, "sample");
+                format!("{} of {samples}", message::count(s.count, "period"))
+            }
             Some(window) => {
                 let samples = message::count(s.samples, "sample");
-                format!("segments of {samples} every {} under a {window} window", s.hop)
+                let count = message::count(s.count, "segment");
+                format!("{count} of {samples} every {} under a {window} window", s.hop)
             }
+        };
+        let cut = match self.records.len() {
+            1 => cut,
+            several => format!("{several} records, {cut}"),
         };
         let [low, high] = [self.frequency_hz.first(), self.frequency_hz.last()]
             .map(|hz| compact(hz.copied().unwrap_or(0.0), 5));
@@ -207,8 +250,11 @@ impl FrfTable {
         let rate_hz = compact(self.sample_rate_hz, 8);
         let mut text = match self.hits.is_empty() {
             true => {
-                let (first, last) = (self.first_sample, self.last_sample);
-                format!("{}: samples {first} to {last}, {rate_hz} Hz\n", self.file)
+                let row = |r: &AveragedRecord| {
+                    let (file, first, last) = (&r.file, r.first_sample, r.last_sample);
+                    format!("{file}: samples {first} to {last}, {rate_hz} Hz\n")
+                };
+                self.records.iter().map(row).collect()
             }
             false => heading(&self.hits, &rate_hz),
         };
@@ -370,9 +416,11 @@ impl Coherence {
 
 impl SegmentRow {
     fn of(responses: &Responses) -> Self {
-        let averages = responses.frf.averages();
+        let (averages, count) = (responses.frf.averages(), responses.counts.iter().sum());
         match responses.segments {
-            Segments::Periods(samples) => Self { samples, hop: samples, window: None, averages },
+            Segments::Periods(samples) => {
+                Self { samples, hop: samples, window: None, count, averages }
+            }
             Segments::Windowed { len, hop, window } => {
                 let name = match window {
                     Window::Hann => "hann",
@@ -380,7 +428,7 @@ impl SegmentRow {
                     Window::Blackman => "blackman",
                     Window::Rectangular => "rectangular",
                 };
-                Self { samples: len, hop, window: Some(name), averages }
+                Self { samples: len, hop, window: Some(name), count, averages }
             }
         }
     }

@@ -13,12 +13,14 @@
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
 pub mod checks;
 mod derivatives;
 pub(crate) mod fitted;
+mod fitted_lines;
 pub mod left_out;
 pub mod lines;
 pub mod mass;
@@ -46,6 +48,7 @@ use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
 pub use self::fitted::{Fitted, Misfit, Residual, ResponseCoherence, SampleResidual, WithTerms};
+pub use self::fitted_lines::FittedLine;
 use self::left_out::LineRule;
 pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
@@ -302,6 +305,26 @@ impl Identified {
         self.summary.remarks.extend(of_other.cloned());
         self.summary.validation = Some(validation);
         self.validated = Some(held);
+        Ok(())
+    }
+
+    /// Adds every line of the fit to [`Identified::summary`]: force, measured and fitted response with their
+    /// standard errors, and the residual.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] of a fit in the time domain or with nonlinear terms.
+    pub fn add_fitted_lines(&mut self) -> Result<(), AnalysisError> {
+        let refused =
+            |why: &str| Err(AnalysisError::Setting { setting: "fitted_lines", why: why.into() });
+        let Some((_, data)) = &self.fitted.frequency else {
+            return refused("a fit in the time domain has none");
+        };
+        if self.fitted.nonlinear.is_some() {
+            return refused(
+                "the response of a system with nonlinear terms is no matter of single lines",
+            );
+        }
+        self.summary.fitted_lines = Some(FittedLine::all(data, &self.fitted.estimate)?);
         Ok(())
     }
 

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::checks::{
-    Finding, after_response_fit, before_spectral_fit, claimed_period, coherence, delay_of_lines,
-    linearity,
+    Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
+    delay_of_lines, linearity,
 };
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
@@ -16,7 +16,7 @@ use super::left_out::LineRule;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
 use super::rows::LinesUsed;
-use super::spectra::one_motion_of;
+use super::spectra::{no_period, one_motion_of};
 use crate::AnalysisError;
 use crate::frf::Responses;
 use crate::measurement::{Block, Windowed};
@@ -33,7 +33,8 @@ pub fn fit(
     how: &ResponseFit,
 ) -> Result<Fitted, AnalysisError> {
     let ResponseFit { estimator, segments, method } = how;
-    let estimate = |recorded| Responses::of(recorded, segments, *estimator, lines);
+    let estimate =
+        |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
     let responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
     let mut all: Vec<FrequencyData> =
         responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
@@ -47,15 +48,34 @@ pub fn fit(
         frequency_hz: r.frf.omega().iter().map(|omega| omega / TAU).collect(),
         values: r.frf.coherence().clone(),
     });
-    let (mut before, mut after) = (Vec::new(), Vec::new());
+    let (mut before, mut after, mut misfit) = (Vec::new(), Vec::new(), misfit);
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
         let mut checks = Vec::from_iter(coherence(&r.frf));
         if periodic {
             checks.extend(claimed_period(&held.force, held.period));
         }
+        let mut looked = looked_at(held, r, unknowns, &estimate, data.len(), periodic)?;
+        // What differs between windows that are no periods is no noise.
+        if checks.iter().any(no_period) {
+            looked.retain(|finding| finding.subject() != Subject::Misfit);
+            misfit = None;
+        }
         before.push(checks);
-        after.push(looked_at(held, r, unknowns, &estimate, data.len(), periodic)?);
+        after.push(looked);
     }
+    let of_idle = records.iter().zip(&responses).filter_map(|(recorded, r)| {
+        let file = (records.len() > 1).then_some(recorded.held.file.as_str());
+        r.of_idle(file)
+    });
+    let segments_of: Vec<String> = responses.iter().map(|r| r.counts[0].to_string()).collect();
+    let of_segments = format!(
+        "the frequency responses of {} records, fitted together, are averages of {} segments",
+        records.len(),
+        segments_of.join(", ")
+    );
+    let of_segments = (records.len() > 1).then_some(of_segments);
+    let of_motion = one_motion_of(&records[0].held).into_iter();
+    let remarks = of_motion.chain(of_segments).chain(of_idle).collect();
     Ok(Fitted {
         domain: "frequency",
         estimator: name,
@@ -78,7 +98,7 @@ pub fn fit(
         misfit,
         noise: Vec::new(),
         open: false,
-        remarks: one_motion_of(&records[0].held),
+        remarks,
         estimate,
         nonlinear: None,
     })

@@ -1,8 +1,8 @@
 //! Fits sample by sample.
 
 use mechid_estimate::checks::{
-    Finding, before_equation_of_motion, before_fit, claimed_period, delay_at_samples,
-    delay_between_samples, noise_on_response, periodicity, periodicity_across,
+    Finding, ModeLimit, before_equation_of_motion, before_fit, claimed_period, delay_at_samples,
+    delay_between_samples, fitted_step, noise_on_response, periodicity, periodicity_across,
 };
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns, missing_force};
@@ -214,9 +214,15 @@ impl SampleFit {
         let held_whole = records.iter().all(|recorded| recorded.held.held_to().is_none());
         let extent = if held_whole { self.extent() } else { Extent::Open };
         let states: Vec<[&Record; 3]> = prepared.iter().map(Prepared::states).collect();
-        let before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
+        let mut before_all = before_fit(TimeDomain::new(discretisation, extent), &states)?;
         let fit = rows.fit(discretisation, unknowns)?;
         let estimate = fit.into_estimate();
+        // The modes that were found say more than a force held between the samples.
+        for finding in &mut before_all {
+            if matches!(finding, Finding::HighestMode { limit: ModeLimit::BetweenSamples, .. }) {
+                *finding = fitted_step(&estimate, dt)?;
+            }
+        }
         let residual = |(recorded, p): (&Windowed, &Prepared)| -> Result<Residual, AnalysisError> {
             let extent = self.extent_of(&recorded.held);
             let [samples, fitted] =

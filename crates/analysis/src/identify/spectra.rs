@@ -83,7 +83,7 @@ pub(super) fn fit(
 }
 
 /// Returns whether a finding says that the windows are no periods of the record.
-fn no_period(finding: &Finding) -> bool {
+pub(super) fn no_period(finding: &Finding) -> bool {
     finding.subject() == Subject::Periodicity && finding.verdict() == Verdict::Bad
 }
 

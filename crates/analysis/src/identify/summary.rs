@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::CONSPICUOUS;
 use super::checks::{self, CheckRow, When};
 use super::fitted::Fitted;
+use super::fitted_lines::FittedLine;
 use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::Identify;
 use super::prediction::Prediction;
@@ -63,6 +64,9 @@ pub struct IdentificationSummary {
     pub hits: Vec<HitRow>,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
+    /// Every line of the fit, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted_lines: Option<Vec<FittedLine>>,
     /// Prediction of a record that was not fitted.
     pub validation: Option<Validation>,
     /// Remarks to read before using the numbers.
@@ -152,6 +156,7 @@ impl IdentificationSummary {
             records: records.iter().map(row).collect(),
             hits,
             checks: checks::rows(fitted, &records)?,
+            fitted_lines: None,
             validation: None,
             remarks: Vec::new(),
             system: unscaled.is_none().then(|| SystemMatrices::from(&system)),

@@ -19,7 +19,7 @@ use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
 use super::rows::{CONFIDENCE, ParameterRow, covariance, header, mode_table, parameters};
 use super::summary::{FitRow, verdict};
-use super::{Band, KnownMass, Method, Unscaled};
+use super::{Band, FittedLine, KnownMass, Method, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::modal::{ShapedMode, shape_table};
@@ -116,6 +116,7 @@ pub fn identify_responses(
             equations: 2 * data.len(),
             unknowns: estimate.parameters().len(),
         },
+        fitted_lines: None,
         checks,
         remarks: unscaled
             .iter()
@@ -167,6 +168,9 @@ pub struct ResponseSummary {
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
+    /// Every line of the fit, if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted_lines: Option<Vec<FittedLine>>,
     /// Checks before and after the fit.
     pub checks: Vec<CheckRow>,
     /// Remarks to read before using the numbers.
@@ -221,6 +225,16 @@ impl IdentifiedResponses {
     /// Returns the numbers, checks and remarks.
     pub fn summary(&self) -> &ResponseSummary {
         &self.summary
+    }
+
+    /// Adds every line of the fit to [`IdentifiedResponses::summary`]: measured and fitted responses with
+    /// their standard errors, and the residual.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Model`] if the identified system has no response at a line.
+    pub fn add_fitted_lines(&mut self) -> Result<(), AnalysisError> {
+        self.summary.fitted_lines = Some(FittedLine::all(&self.data, &self.estimate)?);
+        Ok(())
     }
 
     /// Returns the identified system with the covariance of its parameters.

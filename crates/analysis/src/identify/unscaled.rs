@@ -32,38 +32,34 @@ impl Unscaled {
         driven: &[usize],
         fit: impl Fn(&Unknowns) -> Result<T, AnalysisError>,
     ) -> Result<(T, Option<Self>), AnalysisError> {
-        match fit(unknowns) {
-            Err(refused @ AnalysisError::Estimate(EstimateError::OnlyRatios { .. })) => {
-                match Self::normalised(unknowns, driven)? {
-                    Some((unscaled, normalised)) => Ok((fit(&normalised)?, Some(unscaled))),
-                    None => Err(refused),
+        let mut free = without_force(unknowns, driven);
+        let (mut normalised, mut unscaled) = (unknowns.clone(), None);
+        loop {
+            match fit(&normalised) {
+                // That a channel is noise and no force may only come to light in the fit.
+                Err(AnalysisError::Estimate(EstimateError::OnlyRatios { dof, .. }))
+                    if unscaled.is_none() || !free.contains(&(dof - 1)) =>
+                {
+                    if !free.contains(&(dof - 1)) {
+                        free.push(dof - 1);
+                        free.sort_unstable();
+                    }
+                    let found;
+                    (found, normalised) = Self::normalised(unknowns, &free)?;
+                    unscaled = Some(found);
                 }
+                fitted => return Ok((fitted?, unscaled)),
             }
-            fitted => Ok((fitted?, None)),
         }
     }
 
     /// Finds the equations and the unknowns of one of the systems that have the same modes: that with unit
-    /// masses where no force acts, and no mass that couples other equations to these. `None` if every
-    /// equation has a force or a known entry.
-    fn normalised(
-        unknowns: &Unknowns,
-        driven: &[usize],
-    ) -> Result<Option<(Self, Unknowns)>, AnalysisError> {
-        let dofs = unknowns.dof();
-        let entries =
-            || Matrix::ALL.into_iter().flat_map(|matrix| (0..dofs).map(move |j| (matrix, j)));
-        let is_free = |row: &usize| {
-            let known = |(matrix, column)| unknowns.fixed(matrix, *row, column);
-            !driven.contains(row) && entries().filter_map(known).all(|value| value == 0.0)
-        };
-        let free: Vec<usize> = (0..dofs).filter(is_free).collect();
-        if free.is_empty() {
-            return Ok(None);
-        }
+    /// masses on the degrees of freedom `free`, counted from 0, and no mass that couples other equations to
+    /// these.
+    fn normalised(unknowns: &Unknowns, free: &[usize]) -> Result<(Self, Unknowns), AnalysisError> {
         let (mut normalised, mut equations) = (unknowns.clone(), Vec::new());
-        for row in 0..dofs {
-            for &column in &free {
+        for row in 0..unknowns.dof() {
+            for &column in free {
                 if unknowns.fixed(Matrix::Mass, row, column).is_none() {
                     let value = if row == column { 1.0 } else { 0.0 };
                     normalised = normalised.fix(Matrix::Mass, row, column, value)?;
@@ -73,7 +69,7 @@ impl Unscaled {
         }
         equations.dedup();
         let degrees_of_freedom = free.iter().map(|dof| dof + 1).collect();
-        Ok(Some((Self { degrees_of_freedom, equations }, normalised)))
+        Ok((Self { degrees_of_freedom, equations }, normalised))
     }
 
     /// Returns whether an equation, counted from 0, is not given.
@@ -94,6 +90,17 @@ impl Unscaled {
         let is_unknown = |dof: &usize| self.degrees_of_freedom.contains(&(dof + 1));
         Self::check(driven.iter().any(is_unknown).then_some(self))
     }
+}
+
+/// Degrees of freedom, counted from 0, without force and without known entry in their equation.
+fn without_force(unknowns: &Unknowns, driven: &[usize]) -> Vec<usize> {
+    let dofs = unknowns.dof();
+    let entries = || Matrix::ALL.into_iter().flat_map(|matrix| (0..dofs).map(move |j| (matrix, j)));
+    let is_free = |row: &usize| {
+        let known = |(matrix, column)| unknowns.fixed(matrix, *row, column);
+        !driven.contains(row) && entries().filter_map(known).all(|value| value == 0.0)
+    };
+    (0..dofs).filter(is_free).collect()
 }
 
 impl fmt::Display for Unscaled {

@@ -88,6 +88,10 @@ pub struct FitArgs {
     segments: SegmentArgs,
     #[command(flatten)]
     validation: ValidationArgs,
+    /// Add every line of the fit to the JSON: force, measured and fitted response with their standard errors,
+    /// and the residual
+    #[arg(long, help_heading = "Output", requires = "json")]
+    fitted_lines: bool,
     /// List every check with its verdict, not only the warnings (--json and the report always do)
     #[arg(long, help_heading = "Output", conflicts_with_all = ["json", "quiet"])]
     verbose: bool,
@@ -312,6 +316,9 @@ impl FitArgs {
             records.push(self.input.open_other(record, channels, self.input.window())?);
         }
         let mut identified = mechid::identify(&records, &self.settings())?;
+        if self.fitted_lines {
+            identified.add_fitted_lines()?;
+        }
         let predicted = &self.validation;
         let (start, samples) = (predicted.validate_start, predicted.validate_samples);
         let other = match (&predicted.validate, start, samples) {
@@ -363,7 +370,11 @@ impl FitArgs {
             mass: self.mass.clone(),
             method: self.method.map(Method::from),
         };
-        Ok(Some(mechid::identify_responses(&tables, &how)?))
+        let mut identified = mechid::identify_responses(&tables, &how)?;
+        if self.fitted_lines {
+            identified.add_fitted_lines()?;
+        }
+        Ok(Some(identified))
     }
 
     /// Returns the records that are read.

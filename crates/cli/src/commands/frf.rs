@@ -23,11 +23,16 @@ use crate::outcome::{Files, Outcome};
   mechid frf record.csv --force force --displacement displacement --period 256 --plot frf.svg
   mechid frf random.csv --force f --acceleration a --segment 1024 --segment-overlap 66 \\
       --estimator hv --band-hz 5:400 --output frf.csv
+  mechid frf a.csv b.csv --force f --acceleration a --segment 1024 --plot frf.svg
   mechid frf hammer.csv --force f --acceleration a --hits --exponential-percent 1
   mechid frf rotor.csv --force fx,fy --displacement x,y --period 512 --json")]
 pub struct FrfArgs {
     #[command(flatten)]
     input: RecordArgs,
+    /// More records of the same machine, with the same columns and window: the segments of all are averaged
+    /// together
+    #[arg(value_name = "RECORD")]
+    more: Vec<PathBuf>,
     #[command(flatten)]
     channels: ChannelArgs,
     /// Frequency response estimator
@@ -74,7 +79,7 @@ impl FrfArgs {
     /// Returns the files that the arguments name.
     pub fn files(&self) -> Files<'_> {
         let outputs = [&self.output, &self.plot.plot].into_iter().flatten();
-        Files::default().reads([&self.input.record]).writes(outputs)
+        Files::default().reads([&self.input.record]).reads(&self.more).writes(outputs)
     }
 
     /// Reads, averages, and reports.
@@ -89,7 +94,11 @@ impl FrfArgs {
             hits: self.hits.rule(),
             exponential_percent: self.exponential_percent,
         };
-        let table = mechid::frf(&self.input.open(&channels)?, &how)?;
+        let mut records = vec![self.input.open(&channels)?];
+        for record in &self.more {
+            records.push(self.input.open_other(record, &channels, self.input.window())?);
+        }
+        let table = mechid::frf_of_records(&records, &how)?;
         let mut outcome = Outcome::new(table.to_string(), &table)?
             .with_plot(&self.plot, || Ok(table.styled_figure(self.style.style())?))?;
         if let Some(path) = &self.output {

@@ -54,6 +54,11 @@ pub enum Finding {
         /// Largest RMS deviation of a period over the RMS of the response (pure number).
         fraction: f64,
     },
+    /// The force differs from period to period, and the response with it.
+    UnequalPeriods {
+        /// Largest RMS deviation of a period over the RMS of the force (pure number).
+        fraction: f64,
+    },
     /// The force does not repeat after the claimed period.
     WrongPeriod {
         /// Period claimed, in samples.
@@ -457,9 +462,10 @@ impl Finding {
                 Subject::Excitation
             }
             Finding::Conditioning { .. } => Subject::Conditioning,
-            Finding::Seam { .. } | Finding::PeriodScatter { .. } | Finding::WrongPeriod { .. } => {
-                Subject::Periodicity
-            }
+            Finding::Seam { .. }
+            | Finding::PeriodScatter { .. }
+            | Finding::UnequalPeriods { .. }
+            | Finding::WrongPeriod { .. } => Subject::Periodicity,
             Finding::HighestMode { .. } | Finding::NoLogarithm { .. } => Subject::Step,
             Finding::Coherence { .. } => Subject::Coherence,
             Finding::Clipping { .. }
@@ -507,7 +513,8 @@ impl Finding {
             Finding::Coherence { median, .. } => {
                 grade(1.0 - median, INCOHERENCE_DOUBTFUL, INCOHERENCE_BAD)
             }
-            Finding::WrongPeriod { .. }
+            Finding::UnequalPeriods { .. }
+            | Finding::WrongPeriod { .. }
             | Finding::NoLogarithm { .. }
             | Finding::Clipping { .. }
             | Finding::ConstantChannel { .. }
@@ -527,7 +534,9 @@ impl Finding {
             Finding::ExcitedLines { lines, .. } => lines as f64,
             Finding::Conditioning { condition_number, .. } => condition_number,
             Finding::Seam { ratio } | Finding::Misfit { ratio, .. } => ratio,
-            Finding::PeriodScatter { fraction } | Finding::PowerFlow { fraction } => fraction,
+            Finding::PeriodScatter { fraction }
+            | Finding::UnequalPeriods { fraction }
+            | Finding::PowerFlow { fraction } => fraction,
             Finding::WrongPeriod { claimed, fault } => match fault {
                 PeriodFault::Neighbour { period, .. } | PeriodFault::Other { period, .. } => {
                     period as f64

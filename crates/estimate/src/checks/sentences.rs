@@ -60,11 +60,22 @@ impl Display for Finding {
                     Verdict::Bad => ": hardly a steady response of this period; check `period`",
                 })
             }
+            Finding::UnequalPeriods { fraction } => write!(
+                f,
+                "single periods of the force differ from their mean by up to {:.2} %, and the response \
+                 follows them: the test does not repeat, and what differs is no noise. Average frequency \
+                 responses over the periods (`from_frf`), or fit the strokes of a hammer as `hits`",
+                100.0 * fraction
+            ),
             Finding::WrongPeriod { claimed, fault } => fault.sentence(*claimed, f),
             Finding::HighestMode { frequency_hz, samples_per_period, limit } => {
+                let condition = match limit {
+                    ModeLimit::Euler { .. } => " if the force is held between the samples",
+                    _ => "",
+                };
                 write!(
                     f,
-                    "the highest mode ({frequency_hz:.4} Hz) has {samples_per_period:.1} samples per \
+                    "the highest mode ({frequency_hz:.4} Hz{condition}) has {samples_per_period:.1} samples per \
                      period{}",
                     limit.clause(self.verdict(), *samples_per_period)
                 )

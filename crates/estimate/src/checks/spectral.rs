@@ -1,13 +1,18 @@
 //! Checks of a record before a fit of its spectra or frequency responses.
 
-use mechid_signal::Record;
+use mechid_model::ResponseQuantity;
+use mechid_signal::{Record, Spectrum, lines};
+use nalgebra::DMatrix;
 
 use super::before::{conditioning, highest_mode, periodicity, unknowns_of_an_equation};
 use super::claimed_period;
 use super::finding::{Finding, ModeLimit};
-use super::thresholds::EXCITED_LINE;
+use super::thresholds::{EXCITED_LINE, PERIOD_SCATTER_DOUBTFUL};
 use crate::frequency_domain::{FrequencyData, Lines, equation_rows};
-use crate::{Estimate, EstimateError, Frf, Unknowns};
+use crate::{Estimate, EstimateError, Frf, FrfAverage, Segments, Unknowns};
+
+/// Amplitude of a line over that of the strongest of its force, above which the response to it shows.
+const STRONG_LINE: f64 = 0.01;
 
 /// Checks excitation and conditioning before spectra or frequency responses are fitted: of all
 /// experiments that are fitted together, since one shaker at a time excites one degree of freedom each.
@@ -45,8 +50,52 @@ pub fn steady_periods(
     period: usize,
 ) -> Result<Vec<Finding>, EstimateError> {
     let mut findings = vec![repetition(response, period)?];
+    findings.extend(unequal_periods(force, response, period)?);
     findings.extend(claimed_period(force, period));
     Ok(findings)
+}
+
+/// Whether the force differs from period to period by more than noise of its channel, which no response
+/// would follow.
+fn unequal_periods(
+    force: &Record,
+    response: &Record,
+    period: usize,
+) -> Result<Option<Finding>, EstimateError> {
+    let fraction = deviation_of_periods(force, period)?;
+    if fraction < PERIOD_SCATTER_DOUBTFUL {
+        return Ok(None);
+    }
+    let mean = force.period_mean(period)?;
+    let spectrum = Spectrum::of(&mean);
+    let lines = lines::full(mean.sampling());
+    let amplitude = |line: usize, channel: usize| -> f64 { spectrum.line(line, channel).norm() };
+    let strongest =
+        |channel: usize| lines.iter().map(|line| amplitude(*line, channel)).fold(0.0, f64::max);
+    let of_channels: Vec<(usize, f64)> =
+        (0..force.channels()).map(|c| (c, strongest(c))).filter(|(_, s)| *s > 0.0).collect();
+    let is_strong = |line: &usize| {
+        of_channels.iter().any(|(c, strongest)| amplitude(*line, *c) > STRONG_LINE * strongest)
+    };
+    let chosen = Lines::new(mean.sampling(), lines.iter().copied().filter(is_strong))?;
+    let acting: Vec<usize> = of_channels.iter().map(|(channel, _)| *channel).collect();
+    let apart = |record: &Record, channels: &[usize]| -> Result<Record, EstimateError> {
+        let mean = record.period_mean(period)?;
+        let data = DMatrix::from_fn(record.len(), channels.len(), |k, at| {
+            record.data()[(k, channels[at])] - mean.data()[(k % period, channels[at])]
+        });
+        Ok(Record::new(record.sampling(), data)?)
+    };
+    let all: Vec<usize> = (0..response.channels()).collect();
+    // Whatever was measured: a share of power has no unit.
+    let quantity = ResponseQuantity::Displacement;
+    let mut average =
+        FrfAverage::new(chosen, [acting.len(), all.len()], quantity, Segments::Periods(period))?;
+    average.push(&apart(force, &acting)?, &apart(response, &all)?)?;
+    // The mean was taken off.
+    let independent = average.pieces().saturating_sub(1);
+    let follows = average.response_follows(independent as f64);
+    Ok(follows.then_some(Finding::UnequalPeriods { fraction }))
 }
 
 /// Checks the coherence of frequency responses, whose median is judged; `None` without a response.
@@ -77,10 +126,15 @@ fn repetition(response: &Record, period: usize) -> Result<Finding, EstimateError
     if response.len() / 2 < period {
         return Ok(periodicity(response));
     }
-    let mean = response.period_mean(period)?;
+    Ok(Finding::PeriodScatter { fraction: deviation_of_periods(response, period)? })
+}
+
+/// Largest RMS deviation of a period from the mean of all, over the RMS of that without its constant part.
+fn deviation_of_periods(record: &Record, period: usize) -> Result<f64, EstimateError> {
+    let mean = record.period_mean(period)?;
     let around = mean.without_mean();
     let change = |channel: usize| {
-        let (x, mean) = (response.channel(channel), mean.channel(channel));
+        let (x, mean) = (record.channel(channel), mean.channel(channel));
         let size = around.column(channel).norm();
         let deviation = |period: &[f64]| {
             period.iter().zip(mean).map(|(x, mean)| (x - mean).powi(2)).sum::<f64>().sqrt()
@@ -88,8 +142,20 @@ fn repetition(response: &Record, period: usize) -> Result<Finding, EstimateError
         let largest = x.chunks_exact(period).map(deviation).fold(0.0, f64::max);
         if largest == 0.0 { 0.0 } else { largest / size }
     };
-    let fraction = (0..response.channels()).map(change).fold(0.0, f64::max);
-    Ok(Finding::PeriodScatter { fraction })
+    Ok((0..record.channels()).map(change).fold(0.0, f64::max))
+}
+
+/// Checks the highest mode of an estimate against the step from sample to sample
+/// ([`Finding::HighestMode`]), in s.
+///
+/// # Errors
+/// [`EstimateError::Undetermined`] or [`EstimateError::Model`] if there are no modes.
+///
+/// # Source
+/// Ours.
+pub fn fitted_step(estimate: &Estimate, dt: f64) -> Result<Finding, EstimateError> {
+    let [frequency_hz, samples_per_period] = highest_mode(&estimate.system()?, dt)?;
+    Ok(Finding::HighestMode { frequency_hz, samples_per_period, limit: ModeLimit::BetweenSamples })
 }
 
 /// Checks the highest mode of an estimate against the lines that were fitted and the Nyquist frequency

@@ -10,6 +10,13 @@ use super::{ComplexMatrix, Frf, FrfEstimator, Segments};
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
 
+/// Amplitude of a force over that of the strongest, below which its channel may be idle.
+const IDLE: f64 = 0.1;
+/// Mean of −ln p over lines and channels up to which nothing shows; of no signal it is 1.
+const MEAN_EVIDENCE: f64 = 3.0;
+/// Largest −ln p, beyond the logarithm of their number, up to which nothing shows: a probability of 10⁻³.
+const LARGEST_EVIDENCE: f64 = 6.9;
+
 /// Sums from which frequency responses are estimated, gathered stretch by stretch; memory does not grow
 /// with the record.
 #[derive(Debug, Clone)]
@@ -85,6 +92,101 @@ impl FrfAverage {
         Ok(())
     }
 
+    /// Adds all segments of another average over the same lines, channels and segments, such as of another
+    /// record of the same machine.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] if it has other channels or lines.
+    ///
+    /// # Source
+    /// That of [`FrfAverage::push`].
+    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
+        let size = crate::least_squares::size;
+        size("channels of the force", self.inputs, other.inputs)?;
+        size("channels of the motion", self.outputs, other.outputs)?;
+        size("lines of a segment", self.sums.len(), other.sums.len())?;
+        for (sum, other) in self.sums.iter_mut().zip(&other.sums) {
+            sum.merge(other);
+        }
+        self.pieces += other.pieces;
+        Ok(())
+    }
+
+    /// Number of segments so far.
+    pub fn pieces(&self) -> usize {
+        self.pieces
+    }
+
+    /// Returns the force channels, counted from 0, that show nothing but noise of their own: weaker than a
+    /// tenth of the strongest force, and on no line in common with another force or with a response. They
+    /// are of shakers or points where no force acts; as forces they would seem to do nothing, which biases
+    /// the responses to them towards zero.
+    ///
+    /// # Source
+    /// Goodman (1957), *On the joint estimation of the spectra, cospectrum and quadrature spectrum of a
+    /// two-dimensional stationary Gaussian process*, for the distribution of a coherence of no signal; the
+    /// limits are ours.
+    pub fn idle_inputs(&self) -> Vec<usize> {
+        let averages = self.averages();
+        if self.inputs < 2 || averages <= self.inputs as f64 {
+            return Vec::new();
+        }
+        let power = |input: usize| self.sums.iter().map(|sum| sum.force_power(input)).sum::<f64>();
+        let powers: Vec<f64> = (0..self.inputs).map(power).collect();
+        let strongest = powers.iter().copied().fold(0.0, f64::max);
+        let is_weak = |input: &usize| powers[*input] < IDLE * IDLE * strongest;
+        (0..self.inputs).filter(is_weak).filter(|input| self.is_idle(*input, averages)).collect()
+    }
+
+    /// Whether neither a response nor another force has anything in common with a force, by the mean and
+    /// the largest of −ln p: of no signal an exponential variate each.
+    fn is_idle(&self, input: usize, averages: f64) -> bool {
+        let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
+        for line in &self.sums {
+            let (Some(of_motion), Some(of_forces)) = (
+                line.evidence_of_motion(input, averages),
+                line.evidence_of_forces(input, averages),
+            ) else {
+                return false;
+            };
+            for value in of_motion.into_iter().chain([of_forces]) {
+                sum += value;
+                largest = largest.max(value);
+                count += 1.0;
+            }
+        }
+        sum <= MEAN_EVIDENCE * count && largest <= LARGEST_EVIDENCE + f64::ln(count)
+    }
+
+    /// Returns whether a response has something in common with a force, from so many independent averages.
+    pub(crate) fn response_follows(&self, averages: f64) -> bool {
+        let follows = |input: usize| {
+            let each =
+                self.sums.iter().filter_map(|s| s.evidence_of_motion(input, averages)).flatten();
+            let (sum, count) =
+                each.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+            sum > MEAN_EVIDENCE * count
+        };
+        averages > self.inputs as f64 && (0..self.inputs).any(follows)
+    }
+
+    /// Returns the same average of some of the force channels, counted from 0.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    #[must_use]
+    pub fn of_inputs(&self, inputs: &[usize]) -> Self {
+        let sums = self.sums.iter().map(|sum| sum.of_inputs(inputs)).collect();
+        Self { inputs: inputs.len(), sums, ..self.clone() }
+    }
+
+    /// Equivalent number of independent segments.
+    fn averages(&self) -> f64 {
+        let hop = self.segments.hop();
+        let loss = self.weights.as_deref().map(|weights| overlap_loss(weights, hop, self.pieces));
+        self.pieces as f64 / loss.unwrap_or(1.0)
+    }
+
     /// The frequency responses from all segments so far.
     ///
     /// # Errors
@@ -101,10 +203,6 @@ impl FrfAverage {
         if self.pieces <= inputs {
             return Err(EstimateError::TooFewAverages { got: self.pieces, needed: inputs + 1 });
         }
-        let loss = self
-            .weights
-            .as_deref()
-            .map(|weights| overlap_loss(weights, self.segments.hop(), self.pieces));
         let omega = self.lines.omega();
         let mut frf = Frf {
             line_correlation: self.segments.line_correlation(self.pieces),
@@ -114,7 +212,7 @@ impl FrfAverage {
             variance: Vec::with_capacity(omega.len()),
             omega,
             measured: self.measured,
-            averages: self.pieces as f64 / loss.unwrap_or(1.0),
+            averages: self.averages(),
         };
         for (line, sum) in self.sums.iter().enumerate() {
             frf.push_line(line, &sum.mean(self.pieces), estimator)?;

@@ -3,6 +3,8 @@
 use mechid_model::linear_algebra::hermitian_eigen;
 use nalgebra::{Complex, DMatrix, DVector, Dyn, MatrixView, U1};
 
+use statrs::distribution::{Beta, ContinuousCDF};
+
 use super::ComplexMatrix;
 use crate::EstimateError;
 
@@ -53,6 +55,51 @@ impl CrossSpectra {
             motion_force: &self.motion_force / count,
             motion: &self.motion / count,
         }
+    }
+
+    /// Adds the sums of other pieces.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.force += &other.force;
+        self.motion_force += &other.motion_force;
+        self.motion += &other.motion;
+    }
+
+    /// Sum of |F|² of a force.
+    pub(super) fn force_power(&self, input: usize) -> f64 {
+        self.force[(input, input)].re
+    }
+
+    /// The sums of some of the forces.
+    pub(super) fn of_inputs(&self, inputs: &[usize]) -> Self {
+        Self {
+            force: self.force.select_rows(inputs).select_columns(inputs),
+            motion_force: self.motion_force.select_columns(inputs),
+            motion: self.motion.clone(),
+        }
+    }
+
+    /// −ln p of each motion, that it has nothing in common with a force beyond the others, from so many
+    /// independent averages; `None` if the forces are dependent.
+    pub(super) fn evidence_of_motion(&self, input: usize, averages: f64) -> Option<Vec<f64>> {
+        let inverse = self.inverse_force(0.0).ok()?;
+        let h = &self.motion_force * &inverse;
+        let explained = &h * self.motion_force.adjoint();
+        let spare = averages - inverse.nrows() as f64;
+        let of_motion = (0..h.nrows()).filter_map(|o| {
+            let left = (self.motion[(o, o)] - explained[(o, o)]).re;
+            let share = h[(o, input)].norm_sqr() / inverse[(input, input)].re;
+            (left > 0.0).then(|| spare * (share / left).ln_1p())
+        });
+        Some(of_motion.collect())
+    }
+
+    /// −ln p that a force has nothing in common with the others, likewise: 1 − γ² is a beta variate then.
+    pub(super) fn evidence_of_forces(&self, input: usize, averages: f64) -> Option<f64> {
+        let inverse = self.inverse_force(0.0).ok()?;
+        let others = inverse.nrows() as f64 - 1.0;
+        let apart = (1.0 / (self.force_power(input) * inverse[(input, input)].re)).clamp(0.0, 1.0);
+        let p = Beta::new(averages - others, others).ok()?.cdf(apart);
+        Some(-p.max(f64::MIN_POSITIVE).ln())
     }
 
     /// S_FF⁻¹, refused where the forces do not act independently.
