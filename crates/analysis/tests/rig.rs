@@ -2,7 +2,8 @@
 
 use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
 use mechid_analysis::{
-    FrfSettings, Identified, Identify, Measurement, ResponseQuantity, frf, identify,
+    AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
+    Window, frf, frf_of_records, identify,
 };
 use mechid_estimate::checks::{Concentration, Finding};
 use mechid_model::{Response, Sdof, SecondOrderSystem};
@@ -110,6 +111,96 @@ fn noise_in_idle_channels_is_no_cause_for_warnings() {
     assert!(warned <= 4, "{warned} of {RUNS} warn");
     let coverage = held as f64 / f64::from(all);
     assert!((0.93..0.97).contains(&coverage), "{coverage}");
+}
+
+fn from_frf() -> Identify {
+    Identify::responses(Default::default(), Segmentation::default())
+}
+
+/// A load cell where no force acts shows noise, to which nothing responds.
+#[test]
+fn noise_in_idle_channels_is_no_force_of_frequency_responses() {
+    const RUNS: u64 = 40;
+    let (mut warned, mut kept) = (0, 0);
+    for seed in 0..RUNS {
+        let found = identify(&records(seed, [0.005, 0.002]), &from_frf()).unwrap();
+        // All lines of all shakers, and hardly ever those of a channel of noise.
+        kept += found.summary().fit.equations / (2 * 70) - DOFS;
+        let of_idle = |remark: &&String| remark.contains("taken as noise of the channel");
+        assert_eq!(found.summary().remarks.iter().filter(of_idle).count(), DOFS, "{found}");
+        warned += u64::from(found.checks().iter().any(|check| check.is_conspicuous()));
+    }
+    // Of 240 channels one in a thousand is kept: more than three with a probability of 10⁻⁴.
+    assert!(kept <= 3, "{kept} channels are kept");
+    // With a rate of 1 in 50 more than four of forty warn with a probability of 0.001.
+    assert!(warned <= 4, "{warned} of {RUNS} warn");
+}
+
+/// A shaker of which nothing is known but its noisy channel, and no mass: the modes are left.
+#[test]
+fn a_channel_of_noise_is_no_force_that_scales_an_equation() {
+    let test = records(7, [0.005, 0.002]).swap_remove(0);
+    let found = identify(&[test], &from_frf()).unwrap();
+    assert_eq!(found.summary().unscaled.as_ref().unwrap().degrees_of_freedom, [2, 3]);
+    for (mode, exact) in found.summary().modes.iter().zip(machine().modes().unwrap()) {
+        let estimate = mode.row.natural_frequency_hz;
+        let apart = estimate.value - exact.natural_frequency() / std::f64::consts::TAU;
+        // Noise on the driving force is taken for none.
+        assert!(apart.abs() < 6.0 * estimate.standard_error.unwrap(), "{found}");
+    }
+}
+
+/// Judges: the same periods in one record, and the receptance in closed form.
+#[test]
+fn records_are_averaged_together() {
+    let whole = &records(3, [0.005, 0.0])[0];
+    let how = FrfSettings::default();
+    let part = |first: usize, periods: usize| {
+        let window =
+            Window { start: 1 + first * PERIOD, period: Some(PERIOD), periods: Some(periods) };
+        whole.clone().window(window).unwrap()
+    };
+    let one = frf(whole, &how).unwrap();
+    let parts = frf_of_records(&[part(0, 1), part(1, 3)], &how).unwrap();
+    assert_eq!(parts.segments.count, 4);
+    assert_eq!(parts.records.iter().map(|r| r.segments).collect::<Vec<_>>(), [1, 3]);
+    let text = parts.to_string();
+    assert!(text.contains("2 records, 4 periods of 256 samples, worth 4 averages"), "{text}");
+    for (a, b) in one.responses.iter().zip(&parts.responses) {
+        for (a, b) in [(&a.real, &b.real), (&a.standard_error, &b.standard_error)] {
+            let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let largest = a.iter().map(|a| a.abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-9 * largest, "{apart} of {largest}");
+        }
+    }
+    // One shaker at a time, and H whole.
+    let table = frf_of_records(&records(4, [0.0, 0.0]), &how).unwrap();
+    assert_eq!((table.responses.len(), table.records.len()), (DOFS * DOFS, DOFS));
+    for response in &table.responses {
+        for (at, hz) in table.frequency_hz.iter().enumerate() {
+            let exact = machine().receptance(std::f64::consts::TAU * hz).unwrap();
+            let exact = exact[(response.motion - 1, response.force - 1)];
+            let found = nalgebra::Complex::new(response.real[at], response.imaginary[at]);
+            assert!((found - exact).norm() < 1e-9 * exact.norm(), "{hz} Hz");
+        }
+    }
+    let other = {
+        let (force, motion) = test(0, 1);
+        let responses = [(ResponseQuantity::Velocity, motion.velocity())];
+        Measurement::from_records(&force, &responses).unwrap()
+    };
+    let refused = frf_of_records(&[whole.clone(), other], &how).unwrap_err();
+    assert!(matches!(refused, AnalysisError::Setting { setting: "response", .. }), "{refused}");
+    assert!(matches!(frf_of_records(&[], &how), Err(AnalysisError::NoRecord)));
+}
+
+#[test]
+fn how_many_segments_each_record_has_is_told() {
+    let found = identify(&records(5, [0.005, 0.0]), &from_frf()).unwrap();
+    let told =
+        "the frequency responses of 3 records, fitted together, are averages of 4, 4, 4 segments";
+    assert!(found.summary().remarks.iter().any(|remark| remark == told), "{found}");
+    assert_eq!(found.summary().fit.equations, 2 * 70 * DOFS);
 }
 
 /// The lines that the misfit of a fit names.

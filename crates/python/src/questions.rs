@@ -14,18 +14,19 @@ use crate::machine::Machine;
 use crate::measurement::Measurement;
 use crate::{failure, work};
 
-/// Estimates frequency responses; settings are JSON.
+/// Estimates frequency responses, averaged over all records; settings are JSON.
 #[pyfunction]
-#[pyo3(signature = (record, settings, threads))]
+#[pyo3(signature = (records, settings, threads))]
 pub fn frf(
     py: Python<'_>,
-    record: PyRef<'_, Measurement>,
+    records: Vec<PyRef<'_, Measurement>>,
     settings: &str,
     threads: Option<usize>,
 ) -> PyResult<Answer> {
     let how: FrfSettings = failure::settings(py, settings)?;
-    let record = record.0.clone();
-    work::watched(py, threads, || Ok(()), move || mechid::frf(&record, &how)).map(Answer::of)
+    let records: Vec<mechid::Measurement> = records.iter().map(|record| record.0.clone()).collect();
+    let find = move || mechid::frf_of_records(&records, &how);
+    work::watched(py, threads, || Ok(()), find).map(Answer::of)
 }
 
 /// Finds the modes of a free decay; settings are JSON.

@@ -56,6 +56,9 @@ fn the_schroeder_record_is_explained() {
         let left = told["fit"]["unexplained_motion"].as_f64().unwrap();
         assert!(left <= most, "{terms} leaves {left}");
         assert_small_amplitude_frequency(&told);
+        // Before any model, from the lines without force.
+        let kind = told["nonlinear"]["distortion"]["text"].as_str().unwrap();
+        assert!(kind.contains("cubic stiffness"), "{kind}");
     }
     // Surface, spring, damper and residual; and all of it on a page.
     let drawn = format!("identify {window} --nonlinear k2:x1^2,k3:x1^3 --quiet --plot drawn.svg");

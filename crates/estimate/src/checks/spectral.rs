@@ -50,8 +50,10 @@ pub fn steady_periods(
     period: usize,
 ) -> Result<Vec<Finding>, EstimateError> {
     let mut findings = vec![repetition(response, period)?];
-    findings.extend(unequal_periods(force, response, period)?);
-    findings.extend(claimed_period(force, period));
+    match claimed_period(force, period) {
+        Some(other_period) => findings.push(other_period),
+        None => findings.extend(unequal_periods(force, response, period)?),
+    }
     Ok(findings)
 }
 

@@ -417,3 +417,62 @@ fn some_responses_are_those_estimated_on_their_lines_alone() {
     assert_eq!(some, on(places.map(|at| lines[at]).to_vec()));
     assert_eq!(some.data(&[0, 1]).unwrap().len(), 2 * places.len());
 }
+
+/// Judge: what was put into the channels. With independent forces at both places the second is scaled down, replaced by
+/// noise, and made to follow the first.
+#[test]
+fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
+    let system = bearing();
+    for (seed, periods) in [(1, 4), (2, 8), (3, 16)] {
+        let (force, motion, lines) = steady(&system, periods);
+        let (of_first, of_second) = {
+            let alone = |dof: usize, part: f64| {
+                let mut force = force.data().clone();
+                force.column_mut(1 - dof).fill(0.0);
+                force.column_mut(dof).scale_mut(part);
+                Record::new(motion.sampling(), force).unwrap()
+            };
+            // Periods are steady states of their own: line by line, period by period.
+            let response = |force: &Record| {
+                let mut x = DMatrix::zeros(force.len(), 2);
+                for p in 0..periods {
+                    let part = force.window(128 * p, 128).unwrap();
+                    let one = exact_harmonic_periodic(&system, &part).unwrap();
+                    x.rows_mut(128 * p, 128).copy_from(one.displacement().data());
+                }
+                x
+            };
+            (response(&alone(0, 1.0)), response(&alone(1, 1.0)))
+        };
+        let noisy = |x: DMatrix<f64>, seed| {
+            let x = Record::new(force.sampling(), x).unwrap();
+            noise::add_white(&x, NoiseLevel::FractionOfRms(0.01), seed).unwrap()
+        };
+        let with_second = |second: DMatrix<f64>| {
+            let mut data = force.data().clone();
+            data.set_column(1, &second.column(0));
+            Record::new(force.sampling(), data).unwrap()
+        };
+        let idle = |force: &Record, motion: &Record| {
+            let period = force.sampling().with_len(128).unwrap();
+            let lines = Lines::new(period, lines.iter().copied()).unwrap();
+            let quantity = ResponseQuantity::Displacement;
+            let mut average =
+                FrfAverage::new(lines, [2, 2], quantity, Segments::Periods(128)).unwrap();
+            average.push(force, motion).unwrap();
+            average.idle_inputs()
+        };
+        let zero = Record::new(force.sampling(), DMatrix::zeros(force.len(), 1)).unwrap();
+        let level = 0.003 * force.column(0).norm() / (force.len() as f64).sqrt();
+        let cell =
+            |seed| noise::add_white(&zero, NoiseLevel::StandardDeviation(level), seed).unwrap();
+        let noise_alone = with_second(cell(10 * seed).into_data());
+        assert_eq!(idle(&noise_alone, &noisy(of_first.clone(), seed)), [1], "{periods} periods");
+        let weak = with_second(force.data().columns(1, 1) * 0.03);
+        let motion = noisy(&of_first + &of_second * 0.03, seed);
+        assert!(idle(&weak, &motion).is_empty(), "{periods} periods");
+        let crosstalk = cell(20 * seed).into_data() + force.data().columns(0, 1) * 0.02;
+        let motion = noisy(of_first, seed);
+        assert!(idle(&with_second(crosstalk), &motion).is_empty(), "{periods} periods");
+    }
+}

@@ -429,7 +429,7 @@ def frf(
     Parameters
     ----------
     *sources, **record
-        The record, as in `identify`.
+        The record, as in `identify`; of a list of files the segments are averaged together.
     estimator : {"h1", "h2", "hv"}
         Where the noise is: on the response, on the force, or on both.
     lines, band_hz, without_lines, without_hz : optional
@@ -454,7 +454,7 @@ def frf(
     MechidError
         If the record cannot be read, no chosen line carries force, or segments are too few.
     """
-    found = one(sources, "frf", record)
+    records = [measured._inner for measured in measurements(sources, "frf", record)]
     if settings is None:
         settings = {
             "estimator": estimator,
@@ -464,7 +464,7 @@ def frf(
             "hits": json.loads(_hits(hits) or "null"),
             "exponential_percent": exponential_percent,
         }
-    return FrequencyResponses(_mechid.frf(found._inner, json.dumps(settings), threads))
+    return FrequencyResponses(_mechid.frf(records, json.dumps(settings), threads))
 
 
 def decay(

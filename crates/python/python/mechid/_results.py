@@ -266,7 +266,7 @@ class Receptances:
         Motion over force in m/N, shape (frequencies, motions, forces); NaN where another force acts at
         the same frequency.
     model : array of complex
-        Receptance of the identified machine, likewise.
+        Receptance of the identified machine, likewise; NaN for forces to which it is not known (`unscaled`).
     """
 
     frequency_hz: NDArray[np.float64]
