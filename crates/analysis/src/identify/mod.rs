@@ -3,7 +3,7 @@
 //! | File | What it does |
 //! |---|---|
 //! | `options` | settings, as values |
-//! | `lines`, `left_out`, `mass` | spectral lines to use and to leave out; known masses |
+//! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `tables` | frequency responses that were measured elsewhere |
@@ -12,6 +12,7 @@
 //! | `prediction` | response of the identified system to a measured force |
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
+//! | `mass`, `structure` | what is known of M, C and K |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
@@ -29,6 +30,7 @@ mod responses;
 pub mod rows;
 mod samples;
 pub(crate) mod spectra;
+pub mod structure;
 pub mod summary;
 pub mod tables;
 pub mod validation;
@@ -53,6 +55,7 @@ pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
+pub use self::structure::{Form, Structure};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::validation::{Validation, ValidationWindow};
@@ -85,7 +88,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
             return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
         }
     }
-    let unknowns = how.mass.unknowns(dofs)?;
+    let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
     let mut hits = Vec::new();
     if let Some(rule) = &how.hits {
@@ -200,6 +203,11 @@ impl Identify {
                 }
             }
             Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
+            Fit::Samples(_) if unknowns.is_related() => {
+                let why =
+                    "symmetric matrices and proportional damping belong to `domain` frequency";
+                Err(AnalysisError::Setting { setting: "structure", why: why.into() })
+            }
             Fit::Samples(how) => how.fit(records, unknowns),
         }
     }

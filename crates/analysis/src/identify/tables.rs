@@ -17,12 +17,14 @@ use serde::{Deserialize, Serialize};
 
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
-use super::rows::{CONFIDENCE, ModeRow, ParameterRow, header, mode_table, parameters};
+use super::rows::{
+    CONFIDENCE, ModeRow, ParameterRow, ProportionalDamping, mode_table, parameter_table, parameters,
+};
 use super::summary::{FitRow, verdict};
-use super::{Band, KnownMass, Method};
+use super::{Band, KnownMass, Method, Structure};
 use crate::AnalysisError;
 use crate::machine::Machine;
-use crate::text::{compact, paragraph, text_table};
+use crate::text::{compact, paragraph};
 
 /// Settings of an identification from tables of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -38,6 +40,9 @@ pub struct IdentifyResponses {
     pub band: Option<Band>,
     /// Known masses.
     pub mass: KnownMass,
+    /// Form of M, C and K, such as that of a chain.
+    #[serde(skip_serializing_if = "Structure::is_empty")]
+    pub structure: Structure,
     /// Estimator; `None`: maximum likelihood.
     pub method: Option<Method>,
 }
@@ -67,7 +72,7 @@ pub fn identify_responses(
     for other in &measured[1..] {
         data = data.and(&other.data)?;
     }
-    let unknowns = how.mass.unknowns(data.dof())?;
+    let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
     let fit = Fit::of(&data, &unknowns, &measured, how.method)?;
     let before = before_spectral_fit(&data, &unknowns)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
@@ -102,6 +107,7 @@ pub fn identify_responses(
         },
         confidence: CONFIDENCE,
         parameters: parameters(estimate)?,
+        proportional_damping: ProportionalDamping::of(estimate)?,
         modes: ModeRow::all(&estimate.modes()?, false)?,
         fit: FitRow {
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
@@ -110,7 +116,7 @@ pub fn identify_responses(
             noise: fit.noise.clone(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
-            unknowns: estimate.parameters().len(),
+            unknowns: estimate.unknowns().independent(),
         },
         checks,
         remarks: tables
@@ -158,6 +164,9 @@ pub struct ResponseSummary {
     pub confidence: f64,
     /// Parameters, one each.
     pub parameters: Vec<ParameterRow>,
+    /// Factors of proportional damping, if it was to be such.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional_damping: Option<ProportionalDamping>,
     /// Modes, by rising frequency.
     pub modes: Vec<ModeRow>,
     /// Quality of the fit.
@@ -242,9 +251,8 @@ impl fmt::Display for IdentifiedResponses {
                 count => format!("{count} frequencies"),
             },
         )?;
-        let mut rows = vec![header("parameter")];
-        rows.extend(s.parameters.iter().map(ParameterRow::cells));
-        writeln!(f, "{}", text_table(&rows))?;
+        let factors = s.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+        writeln!(f, "{}", parameter_table(&s.parameters, factors))?;
         writeln!(f, "{}", mode_table("mode", &s.modes))?;
         writeln!(f, "{}", s.fit.lines("linear model"))?;
         f.write_str(&verdict(&s.checks))?;
