@@ -118,11 +118,11 @@ fn strokes(strengths: [f64; 8]) -> Measurement {
 fn strokes_of_unequal_strength_are_no_periods() {
     let band = LineChoice::Band(Band { low_hz: 2.0, high_hz: 150.0 });
     let unequal = |found: &Identified| {
-        let fractions = found.checks().iter().filter_map(|check| match check.finding {
+        let mut fractions = found.checks().iter().filter_map(|check| match check.finding {
             Finding::UnequalPeriods { fraction } => Some(fraction),
             _ => None,
         });
-        fractions.last()
+        fractions.next_back()
     };
     let how = |how: Identify| how.lines(band.clone());
     let strengths = [1.0, 0.7, 1.3, 0.9, 1.2, 0.8, 0.65, 1.1];

@@ -8,6 +8,7 @@ use crate::covariance::{Covariance, Product};
 use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
 use crate::least_squares::{Solution, finite, size, solve_compressed};
+use crate::related_equations::RelatedEquations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
@@ -99,7 +100,8 @@ impl EquationOfMotion {
         if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
     }
 
-    /// Least squares for the free entries of M, C and K, one equation of motion after another.
+    /// Least squares for the free entries of M, C and K: one equation of motion after another, or all of
+    /// them together where entries are related.
     ///
     /// Parameters the data do not excite are reported in [`Estimate::undetermined`];
     /// the others are as they should be.
@@ -108,12 +110,19 @@ impl EquationOfMotion {
     /// [`EstimateError::Size`] if `unknowns` has another number of degrees of freedom,
     /// [`EstimateError::NothingUnknown`], [`EstimateError::TooFewRows`],
     /// [`EstimateError::Underflow`], [`EstimateError::OnlyRatios`] if an equation has neither force
-    /// nor known entry.
+    /// nor known entry; [`EstimateError::NotConverged`] if no proportional damping is found.
     ///
     /// # Source
     /// Dissertation eqs. (4.4.1)–(4.4.6), (4.6.12), (4.6.31).
     pub fn solve(&self, unknowns: &Unknowns) -> Result<Estimate, EstimateError> {
-        Estimate::new(self.findings(unknowns)?.0)
+        if !unknowns.is_related() {
+            return Estimate::new(self.findings(unknowns)?.0);
+        }
+        self.check(unknowns, &unknowns.free())?;
+        let targets: Vec<_> = (0..self.dof).map(|i| self.target(unknowns, i)).collect();
+        let motions = self.factor.r().columns(0, 3 * self.dof).into_owned();
+        let targets = DMatrix::from_columns(&targets);
+        RelatedEquations { motions, targets, rows: self.rows(), unknowns }.solve()
     }
 
     /// The estimate to be, and the factors of its covariance: how every parameter follows from the
@@ -122,18 +131,8 @@ impl EquationOfMotion {
         &self,
         unknowns: &Unknowns,
     ) -> Result<(Findings, Product), EstimateError> {
-        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         let free = unknowns.free();
-        if free.is_empty() {
-            return Err(EstimateError::NothingUnknown);
-        }
-        if self.rows() == 0 {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() });
-        }
-        if let Some((at, norm)) = self.factor.too_small() {
-            let what = ["acceleration", "velocity", "displacement", "force"][at / self.dof];
-            return Err(EstimateError::Underflow { what, column: at % self.dof, norm });
-        }
+        self.check(unknowns, &free)?;
         let groups = self.groups(unknowns, &free)?;
         let places: Vec<Place<'_>> =
             free.iter().map(|parameter| Place::of(parameter, &groups)).collect();
@@ -155,6 +154,21 @@ impl EquationOfMotion {
             unknowns: unknowns.clone(),
         };
         Ok((findings, product))
+    }
+
+    fn check(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<(), EstimateError> {
+        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        if free.is_empty() {
+            return Err(EstimateError::NothingUnknown);
+        }
+        if self.rows() == 0 {
+            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() });
+        }
+        if let Some((at, norm)) = self.factor.too_small() {
+            let what = ["acceleration", "velocity", "displacement", "force"][at / self.dof];
+            return Err(EstimateError::Underflow { what, column: at % self.dof, norm });
+        }
+        Ok(())
     }
 
     /// Rows \[ẍ | ẋ | x | F\] that stand for `rows` original ones with the same Gram matrix.

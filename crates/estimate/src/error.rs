@@ -110,6 +110,38 @@ pub enum EstimateError {
         /// Names of the parameters of that equation.
         parameters: String,
     },
+    /// Two entries of a symmetric matrix are known, and differ.
+    #[error(
+        "{lower} is known as {} and {upper} as {}: the matrix cannot be symmetric",
+        message::number(*lower_value), message::number(*upper_value)
+    )]
+    Asymmetric {
+        /// Name of the entry below the diagonal.
+        lower: String,
+        /// Value of that entry, in its SI unit.
+        lower_value: f64,
+        /// Name of the entry above the diagonal.
+        upper: String,
+        /// Value of that entry, in its SI unit.
+        upper_value: f64,
+    },
+    /// An entry of the damping is known, though all of it follows from mass and stiffness.
+    #[error(
+        "{parameter} cannot be given: of proportional damping every entry follows from mass and stiffness"
+    )]
+    RelatedDamping {
+        /// Name of the entry.
+        parameter: String,
+    },
+    /// Entries of M, C and K are related, which an estimator knows nothing of.
+    #[error(
+        "{estimator} takes every entry of M, C and K by itself: least squares on the equation of motion and \
+         maximum likelihood know of symmetric matrices and proportional damping"
+    )]
+    Related {
+        /// The estimator.
+        estimator: &'static str,
+    },
     /// The data leave some parameters undetermined, and all of them are needed.
     #[error("the data do not determine {parameters}: {directions}")]
     Undetermined {

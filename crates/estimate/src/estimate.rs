@@ -9,7 +9,8 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::covariance::Covariance;
 use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
-use crate::{EstimateError, Unknowns};
+use crate::relations::Relations;
+use crate::{EstimateError, Uncertain, Unknowns};
 
 /// M̂, Ĉ, K̂ with the covariance of what was estimated.
 ///
@@ -159,6 +160,20 @@ impl Estimate {
     pub fn stiffness(&self) -> DMatrix<f64> {
         let [_, _, stiffness] = self.unknowns.assemble(&self.values);
         stiffness
+    }
+
+    /// α (1/s) and β (s) of a damping C = αM + βK, where the unknowns say that it is proportional.
+    ///
+    /// # Source
+    /// Rayleigh, *The Theory of Sound*, vol. 1 (1877), article 97.
+    pub fn proportional_damping(&self) -> Option<[Uncertain; 2]> {
+        let relations = Relations::of(&self.unknowns)?;
+        let factors = relations.damping_factors(&self.values)?;
+        Some(factors.map(|(value, gradient)| Uncertain {
+            value,
+            standard_error: self.covariance.variance(&gradient).max(0.0).sqrt(),
+            degrees_of_freedom: self.degrees_of_freedom,
+        }))
     }
 
     /// The identified machine.

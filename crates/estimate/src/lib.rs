@@ -42,6 +42,8 @@ pub mod nonlinear;
 mod pooling;
 mod prediction;
 mod quasi_triangular;
+mod related_equations;
+mod relations;
 mod sweep;
 pub mod time_domain;
 mod triangular;

@@ -4,6 +4,7 @@ use mechid_model::{Matrix, Parameter};
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
+use crate::relations::Relations;
 
 /// Free entries of M, C and K, and the values of the others.
 ///
@@ -21,7 +22,12 @@ use crate::EstimateError;
 /// # Ok::<(), mechid_estimate::EstimateError>(())
 /// ```
 ///
-/// With the feature `serde` it is written as three matrices, `null` where an entry is free.
+/// Entries may be related: [`Unknowns::symmetric`] makes two of them one unknown, and
+/// [`Unknowns::proportional_damping`] leaves two unknowns of all the damping. Machines of many masses need
+/// that, for every entry by itself has to be excited.
+///
+/// With the feature `serde` it is written as three matrices, `null` where an entry is free, and its
+/// relations.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "form::UnknownsForm", into = "form::UnknownsForm"))]
@@ -29,6 +35,10 @@ pub struct Unknowns {
     dof: usize,
     /// M, C, K: `None` where the entry is free.
     fixed: [DMatrix<Option<f64>>; 3],
+    /// M, C, K: whether entries (i, j) and (j, i) are one.
+    symmetric: [bool; 3],
+    /// C = αM + βK.
+    proportional: bool,
 }
 
 impl Unknowns {
@@ -60,14 +70,15 @@ impl Unknowns {
             return Err(EstimateError::NoDof);
         }
         let free = DMatrix::from_element(dof, dof, None);
-        Ok(Self { dof, fixed: [free.clone(), free.clone(), free] })
+        let fixed = [free.clone(), free.clone(), free];
+        Ok(Self { dof, fixed, symmetric: [false; 3], proportional: false })
     }
 
     /// The same, with one entry (counted from 0) known: kg, N·s/m or N/m.
     ///
     /// # Errors
     /// [`EstimateError::Model`] if there is no such entry, [`EstimateError::FixedValue`] unless
-    /// `value` is finite.
+    /// `value` is finite, [`EstimateError::RelatedDamping`] for an entry of proportional damping.
     pub fn fix(
         mut self,
         matrix: Matrix,
@@ -79,7 +90,10 @@ impl Unknowns {
         if !value.is_finite() {
             return Err(EstimateError::FixedValue { parameter: parameter.to_string(), value });
         }
-        self.fixed[matrix as usize][(row, column)] = Some(value);
+        if self.proportional && matrix == Matrix::Damping {
+            return Err(EstimateError::RelatedDamping { parameter: parameter.to_string() });
+        }
+        self.set(matrix, row, column, Some(value));
         Ok(self)
     }
 
@@ -94,7 +108,60 @@ impl Unknowns {
         column: usize,
     ) -> Result<Self, EstimateError> {
         Parameter::new(matrix, row, column, self.dof)?;
-        self.fixed[matrix as usize][(row, column)] = None;
+        self.set(matrix, row, column, None);
+        Ok(self)
+    }
+
+    fn set(&mut self, matrix: Matrix, row: usize, column: usize, value: Option<f64>) {
+        self.fixed[matrix as usize][(row, column)] = value;
+        if self.symmetric[matrix as usize] {
+            self.fixed[matrix as usize][(column, row)] = value;
+        }
+    }
+
+    /// The same, with a matrix that is symmetric: its entries (i, j) and (j, i) are one unknown, and where one
+    /// of them is known both are.
+    ///
+    /// # Errors
+    /// [`EstimateError::Asymmetric`] if two such entries are known and differ.
+    pub fn symmetric(mut self, matrix: Matrix) -> Result<Self, EstimateError> {
+        let known = &mut self.fixed[matrix as usize];
+        for row in 0..self.dof {
+            for column in 0..row {
+                let pair = [(row, column), (column, row)].map(|at| known[at]);
+                if let [Some(lower), Some(upper)] = pair
+                    && lower != upper
+                {
+                    return Err(EstimateError::Asymmetric {
+                        lower: Parameter::new(matrix, row, column, self.dof)?.to_string(),
+                        lower_value: lower,
+                        upper: Parameter::new(matrix, column, row, self.dof)?.to_string(),
+                        upper_value: upper,
+                    });
+                }
+                let both = pair[0].or(pair[1]);
+                (known[(row, column)], known[(column, row)]) = (both, both);
+            }
+        }
+        self.symmetric[matrix as usize] = true;
+        Ok(self)
+    }
+
+    /// The same, with a damping matrix C = αM + βK: of all its entries, α (1/s) and β (s) are unknown.
+    ///
+    /// # Errors
+    /// [`EstimateError::RelatedDamping`] if an entry of the damping is known.
+    ///
+    /// # Source
+    /// Rayleigh, *The Theory of Sound*, vol. 1 (1877), article 97.
+    pub fn proportional_damping(mut self) -> Result<Self, EstimateError> {
+        let damping = Parameter::all(self.dof).filter(|p| p.matrix() == Matrix::Damping);
+        for p in damping {
+            if self.fixed[Matrix::Damping as usize][(p.row(), p.column())].is_some() {
+                return Err(EstimateError::RelatedDamping { parameter: p.to_string() });
+            }
+        }
+        self.proportional = true;
         Ok(self)
     }
 
@@ -108,7 +175,46 @@ impl Unknowns {
     /// # Panics
     /// If there is no such entry.
     pub fn fixed(&self, matrix: Matrix, row: usize, column: usize) -> Option<f64> {
+        if self.proportional && matrix == Matrix::Damping {
+            let zero = |of: Matrix| self.fixed[of as usize][(row, column)] == Some(0.0);
+            return (zero(Matrix::Mass) && zero(Matrix::Stiffness)).then_some(0.0);
+        }
         self.fixed[matrix as usize][(row, column)]
+    }
+
+    /// Returns whether entries (i, j) and (j, i) of a matrix are one unknown: as was said, or as proportional damping
+    /// has it from mass and stiffness.
+    pub fn is_symmetric(&self, matrix: Matrix) -> bool {
+        let [mass, damping, stiffness] = self.symmetric;
+        match matrix {
+            Matrix::Damping => damping || self.proportional && mass && stiffness,
+            of => self.symmetric[of as usize],
+        }
+    }
+
+    /// Returns whether the damping is proportional to mass and stiffness.
+    pub fn has_proportional_damping(&self) -> bool {
+        self.proportional
+    }
+
+    /// Returns whether entries are related, by a symmetric matrix or proportional damping.
+    pub fn is_related(&self) -> bool {
+        self.proportional || self.symmetric.contains(&true)
+    }
+
+    /// Number of independent unknowns: as many as [`Unknowns::free`] has entries, but for those that are
+    /// related.
+    pub fn independent(&self) -> usize {
+        Relations::of(self).map_or_else(|| self.free().len(), |relations| relations.count())
+    }
+
+    /// # Errors
+    /// [`EstimateError::Related`] if entries are related, which `estimator` knows nothing of.
+    pub(crate) fn check_unrelated(&self, estimator: &'static str) -> Result<(), EstimateError> {
+        match self.is_related() {
+            false => Ok(()),
+            true => Err(EstimateError::Related { estimator }),
+        }
     }
 
     /// The free entries in the order of every covariance: M, C, K, each row by row.
@@ -142,6 +248,8 @@ impl Unknowns {
 
 #[cfg(feature = "serde")]
 mod form {
+    use std::ops::Not;
+
     use super::{EstimateError, Matrix, Unknowns};
 
     type Rows = Vec<Vec<Option<f64>>>;
@@ -152,6 +260,10 @@ mod form {
         mass: Rows,
         damping: Rows,
         stiffness: Rows,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        symmetric: Vec<Matrix>,
+        #[serde(default, skip_serializing_if = "Not::not")]
+        proportional_damping: bool,
     }
 
     impl From<Unknowns> for UnknownsForm {
@@ -159,7 +271,14 @@ mod form {
             let [mass, damping, stiffness] = unknowns
                 .fixed
                 .map(|m| m.row_iter().map(|row| row.iter().copied().collect()).collect());
-            Self { mass, damping, stiffness }
+            let symmetric = Matrix::ALL.into_iter().filter(|m| unknowns.symmetric[*m as usize]);
+            Self {
+                mass,
+                damping,
+                stiffness,
+                symmetric: symmetric.collect(),
+                proportional_damping: unknowns.proportional,
+            }
         }
     }
 
@@ -185,7 +304,13 @@ mod form {
                     }
                 }
             }
-            Ok(unknowns)
+            for matrix in form.symmetric {
+                unknowns = unknowns.symmetric(matrix)?;
+            }
+            match form.proportional_damping {
+                true => unknowns.proportional_damping(),
+                false => Ok(unknowns),
+            }
         }
     }
 }

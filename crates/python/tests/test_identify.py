@@ -212,3 +212,33 @@ def test_several_records_and_known_masses() -> None:
     assert len(found.to_dict()["records"]) == 2
     assert found.parameters["m"].known and found.parameters["m"].std_error is None
     assert found.estimated == ("c", "k")
+
+
+def test_the_form_of_the_matrices_takes_the_place_of_forces() -> None:
+    mass, stiffness = [[2.0, 0.0], [0.0, 3.0]], [[3000.0, -1000.0], [-1000.0, 2000.0]]
+    damping = [[0.4 * m + 0.002 * k for m, k in zip(*rows)] for rows in zip(mass, stiffness)]
+    simulated = mechid.simulate({
+        "system": {"mass": mass, "damping": damping, "stiffness": stiffness},
+        "sampling": {"samples": 256, "rate_hz": 64},
+        "excitation": [{"dof": 1, "lines": "2:100", "amplitude": 1, "phases": "random", "seed": 1}],
+        "periods": 4,
+        "scheme": {"name": "exact"},
+        "response": "periodic",
+        "noise": {"displacement": {"snr_db": 60}, "seed": 2},
+    })
+    record = mechid.Measurement.from_arrays(
+        simulated.force, simulated.displacement, fs=64, period=256
+    )
+    found = mechid.identify(record, structure=["chain", "proportional-damping"])
+    assert found.parameters["m22"].value == pytest.approx(3.0, rel=1e-2)
+    assert found.parameters["k12"].value == found.parameters["k21"].value
+    factors = found.to_dict()["proportional_damping"]
+    assert factors["beta"]["value"] == pytest.approx(0.002, rel=1e-2)
+    assert mechid.identify(record, structure="chain").parameters["c11"].known is False
+    for wrong in (
+        lambda: mechid.identify(record, structure="chains"),
+        lambda: mechid.identify(record, structure="symmetric", domain="time"),
+        lambda: mechid.identify(record, structure="k13=0"),
+    ):
+        with pytest.raises((mechid.MechidError, ValueError)):
+            wrong()

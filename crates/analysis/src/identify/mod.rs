@@ -3,7 +3,7 @@
 //! | File | What it does |
 //! |---|---|
 //! | `options` | settings, as values |
-//! | `lines`, `left_out`, `mass` | spectral lines to use and to leave out; known masses |
+//! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
 //! | `tables` | frequency responses that were measured elsewhere |
@@ -12,6 +12,7 @@
 //! | `prediction` | response of the identified system to a measured force |
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
+//! | `mass`, `structure` | what is known of M, C and K |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data fix up to factors only |
@@ -32,6 +33,7 @@ mod responses;
 pub mod rows;
 mod samples;
 pub(crate) mod spectra;
+pub mod structure;
 pub mod summary;
 pub mod tables;
 mod unscaled;
@@ -58,6 +60,7 @@ pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
+pub use self::structure::{Form, Structure};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};
 pub use self::unscaled::Unscaled;
@@ -91,7 +94,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
             return Err(AnalysisError::DegreesOfFreedom { file, got, dofs });
         }
     }
-    let unknowns = how.mass.unknowns(dofs)?;
+    let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
     let mut hits = Vec::new();
     if let Some(rule) = &how.hits {
@@ -216,6 +219,11 @@ impl Identify {
                 }
             }
             Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
+            Fit::Samples(_) if unknowns.is_related() => {
+                let why =
+                    "symmetric matrices and proportional damping belong to `domain` frequency";
+                Err(AnalysisError::Setting { setting: "structure", why: why.into() })
+            }
             Fit::Samples(how) => how.fit(records, unknowns),
         }
     }

@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::left_out::LeftOut;
 use super::lines::LineChoice;
 use super::mass::KnownMass;
+use super::structure::Structure;
 use crate::AnalysisError;
 use crate::frf::{Estimator, Segmentation};
 
@@ -37,6 +38,9 @@ pub struct Identify {
     pub without: LeftOut,
     /// Known masses.
     pub mass: KnownMass,
+    /// Form of M, C and K, such as that of a chain.
+    #[serde(skip_serializing_if = "Structure::is_empty")]
+    pub structure: Structure,
     /// Rule by which the records of a hammer test are cut into hits, each of which is fitted as a record of
     /// its own; `None`: no hammer test.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -308,6 +312,12 @@ impl Identify {
     pub fn mass(self, mass: KnownMass) -> Self {
         Self { mass, ..self }
     }
+
+    /// Takes the form of M, C and K as known.
+    #[must_use]
+    pub fn structure(self, structure: Structure) -> Self {
+        Self { structure, ..self }
+    }
 }
 
 impl SampleFit {
@@ -373,6 +383,7 @@ mod tests {
             Identify::responses(Estimator::Hv, Segmentation::default()),
             Identify { fit: Fit::Samples(samples), ..Identify::default() }
                 .mass("2.5,unknown".parse().unwrap()),
+            Identify::default().structure("chain k12=-5".parse().unwrap()),
             Identify::default().hits(HitRule { samples: Some(512), ..HitRule::default() }),
             Identify::default().nonlinear("k3: x1^3, c2: |v1| v1".parse().unwrap()),
             Identify::default().nonlinear(Nonlinear {

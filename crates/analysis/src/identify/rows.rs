@@ -74,6 +74,15 @@ pub struct ParameterRow {
     pub estimate: Uncertain,
 }
 
+/// Factors of a damping C = αM + βK.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct ProportionalDamping {
+    /// α, in 1/s.
+    pub alpha: Uncertain,
+    /// β, in s.
+    pub beta: Uncertain,
+}
+
 /// One mode of a system.
 #[derive(Debug, Clone, Serialize)]
 pub struct ModeRow {
@@ -306,6 +315,46 @@ pub(crate) fn mode_cells(modes: &[ModeRow], damped: bool) -> impl Iterator<Item 
         row.push(unit.into());
         row
     })
+}
+
+impl ProportionalDamping {
+    /// The factors of an estimate that was to have such a damping.
+    pub(super) fn of(estimate: &Estimate) -> Result<Option<Self>, AnalysisError> {
+        let Some([alpha, beta]) = estimate.proportional_damping() else { return Ok(None) };
+        Ok(Some(Self { alpha: Uncertain::of(&alpha)?, beta: Uncertain::of(&beta)? }))
+    }
+
+    /// Name, value, standard error, interval and unit of each.
+    pub(super) fn rows(&self) -> [Vec<String>; 2] {
+        [("alpha", &self.alpha, "1/s"), ("beta", &self.beta, "s")].map(|(name, factor, unit)| {
+            let mut row = vec![name.to_owned()];
+            row.extend(factor.cells());
+            row.push(unit.into());
+            row
+        })
+    }
+}
+
+/// Number of entries known to be zero up to which a table shows them.
+const ZEROS_SHOWN: usize = 12;
+
+/// Returns the table of the parameters, with the rows of others after theirs; of many entries that are known
+/// to be zero, it tells the number.
+pub(super) fn parameter_table(
+    parameters: &[ParameterRow],
+    others: impl Iterator<Item = Vec<String>>,
+) -> String {
+    let is_zero = |p: &&ParameterRow| p.known && p.estimate.value == 0.0;
+    let zeros = parameters.iter().filter(is_zero).count();
+    let shown = parameters.iter().filter(|p| zeros <= ZEROS_SHOWN || !is_zero(p));
+    let mut rows = vec![header("parameter")];
+    rows.extend(shown.map(ParameterRow::cells));
+    rows.extend(others);
+    let mut text = text_table(&rows);
+    if zeros > ZEROS_SHOWN {
+        text += &format!("{zeros} entries known to be zero are left out\n");
+    }
+    text
 }
 
 impl ParameterRow {

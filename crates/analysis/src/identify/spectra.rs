@@ -142,11 +142,11 @@ fn found(
             if noisy.noise().is_none() {
                 return least_squares(None);
             }
-            if unknowns.free().len() > LIKELIHOOD_PARAMETERS {
+            let parameters = unknowns.independent();
+            if parameters > LIKELIHOOD_PARAMETERS {
                 return least_squares(Some(format!(
-                    "least squares was used, for {} parameters: noise on the response biases it. \
-                     Maximum likelihood takes minutes; --method maximum-likelihood chooses it",
-                    unknowns.free().len()
+                    "least squares was used, for {parameters} parameters: noise on the response biases it. \
+                     Maximum likelihood takes minutes; --method maximum-likelihood chooses it"
                 )));
             }
             match likelihood(&noisy) {

@@ -17,7 +17,8 @@ use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::Identify;
 use super::prediction::Prediction;
 use super::rows::{
-    self, CONFIDENCE, LinesUsed, ParameterRow, WindowRow, header, mode_table, parameters,
+    self, CONFIDENCE, LinesUsed, ParameterRow, ProportionalDamping, WindowRow, mode_table,
+    parameter_table, parameters,
 };
 use super::unscaled::Unscaled;
 use super::validation::Validation;
@@ -50,6 +51,9 @@ pub struct IdentificationSummary {
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscaled: Option<Unscaled>,
+    /// Factors of proportional damping, if it was to be such.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional_damping: Option<ProportionalDamping>,
     /// Nonlinear terms, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<NonlinearSummary>,
@@ -136,6 +140,7 @@ impl IdentificationSummary {
             lines: fitted.frequency.as_ref().map(|(lines, _)| LinesUsed::of(lines)),
             confidence: CONFIDENCE,
             parameters: parameters(estimate, unscaled.as_ref())?,
+            proportional_damping: ProportionalDamping::of(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: ShapedMode::all(&estimate.modes()?, false)?,
             fit: FitRow {
@@ -150,7 +155,7 @@ impl IdentificationSummary {
                 equations: fitted.equations,
                 unknowns: match &fitted.nonlinear {
                     Some(all) => all.estimate.parameters().len(),
-                    None => estimate.parameters().len(),
+                    None => estimate.unknowns().independent(),
                 },
             },
             records: records.iter().map(row).collect(),
@@ -290,15 +295,14 @@ impl IdentificationSummary {
     }
 
     fn parameter_table(&self) -> String {
-        let mut rows = vec![header("parameter")];
-        rows.extend(self.parameters.iter().map(ParameterRow::cells));
-        for p in self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters) {
+        let factors = self.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+        let terms = self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.parameters).map(|p| {
             let mut row = vec![p.name.clone()];
             row.extend(p.estimate.cells());
             row.push(p.unit.clone());
-            rows.push(row);
-        }
-        text_table(&rows)
+            row
+        });
+        parameter_table(&self.parameters, factors.chain(terms))
     }
 
     fn mode_table(&self) -> String {

@@ -17,13 +17,16 @@ use serde::{Deserialize, Serialize};
 
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
-use super::rows::{CONFIDENCE, ParameterRow, covariance, header, mode_table, parameters};
+use super::rows::{
+    CONFIDENCE, ParameterRow, ProportionalDamping, covariance, mode_table, parameter_table,
+    parameters,
+};
 use super::summary::{FitRow, verdict};
-use super::{Band, FittedLine, KnownMass, Method, Unscaled};
+use super::{Band, FittedLine, KnownMass, Method, Structure, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::modal::{ShapedMode, shape_table};
-use crate::text::{compact, paragraph, text_table};
+use crate::text::{compact, paragraph};
 
 /// Settings of an identification from tables of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -39,6 +42,9 @@ pub struct IdentifyResponses {
     pub band: Option<Band>,
     /// Known masses.
     pub mass: KnownMass,
+    /// Form of M, C and K, such as that of a chain.
+    #[serde(skip_serializing_if = "Structure::is_empty")]
+    pub structure: Structure,
     /// Estimator; `None`: maximum likelihood.
     pub method: Option<Method>,
 }
@@ -73,7 +79,7 @@ pub fn identify_responses(
         let fit = Fit::of(&data, unknowns, &measured, how.method)?;
         Ok((fit, before_spectral_fit(&data, unknowns)?))
     };
-    let unknowns = how.mass.unknowns(data.dof())?;
+    let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
     let ((fit, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
         before.into_iter().map(|finding| (When::Before, None, finding)).collect();
@@ -106,6 +112,7 @@ pub fn identify_responses(
         },
         confidence: CONFIDENCE,
         parameters: parameters(estimate, unscaled.as_ref())?,
+        proportional_damping: ProportionalDamping::of(estimate)?,
         modes: ShapedMode::all(&estimate.modes()?, false)?,
         fit: FitRow {
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
@@ -114,7 +121,7 @@ pub fn identify_responses(
             noise: fit.noise.clone(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
-            unknowns: estimate.parameters().len(),
+            unknowns: estimate.unknowns().independent(),
         },
         fitted_lines: None,
         checks,
@@ -164,6 +171,9 @@ pub struct ResponseSummary {
     /// Equations of motion without scale, whose parameters do not follow from the data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unscaled: Option<Unscaled>,
+    /// Factors of proportional damping, if it was to be such.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub proportional_damping: Option<ProportionalDamping>,
     /// Modes, by rising frequency.
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
@@ -271,9 +281,8 @@ impl fmt::Display for IdentifiedResponses {
             },
         )?;
         if !s.parameters.is_empty() {
-            let mut rows = vec![header("parameter")];
-            rows.extend(s.parameters.iter().map(ParameterRow::cells));
-            writeln!(f, "{}", text_table(&rows))?;
+            let factors = s.proportional_damping.iter().flat_map(ProportionalDamping::rows);
+            writeln!(f, "{}", parameter_table(&s.parameters, factors))?;
         }
         writeln!(f, "{}", mode_table("mode", &ShapedMode::rows(&s.modes)))?;
         if s.unscaled.is_some() {

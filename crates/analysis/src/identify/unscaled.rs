@@ -37,8 +37,10 @@ impl Unscaled {
         loop {
             match fit(&normalised) {
                 // That a channel is noise and no force may only come to light in the fit.
+                // Related equations have one scale in common.
                 Err(AnalysisError::Estimate(EstimateError::OnlyRatios { dof, .. }))
-                    if unscaled.is_none() || !free.contains(&(dof - 1)) =>
+                    if !unknowns.is_related()
+                        && (unscaled.is_none() || !free.contains(&(dof - 1))) =>
                 {
                     if !free.contains(&(dof - 1)) {
                         free.push(dof - 1);

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
 use mechid::analysis::identify::{
-    Band, Derivatives, Disturbance, Fit, Identified, IdentifiedResponses, Identify,
+    Band, Derivatives, Disturbance, Fit, Form, Identified, IdentifiedResponses, Identify,
     IdentifyResponses, KnownMass, LeftOut, LineChoice, Method, Nonlinear, Refinement, ResponseFit,
-    SampleFit, ValidationWindow,
+    SampleFit, Structure, ValidationWindow,
 };
 use mechid::analysis::{Channels, Segmentation, Window};
 use mechid::estimate::frequency_domain::Pooling;
@@ -70,6 +70,11 @@ pub struct FitArgs {
         allow_hyphen_values = true
     )]
     mass: KnownMass,
+    /// What is known of the form of M, C and K: symmetric; chain (masses in a row, with springs and
+    /// dampers to neighbours and to the ground); diagonal-mass; proportional-damping (C = αM + βK); or
+    /// the value of an entry, such as k13=0. Several of them with spaces between, or each by itself
+    #[arg(long, value_name = "FORM", value_delimiter = ' ')]
+    structure: Vec<Form>,
     #[command(flatten)]
     hits: HitArgs,
     /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
@@ -368,6 +373,7 @@ impl FitArgs {
             points: table.points.clone(),
             band: self.lines.band_hz,
             mass: self.mass.clone(),
+            structure: self.structure(),
             method: self.method.map(Method::from),
         };
         let mut identified = mechid::identify_responses(&tables, &how)?;
@@ -391,6 +397,11 @@ impl FitArgs {
             true => format!("{identified}\nchecks:\n{}", identified.summary().all_checks()),
             false => identified.to_string(),
         }
+    }
+
+    /// Returns what is known of the form of M, C and K.
+    fn structure(&self) -> Structure {
+        Structure { forms: self.structure.clone() }
     }
 
     /// Returns the settings of the identification.
@@ -423,6 +434,7 @@ impl FitArgs {
             lines: self.lines.choice(),
             without: self.lines.without(),
             mass: self.mass.clone(),
+            structure: self.structure(),
             hits: self.hits.rule(),
             nonlinear: self.nonlinear.settings(),
         }

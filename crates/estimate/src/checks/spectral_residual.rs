@@ -11,6 +11,7 @@ use super::correlation::{Correlation, share_above_of};
 use super::finding::{Concentration, Finding, NoiseSource, PValue, Reference, Residual};
 use super::thresholds::{LAGS, ROUNDING};
 use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
+use crate::relations::Relations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
 
@@ -148,7 +149,10 @@ impl WeightedFit {
         let noise: Option<Vec<&NoiseSpectrum>> =
             records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
+        let relations = Relations::of(estimate.unknowns());
         let weighted = |values: &DVector<f64>| -> Option<Vec<Whitened>> {
+            let entries = relations.as_ref().map(|relations| relations.entries(values.as_slice()));
+            let values = entries.as_ref().unwrap_or(values);
             let one = |(at, data): (usize, &FrequencyData)| {
                 Whitened::of(data, estimate.unknowns(), values, |row| match &noise {
                     Some(noise) => noise[at].covariance(row).clone(),
@@ -157,8 +161,11 @@ impl WeightedFit {
             };
             records.iter().enumerate().map(one).collect()
         };
-        let start: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
-        let start = DVector::from_vec(start);
+        let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
+        let start = match &relations {
+            None => DVector::from_column_slice(&entries),
+            Some(relations) => relations.unknowns(&entries),
+        };
         let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
         let sensitivities = rows * start.len();
         let small = sensitivities <= SENSITIVITIES && sensitivities * start.len() <= PRODUCTS;
@@ -178,7 +185,11 @@ impl WeightedFit {
             let Some(next) = next else { break };
             (values, linear) = next;
         }
-        let step = &values + linear.step() - start;
+        let end = &values + linear.step();
+        let step = match &relations {
+            None => end - start,
+            Some(relations) => relations.entries(end.as_slice()) - DVector::from_vec(entries),
+        };
         let Linearised { weighted, explained, coefficients, .. } = linear;
         let residuals = records.iter().zip(weighted).zip(explained);
         let residuals = residuals.map(|((data, weighted), explained)| SpectralResidual {
@@ -209,9 +220,15 @@ impl WeightedFit {
         for (mut column, size) in correlation.column_iter_mut().zip(&scale) {
             column.iter_mut().zip(&scale).for_each(|(entry, other)| *entry /= other * size);
         }
-        let statistic = step.dot(&correlation.cholesky()?.solve(&step));
         let count = scale.len() as f64;
-        let together = ChiSquared::new(count).expect("at least one parameter").sf(statistic);
+        let together = match estimate.unknowns().is_related() {
+            false => {
+                let statistic = step.dot(&correlation.cholesky()?.solve(&step));
+                ChiSquared::new(count).expect("at least one parameter").sf(statistic)
+            }
+            // Entries that follow from others have no inverse of their covariance.
+            true => 1.0,
+        };
         let largest = step.iamax();
         let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
         let parameter = estimate.parameters().nth(largest)?;

@@ -40,6 +40,7 @@ pub fn instrumental_variables(
         let what = "channels of the second measurement";
         return Err(EstimateError::Size { what, expected: first.dof(), got: second.dof() });
     }
+    unknowns.check_unrelated("an estimator with instrumental variables")?;
     // Least squares finds out what can be determined, and refuses what it must.
     let mut rows = equation_rows(first)?;
     rows.merge(&equation_rows(second)?)?;

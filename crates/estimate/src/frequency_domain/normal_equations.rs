@@ -14,6 +14,8 @@ use crate::triangular::TriangularFactor;
 
 /// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
 const DEPENDENT: f64 = 1e-14;
+/// Part of its length that every regressor of related entries has to itself.
+const RIDGE: f64 = 1e-7;
 /// Lines whose products are held at a time.
 const LINES: usize = 256;
 
@@ -39,10 +41,18 @@ struct Equation {
 }
 
 /// Coordinates u = T θ, equation by equation, in which the regressors are orthonormal, scaled to a
-/// Gram matrix of unit diagonal.
+/// Gram matrix of unit diagonal. Where entries are related, coordinates of the independent unknowns among
+/// these.
 pub(super) struct Coordinates {
     blocks: Vec<Block>,
     scale: DVector<f64>,
+    related: Option<Related>,
+}
+
+/// Independent unknowns p of related entries, dθ = S dp: Qᵀ and the triangle R of T S = Q R, scaled.
+struct Related {
+    transposed: DMatrix<f64>,
+    triangle: DMatrix<f64>,
 }
 
 struct Block {
@@ -120,11 +130,18 @@ impl Layout {
     /// # Source
     /// Van Loan (2000), J. Computational and Applied Mathematics 123, 85–100 (least squares with
     /// Kronecker products).
-    pub(super) fn normal_equations(&self, factors: &mut Factors) -> Option<NormalEquations> {
-        let triangle = self.orthonormalise(factors)?;
+    ///
+    /// With a `tangent` S, entries and loads of ends × unknowns, they are those of the independent unknowns.
+    pub(super) fn normal_equations(
+        &self,
+        factors: &mut Factors,
+        tangent: Option<&DMatrix<f64>>,
+    ) -> Option<NormalEquations> {
+        let triangle = self.orthonormalise(factors, tangent.is_some())?;
         let mut coordinates = Coordinates {
             blocks: self.blocks(triangle),
             scale: DVector::from_element(self.unknowns, 1.0),
+            related: None,
         };
         let mut gram = self.gram(&self.products(factors), &coordinates);
         for at in 0..self.unknowns {
@@ -135,13 +152,18 @@ impl Layout {
             column.component_div_assign(&coordinates.scale);
             column.unscale_mut(*scale);
         }
+        if let Some(tangent) = tangent {
+            gram = coordinates.relate(tangent, &gram)?;
+        }
         let gradient = coordinates.project(&factors.regressors, &factors.residuals);
         let finite = gram.iter().chain(gradient.iter()).all(|v| v.is_finite());
         finite.then_some(NormalEquations { gram, gradient, coordinates })
     }
 
-    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ.
-    fn orthonormalise(&self, factors: &mut Factors) -> Option<DMatrix<f64>> {
+    /// R of the regressors, each line weighted by the size of its W, which become R⁻ᵀφ. Dependent ones are
+    /// no obstacle where entries are `related`: without a force on a degree of freedom they are dependent,
+    /// but its relations to others determine its entries.
+    fn orthonormalise(&self, factors: &mut Factors, related: bool) -> Option<DMatrix<f64>> {
         let lines = factors.weights.nrows() / 2;
         let diagonal = (0..self.dof).map(|i| factors.weights.column(i * (self.dof + 1)));
         let power = diagonal.fold(DVector::zeros(2 * lines), |sum, part| sum + part);
@@ -154,6 +176,13 @@ impl Layout {
         let mut factor = TriangularFactor::new(self.columns.len());
         if !factor.push(&[weighted.as_view()]) {
             return None;
+        }
+        if related {
+            let lengths = factor.r().column_iter().map(|column| RIDGE * column.norm());
+            let lengths = DVector::from_iterator(self.columns.len(), lengths);
+            if !factor.push(&[DMatrix::from_diagonal(&lengths).as_view()]) {
+                return None;
+            }
         }
         let r = factor.r().clone();
         let independent = |at: usize| r[(at, at)].abs() > DEPENDENT * r.column(at).norm();
@@ -309,7 +338,44 @@ impl Coordinates {
     pub(super) fn plain(unknowns: usize) -> Self {
         let triangle = Rc::new(DMatrix::identity(unknowns, unknowns));
         let block = Block { row: 0, places: (0..unknowns).collect(), basis: None, triangle };
-        Self { blocks: vec![block], scale: DVector::from_element(unknowns, 1.0) }
+        Self { blocks: vec![block], scale: DVector::from_element(unknowns, 1.0), related: None }
+    }
+
+    /// Passes from entries to the independent unknowns behind them; returns their Gram matrix, of unit
+    /// diagonal. `None` if rounding leaves unknowns without an influence.
+    fn relate(&mut self, tangent: &DMatrix<f64>, gram: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+        let mut moved = DMatrix::zeros(self.scale.len(), tangent.ncols());
+        for (mut to, column) in moved.column_iter_mut().zip(tangent.column_iter()) {
+            to.copy_from(&self.of(&column.into_owned()));
+        }
+        let count = moved.ncols();
+        let mut factor = TriangularFactor::new(count);
+        if !factor.push(&[moved.as_view()]) {
+            return None;
+        }
+        let mut triangle = factor.r().clone();
+        let independent =
+            |at: usize| triangle[(at, at)].abs() > DEPENDENT * triangle.column(at).norm();
+        if !(0..count).all(independent) {
+            return None;
+        }
+        let inverse = triangle.solve_upper_triangular(&DMatrix::identity(count, count))?;
+        let columns = moved * inverse;
+        // Products of whole matrices: nalgebra's `tr_mul` takes dot products.
+        let mut transposed = columns.transpose();
+        let mut gram = &transposed * (gram * columns);
+        let scale = gram.diagonal().map(f64::sqrt);
+        if !scale.iter().all(|length| *length > 0.0 && length.is_finite()) {
+            return None;
+        }
+        for (at, length) in scale.iter().enumerate() {
+            gram.row_mut(at).unscale_mut(*length);
+            gram.column_mut(at).unscale_mut(*length);
+            transposed.row_mut(at).unscale_mut(*length);
+            triangle.row_mut(at).scale_mut(*length);
+        }
+        self.related = Some(Related { transposed, triangle });
+        Some(gram)
     }
 
     /// 2 Re Σ φ̄ y for every unknown: Jᵀ of what W_lᴴ has made y of, 2 lines × dof.
@@ -329,7 +395,10 @@ impl Coordinates {
             }
         }
         projected.component_div_assign(&self.scale);
-        projected
+        match &self.related {
+            None => projected,
+            Some(related) => &related.transposed * projected,
+        }
     }
 
     /// Unknowns θ at coordinates v.
@@ -340,6 +409,12 @@ impl Coordinates {
 
     /// Unknowns θ at the coordinates v in each column.
     fn unknowns_of_columns(&self, coordinates: &DMatrix<f64>) -> DMatrix<f64> {
+        if let Some(Related { triangle, .. }) = &self.related {
+            let mut unknowns = coordinates.clone();
+            let solved = triangle.solve_upper_triangular_mut(&mut unknowns);
+            debug_assert!(solved, "independent unknowns");
+            return unknowns;
+        }
         let mut unknowns = coordinates.clone();
         for (block, start) in self.starts() {
             let len = block.places.len();
@@ -360,6 +435,9 @@ impl Coordinates {
 
     /// Coordinates v of unknowns θ.
     pub(super) fn of(&self, unknowns: &DVector<f64>) -> DVector<f64> {
+        if let Some(Related { triangle, .. }) = &self.related {
+            return triangle * unknowns;
+        }
         let mut coordinates = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
             let values = block.places.iter().map(|at| unknowns[*at]);
@@ -372,6 +450,9 @@ impl Coordinates {
 
     /// The transpose of what makes coordinates of unknowns.
     fn transposed(&self, coordinates: &DVector<f64>) -> DVector<f64> {
+        if let Some(Related { triangle, .. }) = &self.related {
+            return triangle.tr_mul(coordinates);
+        }
         let mut unknowns = DVector::zeros(self.scale.len());
         let scaled = coordinates.component_mul(&self.scale);
         for (block, start) in self.starts() {
@@ -383,6 +464,11 @@ impl Coordinates {
 
     /// Lengths of the columns of J, of the unknowns, from the Gram matrix of the coordinates.
     fn lengths(&self, gram: &DMatrix<f64>) -> DVector<f64> {
+        if let Some(Related { triangle, .. }) = &self.related {
+            let inner = gram * triangle;
+            let squared = triangle.column_iter().zip(inner.column_iter()).map(|(t, g)| t.dot(&g));
+            return DVector::from_iterator(triangle.ncols(), squared.map(f64::sqrt));
+        }
         let mut lengths = DVector::zeros(self.scale.len());
         for (block, start) in self.starts() {
             let len = block.places.len();

@@ -14,6 +14,7 @@ use super::search::SumOfSquares;
 use super::starts::Starts;
 use super::{FrequencyData, NoiseSpectrum, Pooling, equation_error};
 use crate::least_squares::size;
+use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// Maximum-likelihood estimate of the free entries of M, C and K from noisy displacements.
@@ -130,7 +131,10 @@ pub(crate) fn in_units_of_noise(
     data: &FrequencyData,
     estimate: &Estimate,
 ) -> Option<DMatrix<Complex<f64>>> {
-    let theta: DVector<f64> = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
+    let mut theta: DVector<f64> = estimate.parameters().map(|p| p.value).collect::<Vec<_>>().into();
+    if let Some(relations) = Relations::of(estimate.unknowns()) {
+        theta = relations.unknowns(theta.as_slice());
+    }
     let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;
     let all = theta.len() + ends::count(data);
     misfit.try_at(&theta.resize_vertically(all, 0.0))?;

@@ -10,6 +10,7 @@ use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum};
 use crate::estimate::Findings;
+use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// Standard deviations by which the misfit ratio of a right model may differ from 1.
@@ -134,15 +135,24 @@ pub(super) fn finish(
 ) -> Result<OutputErrorFit, EstimateError> {
     let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
     let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
-    let (entries, tau) = parts(data, &best.minimum.theta);
-    let of_ends = covariance.view((entries.len(), entries.len()), (tau.len(), tau.len()));
+    let (independent, tau) = parts(data, &best.minimum.theta);
+    let count = independent.len();
+    let of_ends = covariance.view((count, count), (tau.len(), tau.len()));
     let ends = EndLoads::of(data, tau, of_ends * scale.level);
-    let covariance = covariance.view((0, 0), (entries.len(), entries.len())).into_owned();
+    let covariance = covariance.view((0, 0), (count, count)).into_owned();
     let (covariance, degrees_of_freedom) = match scale.weights {
         None => (covariance * scale.inflation, scale.degrees_of_freedom),
         Some(weights) => {
             let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
             (covariance + weights.excess, fewest.max(1.0) as usize)
+        }
+    };
+    let (entries, covariance) = match Relations::of(unknowns) {
+        None => (independent.to_vec(), covariance),
+        Some(relations) => {
+            let tangent = relations.tangent(independent);
+            let entries = relations.entries(independent).as_slice().to_vec();
+            (entries, &tangent * covariance * tangent.transpose())
         }
     };
     let errors = misfit.errors();
@@ -154,7 +164,7 @@ pub(super) fn finish(
         .collect();
     let estimate = Estimate::new(Findings {
         unknowns: unknowns.clone(),
-        values: entries.to_vec(),
+        values: entries,
         covariance: (covariance * scale.level).into(),
         degrees_of_freedom,
         residual_nrmse,
@@ -180,22 +190,30 @@ pub(super) fn uncertain_weights(
     theta: &DVector<f64>,
     noise: &NoiseSpectrum,
 ) -> Option<WeightUncertainty> {
-    let (entries, tau) = parts(data, theta);
-    let entries = DVector::from_column_slice(entries);
+    let (independent, tau) = parts(data, theta);
+    let entries = entries(unknowns, independent);
     match tau {
         [] => WeightUncertainty::of(data, unknowns, &entries, noise),
         _ => WeightUncertainty::of(&data.with_load_of_ends(tau), unknowns, &entries, noise),
     }
 }
 
-/// The free entries of M, C and K among the parameters of a search, and the loads of open ends.
+/// The free entries of M, C and K.
+pub(super) fn entries(unknowns: &Unknowns, independent: &[f64]) -> DVector<f64> {
+    match Relations::of(unknowns) {
+        None => DVector::from_column_slice(independent),
+        Some(relations) => relations.entries(independent),
+    }
+}
+
+/// The independent unknowns of M, C and K among the parameters of a search, and the loads of open ends.
 pub(super) fn parts<'a>(data: &FrequencyData, theta: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
     theta.as_slice().split_at(theta.len() - ends::count(data))
 }
 
 /// Real equations less unknowns.
 pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
-    let unknowns = unknowns.free().len() + ends::count(data);
+    let unknowns = unknowns.independent() + ends::count(data);
     (2 * data.dof() * data.len()).saturating_sub(unknowns)
 }
 

@@ -1,12 +1,12 @@
 //! Maximum likelihood where the noise is known from the residual alone.
 
 use mechid_model::SecondOrderSystem;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix};
 
 use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
-    OutputErrorFit, Scale, finish, parts, plausible, sampled_weight_inflation, spare,
+    OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
 };
 use super::search::SumOfSquares;
@@ -173,8 +173,8 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
     if 2 * n * rows * unknowns.free().len() > SENSITIVITIES {
         return None;
     }
-    let (entries, tau) = parts(data, &fit.fit.minimum.theta);
-    let (data, entries) = (data.with_load_of_ends(tau), DVector::from_column_slice(entries));
+    let (independent, tau) = parts(data, &fit.fit.minimum.theta);
+    let (data, entries) = (data.with_load_of_ends(tau), entries(unknowns, independent));
     let covariance = |row: usize| fit.noise.covariance(row).clone();
     let mut sensitivity = Whitened::of(&data, unknowns, &entries, covariance)?.sensitivity;
     for mut column in sensitivity.column_iter_mut() {

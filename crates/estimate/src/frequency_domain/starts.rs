@@ -11,6 +11,7 @@ use super::ends;
 use super::equation_error::weighted_equation_errors;
 use super::misfit::powers;
 use super::{FrequencyData, NoiseSpectrum};
+use crate::relations::Relations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, Unknowns};
 
@@ -29,6 +30,8 @@ pub(super) struct Starts<'a> {
     unknowns: &'a Unknowns,
     noise: &'a NoiseSpectrum,
     equations: Vec<Equation>,
+    /// Linear relations between entries, by which all equations are solved together.
+    linear: Option<Relations>,
     nominal: Option<DVector<f64>>,
 }
 
@@ -67,7 +70,15 @@ impl<'a> Starts<'a> {
             0 => Cow::Borrowed(data),
             _ => Cow::Owned(data.under_hann_window()),
         };
-        Self { data: under, ends: ends::count(data), unknowns, noise, equations, nominal: None }
+        Self {
+            data: under,
+            ends: ends::count(data),
+            unknowns,
+            noise,
+            equations,
+            linear: Relations::linear(unknowns),
+            nominal: None,
+        }
     }
 
     /// The same, with the entries of a machine expected to be near.
@@ -96,9 +107,14 @@ impl<'a> Starts<'a> {
         let single = single.chain(self.nominal.clone()).chain(powers.iter().flatten().cloned());
         let single = single.chain(weighted.map(|solution| values(&solution)));
         let all = std::iter::once(total).chain(ordinary).chain(single.map(|start| vec![start]));
+        let relations = Relations::of(self.unknowns);
         let with_ends = |start: DVector<f64>| {
-            let len = start.len() + self.ends;
-            start.resize_vertically(len, 0.0)
+            let independent = match &relations {
+                None => start,
+                Some(relations) => relations.unknowns(start.as_slice()),
+            };
+            let len = independent.len() + self.ends;
+            independent.resize_vertically(len, 0.0)
         };
         all.map(|family| family.into_iter().map(with_ends).collect()).collect()
     }
@@ -145,34 +161,59 @@ impl<'a> Starts<'a> {
         weights.iter().all(|w| w.is_finite()).then_some(weights)
     }
 
+    /// The free entries, of each equation of motion by itself or, where they are related, of all together.
     fn estimate(&self, kind: Kind, weights: &Weights) -> Option<DVector<f64>> {
-        let mut theta = DVector::zeros(self.equations.iter().map(|e| e.parameters.len()).sum());
+        let theta = match &self.linear {
+            Some(linear) => self.estimate_together(kind, weights, linear)?,
+            None => {
+                let count = self.equations.iter().map(|e| e.parameters.len()).sum();
+                let mut theta = DVector::zeros(count);
+                for equation in &self.equations {
+                    let weights: Vec<f64> = weights.column(equation.row).iter().copied().collect();
+                    let triangle = self.triangle(equation, &weights)?;
+                    let noise = || self.noise_gram(equation, &weights);
+                    let values = solve(kind, triangle, noise)?;
+                    for ((place, _), value) in equation.parameters.iter().zip(values.iter()) {
+                        theta[*place] = *value;
+                    }
+                }
+                theta
+            }
+        };
+        theta.iter().all(|v| v.is_finite()).then_some(theta)
+    }
+
+    fn estimate_together(
+        &self,
+        kind: Kind,
+        weights: &Weights,
+        linear: &Relations,
+    ) -> Option<DVector<f64>> {
+        let count = linear.count();
+        let mut factor = TriangularFactor::new(count + 1);
+        let mut noise = DMatrix::zeros(count + 1, count + 1);
         for equation in &self.equations {
             let weights: Vec<f64> = weights.column(equation.row).iter().copied().collect();
-            let mut triangle = self.triangle(equation, &weights)?;
-            let scale = DVector::from_iterator(
-                triangle.ncols(),
-                triangle.column_iter().map(|c| c.norm()).map(|l| if l > 0.0 { l } else { 1.0 }),
-            );
-            triangle.column_iter_mut().zip(scale.iter()).for_each(|(mut c, s)| c.unscale_mut(*s));
-            let last = equation.parameters.len();
-            let values = match kind {
-                Kind::Ordinary => triangle
-                    .view((0, 0), (last, last))
-                    .solve_upper_triangular(&triangle.view((0, last), (last, 1)))?,
-                Kind::Total => {
-                    let mut noise = self.noise_gram(equation, &weights);
-                    for (at, value) in noise.iter_mut().enumerate() {
-                        *value /= scale[at % scale.len()] * scale[at / scale.len()];
+            // Unknowns of the equation and, last, its force, among those of all.
+            let unknowns = equation.parameters.iter().map(|(place, _)| linear.shared(*place));
+            let places: Vec<usize> = unknowns.chain([count]).collect();
+            let own = self.triangle(equation, &weights)?;
+            let mut triangle = DMatrix::zeros(own.nrows(), count + 1);
+            for (column, at) in own.column_iter().zip(&places) {
+                triangle.column_mut(*at).axpy(1.0, &column, 1.0);
+            }
+            factor.push(&[triangle.as_view()]).then_some(())?;
+            if kind == Kind::Total {
+                let own = self.noise_gram(equation, &weights);
+                for (column, to) in own.column_iter().zip(&places) {
+                    for (value, at) in column.iter().zip(&places) {
+                        noise[(*at, *to)] += value;
                     }
-                    total_least_squares(&triangle, &noise)?
                 }
-            };
-            for (at, (place, _)) in equation.parameters.iter().enumerate() {
-                theta[*place] = values[at] * (scale[last] / scale[at]);
             }
         }
-        theta.iter().all(|v| v.is_finite()).then_some(theta)
+        let values = solve(kind, factor.r().clone(), || noise)?;
+        Some(linear.entries(values.as_slice()))
     }
 
     /// R of the weighted regressors and, last, the force less what known entries account for.
@@ -239,6 +280,34 @@ impl<'a> Starts<'a> {
             Some((matrix, column, value))
         })
     }
+}
+
+/// The unknowns of a triangle whose last column is the force; `noise` gives the Gram matrix of its columns that
+/// noise alone would have.
+fn solve(
+    kind: Kind,
+    mut triangle: DMatrix<f64>,
+    noise: impl FnOnce() -> DMatrix<f64>,
+) -> Option<DVector<f64>> {
+    let scale = DVector::from_iterator(
+        triangle.ncols(),
+        triangle.column_iter().map(|c| c.norm()).map(|l| if l > 0.0 { l } else { 1.0 }),
+    );
+    triangle.column_iter_mut().zip(scale.iter()).for_each(|(mut c, s)| c.unscale_mut(*s));
+    let last = scale.len() - 1;
+    let values = match kind {
+        Kind::Ordinary => triangle
+            .view((0, 0), (last, last))
+            .solve_upper_triangular(&triangle.view((0, last), (last, 1)))?,
+        Kind::Total => {
+            let mut noise = noise();
+            for (at, value) in noise.iter_mut().enumerate() {
+                *value /= scale[at % scale.len()] * scale[at / scale.len()];
+            }
+            total_least_squares(&triangle, &noise)?
+        }
+    };
+    Some(DVector::from_fn(last, |at, _| values[at] * (scale[last] / scale[at])))
 }
 
 fn values(estimate: &Estimate) -> DVector<f64> {

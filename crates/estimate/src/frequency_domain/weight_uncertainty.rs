@@ -17,7 +17,7 @@ pub(super) struct WeightUncertainty {
 }
 
 impl WeightUncertainty {
-    /// Judges an estimate at `values`, weighted by `noise`; `None` where the noise is no smooth spectrum or the
+    /// Judges an estimate at the entries `values`, weighted by `noise`; `None` where the noise is no smooth spectrum or the
     /// fit is a large one.
     ///
     /// With log powers B β of unit information times ν, orthonormal sensitivities Q and
@@ -33,9 +33,9 @@ impl WeightUncertainty {
         values: &DVector<f64>,
         noise: &NoiseSpectrum,
     ) -> Option<Self> {
-        let (n, count) = (data.dof(), values.len());
+        let (n, count) = (data.dof(), unknowns.independent());
         let parts = noise.smooth_parts()?;
-        if 2 * n * data.len() * count > SENSITIVITIES {
+        if 2 * n * data.len() * values.len() > SENSITIVITIES {
             return None;
         }
         let covariance = |row: usize| noise.covariance(row).clone();

@@ -5,6 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::FrequencyData;
 use crate::Unknowns;
+use crate::relations::Relations;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
@@ -20,7 +21,8 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 pub(crate) struct Whitened {
     /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
     pub residual: DVector<f64>,
-    /// Derivative of −`residual` with respect to the free parameters, at the most likely force.
+    /// Derivative of −`residual` with respect to the free parameters, the independent ones where they are
+    /// related, at the most likely force.
     pub sensitivity: DMatrix<f64>,
 }
 
@@ -46,6 +48,10 @@ impl Whitened {
                 let derivative = line.derivative(parameter, omega);
                 write_real(&derivative, &mut column.as_mut_slice()[at.clone()]);
             }
+        }
+        if let Some(relations) = Relations::of(unknowns) {
+            let independent = relations.unknowns(values.as_slice());
+            sensitivity *= relations.tangent(independent.as_slice());
         }
         let finite = residual.iter().chain(sensitivity.iter()).all(|value| value.is_finite());
         finite.then_some(Self { residual, sensitivity })

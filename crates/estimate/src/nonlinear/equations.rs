@@ -42,6 +42,7 @@ impl<'a> Equations<'a> {
     ) -> Result<Self, EstimateError> {
         size("degrees of freedom of the unknowns", data.dof(), unknowns.dof())?;
         terms.check_dof(data.dof())?;
+        unknowns.check_unrelated("a fit with nonlinear terms")?;
         let free = unknowns.free();
         if free.is_empty() && terms.is_empty() {
             return Err(EstimateError::NothingUnknown);

@@ -155,6 +155,7 @@ impl Transitions {
         unknowns: &Unknowns,
     ) -> Result<TimeDomainFit, EstimateError> {
         size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        unknowns.check_unrelated("a fit from sample to sample")?;
         TimeDomainFit::new(self, discretisation, unknowns)
     }
 

@@ -23,6 +23,7 @@ mod nonlinear_silverbox;
 mod nonlinear_study;
 mod open_record;
 mod refined;
+mod related;
 mod response_checks;
 mod search_start;
 mod silverbox;

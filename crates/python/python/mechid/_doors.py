@@ -84,6 +84,7 @@ def identify(
     without_lines: str | None = None,
     without_hz: Sequence[float | Mapping[str, Any]] = (),
     mass: float | Sequence[float | None] | None = None,
+    structure: str | Sequence[str] = (),
     domain: Literal["frequency", "time"] = "frequency",
     from_frf: Estimator | None = None,
     segment: int | None = None,
@@ -137,6 +138,10 @@ def identify(
     mass : float or sequence of float or None, optional
         Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
         one.
+    structure : str or sequence of str
+        What is known of the form of M, C and K: ``"symmetric"``, ``"chain"`` (masses in a row, with
+        springs and dampers to neighbours and to the ground), ``"diagonal-mass"``,
+        ``"proportional-damping"`` (C = αM + βK), or an entry such as ``"k13=0"``.
     domain : {"frequency", "time"}
         Domain of the fit.
     from_frf : {"h1", "h2", "hv"}, optional
@@ -206,8 +211,8 @@ def identify(
         told = _identify_settings(
             method, noise, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
             extent, derivatives, refine, interpolation, lines, band,
-            _without(without_lines, without_hz), tuple(_mass(mass)), _hits(hits), nonlinear, candidates,
-            criterion,
+            _without(without_lines, without_hz), tuple(_mass(mass)),
+            tuple(_structure(structure)), _hits(hits), nonlinear, candidates, criterion,
             tuple(search), weighting,
         )
     else:
@@ -232,6 +237,7 @@ def identify_responses(
     points: Sequence[str] = (),
     band_hz: tuple[float, float] | None = None,
     mass: float | Sequence[float | None] | None = None,
+    structure: str | Sequence[str] = (),
     method: Method | None = None,
     threads: int | None = None,
 ) -> IdentifiedResponses:
@@ -255,6 +261,8 @@ def identify_responses(
     mass : float or sequence of float or None, optional
         Known masses in kg, one per degree of freedom or all entries row by row; None for an unknown
         one.
+    structure : str or sequence of str
+        What is known of the form of M, C and K, as in `identify`.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
         Estimator; maximum likelihood, without.
     threads : int, optional
@@ -286,6 +294,7 @@ def identify_responses(
         "points": [str(point) for point in points],
         "band": band,
         "mass": _mass(mass),
+        "structure": _structure(structure),
         "method": method,
     }
     inner = _mechid.identify_responses([one._inner for one in given], json.dumps(settings), threads)
@@ -928,6 +937,7 @@ def _identify_settings(
     band_hz: tuple[float, float] | None,
     without: str,
     mass: tuple[float | None, ...],
+    structure: tuple[str, ...],
     hits: str | None,
     nonlinear: str | None,
     candidates: str | None,
@@ -949,6 +959,7 @@ def _identify_settings(
         "lines": _lines(lines, band_hz),
         "without": json.loads(without),
         "mass": list(mass),
+        "structure": list(structure),
         "hits": None if hits is None else json.loads(hits),
         "nonlinear": _nonlinear(nonlinear, candidates, criterion, search, weighting),
     }
@@ -1074,6 +1085,11 @@ def _mass(mass: float | Sequence[float | None] | None) -> list[float | None]:
     if isinstance(mass, Sequence):
         return [None if value is None else float(value) for value in mass]
     return [float(mass)]
+
+
+def _structure(structure: str | Sequence[str]) -> list[str]:
+    forms = [structure] if isinstance(structure, str) else structure
+    return [word for form in forms for word in str(form).split()]
 
 
 def _derivatives(text: str | None) -> Any:

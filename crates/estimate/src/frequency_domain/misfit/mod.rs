@@ -13,6 +13,7 @@ use super::ends::{self, Ends};
 use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
 use super::search::SumOfSquares;
 use super::{FrequencyData, NoiseSpectrum};
+use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
 use row::Row;
 
@@ -45,12 +46,16 @@ enum Noise<'a> {
 pub(super) struct Misfit<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
+    relations: Option<Relations>,
     layout: Layout,
     noise: Noise<'a>,
     /// n × rows, so that the forces of one row are contiguous; less the load of the ends of open records at
     /// the parameters last tried.
     force: ComplexMatrix,
     displacement: ComplexMatrix,
+    /// Independent unknowns last accepted, and those last tried.
+    at: DVector<f64>,
+    tried_at: DVector<f64>,
     /// All rows at the parameters last accepted, and at those last tried.
     rows: Vec<Row>,
     tried: Vec<Row>,
@@ -77,10 +82,13 @@ impl<'a> Misfit<'a> {
         Ok(Self {
             data,
             unknowns,
+            relations: Relations::of(unknowns),
             layout: Layout::new(unknowns, data.ends().ncols()),
             noise,
             force: data.force().transpose(),
             displacement: data.displacement().transpose(),
+            at: DVector::zeros(0),
+            tried_at: DVector::zeros(0),
             tried: rows.clone(),
             rows,
             regressors: DMatrix::zeros(0, 0),
@@ -103,9 +111,24 @@ impl<'a> Misfit<'a> {
         DMatrix::from_rows(&rows)
     }
 
+    /// Derivative of entries and loads of ends with respect to the independent unknowns last accepted, where
+    /// the entries are related.
+    fn tangent(&self) -> Option<DMatrix<f64>> {
+        let relations = self.relations.as_ref()?;
+        let ends = ends::count(self.data);
+        let tangent = relations.tangent(self.at.rows(0, self.at.len() - ends).as_slice());
+        let (entries, unknowns) = tangent.shape();
+        let mut all = tangent.resize(entries + ends, unknowns + ends, 0.0);
+        all.view_mut((entries, unknowns), (ends, ends)).fill_with_identity();
+        Some(all)
+    }
+
     fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
-        let (entries, tau) = theta.as_slice().split_at(theta.len() - ends::count(self.data));
-        let matrices = self.unknowns.assemble(entries);
+        let (unknowns, tau) = theta.as_slice().split_at(theta.len() - ends::count(self.data));
+        let matrices = match &self.relations {
+            None => self.unknowns.assemble(unknowns),
+            Some(relations) => self.unknowns.assemble(relations.entries(unknowns).as_slice()),
+        };
         if !tau.is_empty() {
             let ends = Ends::new(self.data, tau);
             for (at, mut force) in self.force.column_iter_mut().enumerate() {
@@ -176,10 +199,12 @@ impl<'a> Misfit<'a> {
 
 impl SumOfSquares for Misfit<'_> {
     fn try_at(&mut self, theta: &DVector<f64>) -> Option<f64> {
+        self.tried_at.clone_from(theta);
         self.evaluate(theta)
     }
 
     fn accept(&mut self) {
+        std::mem::swap(&mut self.at, &mut self.tried_at);
         std::mem::swap(&mut self.rows, &mut self.tried);
     }
 
@@ -188,7 +213,7 @@ impl SumOfSquares for Misfit<'_> {
     fn linear_step(&mut self) -> Option<DVector<f64>> {
         let mut factors = self.factors(|at, column| self.displacement[(column, at)]);
         let NormalEquations { gram, gradient, coordinates } =
-            self.layout.normal_equations(&mut factors)?;
+            self.layout.normal_equations(&mut factors, self.tangent().as_ref())?;
         Some(coordinates.unknowns(&-Cholesky::new(&gram, 0.0)?.solve(&gradient)))
     }
 
@@ -208,14 +233,18 @@ impl SumOfSquares for Misfit<'_> {
 
     fn normal_equations(&mut self) -> Option<NormalEquations> {
         let mut factors = self.factors(|at, column| self.rows[at].likely_displacement()[column]);
-        let equations = self.layout.normal_equations(&mut factors);
+        let equations = self.layout.normal_equations(&mut factors, self.tangent().as_ref());
         self.regressors = factors.regressors;
         equations
     }
 
     /// r″ = −2 W dD G dD X̂ along dD, the change of the dynamic stiffness; that of the spread, with
-    /// a noisy force, is left out.
+    /// a noisy force, is left out, and that of proportional damping, whose entries are products.
     fn curvature(&self, coordinates: &Coordinates, step: &DVector<f64>) -> DVector<f64> {
+        let step = match self.tangent() {
+            None => step.clone(),
+            Some(tangent) => tangent * step,
+        };
         let (entries, tau) = step.as_slice().split_at(step.len() - ends::count(self.data));
         let zero = self.unknowns.assemble(&vec![0.0; entries.len()]);
         let moved = self.unknowns.assemble(entries);

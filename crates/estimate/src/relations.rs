@@ -1,0 +1,284 @@
+//! Relations between the entries of M, C and K, and the independent unknowns that they leave.
+
+use std::collections::BTreeMap;
+
+use mechid_model::{Matrix, Parameter};
+use nalgebra::{DMatrix, DVector};
+
+use crate::Unknowns;
+
+/// Independent unknowns p behind free entries θ(p), which are not all independent.
+#[derive(Debug, Clone)]
+pub(crate) struct Relations {
+    /// How each free entry follows from the unknowns, in the order of [`Unknowns::free`].
+    entries: Vec<Source>,
+    /// Number of unknowns that are entries themselves; α and β of proportional damping come after them.
+    shared: usize,
+    proportional: bool,
+}
+
+/// How a free entry follows from the independent unknowns.
+#[derive(Debug, Clone)]
+enum Source {
+    /// It is one of them.
+    Shared(usize),
+    /// α m + β k of an entry of the damping.
+    Damping { mass: Part, stiffness: Part },
+}
+
+/// An entry of the mass or the stiffness.
+#[derive(Debug, Clone, Copy)]
+enum Part {
+    Known(f64),
+    Shared(usize),
+}
+
+impl Part {
+    fn value(self, unknowns: &[f64]) -> f64 {
+        match self {
+            Self::Known(value) => value,
+            Self::Shared(at) => unknowns[at],
+        }
+    }
+}
+
+impl Relations {
+    /// The relations between entries; none if every free entry is independent.
+    pub(crate) fn of(unknowns: &Unknowns) -> Option<Self> {
+        unknowns.is_related().then(|| Self::new(unknowns, unknowns.has_proportional_damping()))
+    }
+
+    /// The linear ones of these relations: proportional damping is left out.
+    pub(crate) fn linear(unknowns: &Unknowns) -> Option<Self> {
+        unknowns.is_related().then(|| Self::new(unknowns, false))
+    }
+
+    fn new(unknowns: &Unknowns, proportional: bool) -> Self {
+        let mut places: BTreeMap<(usize, usize, usize), usize> = BTreeMap::new();
+        let mut place = |matrix: Matrix, row: usize, column: usize| {
+            let key = match unknowns.is_symmetric(matrix) {
+                true => (matrix as usize, row.min(column), row.max(column)),
+                false => (matrix as usize, row, column),
+            };
+            let next = places.len();
+            *places.entry(key).or_insert(next)
+        };
+        let free = unknowns.free();
+        let of_damping = |p: &Parameter| proportional && p.matrix() == Matrix::Damping;
+        let mut entries: Vec<Option<Source>> = free
+            .iter()
+            .map(|p| {
+                let own = !of_damping(p);
+                own.then(|| Source::Shared(place(p.matrix(), p.row(), p.column())))
+            })
+            .collect();
+        for (entry, p) in entries.iter_mut().zip(&free) {
+            let mut part = |matrix| match unknowns.fixed(matrix, p.row(), p.column()) {
+                Some(value) => Part::Known(value),
+                None => Part::Shared(place(matrix, p.row(), p.column())),
+            };
+            entry.get_or_insert_with(|| Source::Damping {
+                mass: part(Matrix::Mass),
+                stiffness: part(Matrix::Stiffness),
+            });
+        }
+        let shared = places.len();
+        Self { entries: entries.into_iter().flatten().collect(), shared, proportional }
+    }
+
+    /// Number of independent unknowns.
+    pub(crate) fn count(&self) -> usize {
+        self.shared + if self.proportional { 2 } else { 0 }
+    }
+
+    /// The unknown that a free entry is, of relations that are linear.
+    ///
+    /// # Panics
+    /// If it is an entry of proportional damping.
+    pub(crate) fn shared(&self, entry: usize) -> usize {
+        match self.entries[entry] {
+            Source::Shared(at) => at,
+            Source::Damping { .. } => unreachable!("linear relations"),
+        }
+    }
+
+    /// θ(p).
+    pub(crate) fn entries(&self, unknowns: &[f64]) -> DVector<f64> {
+        let value = |source: &Source| match source {
+            Source::Shared(at) => unknowns[*at],
+            Source::Damping { mass, stiffness } => {
+                unknowns[self.shared] * mass.value(unknowns)
+                    + unknowns[self.shared + 1] * stiffness.value(unknowns)
+            }
+        };
+        DVector::from_iterator(self.entries.len(), self.entries.iter().map(value))
+    }
+
+    /// ∂θ/∂p, entries × unknowns.
+    pub(crate) fn tangent(&self, unknowns: &[f64]) -> DMatrix<f64> {
+        let mut tangent = DMatrix::zeros(self.entries.len(), self.count());
+        for (row, source) in self.entries.iter().enumerate() {
+            match source {
+                Source::Shared(at) => tangent[(row, *at)] = 1.0,
+                Source::Damping { mass, stiffness } => {
+                    for (factor, part) in [(self.shared, mass), (self.shared + 1, stiffness)] {
+                        tangent[(row, factor)] = part.value(unknowns);
+                        if let Part::Shared(at) = part {
+                            tangent[(row, *at)] += unknowns[factor];
+                        }
+                    }
+                }
+            }
+        }
+        tangent
+    }
+
+    /// p of entries that obey the relations; of others the means of those that should be one, and the α and
+    /// β that come nearest.
+    pub(crate) fn unknowns(&self, entries: &[f64]) -> DVector<f64> {
+        let mut unknowns = DVector::zeros(self.count());
+        let mut counts = vec![0.0_f64; self.shared];
+        for (source, entry) in self.entries.iter().zip(entries) {
+            if let Source::Shared(at) = source {
+                unknowns[*at] += entry;
+                counts[*at] += 1.0;
+            }
+        }
+        for (value, count) in unknowns.iter_mut().zip(&counts) {
+            *value /= count.max(1.0);
+        }
+        if self.proportional {
+            let [alpha, beta] = self.nearest(entries, unknowns.as_slice());
+            (unknowns[self.shared], unknowns[self.shared + 1]) = (alpha, beta);
+        }
+        unknowns
+    }
+
+    /// α and β with their gradients over the entries, which obey the relations; `None` without proportional
+    /// damping.
+    pub(crate) fn damping_factors(&self, entries: &[f64]) -> Option<[(f64, DVector<f64>); 2]> {
+        if !self.proportional {
+            return None;
+        }
+        let unknowns = self.unknowns(entries);
+        let rows = self.damping(unknowns.as_slice());
+        let columns = DMatrix::from_fn(rows.len(), 2, |row, part| rows[row].1[part]);
+        let lengths = [0, 1].map(|part| columns.column(part).norm());
+        let factors = [unknowns[self.shared], unknowns[self.shared + 1]];
+        let gradient = |of: usize| {
+            // What the other factor does not explain of the entries of this matrix.
+            let (own, other) = (columns.column(of), columns.column(1 - of));
+            let unit = if lengths[1 - of] > 0.0 { other / lengths[1 - of] } else { other.into() };
+            let left = own - &unit * unit.dot(&own);
+            let weights = &left / left.norm_squared();
+            let mut gradient = DVector::zeros(self.entries.len());
+            for ((entry, _), weight) in rows.iter().zip(weights.iter()) {
+                gradient[*entry] += weight;
+                let Source::Damping { mass, stiffness } = &self.entries[*entry] else { continue };
+                for (part, factor) in [mass, stiffness].into_iter().zip(factors) {
+                    let Part::Shared(at) = part else { continue };
+                    let same = |s: &Source| matches!(s, Source::Shared(of) if of == at);
+                    let place = self.entries.iter().position(same).expect("a free entry");
+                    gradient[place] -= factor * weight;
+                }
+            }
+            gradient
+        };
+        Some([(factors[0], gradient(0)), (factors[1], gradient(1))])
+    }
+
+    /// Place of every free entry of proportional damping, with its mass and stiffness.
+    fn damping(&self, unknowns: &[f64]) -> Vec<(usize, [f64; 2])> {
+        let of = |(at, source): (usize, &Source)| match source {
+            Source::Shared(_) => None,
+            Source::Damping { mass, stiffness } => {
+                Some((at, [mass.value(unknowns), stiffness.value(unknowns)]))
+            }
+        };
+        self.entries.iter().enumerate().filter_map(of).collect()
+    }
+
+    /// α and β of the least squares of C − αM − βK over the entries of the damping.
+    fn nearest(&self, entries: &[f64], unknowns: &[f64]) -> [f64; 2] {
+        let rows = self.damping(unknowns);
+        let rows = rows.iter().map(|(at, [mass, stiffness])| [*mass, *stiffness, entries[*at]]);
+        let mut products = [[0.0; 3]; 3];
+        for row in rows {
+            for (i, left) in row.iter().enumerate() {
+                for (j, right) in row.iter().enumerate() {
+                    products[i][j] += left * right;
+                }
+            }
+        }
+        let [[mm, mk, mc], [_, kk, kc], _] = products;
+        let determinant = mm * kk - mk * mk;
+        // Damping that one of the two explains as well as the other is taken for that of the stiffness.
+        if determinant > 1e-12 * mm * kk {
+            [(kk * mc - mk * kc) / determinant, (mm * kc - mk * mc) / determinant]
+        } else if kk > 0.0 {
+            [0.0, kc / kk]
+        } else {
+            [if mm > 0.0 { mc / mm } else { 0.0 }, 0.0]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three masses in a row with proportional damping.
+    fn chain() -> Unknowns {
+        let mut unknowns = Unknowns::unknown_mass(3).unwrap();
+        for (matrix, row, column) in [
+            (Matrix::Mass, 0, 1),
+            (Matrix::Mass, 0, 2),
+            (Matrix::Mass, 1, 2),
+            (Matrix::Stiffness, 0, 2),
+        ] {
+            unknowns = unknowns.symmetric(matrix).unwrap().fix(matrix, row, column, 0.0).unwrap();
+        }
+        unknowns.proportional_damping().unwrap()
+    }
+
+    #[test]
+    fn entries_follow_from_independent_unknowns_and_lead_back_to_them() {
+        let unknowns = chain();
+        let relations = Relations::of(&unknowns).unwrap();
+        // m1, m2, m3, then k11 k12 k22 k23 k33, then α and β.
+        assert_eq!(relations.count(), 10);
+        let p = [2.0, 3.0, 4.0, 50.0, -20.0, 60.0, -30.0, 70.0, 0.5, 0.01];
+        let [m, c, k] = unknowns.assemble(relations.entries(&p).as_slice());
+        assert_eq!(m, DMatrix::from_diagonal(&nalgebra::dvector![2.0, 3.0, 4.0]));
+        let stiffness = nalgebra::dmatrix![
+            50.0, -20.0, 0.0;
+            -20.0, 60.0, -30.0;
+            0.0, -30.0, 70.0
+        ];
+        assert_eq!(k, stiffness);
+        assert!((c - (&m * 0.5 + &k * 0.01)).amax() < 1e-15);
+        let back = relations.unknowns(relations.entries(&p).as_slice());
+        assert!((back - DVector::from_column_slice(&p)).amax() < 1e-12);
+    }
+
+    #[test]
+    fn the_tangent_is_the_derivative_of_the_entries() {
+        let relations = Relations::of(&chain()).unwrap();
+        let p = DVector::from_fn(relations.count(), |at, _| 1.0 + (3.0 * at as f64).sin());
+        let tangent = relations.tangent(p.as_slice());
+        for (at, column) in tangent.column_iter().enumerate() {
+            let moved = |by: f64| {
+                let mut p = p.clone();
+                p[at] += by;
+                relations.entries(p.as_slice())
+            };
+            let difference = (moved(1e-3) - moved(-1e-3)) / 2e-3;
+            assert!((difference - column).amax() < 1e-10);
+        }
+    }
+
+    #[test]
+    fn unrelated_entries_have_no_relations() {
+        assert!(Relations::of(&Unknowns::unknown_mass(2).unwrap()).is_none());
+    }
+}
