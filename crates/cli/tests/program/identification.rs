@@ -381,7 +381,10 @@ fn frequency_responses_are_estimated_and_fitted() {
         assert!(error(&found) < 1e-5, "{estimator}: {found}");
     }
     let (_, text, _) = run(folder, &format!("frf p.csv {common}"));
-    assert!(text.contains("H1 from periods of 256 samples, worth 4 averages; 20 lines"), "{text}");
+    assert!(
+        text.contains("H1 from 4 periods of 256 samples, worth 4 averages; 20 lines"),
+        "{text}"
+    );
     refused(
         folder,
         &format!("frf p.csv {common} --periods 1"),
