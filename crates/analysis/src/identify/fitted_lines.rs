@@ -20,16 +20,16 @@ pub struct FittedLine {
     pub frequency_hz: f64,
     /// Force on each degree of freedom, in N.
     pub force: Vec<[f64; 2]>,
-    /// Measured response of each degree of freedom.
+    /// Measured response of each degree of freedom, in the SI unit of its quantity.
     pub measured: Vec<[f64; 2]>,
     /// Standard error of real and imaginary part alike of each measured response, √(E|ΔX|²/2), in its unit;
     /// `None` where the noise is not known.
     pub measured_standard_error: Option<Vec<f64>>,
-    /// Response of the identified system to the force.
+    /// Response of the identified system to the force, of each degree of freedom, in the same unit.
     pub fitted: Vec<[f64; 2]>,
-    /// Standard error of the fitted response likewise, from that of the parameters, in its unit.
+    /// Standard error of each fitted response likewise, from that of the parameters, in its unit.
     pub fitted_standard_error: Vec<f64>,
-    /// Measured minus fitted response.
+    /// Measured minus fitted response of each degree of freedom, in the same unit.
     pub residual: Vec<[f64; 2]>,
 }
 
