@@ -77,7 +77,7 @@ fn a_row_is_the_identification_of_its_record() {
         assert_eq!(cell.value.to_bits(), parameter.value.to_bits());
         assert_eq!(cell.standard_error, Some(parameter.standard_error));
     }
-    assert_eq!(row.covariance.as_ref(), Some(&found.summary().covariance));
+    assert_eq!(row.covariance, found.summary().covariance);
     assert_eq!(
         row.modes[0].natural_frequency_hz,
         found.summary().modes[0].row.natural_frequency_hz.value

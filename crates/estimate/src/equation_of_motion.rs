@@ -40,7 +40,7 @@ pub struct EquationOfMotion {
 }
 
 /// The unknown columns of an equation of motion: which matrix, which degree of freedom.
-type Columns = Vec<(Matrix, usize)>;
+pub(crate) type Columns = Vec<(Matrix, usize)>;
 
 /// Equations of motion (rows of M, C, K) that have the same unknown columns.
 struct Group {
@@ -189,18 +189,8 @@ impl EquationOfMotion {
     }
 
     fn groups(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<Vec<Group>, EstimateError> {
-        let mut shared: Vec<(Columns, Vec<usize>)> = Vec::new();
-        for equation in 0..self.dof {
-            let parameters = free.iter().filter(|p| p.row() == equation);
-            let columns: Columns = parameters.map(|p| (p.matrix(), p.column())).collect();
-            match shared.iter_mut().find(|(same, _)| *same == columns) {
-                _ if columns.is_empty() => {}
-                Some((_, equations)) => equations.push(equation),
-                None => shared.push((columns, vec![equation])),
-            }
-        }
         let solve = |(columns, equations)| self.group(unknowns, columns, equations);
-        shared.into_iter().map(solve).collect()
+        equations_by_columns(unknowns, free).into_iter().map(solve).collect()
     }
 
     fn group(
@@ -245,6 +235,24 @@ impl EquationOfMotion {
     fn column(&self, matrix: Matrix, dof: usize) -> usize {
         matrix as usize * self.dof + dof
     }
+}
+
+/// The equations of motion, counted from 0, with the same unknown columns: those columns, and the equations.
+pub(crate) fn equations_by_columns(
+    unknowns: &Unknowns,
+    free: &[Parameter],
+) -> Vec<(Columns, Vec<usize>)> {
+    let mut shared: Vec<(Columns, Vec<usize>)> = Vec::new();
+    for equation in 0..unknowns.dof() {
+        let parameters = free.iter().filter(|p| p.row() == equation);
+        let columns: Columns = parameters.map(|p| (p.matrix(), p.column())).collect();
+        match shared.iter_mut().find(|(same, _)| *same == columns) {
+            _ if columns.is_empty() => {}
+            Some((_, equations)) => equations.push(equation),
+            None => shared.push((columns, vec![equation])),
+        }
+    }
+    shared
 }
 
 /// Position of a free parameter among the solutions.

@@ -1,5 +1,6 @@
 //! Arrays in and out: copied in, owned arrays handed out.
 
+use mechid::io::ParameterCovariance;
 use mechid::model::ResponseQuantity;
 use mechid::signal::Record;
 use nalgebra::DMatrix;
@@ -45,4 +46,12 @@ pub fn responses(
 ) -> PyResult<Vec<Named<'_>>> {
     let named = records.into_iter();
     named.map(|(kind, values)| Ok((kind.to_string(), record(py, values)?))).collect()
+}
+
+/// Names of parameters, and their covariance: parameters × parameters.
+pub type Covariance<'py> = (Vec<String>, Bound<'py, PyArray2<f64>>);
+
+/// Returns a covariance with the names of its parameters.
+pub fn covariance<'py>(py: Python<'py>, found: &ParameterCovariance) -> PyResult<Covariance<'py>> {
+    Ok((found.parameters.clone(), matrix(py, found.matrix())?))
 }

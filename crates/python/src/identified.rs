@@ -163,6 +163,11 @@ impl Identified {
         work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
     }
 
+    /// Names of the parameters that were estimated, and their covariance.
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<arrays::Covariance<'py>> {
+        arrays::covariance(py, &self.0.covariance())
+    }
+
     /// The identified system with the covariance of its parameters.
     fn machine(&self, py: Python<'_>) -> PyResult<Machine> {
         work::brief(py, || self.0.machine()).map(Machine)

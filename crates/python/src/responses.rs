@@ -10,7 +10,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 
 use crate::machine::Machine;
-use crate::{answer, failure, work};
+use crate::{answer, arrays, failure, work};
 
 /// A table of frequency responses.
 #[pyclass(frozen, module = "mechid._mechid")]
@@ -126,6 +126,11 @@ impl IdentifiedResponses {
     /// Confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
         work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
+    }
+
+    /// Names of the parameters that were estimated, and their covariance.
+    fn covariance<'py>(&self, py: Python<'py>) -> PyResult<arrays::Covariance<'py>> {
+        arrays::covariance(py, &self.0.covariance())
     }
 
     /// The identified system with the covariance of its parameters.

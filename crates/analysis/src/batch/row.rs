@@ -179,7 +179,7 @@ impl ResultRow {
             first_sample: Some(first_sample),
             last_sample: Some(last_sample),
             parameters: entries.chain(terms).collect(),
-            covariance: Some(identification.covariance.clone()),
+            covariance: identification.covariance.clone(),
             modes: identification.modes.iter().map(|mode| ModeCell::of(&mode.row)).collect(),
             nrmse: Some(nrmse),
             unexplained_motion,

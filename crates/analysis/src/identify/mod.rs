@@ -44,6 +44,7 @@ use std::fmt;
 use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
+use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Extent;
 use serde::{Serialize, Serializer};
@@ -264,6 +265,12 @@ impl Identified {
     pub fn system(&self) -> Result<SecondOrderSystem, AnalysisError> {
         self.check_scale()?;
         Ok(self.fitted.estimate.system()?)
+    }
+
+    /// Returns the covariance of the parameters that were estimated, whatever their number; with nonlinear
+    /// terms, of theirs, too.
+    pub fn covariance(&self) -> ParameterCovariance {
+        summary::covariance(&self.fitted, self.summary.unscaled.as_ref())
     }
 
     fn check_scale(&self) -> Result<(), AnalysisError> {

@@ -256,13 +256,15 @@ pub(super) fn parameters(
 ) -> Result<Vec<ParameterRow>, AnalysisError> {
     let mut rows = Vec::new();
     let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
-    let estimated = |parameter: Parameter| {
-        let at = estimate.parameters().position(|p| p.parameter == parameter);
-        at.and_then(|at| estimate.parameters().nth(at))
-    };
-    for parameter in Unknowns::unknown_mass(estimate.dof())?.free().into_iter().filter(is_given) {
+    // Both in the order of `Unknowns::free`.
+    let mut estimated = estimate.parameters().peekable();
+    for parameter in Unknowns::unknown_mass(estimate.dof())?.free() {
         let (matrix, row, column) = (parameter.matrix(), parameter.row(), parameter.column());
-        let value = match estimated(parameter) {
+        let found = estimated.next_if(|p| p.parameter == parameter);
+        if !is_given(&parameter) {
+            continue;
+        }
+        let value = match found {
             Some(p) => Uncertain::new(p.value, p.standard_error, p.interval(CONFIDENCE)?),
             None => {
                 Uncertain::known(estimate.unknowns().fixed(matrix, row, column).unwrap_or_default())
@@ -283,15 +285,34 @@ pub(super) fn parameters(
 
 /// Returns the covariance of the estimated entries of M, C and K, but for those of equations without scale.
 pub(super) fn covariance(estimate: &Estimate, unscaled: Option<&Unscaled>) -> ParameterCovariance {
-    let all: Vec<Parameter> = estimate.parameters().map(|p| p.parameter).collect();
-    let is_given = |at: &usize| unscaled.is_none_or(|unscaled| !unscaled.hides(all[*at].row()));
-    let given: Vec<usize> = (0..all.len()).filter(is_given).collect();
-    let names = given.iter().map(|at| all[*at].to_string()).collect();
+    let is_given = |p: &Parameter| unscaled.is_none_or(|unscaled| !unscaled.hides(p.row()));
+    let all = estimate.parameters().map(|p| p.parameter).enumerate();
+    let (given, names): (Vec<usize>, Vec<String>) =
+        all.filter(|(_, p)| is_given(p)).map(|(at, p)| (at, p.to_string())).unzip();
     let mut covariance = estimate.covariance();
-    if given.len() < all.len() {
+    if given.len() < covariance.nrows() {
         covariance = covariance.select_rows(&given).select_columns(&given);
     }
     ParameterCovariance::new(names, &covariance, estimate.degrees_of_freedom())
+}
+
+/// Number of parameters up to which a result carries their covariance, whose entries are its square.
+const MOST_WITH_COVARIANCE: usize = 2_000;
+
+/// Returns whether a result carries the covariance of its parameters.
+pub(super) fn carries_covariance(estimate: &Estimate) -> bool {
+    estimate.parameters().len() <= MOST_WITH_COVARIANCE
+}
+
+/// Returns the remark on a covariance that a result does not carry.
+pub(super) fn of_covariance(estimate: &Estimate) -> Option<String> {
+    let count = estimate.parameters().len();
+    (!carries_covariance(estimate)).then(|| {
+        format!(
+            "the covariance of {count} parameters is no part of this result, which carries that of \
+             {MOST_WITH_COVARIANCE} at most: what reads the machine from it takes M, C and K as exactly known"
+        )
+    })
 }
 
 /// Returns the header of a table of estimates.

@@ -78,8 +78,10 @@ pub struct IdentificationSummary {
     /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
-    /// Covariance of the parameters that were estimated, for what is derived from them.
-    pub covariance: ParameterCovariance,
+    /// Covariance of the parameters that were estimated, for what is derived from them; `None` for more than
+    /// 2,000 of them, for which [`Identified::covariance`](super::Identified::covariance) has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<ParameterCovariance>,
     /// The settings, which repeat the analysis.
     pub analysis: Identify,
 }
@@ -130,6 +132,7 @@ impl IdentificationSummary {
         let estimate = &fitted.estimate;
         let system = estimate.system()?;
         let unexplained_motion = fitted.unexplained_motion(&system)?;
+        let carried = rows::carries_covariance(estimate);
         let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
         let mut summary = Self {
             file: hits.first().map_or(&records[0].file, |hit| &hit.record).clone(),
@@ -165,7 +168,7 @@ impl IdentificationSummary {
             validation: None,
             remarks: Vec::new(),
             system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
-            covariance: covariance(fitted, unscaled.as_ref()),
+            covariance: carried.then(|| covariance(fitted, unscaled.as_ref())),
             unscaled,
             analysis: how.clone(),
         };
@@ -184,7 +187,9 @@ impl IdentificationSummary {
             .chain(of_units)
             .chain(fitted.remarks.iter().cloned())
             .chain(looked_at);
-        summary.remarks = remarks.chain(summary.doubts()).chain(of_method).collect();
+        let of_covariance = rows::of_covariance(estimate);
+        summary.remarks =
+            remarks.chain(summary.doubts()).chain(of_method).chain(of_covariance).collect();
         Ok(summary)
     }
 
@@ -365,7 +370,8 @@ pub(crate) fn of_least_squares(fitted: &Fitted, checks: &[CheckRow]) -> Option<S
     })
 }
 
-fn covariance(fitted: &Fitted, unscaled: Option<&Unscaled>) -> ParameterCovariance {
+/// Returns the covariance of the parameters, with nonlinear terms of theirs, too.
+pub(super) fn covariance(fitted: &Fitted, unscaled: Option<&Unscaled>) -> ParameterCovariance {
     let estimate = &fitted.estimate;
     if let Some(all) = &fitted.nonlinear {
         let names = all.estimate.parameters().iter().map(|p| p.name.clone()).collect();

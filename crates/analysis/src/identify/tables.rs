@@ -18,8 +18,8 @@ use serde::{Deserialize, Serialize};
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
 use super::rows::{
-    CONFIDENCE, ParameterRow, ProportionalDamping, covariance, mode_table, parameter_table,
-    parameters,
+    CONFIDENCE, ParameterRow, ProportionalDamping, carries_covariance, covariance, mode_table,
+    of_covariance, parameter_table, parameters,
 };
 use super::summary::{FitRow, verdict};
 use super::{Band, FittedLine, KnownMass, Method, Structure, Unscaled};
@@ -130,9 +130,10 @@ pub fn identify_responses(
             .map(Unscaled::to_string)
             .chain(tables.iter().flat_map(|table| table.remarks.iter().cloned()))
             .chain(fit.misfit.map(|misfit| misfit.to_string()))
+            .chain(of_covariance(estimate))
             .collect(),
         system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
-        covariance: covariance(estimate, unscaled.as_ref()),
+        covariance: carries_covariance(estimate).then(|| covariance(estimate, unscaled.as_ref())),
         unscaled,
         analysis: how.clone(),
     };
@@ -188,8 +189,10 @@ pub struct ResponseSummary {
     /// M, C and K, as `mechid force --system` and others read them back; `None` where equations have no scale.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
-    /// Covariance of the parameters that were estimated, for what is derived from them.
-    pub covariance: ParameterCovariance,
+    /// Covariance of the parameters that were estimated, for what is derived from them; `None` for more than
+    /// 2,000 of them, for which [`IdentifiedResponses::covariance`] has it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<ParameterCovariance>,
     /// The settings, which repeat the analysis.
     pub analysis: IdentifyResponses,
 }
@@ -224,6 +227,11 @@ impl IdentifiedResponses {
 
     fn check_scale(&self) -> Result<(), AnalysisError> {
         Unscaled::check(self.summary.unscaled.as_ref())
+    }
+
+    /// Returns the covariance of the parameters that were estimated, whatever their number.
+    pub fn covariance(&self) -> ParameterCovariance {
+        covariance(&self.estimate, self.summary.unscaled.as_ref())
     }
 
     /// Returns the frequency responses that were fitted: unit forces and displacements, with the noise

@@ -8,7 +8,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::MAX_SAMPLES;
 use super::finding::Finding;
 use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
-use crate::frequency_domain::{FrequencyData, late_rows, output_error};
+use crate::frequency_domain::{FrequencyData, LateForce, output_error};
 use crate::time_domain::{TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -40,10 +40,8 @@ const PREFERRED: f64 = 0.99;
 /// Ours: least squares on the equation of motion with the force turned by e^(−iωτ).
 pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Option<Finding> {
     let driven = driven(&data.force().map(|f| f.norm()));
-    let power = |samples: f64| {
-        let estimate = late_rows(data, samples * dt).ok()?.solve(unknowns).ok()?;
-        residual_power(&estimate, &driven)
-    };
+    let equations = LateForce::new(data, unknowns, &driven)?;
+    let power = |samples: f64| equations.residual_power(samples * dt);
     let undelayed = power(0.0)?;
     let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
     let longest = longest(undelayed, &driven) * STEPS_PER_SAMPLE;

@@ -105,18 +105,25 @@ struct Linearised {
 }
 
 impl Linearised {
-    /// Makes the problem, with an empty basis unless the problem is `small`.
-    fn of(weighted: Vec<Whitened>, small: bool) -> Option<Self> {
-        let basis = match small {
-            true => orthonormal_basis(&weighted)?,
-            false => DMatrix::zeros(weighted.first()?.sensitivity.ncols(), 0),
-        };
+    fn of(weighted: Vec<Whitened>) -> Option<Self> {
+        let basis = orthonormal_basis(&weighted)?;
         let explained: Vec<DMatrix<f64>> =
             weighted.iter().map(|record| &record.sensitivity * &basis).collect();
         let products = explained.iter().zip(&weighted).map(|(q, w)| q.tr_mul(&w.residual));
         let coefficients =
             products.fold(DVector::zeros(basis.ncols()), |sum, product| sum + product);
         Some(Self { weighted, basis, explained, coefficients })
+    }
+
+    /// Residuals of which the parameters are taken to explain nothing.
+    fn without_sensitivity(weighted: Vec<Whitened>, parameters: usize) -> Self {
+        let nothing = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
+        Self {
+            explained: weighted.iter().map(nothing).collect(),
+            weighted,
+            basis: DMatrix::zeros(parameters, 0),
+            coefficients: DVector::zeros(0),
+        }
     }
 
     fn power(&self) -> f64 {
@@ -150,17 +157,6 @@ impl WeightedFit {
             records.iter().map(FrequencyData::noise_above_rounding).collect();
         let levels = levels(records, estimate)?;
         let relations = Relations::of(estimate.unknowns());
-        let weighted = |values: &DVector<f64>| -> Option<Vec<Whitened>> {
-            let entries = relations.as_ref().map(|relations| relations.entries(values.as_slice()));
-            let values = entries.as_ref().unwrap_or(values);
-            let one = |(at, data): (usize, &FrequencyData)| {
-                Whitened::of(data, estimate.unknowns(), values, |row| match &noise {
-                    Some(noise) => noise[at].covariance(row).clone(),
-                    None => white_covariance(data, row, &levels),
-                })
-            };
-            records.iter().enumerate().map(one).collect()
-        };
         let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
         let start = match &relations {
             None => DVector::from_column_slice(&entries),
@@ -169,8 +165,27 @@ impl WeightedFit {
         let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
         let sensitivities = rows * start.len();
         let small = sensitivities <= SENSITIVITIES && sensitivities * start.len() <= PRODUCTS;
+        let linearised = |values: &DVector<f64>| -> Option<Linearised> {
+            let entries = relations.as_ref().map(|relations| relations.entries(values.as_slice()));
+            let (entries, unknowns) = (entries.as_ref().unwrap_or(values), estimate.unknowns());
+            let one = |(at, data): (usize, &FrequencyData)| {
+                let covariance = |row: usize| match &noise {
+                    Some(noise) => noise[at].covariance(row).clone(),
+                    None => white_covariance(data, row, &levels),
+                };
+                match small {
+                    true => Whitened::of(data, unknowns, entries, covariance),
+                    false => Whitened::residual_of(data, unknowns, entries, covariance),
+                }
+            };
+            let weighted = records.iter().enumerate().map(one).collect::<Option<_>>()?;
+            match small {
+                true => Linearised::of(weighted),
+                false => Some(Linearised::without_sensitivity(weighted, values.len())),
+            }
+        };
         let mut values = start.clone();
-        let mut linear = Linearised::of(weighted(&values)?, small)?;
+        let mut linear = linearised(&values)?;
         for _ in 0..STEPS {
             let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
             if linear.coefficients.norm_squared() <= SETTLED * unit {
@@ -179,7 +194,7 @@ impl WeightedFit {
             // Half a step where a whole one goes too far.
             let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
                 let values = &values + linear.step() * *length;
-                let next = Linearised::of(weighted(&values)?, small)?;
+                let next = linearised(&values)?;
                 (next.power() < linear.power()).then_some((values, next))
             });
             let Some(next) = next else { break };

@@ -77,13 +77,19 @@ pub(super) fn weighted_equation_errors<'a>(
 
 /// The rows of [`equation_error`] with the force `delay` seconds later; where noise is stated, of
 /// clear lines, weighted by it.
-pub(crate) fn late_rows(
+pub(super) fn late_rows(
     data: &FrequencyData,
     delay: f64,
 ) -> Result<EquationOfMotion, EstimateError> {
+    let weight = late_weight(data);
+    weighted_rows(data, delay, |row| weight[row])
+}
+
+/// The weight of each row of [`late_rows`].
+pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, CLEAR) {
-        Some(weight) => weighted_rows(data, delay, weight),
-        None => weighted_rows(data, delay, |_| 1.0),
+        Some(weight) => (0..data.len()).map(weight).collect(),
+        None => vec![1.0; data.len()],
     }
 }
 
@@ -112,22 +118,31 @@ fn weighted_rows(
     if data.force().iter().all(|f| *f == Complex::default()) {
         return Err(EstimateError::NoExcitedLine);
     }
-    let s = |row: usize| Complex::new(0.0, data.omega()[row]);
     let late = |row: usize| Complex::cis(-data.omega()[row] * delay);
     let weight: Vec<f64> = (0..data.len()).map(weight).collect();
-    let x = data.displacement();
-    let velocity = real_rows(x, |row, x| s(row) * x * weight[row]);
-    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight[row]);
-    let displacement = real_rows(x, |row, x| x * weight[row]);
+    let (n, motions) = (data.dof(), motions(data, &weight));
     let force = real_rows(data.force(), |row, f| f * late(row) * weight[row]);
-    let mut rows = EquationOfMotion::new(data.dof());
+    let mut rows = EquationOfMotion::new(n);
     rows.push_rows(
-        acceleration.as_view(),
-        velocity.as_view(),
-        displacement.as_view(),
+        motions.columns(0, n),
+        motions.columns(n, n),
+        motions.columns(2 * n, n),
         force.as_view(),
     )?;
     Ok(rows)
+}
+
+/// Acceleration, velocity and displacement of every degree of freedom, side by side, with a weight on each
+/// line.
+pub(super) fn motions(data: &FrequencyData, weight: &[f64]) -> DMatrix<f64> {
+    let (n, x) = (data.dof(), data.displacement());
+    let s = |row: usize| Complex::new(0.0, data.omega()[row]);
+    let mut motions = DMatrix::zeros(2 * data.len(), 3 * n);
+    let acceleration = real_rows(x, |row, x| s(row) * s(row) * x * weight[row]);
+    motions.columns_mut(0, n).copy_from(&acceleration);
+    motions.columns_mut(n, n).copy_from(&real_rows(x, |row, x| s(row) * x * weight[row]));
+    motions.columns_mut(2 * n, n).copy_from(&real_rows(x, |row, x| x * weight[row]));
+    motions
 }
 
 /// The real parts of all rows, then the imaginary parts.

@@ -46,6 +46,7 @@ mod data;
 mod ends;
 mod equation_error;
 mod instrumental;
+mod late_force;
 mod likelihood_ratio;
 mod lines;
 mod misfit;
@@ -61,9 +62,9 @@ mod weight_uncertainty;
 mod whitened;
 
 pub use data::FrequencyData;
-pub(crate) use equation_error::late_rows;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
+pub(crate) use late_force::LateForce;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
 pub use lines::Lines;
 pub(crate) use lines::check_sampling;

@@ -35,23 +35,45 @@ impl Whitened {
         values: &DVector<f64>,
         covariance: impl Fn(usize) -> ComplexMatrix,
     ) -> Option<Self> {
-        let (n, free) = (data.dof(), unknowns.free());
+        let mut whitened =
+            Self::sensitive_to(&unknowns.free(), data, unknowns, values, covariance)?;
+        if let Some(relations) = Relations::of(unknowns) {
+            let independent = relations.unknowns(values.as_slice());
+            whitened.sensitivity *= relations.tangent(independent.as_slice());
+        }
+        Some(whitened)
+    }
+
+    /// The same without any sensitivity, which takes residuals × parameters numbers.
+    pub fn residual_of(
+        data: &FrequencyData,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+        covariance: impl Fn(usize) -> ComplexMatrix,
+    ) -> Option<Self> {
+        Self::sensitive_to(&[], data, unknowns, values, covariance)
+    }
+
+    fn sensitive_to(
+        parameters: &[Parameter],
+        data: &FrequencyData,
+        unknowns: &Unknowns,
+        values: &DVector<f64>,
+        covariance: impl Fn(usize) -> ComplexMatrix,
+    ) -> Option<Self> {
+        let n = data.dof();
         let [mass, damping, stiffness] = unknowns.assemble(values.as_slice());
         let system = SecondOrderSystem::new(mass, damping, stiffness).ok()?;
         let mut residual = DVector::zeros(2 * n * data.len());
-        let mut sensitivity = DMatrix::zeros(residual.len(), free.len());
+        let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());
         for (row, &omega) in data.omega().iter().enumerate() {
             let line = Line::of(&system, data, row, &covariance(row))?;
             let at = 2 * n * row..2 * n * (row + 1);
             write_real(&line.residual, &mut residual.as_mut_slice()[at.clone()]);
-            for (parameter, mut column) in free.iter().zip(sensitivity.column_iter_mut()) {
+            for (parameter, mut column) in parameters.iter().zip(sensitivity.column_iter_mut()) {
                 let derivative = line.derivative(parameter, omega);
                 write_real(&derivative, &mut column.as_mut_slice()[at.clone()]);
             }
-        }
-        if let Some(relations) = Relations::of(unknowns) {
-            let independent = relations.unknowns(values.as_slice());
-            sensitivity *= relations.tangent(independent.as_slice());
         }
         let finite = residual.iter().chain(sensitivity.iter()).all(|value| value.is_finite());
         finite.then_some(Self { residual, sensitivity })

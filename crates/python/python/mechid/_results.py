@@ -335,13 +335,18 @@ class Estimated(Drawn):
     @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of the estimated parameters, in the order of `estimated`."""
-        count = len(self.estimated)
-        return _array(self._told["covariance"]["matrix"]).reshape(count, count)
+        return self._covariance[1]
 
     @property
     def estimated(self) -> tuple[str, ...]:
         """Names of the parameters that were not given, in the order of `covariance`."""
-        return tuple(self._told["covariance"]["parameters"])
+        return tuple(self._covariance[0])
+
+    @cached_property
+    def _covariance(self) -> tuple[list[str], NDArray[np.float64]]:
+        names, covariance = self._inner.covariance()
+        covariance.flags.writeable = False
+        return names, covariance
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
