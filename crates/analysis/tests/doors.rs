@@ -7,9 +7,10 @@ use mechid_analysis::{
     AnalysisError, Channels, FrfSettings, Identify, Machine, Measurement, Reading, Reconstruct,
     RecordPlan, ResponseQuantity, SweepSettings, Window, frf, identify, reconstruct, sweep_record,
 };
-use mechid_model::Sdof;
+use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
-use mechid_signal::{Multisine, Phases, Record, Sampling, lines, noise};
+use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, lines, noise};
+use nalgebra::DMatrix;
 
 const PERIOD: usize = 128;
 
@@ -253,5 +254,41 @@ fn a_response_equal_to_the_force_is_no_panic() {
                 }
             }
         }
+    }
+}
+
+/// A grounded chain of 26 masses, a force on each: 2,028 parameters, whose covariance has four million entries.
+#[test]
+fn the_covariance_of_very_many_parameters_is_there_for_those_who_ask() {
+    let n = 26;
+    let identity = DMatrix::identity(n, n);
+    let stiffness = DMatrix::from_fn(n, n, |i, j| match i.abs_diff(j) {
+        0 => 2500.0,
+        1 => -1000.0,
+        _ => 0.0,
+    });
+    let damping = &stiffness * 2e-3;
+    let system = SecondOrderSystem::new(identity, damping, stiffness).unwrap();
+    let period = Sampling::from_rate_hz(64.0, 256).unwrap();
+    let force: Vec<Vec<f64>> = (0..n as u64)
+        .map(|seed| {
+            let lines = Multisine::flat(2..=80, 1.0, Phases::Random { seed }).unwrap();
+            lines.sample(period).unwrap().channel(0).to_vec()
+        })
+        .collect();
+    let force = Record::from_channels(period, &force).unwrap();
+    let exact = exact_harmonic_periodic(&system, &force).unwrap();
+    let noisy = noise::add_white(exact.displacement(), NoiseLevel::FractionOfRms(1e-4), 1).unwrap();
+    let responses = [(ResponseQuantity::Displacement, &noisy)];
+    let test = Measurement::from_records(&force, &responses).unwrap().period(256).unwrap();
+    let found = identify(&[test], &Identify::spectra(Method::LeastSquares)).unwrap();
+    assert!(found.summary().covariance.is_none());
+    let told = found.summary().remarks.iter().any(|remark| remark.contains("2028 parameters"));
+    assert!(told && found.summary().system.is_some(), "{found}");
+    let covariance = found.covariance();
+    let (matrix, parameters) = (covariance.matrix(), found.estimate().parameters());
+    assert_eq!((covariance.parameters.len(), matrix.ncols()), (2028, 2028));
+    for (at, parameter) in parameters.enumerate() {
+        assert!((matrix[(at, at)].sqrt() / parameter.standard_error - 1.0).abs() < 1e-9);
     }
 }

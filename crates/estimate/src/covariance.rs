@@ -86,12 +86,18 @@ impl Covariance {
         let parts = || weights.iter().map(|w| [w.re, w.im]).zip(equations).enumerate();
         match self {
             Self::Full(all) => {
+                let mut columns = DMatrix::zeros(all.nrows(), 2 * n);
+                for (p, (weight, equation)) in parts() {
+                    for (a, weight) in weight.into_iter().enumerate() {
+                        columns.column_mut(a * n + equation).axpy(weight, &all.column(p), 1.0);
+                    }
+                }
                 let mut sums = DMatrix::zeros(2 * n, 2 * n);
-                for (q, (right, j)) in parts() {
-                    for (p, (left, i)) in parts() {
-                        for (a, b) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                            sums[(a * n + i, b * n + j)] += left[a] * right[b] * all[(p, q)];
-                        }
+                let by_parameter = columns.transpose();
+                for (p, (weight, equation)) in parts() {
+                    for (a, weight) in weight.into_iter().enumerate() {
+                        let column = by_parameter.column(p);
+                        sums.column_mut(a * n + equation).axpy(weight, &column, 1.0);
                     }
                 }
                 sums

@@ -102,7 +102,7 @@ pub enum Residual {
     /// Samples.
     Samples(SampleResidual),
     /// Lines of a spectrum, weighted by their noise.
-    Lines(SpectralResidual),
+    Lines(Box<SpectralResidual>),
 }
 
 /// Residual of a fit sample by sample.

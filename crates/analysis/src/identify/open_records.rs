@@ -112,7 +112,7 @@ pub(super) fn fit(
         before: vec![Vec::new(); records.len()],
         after,
         after_all: Vec::from_iter(bias),
-        residuals: residuals.into_iter().map(Residual::Lines).collect(),
+        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         prediction: Prediction::Sampled {
             discretisation: Discretisation::FirstOrderHold,
             extent: Extent::Open,

@@ -71,7 +71,7 @@ pub(super) fn fit(
         before,
         after,
         after_all: Vec::from_iter(bias),
-        residuals: residuals.into_iter().map(Residual::Lines).collect(),
+        residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         prediction: Prediction::Steady,
         misfit,
         noise: models,

@@ -146,6 +146,10 @@ pub struct SpectralResidual {
     values: DVector<f64>,
     /// Q of the covariance I − QQᵀ of the values.
     explained: DMatrix<f64>,
+    /// Standard deviation of every residual before the parameters were fitted, from its own size.
+    deviations: DVector<f64>,
+    /// QᵀΣQ with the squares Σ of those deviations.
+    explained_spread: DMatrix<f64>,
     rounding: bool,
     /// Few lines that hold the misfit of all records.
     concentration: Option<Concentration>,
@@ -207,13 +211,23 @@ impl WeightedFit {
         };
         let Linearised { weighted, explained, coefficients, .. } = linear;
         let residuals = records.iter().zip(weighted).zip(explained);
-        let residuals = residuals.map(|((data, weighted), explained)| SpectralResidual {
-            data: data.clone(),
-            noise_stated: noise.is_some(),
-            values: weighted.residual - &explained * &coefficients,
-            explained,
-            rounding: is_rounding(data, &levels),
-            concentration: None,
+        let residuals = residuals.map(|((data, weighted), explained)| {
+            let values = weighted.residual - &explained * &coefficients;
+            let deviations = deviations(&values, &explained);
+            let mut spread = explained.clone();
+            for mut column in spread.column_iter_mut() {
+                column.component_mul_assign(&deviations);
+            }
+            SpectralResidual {
+                data: data.clone(),
+                noise_stated: noise.is_some(),
+                explained_spread: spread.transpose() * &spread,
+                deviations,
+                values,
+                explained,
+                rounding: is_rounding(data, &levels),
+                concentration: None,
+            }
         });
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
@@ -403,7 +417,7 @@ impl SpectralResidual {
             let square = n * each * (n * each + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
             (groups * mean, groups * (square - mean * mean))
         };
-        let gram = self.explained.tr_mul(&self.explained);
+        let gram = self.explained.transpose() * &self.explained;
         let all = self.values.len() as f64;
         let free = (all - gram.trace()) / all;
         let spread = (all - 2.0 * gram.trace() + gram.norm_squared()) / all;
@@ -541,38 +555,33 @@ impl SpectralResidual {
     /// Covariance A P Σ P Aᵀ of weighted sums A over the `own` rows, with P = I − QQᵀ and the variances
     /// Σ that the residuals show themselves.
     fn covariance(&self, weights: &DMatrix<f64>, places: &[usize]) -> Option<DMatrix<f64>> {
-        let deviations = self.deviations();
-        let scaled = |mut matrix: DMatrix<f64>, rows: &[usize]| {
-            for (mut column, row) in matrix.column_iter_mut().zip(rows) {
-                column *= deviations[*row];
+        let scaled = |mut matrix: DMatrix<f64>| {
+            for (mut column, row) in matrix.column_iter_mut().zip(places) {
+                column *= self.deviations[*row];
             }
             matrix
         };
-        let explained = &self.explained;
-        let all: Vec<usize> = (0..self.values.len()).collect();
-        let explained_here = explained.select_rows(places);
-        let loads = weights * &explained_here;
-        let white = scaled(weights.clone(), places);
-        let spread = scaled(explained.transpose(), &all);
-        let cross =
-            &white * scaled(explained_here.transpose(), places).transpose() * loads.transpose();
-        let inner = &loads * (&spread * spread.transpose()) * loads.transpose();
+        let explained = self.explained.select_rows(places);
+        let loads = weights * &explained;
+        let white = scaled(weights.clone());
+        let cross = &white * scaled(explained.transpose()).transpose() * loads.transpose();
+        let inner = &loads * &self.explained_spread * loads.transpose();
         let covariance = &white * white.transpose() - &cross - cross.transpose() + inner;
         (covariance.trace() > 0.0).then_some(covariance)
     }
+}
 
-    /// Standard deviation of every residual before the parameters were fitted, from its own size.
-    fn deviations(&self) -> DVector<f64> {
-        let leverage = |row: usize| self.explained.row(row).norm_squared();
-        let mut deviations = DVector::zeros(self.values.len());
-        for row in (0..self.values.len()).step_by(2) {
-            let power = self.values[row].powi(2) + self.values[row + 1].powi(2);
-            let free = (2.0 - leverage(row) - leverage(row + 1)).max(0.5);
-            deviations[row] = (power / free).sqrt();
-            deviations[row + 1] = deviations[row];
-        }
-        deviations
+/// Standard deviation of every residual before the parameters were fitted, from its own size.
+fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
+    let leverage = |row: usize| explained.row(row).norm_squared();
+    let mut deviations = DVector::zeros(values.len());
+    for row in (0..values.len()).step_by(2) {
+        let power = values[row].powi(2) + values[row + 1].powi(2);
+        let free = (2.0 - leverage(row) - leverage(row + 1)).max(0.5);
+        deviations[row] = (power / free).sqrt();
+        deviations[row + 1] = deviations[row];
     }
+    deviations
 }
 
 /// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the

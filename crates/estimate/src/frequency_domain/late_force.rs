@@ -1,31 +1,31 @@
 //! The equations of motion of spectra with the force some time later.
 
 use mechid_model::Matrix;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVectorView};
 
 use super::FrequencyData;
 use super::equation_error::{late_rows, late_weight, motions, real_rows};
 use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};
+use crate::relations::Relations;
 
 /// How well equations of motion fit the lines of spectra, whatever the delay of the force.
 ///
 /// A delay turns the forces alone: the motions with unknown entries are factored once.
 pub(crate) struct LateForce<'a> {
     data: &'a FrequencyData,
-    unknowns: &'a Unknowns,
-    /// Degrees of freedom on which a force acts.
-    driven: &'a [usize],
     /// Weight of each line.
     weight: Vec<f64>,
-    /// `None` where the equations are solved together, which leaves no factors to keep.
-    groups: Option<Vec<Group>>,
+    /// Number of degrees of freedom on which a force acts.
+    driven: usize,
+    groups: Vec<Group>,
 }
 
-/// Driven equations that have the same unknown columns.
+/// Equations that are fitted by the same columns, or all of them together where entries are related.
 struct Group {
     equations: Vec<usize>,
-    /// Orthonormal columns that span the motions with unknown entries, and their transpose.
+    /// Orthonormal columns that span the motions with unknown entries, and their transpose; of equations
+    /// that are fitted together, one below the other.
     q: DMatrix<f64>,
     q_transposed: DMatrix<f64>,
     /// Force that the known entries account for, rows × equations.
@@ -33,77 +33,125 @@ struct Group {
 }
 
 impl<'a> LateForce<'a> {
-    /// `None` if the data leave an entry open, as they do with any delay.
-    pub fn new(
-        data: &'a FrequencyData,
-        unknowns: &'a Unknowns,
-        driven: &'a [usize],
-    ) -> Option<Self> {
+    /// `None` if the data leave an entry open, as they do with any delay. A force acts on the degrees of
+    /// freedom `driven`, counted from 0.
+    pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
         let undelayed = late_rows(data, 0.0).ok()?.solve(unknowns).ok()?;
         if !undelayed.undetermined().is_empty() {
             return None;
         }
         let weight = late_weight(data);
-        let groups = (!unknowns.is_related()).then(|| {
-            let motions = motions(data, &weight);
-            let group = |(columns, equations): (Columns, Vec<usize>)| {
-                let equations: Vec<usize> =
-                    equations.into_iter().filter(|equation| driven.contains(equation)).collect();
-                (!equations.is_empty()).then(|| Group::new(&motions, unknowns, &columns, equations))
-            };
-            equations_by_columns(unknowns, &unknowns.free()).into_iter().filter_map(group).collect()
-        });
-        Some(Self { data, unknowns, driven, weight, groups })
+        let motions = motions(data, &weight);
+        let groups = match Relations::linear(unknowns) {
+            Some(relations) => vec![Group::together(&motions, unknowns, &relations)],
+            None => {
+                let shared = equations_by_columns(unknowns, &unknowns.free()).into_iter();
+                let group = |(columns, mut equations): (Columns, Vec<usize>)| {
+                    equations.retain(|equation| driven.contains(equation));
+                    let q = || motions.select_columns(&places(unknowns.dof(), &columns)).qr().q();
+                    (!equations.is_empty()).then(|| Group::new(q(), &motions, unknowns, equations))
+                };
+                shared.filter_map(group).collect()
+            }
+        };
+        Some(Self { data, weight, driven: driven.len(), groups })
     }
 
     /// Residual power of the driven equations, each over the power of its right-hand side, with the force
-    /// `delay` (s) later. `None` if there is no solution.
+    /// `delay` (s) later; of related equations that of all of them, times the number of forces. `None` if it
+    /// is not finite.
     pub fn residual_power(&self, delay: f64) -> Option<f64> {
-        let power = match &self.groups {
-            Some(groups) => {
-                let late = |row: usize| Complex::cis(-self.data.omega()[row] * delay);
-                let force = real_rows(self.data.force(), |row, f| f * late(row) * self.weight[row]);
-                groups.iter().map(|group| group.residual_power(&force)).sum()
-            }
-            None => {
-                let estimate = late_rows(self.data, delay).ok()?.solve(self.unknowns).ok()?;
-                let powers = self.driven.iter().map(|dof| estimate.residual_nrmse()[*dof].powi(2));
-                powers.sum::<f64>()
-            }
-        };
-        power.is_finite().then_some(power)
+        let late = |row: usize| Complex::cis(-self.data.omega()[row] * delay);
+        let force = real_rows(self.data.force(), |row, f| f * late(row) * self.weight[row]);
+        let powers = self.groups.iter().map(|group| group.residual_power(&force, self.driven));
+        Some(powers.sum()).filter(|power: &f64| power.is_finite())
     }
+}
+
+/// Columns of the motions, by matrix and degree of freedom.
+fn places(dof: usize, columns: &Columns) -> Vec<usize> {
+    columns.iter().map(|(matrix, column)| *matrix as usize * dof + column).collect()
 }
 
 impl Group {
     fn new(
+        q: DMatrix<f64>,
         motions: &DMatrix<f64>,
         unknowns: &Unknowns,
-        columns: &Columns,
         equations: Vec<usize>,
     ) -> Self {
         let dof = unknowns.dof();
-        let place = |matrix: Matrix, column: usize| matrix as usize * dof + column;
-        let free: Vec<usize> = columns.iter().map(|(matrix, at)| place(*matrix, *at)).collect();
-        let q = motions.select_columns(&free).qr().q();
+        let entries =
+            || Matrix::ALL.into_iter().flat_map(|matrix| (0..dof).map(move |j| (matrix, j)));
         let mut known = DMatrix::zeros(motions.nrows(), equations.len());
         for (mut sum, equation) in known.column_iter_mut().zip(&equations) {
-            for (matrix, column) in
-                Matrix::ALL.into_iter().flat_map(|matrix| (0..dof).map(move |at| (matrix, at)))
-            {
+            for (place, (matrix, column)) in entries().enumerate() {
                 let value = unknowns.fixed(matrix, *equation, column).unwrap_or(0.0);
                 if value != 0.0 {
-                    sum.axpy(value, &motions.column(place(matrix, column)), 1.0);
+                    sum.axpy(value, &motions.column(place), 1.0);
                 }
             }
         }
         Self { equations, q_transposed: q.transpose(), q, known }
     }
 
-    fn residual_power(&self, force: &DMatrix<f64>) -> f64 {
-        let targets = force.select_columns(&self.equations) - &self.known;
+    /// All equations, with entries that are the same unknown.
+    fn together(motions: &DMatrix<f64>, unknowns: &Unknowns, relations: &Relations) -> Self {
+        let (dof, rows) = (unknowns.dof(), motions.nrows());
+        let mut regressors = DMatrix::zeros(rows * dof, relations.count());
+        for (entry, p) in unknowns.free().iter().enumerate() {
+            let motion = motions.column(p.matrix() as usize * dof + p.column());
+            let mut column = regressors.column_mut(relations.shared(entry));
+            column.rows_mut(rows * p.row(), rows).axpy(1.0, &motion, 1.0);
+        }
+        Self::new(regressors.qr().q(), motions, unknowns, (0..dof).collect())
+    }
+
+    fn residual_power(&self, force: &DMatrix<f64>, driven: usize) -> f64 {
+        let mut targets = force.select_columns(&self.equations) - &self.known;
+        let together = self.q.nrows() > targets.nrows();
+        if together {
+            targets = DMatrix::from_column_slice(targets.len(), 1, targets.as_slice());
+        }
         let residuals = &targets - &self.q * (&self.q_transposed * &targets);
         let both = residuals.column_iter().zip(targets.column_iter());
-        both.map(|(e, b)| if e.norm() == 0.0 { 0.0 } else { (e.norm() / b.norm()).powi(2) }).sum()
+        let power = |(e, b): (DVectorView<'_, f64>, DVectorView<'_, f64>)| {
+            if e.norm() == 0.0 { 0.0 } else { (e.norm() / b.norm()).powi(2) }
+        };
+        both.map(power).sum::<f64>() * if together { driven as f64 } else { 1.0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::{Matrix, ResponseQuantity};
+
+    use super::*;
+
+    /// The power is that of a solution of the equations, whatever is known and how late the force is.
+    #[test]
+    fn the_power_is_that_of_a_fit_with_the_delay() {
+        let lines = 12;
+        let number = |scale: f64, row: usize, column: usize| {
+            let phase = (7 * row + 3 * column + 1) as f64;
+            Complex::new((scale * phase).sin(), (1.7 * scale * phase).cos())
+        };
+        let omega: Vec<f64> = (1..=lines).map(|line| 2.0 * line as f64).collect();
+        let force = DMatrix::from_fn(lines, 2, |row, column| number(1.3, row, column));
+        let motion = DMatrix::from_fn(lines, 2, |row, column| number(0.9, row, column));
+        let quantity = ResponseQuantity::Displacement;
+        let data = FrequencyData::from_amplitudes(omega, force, motion, quantity).unwrap();
+        let free = Unknowns::unknown_mass(2).unwrap();
+        let some = free.clone().fix(Matrix::Damping, 0, 1, 0.7).unwrap();
+        let known = Unknowns::known_mass(&DMatrix::from_diagonal_element(2, 2, 3.0)).unwrap();
+        for unknowns in [free, some, known] {
+            let late = LateForce::new(&data, &unknowns, &[0, 1]).unwrap();
+            for delay in [0.0, 0.03, -0.2] {
+                let fit = late_rows(&data, delay).unwrap().solve(&unknowns).unwrap();
+                let power: f64 = fit.residual_nrmse().iter().map(|ratio| ratio * ratio).sum();
+                let found = late.residual_power(delay).unwrap();
+                assert!((found - power).abs() < 1e-12 * power, "{found} {power}");
+            }
+        }
     }
 }

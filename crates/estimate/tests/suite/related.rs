@@ -1,5 +1,6 @@
 //! Symmetric matrices, chains and proportional damping: fewer unknowns than entries.
 
+use mechid_estimate::checks::{Finding, delay_of_lines};
 use mechid_estimate::frequency_domain::{
     FrequencyData, NoiseSpectrum, equation_error, instrumental_variables, output_error,
 };
@@ -122,6 +123,35 @@ fn one_force_determines_a_chain_of_unknown_masses() {
     let all = Unknowns::unknown_mass(8).unwrap();
     let refused = equation_error(&data, &all).unwrap_err();
     assert!(matches!(refused, EstimateError::OnlyRatios { dof: 2, .. }), "{refused}");
+}
+
+/// Half a sample of delay is found with one force on five masses, and none where there is none.
+#[test]
+fn a_delay_of_the_force_on_a_chain_is_found() {
+    let system = chain(5);
+    let omega = omega(&system, 60);
+    let dt = std::f64::consts::PI / (2.0 * omega[59]);
+    let turned = |data: &FrequencyData, delay: f64| {
+        let late = |line: usize| Complex::cis(-omega[line] * delay);
+        let displacement = data.displacement();
+        let displacement = DMatrix::from_fn(60, 5, |l, k| displacement[(l, k)] * late(l));
+        let (force, quantity) = (data.force().clone(), ResponseQuantity::Displacement);
+        let turned = FrequencyData::from_amplitudes(omega.clone(), force, displacement, quantity);
+        turned.and_then(|turned| turned.with_noise(data.noise().unwrap().clone())).unwrap()
+    };
+    for proportional in [false, true] {
+        let unknowns = unknowns(5, proportional);
+        for seed in 0..20 {
+            let data = measured(&system, &omega, 0.003, seed);
+            assert_eq!(delay_of_lines(&data, dt, &unknowns), None, "seed {seed}");
+        }
+        for (seed, samples) in (0..).zip([0.5, -1.3, 4.0]) {
+            let data = turned(&measured(&system, &omega, 0.003, seed), samples * dt);
+            let found = delay_of_lines(&data, dt, &unknowns).unwrap();
+            let Finding::Delay { samples: told, .. } = found else { panic!("{found}") };
+            assert!((told - samples).abs() < 0.1, "{told} for {samples}");
+        }
+    }
 }
 
 /// Standard errors of the entries at the Cramér–Rao bound, by differences of exact responses.
