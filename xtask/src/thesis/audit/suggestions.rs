@@ -132,7 +132,7 @@ fn experiment() -> Vec<String> {
         "Validation on a real machine.",
         format!(
             "`mechid::io` reads measured records and the program's `identify` works on them, with \
-             intervals and checks of the fit; `crates/estimate/tests/silverbox.rs` runs on a public \
+             intervals and checks of the fit; `crates/estimate/tests/suite/silverbox.rs` runs on a public \
              measured benchmark where its data are present. The bearing itself has not been \
              measured: the {} and other motions here are computed.",
             Newmark.name()

@@ -1,6 +1,5 @@
 //! Many records by one analysis: rows judged by single identifications, and parts that are neither
 //! lost nor made twice.
-#![cfg(feature = "parquet")]
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,0 +1,18 @@
+//! The analysis as a caller in Rust meets it, judged by closed forms and seeded experiments.
+//!
+//! One program of many modules: each test program of its own would compile and link all crates below anew.
+
+mod bearing;
+mod decay;
+mod doors;
+mod error_rate;
+#[cfg(feature = "parquet")]
+mod fleet;
+mod hammer;
+mod headlines;
+mod modal;
+mod nonlinear;
+mod random;
+mod rig;
+mod tables;
+mod unscaled;
