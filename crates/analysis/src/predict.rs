@@ -60,6 +60,8 @@ pub struct PredictionError {
     pub quantity: ResponseQuantity,
     /// Degree of freedom, counted from 1.
     pub degree_of_freedom: usize,
+    /// Name of the channel.
+    pub name: String,
     /// SI unit.
     pub unit: &'static str,
     /// RMS of measured minus predicted, in this unit.
@@ -104,7 +106,9 @@ pub fn predict(
         let columns = measured.channels().response(kind);
         for dof in (0..dofs).filter(|dof| columns.get(*dof).is_some_and(|c| c != ABSENT)) {
             let (x, p) = (seen.channel(dof), channels(&response, kind).channel(dof));
-            errors.push(PredictionError::of(kind, dof, &x[settle..], &p[settle..], steady));
+            let name = block.names.response_name(kind, dof);
+            let (x, p) = (&x[settle..], &p[settle..]);
+            errors.push(PredictionError::of((name, kind, dof), x, p, steady));
         }
     }
     let summary = PredictionSummary {
@@ -187,8 +191,7 @@ fn steady_from_rest(
 
 impl PredictionError {
     fn of(
-        quantity: ResponseQuantity,
-        dof: usize,
+        (name, quantity, dof): (String, ResponseQuantity, usize),
         measured: &[f64],
         predicted: &[f64],
         without_mean: bool,
@@ -200,7 +203,7 @@ impl PredictionError {
         let size: Vec<f64> = measured.iter().map(|x| x - about).collect();
         let (rmse, size) = (measures::rms(&error), measures::rms(&size));
         let (degree_of_freedom, unit) = (dof + 1, quantity.unit());
-        Self { quantity, degree_of_freedom, unit, rmse, nrmse: rmse / size }
+        Self { quantity, degree_of_freedom, name, unit, rmse, nrmse: rmse / size }
     }
 }
 
@@ -254,12 +257,8 @@ impl fmt::Display for Predicted {
         let header = [&format!("error from sample {from} on"), "RMSE", "unit", "NRMSE"];
         let mut rows = vec![header.map(String::from).to_vec()];
         for channel in &self.summary.channels {
-            let number = match self.response.dof() {
-                1 => String::new(),
-                _ => format!(" {}", channel.degree_of_freedom),
-            };
             rows.push(vec![
-                format!("{}{number}", channel.quantity),
+                channel.name.clone(),
                 significant(channel.rmse, 4),
                 channel.unit.into(),
                 format!("{} %", significant(100.0 * channel.nrmse, 3)),

@@ -13,6 +13,9 @@ const MAX_BUMPS: usize = 24;
 /// Complex deviations that a level below those beside it is made of at least: few lines may be quiet by
 /// chance, and would then have all the weight.
 const QUIET_DEVIATIONS: f64 = 12.0;
+/// Largest leverage of a line, over the complex deviations of its sample, with which a polynomial is trusted
+/// to be lower there than one of a lower order: at the ends of the band few lines decide.
+const END_LEVERAGE: f64 = 0.25;
 /// Power of a peak over the floor that is tried first.
 const PEAK: f64 = 100.0;
 /// Factor by which the width of a peak is varied.
@@ -270,6 +273,17 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
         }
         column.copy_from(&log_power);
         misfit += least;
+    }
+    let ends: Vec<usize> =
+        (0..omega.len()).filter(|line| basis.row(*line).norm_squared() > END_LEVERAGE * nu).collect();
+    if form.order > 0 && !ends.is_empty() {
+        let lower = Form { order: form.order - 1, bumps: form.bumps.clone() };
+        let lower = fit(lower, omega, variances, nu).log_power;
+        for line in ends {
+            for (own, lower) in log_power.row_mut(line).iter_mut().zip(lower.row(line).iter()) {
+                *own = own.max(*lower);
+            }
+        }
     }
     Smooth { form, basis, log_power, misfit }
 }

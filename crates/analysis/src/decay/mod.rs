@@ -86,7 +86,9 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
     let first_sample = whole.first_sample + release;
     let summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
     let predicted = estimate.fitted().clone();
-    Ok(Decayed { summary, estimate, compared: Compared { kind, measured: record, predicted } })
+    let names = summary.channels.iter().map(|channel| channel.column.clone()).collect();
+    let compared = Compared { kind, names, measured: record, predicted };
+    Ok(Decayed { summary, estimate, compared })
 }
 
 /// The one kind of response that a record has columns of.

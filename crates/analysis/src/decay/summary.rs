@@ -112,7 +112,7 @@ impl DecaySummary {
                 decays: mode.decays(),
             })
         });
-        let columns = measurement.channels().response(kind);
+        let columns = whole.names.response(kind);
         let mut summary = Self {
             file: whole.file.clone(),
             quantity: kind,

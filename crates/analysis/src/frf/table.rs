@@ -44,6 +44,10 @@ pub struct FrfTable {
     pub quantity: String,
     /// SI unit.
     pub unit: &'static str,
+    /// Names of the responses, one per degree of freedom.
+    pub response_names: Vec<String>,
+    /// Names of the forces, one per degree of freedom.
+    pub force_names: Vec<String>,
     /// Frequencies, in Hz, one per value of a response.
     pub frequency_hz: Vec<f64>,
     /// Frequency responses, one per pair of response and force.
@@ -192,6 +196,7 @@ impl FrfTable {
         };
         let remarks =
             records.iter().flat_map(|recorded| recorded.held.unit_remarks.iter().cloned());
+        let (names, dofs) = (&measured.names, 0..measured.force.channels());
         Self {
             file: measured.file.clone(),
             first_sample: measured.first_sample,
@@ -208,12 +213,20 @@ impl FrfTable {
                 ResponseQuantity::Velocity => "m/(s·N)",
                 ResponseQuantity::Acceleration => "m/(s²·N)",
             },
+            response_names: dofs.clone().map(|dof| names.response_name(kind, dof)).collect(),
+            force_names: dofs.map(|dof| names.force_name(dof)).collect(),
             frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence,
             remarks: remarks.chain(averaged.of_idle(None)).collect(),
             analysis: how.clone(),
         }
+    }
+
+    /// Returns the name of a response and that of the force that it belongs to: `a1 / force`.
+    pub fn pair(&self, response: &Response) -> String {
+        let Response { motion, force, .. } = response;
+        format!("{} / {}", self.response_names[motion - 1], self.force_names[force - 1])
     }
 
     /// Returns the result as a person reads it.
@@ -273,7 +286,7 @@ impl FrfTable {
             let mut sorted = self.coherence[r.motion - 1].values.clone();
             sorted.sort_by(f64::total_cmp);
             rows.push(vec![
-                format!("{} {} / force {}", self.quantity, r.motion, r.force),
+                self.pair(r),
                 format!("{} {}", significant(largest, 4), self.unit),
                 format!("{} Hz", significant(self.frequency_hz[at], 5)),
                 format!("{:.4}", sorted[0]),

@@ -1,7 +1,7 @@
 //! Checks before and after the fit, record by record.
 
 use mechid_estimate::checks::{
-    Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
+    Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, instability, kinematics, power, quantised_channels, spiked_channels,
 };
 use mechid_model::ResponseQuantity;
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual};
 use crate::AnalysisError;
-use crate::measurement::Block;
+use crate::measurement::{Block, Channels};
 
 /// One finding, with the record it belongs to.
 #[derive(Debug, Serialize)]
@@ -67,7 +67,8 @@ pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>,
     adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
     let name = |at: usize| (records.len() > 1).then(|| records[at].file.clone());
     let row = |(when, at, finding): &(When, Option<usize>, Finding)| {
-        CheckRow::new(*when, at.and_then(name), finding)
+        let names = &records[at.unwrap_or(0)].names;
+        CheckRow::new(*when, at.and_then(name), finding, names)
     };
     Ok(all.iter().map(row).collect())
 }
@@ -101,14 +102,19 @@ fn of_samples(residual: &SampleResidual) -> Result<Vec<Finding>, AnalysisError> 
 }
 
 impl CheckRow {
-    pub(super) fn new(when: When, record: Option<String>, finding: &Finding) -> Self {
+    pub(super) fn new(
+        when: When,
+        record: Option<String>,
+        finding: &Finding,
+        names: &Channels,
+    ) -> Self {
         Self {
             when,
             record,
             subject: finding.subject(),
             verdict: finding.verdict(),
             value: Some(finding.value()).filter(|value| value.is_finite()),
-            text: finding.to_string(),
+            text: sentence(finding, names),
             finding: finding.clone(),
         }
     }
@@ -130,6 +136,15 @@ impl CheckRow {
             None => self.text.clone(),
         }
     }
+}
+
+/// Returns a finding as a sentence that calls the channels by their names.
+pub(super) fn sentence(finding: &Finding, names: &Channels) -> String {
+    let name = |Channel { quantity, index }| match quantity {
+        Quantity::Force => names.force_name(index),
+        Quantity::Response(kind) => names.response_name(kind, index),
+    };
+    finding.sentence(&name).to_string()
 }
 
 /// Serialises a value as its display.

@@ -69,7 +69,7 @@ pub use self::validation::{Validation, ValidationWindow};
 use crate::AnalysisError;
 use crate::hits;
 use crate::machine::Machine;
-use crate::measurement::{Block, Hold, Measurement, Windowed};
+use crate::measurement::{Block, Channels, Hold, Measurement, Windowed};
 
 /// Unexplained part of the response above which the result says so.
 pub const CONSPICUOUS: f64 = 0.05;
@@ -395,6 +395,11 @@ impl Identified {
         &self.fitted
     }
 
+    /// Returns the names of the channels of the first record, without units.
+    pub fn names(&self) -> &Channels {
+        &self.records[0].held.names
+    }
+
     /// Returns each kind of response of the first record, measured and predicted.
     ///
     /// # Errors
@@ -429,8 +434,11 @@ impl Serialize for Identified {
 /// Adds what the checks of the channels say to the failure of a fit.
 fn explained(error: AnalysisError, records: &[Windowed]) -> AnalysisError {
     let AnalysisError::Estimate(error) = error else { return error };
-    let seen = records.iter().filter_map(|r| checks::of_channels(&r.held).ok()).flatten();
-    let reasons: Vec<String> = seen.map(|finding| finding.to_string()).collect();
+    let seen = records.iter().flat_map(|record| {
+        let findings = checks::of_channels(&record.held).unwrap_or_default();
+        findings.into_iter().map(|finding| checks::sentence(&finding, &record.held.names))
+    });
+    let reasons: Vec<String> = seen.collect();
     match reasons.is_empty() {
         true => AnalysisError::Estimate(error),
         false => AnalysisError::Unfit { error, reasons: reasons.join("; ") },

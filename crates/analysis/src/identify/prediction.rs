@@ -54,6 +54,8 @@ impl Model {
 pub struct Compared {
     /// Kind of response.
     pub kind: ResponseQuantity,
+    /// Names of the channels, one per degree of freedom.
+    pub names: Vec<String>,
     /// Measured response, samples × degrees of freedom.
     pub measured: Record,
     /// Predicted response, samples × degrees of freedom.
@@ -69,18 +71,22 @@ impl Prediction {
         measured: &Block,
     ) -> Result<Vec<Compared>, AnalysisError> {
         let motions = measured.responses();
+        let names =
+            |kind, dofs| (0..dofs).map(|dof| measured.names.response_name(kind, dof)).collect();
         let response =
             self.response(model, measured).map_err(|reason| failed(reason, model, measured))?;
         let compared = |(kind, record): (ResponseQuantity, &Record)| {
             let (measured, predicted) = (record.clone(), channels(&response, kind).clone());
+            let names = names(kind, measured.channels());
             match self {
                 // Transducers have offsets, and a spectrum's mean was not fitted.
                 Prediction::Steady => Compared {
                     kind,
+                    names,
                     measured: measured.without_mean(),
                     predicted: predicted.without_mean(),
                 },
-                Prediction::Sampled { .. } => Compared { kind, measured, predicted },
+                Prediction::Sampled { .. } => Compared { kind, names, measured, predicted },
             }
         };
         Ok(motions.into_iter().map(compared).collect())

@@ -6,6 +6,7 @@ use std::path::Path;
 use mechid_estimate::checks::Subject;
 use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_io::{ParameterCovariance, SystemMatrices};
+use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 use serde::Serialize;
 
@@ -24,7 +25,7 @@ use super::unscaled::Unscaled;
 use super::validation::Validation;
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
-use crate::measurement::{Block, Windowed};
+use crate::measurement::{Block, Channels, Windowed};
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph, significant, text_table};
 
@@ -61,6 +62,9 @@ pub struct IdentificationSummary {
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
+    /// Names of the channels of the first record, without units, one per degree of freedom; `"0"` where
+    /// there is none.
+    pub channels: Channels,
     /// Every record, the first included; of a hammer test every hit that was used.
     pub records: Vec<RecordRow>,
     /// Every hit of a hammer test, used or left out.
@@ -161,6 +165,7 @@ impl IdentificationSummary {
                     None => estimate.unknowns().independent(),
                 },
             },
+            channels: Channels::clone(&records[0].names),
             records: records.iter().map(row).collect(),
             hits,
             checks: checks::rows(fitted, &records)?,
@@ -237,7 +242,10 @@ impl IdentificationSummary {
         text.push('\n');
         if self.unscaled.is_some() {
             // No system is written that they could be computed from.
-            text += &shape_table(&self.modes, |at| format!("degree of freedom {}", at + 1));
+            let kinds = ResponseQuantity::ALL;
+            let measured = kinds.into_iter().find(|kind| !self.channels.response(*kind).is_empty());
+            let kind = measured.unwrap_or(ResponseQuantity::Displacement);
+            text += &shape_table(&self.modes, |at| self.channels.response_name(kind, at));
             text.push('\n');
         }
         text += &self.fit_lines();

@@ -25,6 +25,7 @@ use super::summary::{FitRow, verdict};
 use super::{Band, FittedLine, KnownMass, Method, Structure, Unscaled};
 use crate::AnalysisError;
 use crate::machine::Machine;
+use crate::measurement::Channels;
 use crate::modal::{ShapedMode, shape_table};
 use crate::text::{compact, paragraph};
 
@@ -91,7 +92,7 @@ pub fn identify_responses(
     }
     adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
     let row = |(when, name, finding): (When, Option<String>, Finding)| {
-        CheckRow::new(when, name, &finding)
+        CheckRow::new(when, name, &finding, &Channels::default())
     };
     let checks = findings.into_iter().map(row).collect();
     let estimate = &fit.estimate;

@@ -32,6 +32,8 @@ pub struct Share {
     pub quantity: String,
     /// Degree of freedom, counted from 1.
     pub degree_of_freedom: usize,
+    /// Name of the channel.
+    pub name: String,
     /// 100 (1 − ‖measured − predicted‖ / ‖measured − mean‖): 100 is perfect, 0 no better than the
     /// mean, negative worse; in per cent.
     pub fit_percent: f64,
@@ -90,8 +92,8 @@ impl Validation {
         let mut shares = Vec::new();
         let mut add = |kind: ResponseQuantity, fits: Vec<f64>| {
             for (at, fit_percent) in fits.into_iter().enumerate() {
-                let quantity = kind.to_string();
-                shares.push(Share { quantity, degree_of_freedom: at + 1, fit_percent });
+                let (quantity, name) = (kind.to_string(), measured.names.response_name(kind, at));
+                shares.push(Share { quantity, degree_of_freedom: at + 1, name, fit_percent });
             }
         };
         match (prediction, model) {
@@ -119,16 +121,13 @@ impl Validation {
     /// Returns the result as a person reads it.
     pub fn text(&self) -> String {
         let (first, last) = (self.first_sample, self.last_sample);
-        let several = self.channels.iter().any(|share| share.degree_of_freedom > 1);
         let mut rows = vec![vec![
             format!("predicted of {}, samples {first} to {last}", self.file),
             "fit".into(),
         ]];
         for share in &self.channels {
-            let number =
-                if several { format!(" {}", share.degree_of_freedom) } else { String::new() };
             let fit = format!("{} %", significant(share.fit_percent, 4));
-            rows.push(vec![format!("{}{number}", share.quantity), fit]);
+            rows.push(vec![share.name.clone(), fit]);
         }
         text_table(&rows)
     }

@@ -68,6 +68,34 @@ impl Channels {
         }
     }
 
+    /// Returns the same channels by other names.
+    pub(crate) fn renamed(&self, mut name: impl FnMut(&String) -> String) -> Self {
+        let mut each = |columns: &[String]| -> Vec<String> {
+            let of = |column: &String| match column.as_str() {
+                ABSENT => ABSENT.into(),
+                _ => name(column),
+            };
+            columns.iter().map(of).collect()
+        };
+        Self {
+            force: each(&self.force),
+            displacement: each(&self.displacement),
+            velocity: each(&self.velocity),
+            acceleration: each(&self.acceleration),
+        }
+    }
+
+    /// Returns the name of the force on a degree of freedom, counted from 0: `force 2` where it has no column.
+    pub fn force_name(&self, dof: usize) -> String {
+        named(&self.force, "force", dof)
+    }
+
+    /// Returns the name of a response of a degree of freedom, counted from 0: `velocity 2` where it has no
+    /// column.
+    pub fn response_name(&self, kind: ResponseQuantity, dof: usize) -> String {
+        named(self.response(kind), &kind.to_string(), dof)
+    }
+
     /// Returns the columns of some records in which one force acts, each on another degree of freedom (`dofs`,
     /// one per record, counted from 1), as that of a hammer does.
     ///
@@ -137,6 +165,11 @@ impl Channels {
         }
         Ok(())
     }
+}
+
+fn named(columns: &[String], quantity: &str, dof: usize) -> String {
+    let column = columns.get(dof).filter(|column| *column != ABSENT);
+    column.map_or_else(|| format!("{quantity} {}", dof + 1), Clone::clone)
 }
 
 fn split(columns: &str) -> Vec<String> {

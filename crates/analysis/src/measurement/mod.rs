@@ -153,6 +153,8 @@ pub(crate) struct Source {
     /// Path that the record was read from; `None` for arrays.
     pub path: Option<PathBuf>,
     pub channels: Channels,
+    /// The same by the names of the columns for results, without units.
+    pub names: Arc<Channels>,
     pub reading: Reading,
     /// Time axis of the whole record.
     pub sampling: Sampling,
@@ -195,6 +197,8 @@ pub struct Block {
     pub driven: Vec<usize>,
     /// Columns that were in other than SI units, and a time axis that may be.
     pub unit_remarks: Vec<String>,
+    /// Names of the channels for results, without units.
+    pub names: Arc<Channels>,
 }
 
 impl Measurement {
@@ -240,7 +244,12 @@ impl Measurement {
         let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
         let mut units = units;
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));
+        let name = |column: &String| {
+            let place = file.head().find(column);
+            place.map_or_else(|_| column.clone(), |place| file.head().short_name(place))
+        };
         let source = Source {
+            names: Arc::new(channels.renamed(name)),
             name: file.head().file().to_owned(),
             path: path.map(Path::to_owned),
             channels: channels.clone(),
@@ -325,6 +334,7 @@ impl Measurement {
         let data = record.into_data();
         let source = Source {
             name: "the record".into(),
+            names: Arc::new(channels.renamed(|name| Unit::without(name).to_owned())),
             path: None,
             channels: channels.clone(),
             reading: Reading::default(),
@@ -534,6 +544,7 @@ impl Source {
             periods: 1,
             driven: Vec::new(),
             unit_remarks: self.units.remarks.clone(),
+            names: Arc::clone(&self.names),
             force,
         })
     }

@@ -7,7 +7,7 @@ use mechid_signal::Record;
 use serde::{Deserialize, Serialize};
 
 use super::channels::ABSENT;
-use super::{Block, CHUNK_SAMPLES, Channels, IN_MEMORY_SAMPLES, Measurement, Source};
+use super::{Block, CHUNK_SAMPLES, IN_MEMORY_SAMPLES, Measurement, Source};
 use crate::AnalysisError;
 
 /// Part of a record to use.
@@ -140,15 +140,11 @@ impl Windowed {
             file: held.file.clone(),
             driven: held.driven.clone(),
             unit_remarks: held.unit_remarks.clone(),
+            names: Arc::clone(&held.names),
         };
         let start = self.window.start;
         let window = start + samples.start..start + samples.end;
         Ok(Self { held, source: Arc::clone(&self.source), window })
-    }
-
-    /// Returns the columns of force and response.
-    pub(crate) fn channels(&self) -> &Channels {
-        &self.source.channels
     }
 
     /// Returns how many samples to take at a time: all of a window that is held.

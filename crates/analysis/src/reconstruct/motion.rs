@@ -52,8 +52,8 @@ impl Recorded {
                 let got = named.len();
                 return Err(AnalysisError::MotionCount { response: kind, got, dofs });
             }
-            for (dof, column) in named.iter().enumerate().filter(|(_, c)| *c != ABSENT) {
-                columns.push(column.clone());
+            for (dof, _) in named.iter().enumerate().filter(|(_, c)| *c != ABSENT) {
+                columns.push(source.names.response_name(kind, dof));
                 channels.push(Channel { dof, quantity: kind });
             }
         }

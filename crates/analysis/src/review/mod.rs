@@ -105,7 +105,7 @@ impl<'a> RecordReview<'a> {
             recorded,
             name: (identified.records().len() > 1).then_some(held.file.as_str()),
             index: at,
-            channels: channels::channels(held, &whole, recorded.channels()),
+            channels: channels::channels(held, &whole, &held.names),
             excitations: excitation::excitations(&period.force)?,
             residual: Residual::of(identified, at, mean).map_err(|reason| reason.to_string()),
             reconstruction,

@@ -1,5 +1,7 @@
 //! Levels, histories and mean period of all samples of a window, gathered in one pass.
 
+use std::sync::Arc;
+
 use mechid_signal::{Record, RunningStatistics, Sampling};
 use nalgebra::DMatrix;
 
@@ -76,6 +78,7 @@ fn mean(
         periods: 1,
         driven: held.driven.clone(),
         unit_remarks: held.unit_remarks.clone(),
+        names: Arc::clone(&held.names),
     }))
 }
 

@@ -2,6 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
 use super::finding::{
@@ -10,11 +11,40 @@ use super::finding::{
 };
 use super::{Subject, Verdict};
 
+impl Finding {
+    /// Returns the finding as a sentence in which `name` says what the channels are called.
+    pub fn sentence<'a>(&'a self, name: &'a dyn Fn(Channel) -> String) -> impl Display + 'a {
+        Sentence { finding: self, name }
+    }
+}
+
 impl Display for Finding {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match self {
+        self.sentence(&|channel| channel.to_string()).fmt(f)
+    }
+}
+
+/// A finding whose channels have names.
+struct Sentence<'a> {
+    finding: &'a Finding,
+    name: &'a dyn Fn(Channel) -> String,
+}
+
+impl Sentence<'_> {
+    fn force(&self, index: usize) -> String {
+        (self.name)(Channel { quantity: Quantity::Force, index })
+    }
+
+    fn response(&self, kind: ResponseQuantity, index: usize) -> String {
+        (self.name)(Channel { quantity: Quantity::Response(kind), index })
+    }
+}
+
+impl Display for Sentence<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self.finding {
             Finding::PersistentExcitation { force, order, needed } => {
-                persistent_excitation(f, force + 1, *order, *needed)
+                persistent_excitation(f, &self.force(*force), *order, *needed)
             }
             Finding::ExcitedLines { lines, unknowns } => {
                 write!(
@@ -24,14 +54,14 @@ impl Display for Finding {
                     message::count(2 * lines, "equation"),
                     message::count(*unknowns, "unknown")
                 )?;
-                f.write_str(match self.verdict() {
+                f.write_str(match self.finding.verdict() {
                     Verdict::Good => "",
                     Verdict::Doubtful => "; no redundancy to estimate the noise",
                     Verdict::Bad => "; excite more lines",
                 })
             }
             Finding::Conditioning { condition_number, undetermined } => {
-                conditioning(f, *condition_number, *undetermined, self.verdict())
+                conditioning(f, *condition_number, *undetermined, self.finding.verdict())
             }
             Finding::Seam { ratio } => {
                 write!(
@@ -39,7 +69,7 @@ impl Display for Finding {
                     "from the last sample back to the first the response bends {ratio:.1} times as \
                      much as elsewhere: "
                 )?;
-                f.write_str(match self.verdict() {
+                f.write_str(match self.finding.verdict() {
                     Verdict::Good => "consistent with a whole period",
                     Verdict::Doubtful => "hardly a steady state over one whole period",
                     Verdict::Bad => "not a whole period; fit it as an open record",
@@ -51,7 +81,7 @@ impl Display for Finding {
                     "single periods of the response differ from their mean by up to {:.2} %",
                     100.0 * fraction
                 )?;
-                f.write_str(match self.verdict() {
+                f.write_str(match self.finding.verdict() {
                     Verdict::Good => "",
                     Verdict::Doubtful => {
                         ": noise, drift, or a transient that has not decayed; leave out the beginning, or \
@@ -77,7 +107,7 @@ impl Display for Finding {
                     f,
                     "the highest mode ({frequency_hz:.4} Hz{condition}) has {samples_per_period:.1} samples per \
                      period{}",
-                    limit.clause(self.verdict(), *samples_per_period)
+                    limit.clause(self.finding.verdict(), *samples_per_period)
                 )
             }
             Finding::NoLogarithm { eigenvalue } => write!(
@@ -92,7 +122,7 @@ impl Display for Finding {
                     "median coherence {median:.4}, minimum {minimum:.4}, from {averages:.1} \
                      independent averages"
                 )?;
-                f.write_str(match self.verdict() {
+                f.write_str(match self.finding.verdict() {
                     Verdict::Good => "",
                     _ => ": noise, leakage, or other forces; use longer segments, or more of them",
                 })
@@ -102,35 +132,37 @@ impl Display for Finding {
                 "{channel} is clipped at {}: {} at that level, three or more in a row; choose a wider \
                  range of the amplifier or converter and measure again",
                 six_digits(*level),
-                message::count(*samples, "sample")
+                message::count(*samples, "sample"),
+                channel = (self.name)(*channel)
             ),
             Finding::ConstantChannel { channel, level, samples } => write!(
                 f,
                 "{channel} is {} in all {samples} samples: no response there, or a dead channel; check the sensor",
-                message::number(*level)
+                message::number(*level),
+                channel = (self.name)(*channel)
             ),
             Finding::Quantisation { channel, levels, step } => write!(
                 f,
                 "{channel} has {levels} values only, {} apart: the range of the converter is far too \
                  wide, or its bits are too few; choose a narrower range and measure again",
-                six_digits(*step)
+                six_digits(*step),
+                channel = (self.name)(*channel)
             ),
             Finding::Spike { channel, sample, ratio } => write!(
                 f,
                 "sample {} of {channel} is a spike, {} times as sharp as any other: an error of the \
                  transmission; leave it out of the window",
                 sample + 1,
-                six_digits(*ratio)
+                six_digits(*ratio),
+                channel = (self.name)(*channel)
             ),
-            Finding::Kinematics { dof, quantity, derivative, gain } => {
-                let number = dof + 1;
-                write!(
-                    f,
-                    "{quantity} {number} changes {} times as much as {derivative} {number} predicts: \
-                     their units, columns or signs are inconsistent",
-                    six_digits(*gain)
-                )
-            }
+            Finding::Kinematics { dof, quantity, derivative, gain } => write!(
+                f,
+                "{} changes {} times as much as {} predicts: their units, columns or signs are inconsistent",
+                self.response(*quantity, *dof),
+                six_digits(*gain),
+                self.response(*derivative, *dof)
+            ),
             Finding::PowerFlow { fraction } => write!(
                 f,
                 "the forces take power out of the machine ({:.1} % of the apparent power): force and \
@@ -144,7 +176,7 @@ impl Display for Finding {
             Finding::Bias { p_value, parameter, estimate, unbiased, standard_error, reference } => {
                 let [value, other] = [six_digits(*estimate), six_digits(*unbiased)];
                 let errors = (unbiased - estimate).abs() / standard_error;
-                if self.verdict() == Verdict::Good {
+                if self.finding.verdict() == Verdict::Good {
                     write!(
                         f,
                         "the estimate agrees with {reference} ({p_value}): {parameter} is {other} \
@@ -163,7 +195,7 @@ impl Display for Finding {
                 let number = mode + 1;
                 let growth = [*growth_rate, *standard_error].map(three_digits).join(" ± ");
                 let frequency = three_digits(*frequency_hz);
-                if self.verdict() == Verdict::Good {
+                if self.finding.verdict() == Verdict::Good {
                     write!(
                         f,
                         "mode {number} ({frequency} Hz) of the estimate grows at {growth} 1/s, no more \
@@ -180,17 +212,22 @@ impl Display for Finding {
                     )
                 }
             }
-            Finding::Misfit { ratio, p_value, source, concentration } => {
-                misfit(f, *ratio, p_value, *source, (self.verdict(), concentration.as_ref()))
-            }
+            Finding::Misfit { ratio, p_value, source, concentration } => misfit(
+                f,
+                *ratio,
+                p_value,
+                *source,
+                (self.finding.verdict(), concentration.as_ref()),
+            ),
             Finding::Linearity { power, dof, p_value } => {
-                linearity(f, *power, dof + 1, p_value, self.verdict())
+                let displacement = self.response(ResponseQuantity::Displacement, *dof);
+                linearity(f, *power, &displacement, p_value, self.finding.verdict())
             }
             Finding::Whiteness { residual, test, span } => {
-                whiteness(f, residual, test, span.as_ref())
+                whiteness(f, residual, test, span.as_ref(), &|force| self.force(force))
             }
             Finding::CrossCorrelation { residual, force, test } => {
-                write!(f, "residual {} with force {}: {test}", residual + 1, force + 1)?;
+                write!(f, "residual {} with {}: {test}", residual + 1, self.force(*force))?;
                 f.write_str(match (test.rounding, test.is_significant()) {
                     (true, _) => "",
                     (_, false) => "; uncorrelated",
@@ -206,18 +243,15 @@ impl Display for Finding {
 
 fn persistent_excitation(
     f: &mut Formatter<'_>,
-    force: usize,
+    force: &str,
     order: usize,
     needed: usize,
 ) -> fmt::Result {
     match order {
-        0 => write!(f, "force {force} is zero: it is left out, and determines no mass"),
+        0 => write!(f, "{force} is zero: it is left out, and determines no mass"),
         _ => {
             let more = if order < needed { "; excite more lines" } else { "" };
-            write!(
-                f,
-                "force {force} is persistently exciting of order {order}, {needed} needed{more}"
-            )
+            write!(f, "{force} is persistently exciting of order {order}, {needed} needed{more}")
         }
     }
 }
@@ -367,7 +401,7 @@ fn misfit(
 fn linearity(
     f: &mut Formatter<'_>,
     power: Power,
-    dof: usize,
+    displacement: &str,
     p_value: &PValue,
     verdict: Verdict,
 ) -> fmt::Result {
@@ -379,7 +413,7 @@ fn linearity(
         ),
         _ => write!(
             f,
-            "the residual is correlated with the {power} of displacement {dof} as a force ({p_value}): \
+            "the residual is correlated with the {power} of {displacement} as a force ({p_value}): \
              the machine is nonlinear at this level of the force, to which its parameters belong"
         ),
     }
@@ -390,15 +424,16 @@ fn whiteness(
     residual: &Residual,
     test: &CorrelationTest,
     span: Option<&NoiseSpan>,
+    name_of_force: &dyn Fn(usize) -> String,
 ) -> fmt::Result {
     match residual {
         Residual::Samples { residual } => write!(f, "residual {}: ", residual + 1)?,
         Residual::Lines { residual } => write!(f, "lines of residual {}: ", residual + 1)?,
         Residual::FrequencyResponse { response, force, distance } => {
-            let (response, force) = (response + 1, force + 1);
+            let (response, force) = (response + 1, name_of_force(*force));
             write!(
                 f,
-                "residual of response {response} to force {force}, lines {distance} or more apart: "
+                "residual of response {response} to {force}, lines {distance} or more apart: "
             )?;
         }
     }

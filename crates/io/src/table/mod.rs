@@ -483,6 +483,18 @@ impl Table {
         self.contents.columns[column].axis
     }
 
+    /// Name of a column for results, by its index counted from 0: without its unit, control characters
+    /// shown; `column 2` where it has none.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn short_name(&self, column: usize) -> String {
+        match Unit::without(&self.names[column]) {
+            "" => format!("column {}", column + 1),
+            name => escaped(name).to_string(),
+        }
+    }
+
     /// Number and name of a column for a message, by its index counted from 0: `2 "force"`.
     ///
     /// # Panics

@@ -118,6 +118,12 @@ impl Unit {
         Self::at_end(name.trim()).or_else(|| Self::known(about))
     }
 
+    /// Name of a column without the unit at its end (`Fx` of `Fx [N]`): brackets whatever they hold, or
+    /// otherwise a unit that is known.
+    pub fn without(name: &str) -> &str {
+        without_unit(name)
+    }
+
     fn at_end(name: &str) -> Option<Self> {
         for (open, close) in [('[', ']'), ('(', ')')] {
             if let Some(inner) = name.strip_suffix(close) {

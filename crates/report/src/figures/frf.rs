@@ -17,7 +17,7 @@ pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
         .map(|r| {
             let name = match alone {
                 true => String::new(),
-                false => format!("{} {} / force {}", report.quantity, r.motion, r.force),
+                false => report.pair(r),
             };
             let values = r.real.iter().zip(&r.imaginary).map(|(re, im)| Complex::new(*re, *im));
             let omega = report.frequency_hz.iter().map(|hz| hz * std::f64::consts::TAU);
@@ -35,7 +35,7 @@ pub fn figure(report: &FrfTable, style: FigureStyle) -> Figure {
     for c in &report.coherence {
         let name = match report.coherence.len() {
             1 => String::new(),
-            _ => format!("{} {}", report.quantity, c.motion),
+            _ => report.response_names[c.motion - 1].clone(),
         };
         // 0 Hz has no place on a logarithmic axis.
         let hidden = report.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();

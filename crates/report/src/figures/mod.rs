@@ -19,13 +19,14 @@ use mechid_analysis::bearing::BearingTable;
 #[cfg(feature = "parquet")]
 use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
-    AnalysisError, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
+    AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
     Inspected, Machine, Reconstructed, SweepSummary,
 };
 use mechid_estimate::frequency_domain::FrequencyData;
-use mechid_model::SecondOrderSystem;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
 
+use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};
 use crate::ReportError;
 
@@ -51,13 +52,24 @@ fn receptance_or_responses(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    names: Names<'_>,
     style: FigureStyle,
 ) -> Result<Figure, ReportError> {
-    match receptance::receptance(title, data, system, style)? {
+    match receptance::receptance(title, data, system, names, style)? {
         Some(figure) => Ok(figure),
         None => {
-            receptance::responses(&format!("{title}; {}", receptance::WHY), data, system, style)
+            let title = format!("{title}; {}", receptance::WHY);
+            receptance::responses(&title, data, system, names, style)
         }
+    }
+}
+
+/// Name of a displacement by the channel that shows it, such as `x at a1` of an accelerometer.
+pub(crate) fn displacement_name(channels: &Channels, kind: ResponseQuantity, dof: usize) -> String {
+    let name = channels.response_name(kind, dof);
+    match kind {
+        ResponseQuantity::Displacement => name,
+        _ => format!("x at {name}"),
     }
 }
 
@@ -72,12 +84,18 @@ impl ToFigure for Identified {
         }
         match self.spectra() {
             Some(data) => {
+                let channels = self.names();
                 let drawn = {
                     let system = self.estimate().system().map_err(AnalysisError::from)?;
-                    receptance_or_responses(&title, data, &system, style)?
+                    let names = Names {
+                        displacement: &|dof| displacement_name(channels, data.measured(), dof),
+                        force: &|dof| channels.force_name(dof),
+                    };
+                    receptance_or_responses(&title, data, &system, names, style)?
                 };
+                let name = |dof| channels.response_name(data.measured(), dof);
                 Ok(match &self.fitted().coherence {
-                    Some(coherence) => drawn.panel(receptance::coherence(coherence, style)),
+                    Some(coherence) => drawn.panel(receptance::coherence(coherence, &name, style)),
                     None => drawn,
                 })
             }
@@ -91,7 +109,9 @@ impl ToFigure for IdentifiedResponses {
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
         let system = self.estimate().system().map_err(AnalysisError::from)?;
-        receptance_or_responses(&title, self.data(), &system, style)
+        let point = |dof: usize| self.summary().points[dof].clone();
+        let names = Names { displacement: &point, force: &point };
+        receptance_or_responses(&title, self.data(), &system, names, style)
     }
 }
 

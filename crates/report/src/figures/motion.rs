@@ -13,29 +13,24 @@ pub fn motion(title: &str, compared: &Compared, computed: &str) -> Figure {
     let shown = measured.len().min(SHOWN);
     let time: Vec<f64> = measured.sampling().times().take(shown).collect();
     let unit = compared.kind.unit();
-    let mut name = compared.kind.to_string();
-    name[..1].make_ascii_uppercase();
     let mut figure = Figure::new(match shown < measured.len() {
         true => format!("{title}; the first {shown} samples"),
         false => title.to_owned(),
     });
     for channel in 0..measured.channels() {
-        let number = match measured.channels() {
-            1 => String::new(),
-            _ => format!(" {}", channel + 1),
-        };
+        let name = &compared.names[channel];
         let (x, model) =
             (&measured.channel(channel)[..shown], &predicted.channel(channel)[..shown]);
         let residual: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
         let axis = || Axis::linear("Time", "s");
         figure = figure
             .panel(
-                Panel::new(axis(), Axis::linear(format!("{name}{number}"), unit))
+                Panel::new(axis(), Axis::linear(name, unit))
                     .curve(Curve::line("measured", &time, x).color(Color::GREY).width(2.4))
                     .curve(Curve::line(computed, &time, model).color(Color::VERMILION)),
             )
             .panel(
-                Panel::new(axis(), Axis::linear(format!("Residual{number}"), unit))
+                Panel::new(axis(), Axis::linear(format!("Residual of {name}"), unit))
                     .curve(Curve::line("", &time, &residual)),
             );
     }

@@ -13,6 +13,22 @@ use super::style::{FigureStyle, FrequencyScale, MagnitudeScale};
 use super::trace::Trace;
 use crate::ReportError;
 
+/// Names of displacements and forces, by their degree of freedom counted from 0.
+#[derive(Clone, Copy)]
+pub struct Names<'a> {
+    /// Name of a displacement.
+    pub displacement: &'a dyn Fn(usize) -> String,
+    /// Name of a force.
+    pub force: &'a dyn Fn(usize) -> String,
+}
+
+impl Names<'_> {
+    /// Name of a receptance.
+    fn pair(&self, motion: usize, force: usize) -> String {
+        format!("{} / {}", (self.displacement)(motion), (self.force)(force))
+    }
+}
+
 /// Points of a fitted curve.
 const FINE: usize = 800;
 
@@ -38,6 +54,7 @@ pub fn receptance(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    names: Names<'_>,
     style: FigureStyle,
 ) -> Result<Option<Figure>, ReportError> {
     let dof = data.dof();
@@ -55,7 +72,8 @@ pub fn receptance(
         let fine = fine_grid(&omega);
         let receptances = system.receptances(&fine)?;
         for (i, row) in pairs.iter_mut().enumerate() {
-            let name = if dof == 1 || grid { String::new() } else { format!(" {}", pair(i, *j)) };
+            let name =
+                if dof == 1 || grid { String::new() } else { format!(" {}", names.pair(i, *j)) };
             let model = fine.iter().zip(&receptances).map(|(omega, h)| (*omega, h[(i, *j)]));
             let model = Trace::line(style, format!("identified{name}"), model);
             let measured = points.iter().map(|(omega, h)| (*omega, h[i]));
@@ -79,16 +97,11 @@ pub fn receptance(
         for at in 0..2 {
             for (chart, j) in charts.iter().zip(&shown) {
                 let panel = chart.panels()[at].clone();
-                figure = figure.panel(if at == 0 { panel.title(pair(i, *j)) } else { panel });
+                figure = figure.panel(if at == 0 { panel.title(names.pair(i, *j)) } else { panel });
             }
         }
     }
     Ok(Some(figure.columns(shown.len()).share_x().shared_legend()))
-}
-
-/// Name of a receptance.
-fn pair(motion: usize, force: usize) -> String {
-    format!("x{}/F{}", motion + 1, force + 1)
 }
 
 /// Measured columns of H for each force, by rising frequency.
@@ -147,6 +160,7 @@ pub fn responses(
     title: &str,
     data: &FrequencyData,
     system: &SecondOrderSystem,
+    names: Names<'_>,
     style: FigureStyle,
 ) -> Result<Figure, ReportError> {
     let frequency_hz: Vec<f64> =
@@ -170,7 +184,7 @@ pub fn responses(
             let y: Vec<f64> = shown.iter().map(|row| scaled(size(*row))).collect();
             Curve::points(label, &x, &y)
         };
-        let name = format!("Displacement {}", channel + 1);
+        let name = (names.displacement)(channel);
         let y = style.magnitude_axis(Quantity::new(&name, "m"));
         figure = figure.panel(
             Panel::new(style.frequency_axis(FrequencyScale::Linear), y)
@@ -181,15 +195,19 @@ pub fn responses(
     Ok(figure.share_x())
 }
 
-/// Coherence of each motion with all forces.
-pub fn coherence(measured: &ResponseCoherence, style: FigureStyle) -> Panel {
+/// Coherence of each motion, of the name that `name` has for it, with all forces.
+pub fn coherence(
+    measured: &ResponseCoherence,
+    name: &dyn Fn(usize) -> String,
+    style: FigureStyle,
+) -> Panel {
     let axis = style.frequency_axis(FrequencyScale::Linear);
     let mut panel = Panel::new(axis, Axis::linear("Coherence", "").range(0.0, 1.0));
     // 0 Hz has no place on a logarithmic axis.
     let hidden = measured.frequency_hz.iter().take_while(|hz| **hz <= 0.0).count();
     let motions = measured.values.ncols();
     for (at, values) in measured.values.column_iter().enumerate() {
-        let name = if motions == 1 { String::new() } else { format!("x{}", at + 1) };
+        let name = if motions == 1 { String::new() } else { name(at) };
         let values: Vec<f64> = values.iter().skip(hidden).copied().collect();
         panel = panel.curve(Curve::line(name, &measured.frequency_hz[hidden..], &values));
     }
@@ -250,18 +268,22 @@ mod tests {
             assert!((h - &truth).norm() < 1e-10 * truth.norm(), "{omega}");
         }
         let style = FigureStyle::default();
-        let curves = |data: &FrequencyData| receptance("", data, &machine(), style).unwrap();
+        let names = Names {
+            displacement: &|dof| format!("x{}", dof + 1),
+            force: &|dof| format!("F{}", dof + 1),
+        };
+        let curves = |data: &FrequencyData| receptance("", data, &machine(), names, style).unwrap();
         let drawn = curves(&both).expect("two experiments");
         let titles: Vec<&str> = drawn.panels().iter().map(Panel::name).collect();
-        assert_eq!(titles, ["x1/F1", "x1/F2", "", "", "x2/F1", "x2/F2", "", ""]);
+        assert_eq!(titles, ["x1 / F1", "x1 / F2", "", "", "x2 / F1", "x2 / F2", "", ""]);
         let drawn = curves(&record(1, 0.0)).expect("one force acts alone");
         let titles: Vec<&str> = drawn.panels().iter().map(Panel::name).collect();
-        assert_eq!(titles, ["x1/F2", "", "x2/F2", ""]);
+        assert_eq!(titles, ["x1 / F2", "", "x2 / F2", ""]);
         // Forces in a fixed ratio say no more in two records than in one.
         let same = record(0, 0.5).and(&record(0, 0.5)).unwrap();
         for data in [record(0, 0.02), same] {
             assert!(curves(&data).is_none());
-            assert_eq!(responses("", &data, &machine(), style).unwrap().panels().len(), 2);
+            assert_eq!(responses("", &data, &machine(), names, style).unwrap().panels().len(), 2);
         }
     }
 }

@@ -9,14 +9,14 @@ use mechid_analysis::review::receptance::Receptance;
 use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Correlations, OwnCorrelation, Residual};
 use mechid_analysis::review::whole::Gathered;
-use mechid_model::ResponseQuantity;
 use mechid_plot::{Axis, Color, Curve, Dash, Figure, Legend, Panel, Reference};
 use mechid_signal::{Record, Spectrum};
 
 use super::Captions as _;
 use crate::FigureStyle;
 use crate::ReportError;
-use crate::figures::{receptance as picture, restoring as surface};
+use crate::figures::receptance::{self as picture, Names};
+use crate::figures::{displacement_name, restoring as surface};
 
 /// Width of a figure, px: two stand side by side on a screen, and on a telephone the numbers of
 /// one can still be read.
@@ -42,28 +42,14 @@ pub(super) fn drawn(id: String, figure: Figure, caption: String) -> Result<Drawn
     Ok(Drawn { id, svg, caption })
 }
 
-/// Symbol and unit of a kind of motion.
-pub fn symbol(kind: ResponseQuantity) -> (&'static str, &'static str) {
-    match kind {
-        ResponseQuantity::Displacement => ("Displacement", "m"),
-        ResponseQuantity::Velocity => ("Velocity", "m/s"),
-        ResponseQuantity::Acceleration => ("Acceleration", "m/s²"),
-    }
-}
-
-/// `name`, numbered where there are several.
-fn numbered(name: &str, dof: usize, dofs: usize) -> String {
-    if dofs == 1 { name.into() } else { format!("{name} {}", dof + 1) }
-}
-
 fn times(record: &Record) -> Vec<f64> {
     record.sampling().times().collect()
 }
 
-/// Time history of the window above the amplitudes of its mean period, of each channel; `held` are
-/// the samples to draw where these are all.
+/// Time history of the window above the amplitudes of its mean period, of each channel, by its name and
+/// unit; `held` are the samples to draw where these are all.
 fn history(
-    name: (&str, &str),
+    (name, unit): (&dyn Fn(usize) -> String, &str),
     (held, whole): (&Record, &Gathered),
     period: &Record,
     channels: &[usize],
@@ -72,13 +58,12 @@ fn history(
     let hz: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.frequency_hz(n)).collect();
     let mut figure = Figure::new("");
     for &c in channels {
-        let label = numbered(name.0, c, held.channels());
+        let label = name(c);
         let (t, values) = whole.history(held, c);
-        let time =
-            Panel::new(Axis::linear("Time in the window", "s"), Axis::linear(&label, name.1));
+        let time = Panel::new(Axis::linear("Time in the window", "s"), Axis::linear(&label, unit));
         figure = figure.panel(time.curve(Curve::line("", &t, &values).width(1.0)));
         let amplitude: Vec<f64> = (1..spectrum.len()).map(|n| spectrum.line(n, c).norm()).collect();
-        let axis = Axis::linear(numbered("Amplitude", c, held.channels()), name.1);
+        let axis = Axis::linear(format!("Amplitude of {label}"), unit);
         let stems = Curve::stems("", &hz, &amplitude).color(Color::VERMILION);
         figure = figure.panel(Panel::new(Axis::linear("Frequency", "Hz"), axis).curve(stems));
     }
@@ -113,12 +98,22 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
     Ok(vec![
         drawn(
             part.id("force"),
-            history(("Force", "N"), of_force, &period.force, &held.driven),
+            history(
+                (&|dof| held.names.force_name(dof), "N"),
+                of_force,
+                &period.force,
+                &held.driven,
+            ),
             format!("Measured force: time history of the window, and line amplitudes of {of}."),
         )?,
         drawn(
             part.id("motion"),
-            history(symbol(kind), of_motion, period.response().0, &all),
+            history(
+                (&|dof| held.names.response_name(kind, dof), kind.unit()),
+                of_motion,
+                period.response().0,
+                &all,
+            ),
             format!("Measured {kind}: time history of the window, and line amplitudes of {of}."),
         )?,
     ])
@@ -132,8 +127,12 @@ pub fn data(part: &RecordReview<'_>) -> Result<Vec<Drawn>, ReportError> {
 pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Drawn, ReportError> {
     let system = identified.estimate().system().map_err(AnalysisError::from)?;
     let origin = &measured.origin;
-    let style = FigureStyle::default();
-    let (figure, caption) = match picture::receptance("", &measured.data, &system, style)? {
+    let (style, channels) = (FigureStyle::default(), identified.names());
+    let names = Names {
+        displacement: &|dof| displacement_name(channels, measured.data.measured(), dof),
+        force: &|dof| channels.force_name(dof),
+    };
+    let (figure, caption) = match picture::receptance("", &measured.data, &system, names, style)? {
         Some(figure) => {
             let caption = format!(
                 "Receptance, motion over force: that of the identified machine, and that of the record, \
@@ -147,7 +146,7 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
                  forces; no receptance, for {}.",
                 picture::WHY
             );
-            (picture::responses("", &measured.data, &system, style)?, caption)
+            (picture::responses("", &measured.data, &system, names, style)?, caption)
         }
     };
     drawn("receptance".into(), figure, caption)
@@ -195,21 +194,22 @@ fn over_time(
     samples: usize,
     caption: String,
 ) -> Result<Drawn, ReportError> {
-    let (label, unit) = symbol(compared.kind);
+    let unit = compared.kind.unit();
     let measured = compared.measured.window(0, samples)?;
     let modelled = compared.predicted.window(0, samples)?;
     let t = times(&measured);
     let mut figure = Figure::new("").share_x();
     for c in 0..measured.channels() {
-        let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), unit);
+        let name = &compared.names[c];
         let time = || Axis::linear("Time in the window", "s");
         let (x, model) = (measured.channel(c), modelled.channel(c));
         let residual: Vec<f64> = x.iter().zip(model).map(|(x, model)| x - model).collect();
-        let both = Panel::new(time(), axis(label))
+        let both = Panel::new(time(), Axis::linear(name, unit))
             .curves(overlay(&t, x, "modelled", model))
             .legend(Legend::Above);
         let rest = Curve::line("", &t, &residual).color(Color::VERMILION).width(1.0);
-        figure = figure.panel(both).panel(Panel::new(time(), axis("Residual")).curve(rest));
+        let below = Panel::new(time(), Axis::linear(format!("Residual of {name}"), unit));
+        figure = figure.panel(both).panel(below.curve(rest));
     }
     drawn(id, figure, caption)
 }
@@ -225,7 +225,7 @@ pub fn residual_spectrum(
     let (motion, residual) = (Spectrum::of(motion), Spectrum::of(&residual));
     let mut shown = part.lines.clone().unwrap_or_else(|| (1..motion.len()).collect());
     shown.sort_unstable();
-    let (_, unit) = symbol(compared.kind);
+    let unit = compared.kind.unit();
     let mut figure = Figure::new("");
     for c in 0..motion.channels() {
         let points = |spectrum: &Spectrum| -> (Vec<f64>, Vec<f64>) {
@@ -233,7 +233,7 @@ pub fn residual_spectrum(
             // A logarithmic axis has no place for nothing.
             shown.iter().map(point).filter(|(_, amplitude)| *amplitude > 0.0).unzip()
         };
-        let axis = Axis::log10(numbered("Amplitude", c, motion.channels()), unit);
+        let axis = Axis::log10(format!("Amplitude of {}", compared.names[c]), unit);
         let mut panel = Panel::new(Axis::linear("Frequency", "Hz"), axis).legend(Legend::Above);
         for (name, spectrum, slot) in [("measured", &motion, 0), ("residual", &residual, 1)] {
             let (hz, amplitude) = points(spectrum);
@@ -261,12 +261,14 @@ pub fn correlations(
     part: &RecordReview<'_>,
     correlations: &[Correlations],
 ) -> Result<Drawn, ReportError> {
-    let dofs = correlations.len();
+    let held = part.held();
+    let kind = held.response().1;
     let mut figure = Figure::new("");
     let (mut widest, mut of_lines) = (0, false);
     for (c, channel) in correlations.iter().enumerate() {
-        let panel = |x: Axis, name: &str, at: &[f64], coefficients: &[f64], bound: f64| {
-            Panel::new(x, Axis::linear(numbered(name, c, dofs), ""))
+        let residual = held.names.response_name(kind, c);
+        let panel = |x: Axis, what: &str, at: &[f64], coefficients: &[f64], bound: f64| {
+            Panel::new(x, Axis::linear(format!("{residual}: {what}"), ""))
                 .curve(Curve::stems("", at, coefficients).color(Color::BLUE))
                 .reference(Reference::horizontal("95 % of noise", bound))
                 .reference(Reference::horizontal("", -bound))
@@ -278,7 +280,7 @@ pub fn correlations(
                 let (r, bound) = (&correlation.coefficients, correlation.bound);
                 let lags: Vec<f64> = (1..).take(r.len()).map(f64::from).collect();
                 let x = Axis::linear("Lag", "samples");
-                figure = figure.panel(panel(x, "Autocorrelation", &lags, r, bound));
+                figure = figure.panel(panel(x, "autocorrelation", &lags, r, bound));
             }
             Some(OwnCorrelation::Lines(correlation)) => {
                 of_lines = true;
@@ -287,7 +289,7 @@ pub fn correlations(
                 let (r, bound) = (&correlation.coefficients, correlation.bound);
                 let distances: Vec<f64> = (0..r.len()).map(place).collect();
                 let x = Axis::linear("Distance", "lines");
-                figure = figure.panel(panel(x, "From line to line", &distances, r, bound));
+                figure = figure.panel(panel(x, "from line to line", &distances, r, bound));
             }
             None => {}
         }
@@ -295,7 +297,7 @@ pub fn correlations(
             let (r, bound) = (&correlation.coefficients, correlation.bound);
             let lag = |at: usize| (at as f64 - (r.len() / 2) as f64) * channel.lag;
             let lags: Vec<f64> = (0..r.len()).map(lag).collect();
-            let name = numbered("With the force", *force, dofs);
+            let name = format!("with {}", held.names.force_name(*force));
             figure = figure.panel(panel(Axis::linear("Lag", "s"), &name, &lags, r, bound));
         }
     }
@@ -335,13 +337,13 @@ pub fn force(
     let mut figure = Figure::new("").share_x();
     for &c in &reconstruction.forced {
         let (reconstructed, truth) = (force.channel(c), measured.channel(c));
-        let axis = |name: &str| Axis::linear(numbered(name, c, measured.channels()), "N");
+        let name = part.held().names.force_name(c);
         let time = || Axis::linear("Time in the window", "s");
-        let both = Panel::new(time(), axis("Force"))
+        let both = Panel::new(time(), Axis::linear(&name, "N"))
             .curves(overlay(&t, truth, "found from the motion", reconstructed))
             .legend(Legend::Above);
         let apart: Vec<f64> = reconstructed.iter().zip(truth).map(|(f, m)| f - m).collect();
-        let mut below = Panel::new(time(), axis("Difference"));
+        let mut below = Panel::new(time(), Axis::linear(format!("Difference of {name}"), "N"));
         if let Some(error) = reconstruction.force.standard_error() {
             let upper: Vec<f64> = error.channel(c).iter().map(|e| 2.0 * e).collect();
             let lower: Vec<f64> = upper.iter().map(|e| -e).collect();

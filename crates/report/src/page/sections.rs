@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use maud::{Markup, html};
+use mechid_analysis::Channels;
 use mechid_analysis::identify::checks::When;
 use mechid_analysis::identify::rows::{ModeRow, ParameterRow, Uncertain};
 use mechid_analysis::identify::summary::IdentificationSummary;
@@ -131,7 +132,8 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         "persistence (order)",
     ];
     let records = of_each(contents, |part| {
-        let rows = part.excitations.iter().map(excitation_row).collect();
+        let names = &part.held().names;
+        let rows = part.excitations.iter().map(|e| excitation_row(e, names)).collect();
         let caption = part.of_period("Quality of the excitation");
         Ok(Table { caption: &caption, header: &header, numbers_from: 1, rows }.html())
     })?;
@@ -146,10 +148,10 @@ pub fn excitation(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     })
 }
 
-fn excitation_row(e: &Excitation) -> Vec<String> {
+fn excitation_row(e: &Excitation, names: &Channels) -> Vec<String> {
     let band = e.band.map(|b| format!("{} to {}", compact(b.low_hz, 5), compact(b.high_hz, 5)));
     vec![
-        e.dof.to_string(),
+        names.force_name(e.dof - 1),
         significant(e.crest_factor, 3),
         or_dash(e.peak_factor.map(|factor| significant(factor, 3))),
         e.lines.to_string(),
@@ -325,13 +327,11 @@ fn residual_of(part: &RecordReview<'_>, residual: &Residual) -> Result<Markup, R
     let header = ["motion", "unit", "RMS", "residual, RMS", "residual / motion"];
     let mut rows = Vec::new();
     for compared in &residual.compared {
-        let channels = compared.measured.channels();
-        for channel in 0..channels {
+        for (channel, name) in compared.names.iter().enumerate() {
             let (size, rest) = sizes(compared, channel);
-            let number = if channels > 1 { format!(" {}", channel + 1) } else { String::new() };
             rows.push(vec![
-                format!("{}{number}", compared.kind),
-                figures::symbol(compared.kind).1.into(),
+                name.clone(),
+                compared.kind.unit().into(),
                 significant(size, 4),
                 significant(rest, 4),
                 or_dash((size > 0.0).then(|| percent(rest / size))),
@@ -355,14 +355,7 @@ pub fn validation(contents: &Contents<'_>) -> Result<Option<Markup>, ReportError
         return Ok(None);
     };
     let drawn = figures::validation(source, first)?;
-    let several = source.force.channels() > 1;
-    let row = |share: &Share| {
-        let number = if several { format!(" {}", share.degree_of_freedom) } else { String::new() };
-        pair(
-            &format!("{}{number}", share.quantity),
-            format!("{} %", significant(share.fit_percent, 4)),
-        )
-    };
+    let row = |share: &Share| pair(&share.name, format!("{} %", significant(share.fit_percent, 4)));
     let rows = validation.channels.iter().map(row).collect();
     let (first_sample, last_sample) = (validation.first_sample, validation.last_sample);
     Ok(Some(html! {
@@ -405,7 +398,7 @@ fn reconstruction_of(
     };
     let row = |&dof: &usize| {
         vec![
-            (dof + 1).to_string(),
+            part.held().names.force_name(dof),
             rms(&reconstruction.measured, dof),
             rms(reconstruction.force.record(), dof),
             or_dash(
