@@ -258,7 +258,6 @@ fn main() -> Result<()> {
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for machine in &Machine::ALL {
-        if std::env::args().nth(4).is_some_and(|m| !machine.name().starts_with(&m)) { continue; }
         for colour in Colour::ALL.into_iter().filter(|c| c.name().starts_with(&only)) {
             for periods in [1, 2, 4, 8] {
                 row(&Study::new(machine, colour, periods)?, runs, pooling)?;
@@ -285,16 +284,6 @@ fn row(study: &Study, runs: u64, pooling: Pooling) -> Result<()> {
             (low..=high).contains(truth)
         };
         held.push(100.0 * estimates().filter(holds).count() as f64 / count);
-    }
-    if std::env::var("OUTLIERS").is_ok() {
-        for (seed, fit) in fits.iter().enumerate() {
-            let Some(fit) = fit else { println!("seed {seed} failed"); continue };
-            let z: Vec<f64> = fit.estimate.parameters().zip(truth.iter().zip(&bound)).map(|(p, (t, b))| (p.value - t) / b).collect();
-            let own: Vec<f64> = fit.estimate.parameters().zip(truth.iter()).map(|(p, t)| (p.value - t) / p.standard_error).collect();
-            if z.iter().any(|z| z.abs() > 4.0) {
-                println!("seed {seed}: z {z:.1?} own {own:.1?} noise {:?} df {:?}", fit.noise, fit.searches);
-            }
-        }
     }
     let mut chosen = BTreeMap::new();
     for fit in &found {

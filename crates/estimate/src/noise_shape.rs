@@ -274,8 +274,9 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
         column.copy_from(&log_power);
         misfit += least;
     }
-    let ends: Vec<usize> =
-        (0..omega.len()).filter(|line| basis.row(*line).norm_squared() > END_LEVERAGE * nu).collect();
+    let ends: Vec<usize> = (0..omega.len())
+        .filter(|line| basis.row(*line).norm_squared() > END_LEVERAGE * nu)
+        .collect();
     if form.order > 0 && !ends.is_empty() {
         let lower = Form { order: form.order - 1, bumps: form.bumps.clone() };
         let lower = fit(lower, omega, variances, nu).log_power;
@@ -420,4 +421,31 @@ fn most_likely(basis: &DMatrix<f64>, variances: &DVector<f64>) -> (DVector<f64>,
 
 fn deviance(log_power: &DVector<f64>, variances: &DVector<f64>) -> f64 {
     log_power.iter().zip(variances.iter()).map(|(log, v)| log + v * (-log).exp()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Noise that falls like 1/f, one complex deviation a line, of which the first is quiet by chance.
+    #[test]
+    fn a_line_at_the_end_that_is_quiet_by_chance_has_not_all_the_weight() {
+        let omega: Vec<f64> = (1..=100).map(f64::from).collect();
+        // Deviations of a fixed sequence, exponentially distributed as squares of complex numbers are.
+        let deviation = |line: usize| -(1.0 - (0.618_033_988_75 * line as f64).fract()).ln();
+        let mut variances = DMatrix::from_fn(100, 1, |line, _| deviation(line + 1) / omega[line]);
+        for quiet in [1e-2, 1e-4, 1e-6] {
+            variances[(0, 0)] = quiet;
+            for order in 1..=MAX_ORDER {
+                let form = Form { order, bumps: Vec::new() };
+                let smooth = fit(form, &omega, &variances, 1.0);
+                let first = smooth.log_power[(0, 0)].exp();
+                assert!(first > 0.1, "order {order}: {first}");
+            }
+        }
+        // Where the lines are many, the end is as low as they say.
+        let falling = DMatrix::from_fn(100, 1, |line, _| omega[line].powi(3));
+        let smooth = fit(Form { order: 3, bumps: Vec::new() }, &omega, &falling, 8.0);
+        assert!(smooth.log_power[(0, 0)].abs() < 1e-3, "{}", smooth.log_power[(0, 0)]);
+    }
 }
