@@ -1,6 +1,7 @@
 //! Sparse matrices: products, and factorisations by band or, where that is wide, by `faer`.
 
 mod banded;
+mod fill;
 mod general;
 mod ordering;
 mod product;
@@ -8,6 +9,7 @@ mod product;
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
+use crate::IntegrateError;
 use banded::BandedLu;
 pub(crate) use general::GeneralLu;
 use ordering::Ordering;
@@ -16,6 +18,30 @@ pub(crate) use product::Product;
 /// Most diagonals of a matrix that is factored by band: about where solutions with a grid in two dimensions
 /// take as long either way, 0.4 GB for 100,000 degrees of freedom.
 const WIDEST_BAND: usize = 256;
+
+/// Reason why a matrix was not factored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum NotFactored {
+    /// The smallest pivot relative to the size of its row (or the reciprocal condition) is no more than
+    /// rounding.
+    Singular(f64),
+    /// The factors take at least so many bytes, and may not.
+    TooLarge { bytes: u64, limit: u64 },
+}
+
+impl NotFactored {
+    /// The error of a system with `dof` degrees of freedom, that of a singular matrix being `singular`.
+    pub(crate) fn or_singular(
+        self,
+        dof: usize,
+        singular: impl FnOnce(f64) -> IntegrateError,
+    ) -> IntegrateError {
+        match self {
+            Self::Singular(smallest) => singular(smallest),
+            Self::TooLarge { bytes, limit } => IntegrateError::FactorsTooLarge { dof, bytes, limit },
+        }
+    }
+}
 
 /// A sparse matrix factored once for many solves.
 pub(crate) enum SparseLu {
@@ -33,15 +59,20 @@ pub(crate) enum SparseLu {
 }
 
 impl SparseLu {
-    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`; the smallest
-    /// pivot relative to the size of its row (or the reciprocal condition) if that is no more than rounding.
-    pub(crate) fn new(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Result<Self, f64> {
+    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors
+    /// take more than `limit` bytes.
+    pub(crate) fn new(
+        matrix: &CsrMatrix<f64>,
+        sizes: &[f64],
+        limit: u64,
+    ) -> Result<Self, NotFactored> {
         let ordering = Ordering::narrowing(matrix.pattern());
         if ordering.diagonals(matrix.pattern()) > WIDEST_BAND {
-            let factors = GeneralLu::new(CscMatrix::from(matrix), sizes)?;
+            let factors = GeneralLu::new(CscMatrix::from(matrix), sizes, limit)?;
             return Ok(Self::General(Box::new(factors)));
         }
-        let factors = BandedLu::new(matrix, &ordering, sizes)?;
+        let factors =
+            BandedLu::new(matrix, &ordering, sizes).map_err(NotFactored::Singular)?;
         Ok(Self::Banded { ordering, factors, scratch: vec![0.0; matrix.nrows()] })
     }
 
