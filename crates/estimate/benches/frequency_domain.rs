@@ -87,8 +87,7 @@ fn many_degrees_of_freedom(_: &mut Criterion) {
         let system = machines::chain(dof, Support::Held, 0.02, 1);
         let test = machines::steady_test("held chain", system, false, LINES, 1).unwrap();
         let response = machines::repeated(&test.displacement, 4).unwrap();
-        let response =
-            noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1).unwrap();
+        let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1).unwrap();
         let force = machines::repeated(&test.force, 4).unwrap();
         let lines = Lines::new(test.force.sampling(), test.lines.iter().copied()).unwrap();
         let quantity = ResponseQuantity::Displacement;

@@ -12,8 +12,8 @@ const MOST_DOF: usize = 2;
 #[derive(Debug)]
 pub(crate) struct FixedSize {
     one: Transition,
-    /// Two steps at once, of a single degree of freedom: each waits for the one before, so that the
-    /// second is half the waiting.
+    /// Two steps at once, if both together are short: each step waits for the one before, so that two at
+    /// once wait half as long.
     two: Option<Transition>,
 }
 
@@ -29,7 +29,7 @@ impl FixedSize {
         if !resolves(&one, dt, n, 1.0) {
             return None;
         }
-        let two = (n == 1 && resolves(&one, dt, n, 2.0)).then(|| doubled(&one));
+        let two = resolves(&one, dt, n, 2.0).then(|| doubled(&one));
         Some(Self { one, two })
     }
 

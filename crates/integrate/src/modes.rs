@@ -172,9 +172,8 @@ impl<'a> Inverse<'a> {
             ModeSearch::NearOmega(omega) if omega > 0.0 && omega.is_finite() => {
                 let shift = Complex::new(0.0, omega);
                 let (matrix, sizes) = dynamic_stiffness(system, shift);
-                let factors =
-                    GeneralLu::new(matrix, &sizes, system.factor_limit())
-                        .map_err(|error| singular(shift, error))?;
+                let factors = GeneralLu::new(matrix, &sizes, system.factor_limit())
+                    .map_err(|error| singular(shift, error))?;
                 let factors = Factors::Complex(Box::new(factors));
                 Ok(Self { system, shift, scale: omega, factors })
             }

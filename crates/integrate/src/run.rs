@@ -46,7 +46,11 @@ impl<'a> Motion<'a> {
     pub(crate) fn set(&mut self, k: usize, motion: &[f64]) {
         for (part, values) in self.parts.iter_mut().zip(motion.chunks_exact(self.dof)) {
             match self.observed {
-                None => values.iter().enumerate().for_each(|(c, value)| part[(k, c)] = *value),
+                None => {
+                    let samples = part.nrows();
+                    let row = part.as_mut_slice()[k..].iter_mut().step_by(samples);
+                    row.zip(values).for_each(|(kept, value)| *kept = *value);
+                }
                 Some(observed) => {
                     observed.iter().enumerate().for_each(|(c, &at)| part[(k, c)] = values[at]);
                 }

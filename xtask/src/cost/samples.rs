@@ -8,7 +8,7 @@ use mechid::integrate::{AllowUnstable, Newmark, integrate};
 use mechid::io::{ReadOptions, RecordFile, TimeAxis, csv_text};
 use mechid::model::{InitialState, Response};
 use mechid::signal::{Record, Sampling};
-use mechid_problems::dissertation_bearing;
+use mechid_problems::{KyxSign, dissertation_bearing};
 use nalgebra::DMatrix;
 
 use super::measure::{Growth, shortest};
@@ -22,7 +22,7 @@ pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
     let path = std::env::temp_dir().join(format!("mechid-cost-{}.csv", std::process::id()));
     for samples in [1_000, 10_000, 100_000, 1_000_000, 3_000_000] {
         let (force, response) = stepped(samples)?;
-        let system = dissertation_bearing().map_err(|e| e.to_string())?;
+        let system = dissertation_bearing(KyxSign::Minus).system();
         let (rest, scheme) = (InitialState::rest(2), AllowUnstable(&Newmark::AVERAGE_ACCELERATION));
         step.push(
             samples,
@@ -37,7 +37,7 @@ pub fn measured(seconds: f64) -> Result<Vec<Growth>, String> {
 
 /// The bearing of the dissertation under two forces of many frequencies.
 fn stepped(samples: usize) -> Result<(Record, Response), String> {
-    let system = dissertation_bearing().map_err(|e| e.to_string())?;
+    let system = dissertation_bearing(KyxSign::Minus).system();
     let sampling = Sampling::new(1e-3, samples).map_err(|e| e.to_string())?;
     let data = DMatrix::from_fn(samples, 2, |k, c| {
         let t = 1e-3 * k as f64;
@@ -61,12 +61,7 @@ fn least_squares(force: &Record, response: &Response, seconds: f64) -> Result<f6
     Ok(shortest(seconds, || solve().is_ok()))
 }
 
-fn reading(
-    path: &Path,
-    force: &Record,
-    response: &Response,
-    seconds: f64,
-) -> Result<f64, String> {
+fn reading(path: &Path, force: &Record, response: &Response, seconds: f64) -> Result<f64, String> {
     let x = response.displacement();
     let columns: [(String, &[f64]); 3] = [
         ("force".into(), force.channel(0)),

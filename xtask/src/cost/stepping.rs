@@ -1,8 +1,6 @@
 //! Newmark's scheme on dense and sparse systems.
 
-use mechid::integrate::{
-    AllowUnstable, Newmark, Scheme, SelectedDofs, System, integrate_selected,
-};
+use mechid::integrate::{AllowUnstable, Newmark, Scheme, SelectedDofs, System, integrate_selected};
 use mechid::model::{InitialState, SecondOrderSystem, SparseSystem, band, triplets};
 use mechid::signal::{Record, Sampling};
 use nalgebra::DMatrix;

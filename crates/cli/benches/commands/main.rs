@@ -180,7 +180,11 @@ fn reading(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     let written = fs::metadata(folder.join("force.csv"))?.len() as f64 * 1e-6;
     // What writing adds, for each MB, over what reading takes, for each MB.
     let ratio = (with.seconds - without.seconds) / written / (without.seconds / megabytes);
-    figures.push(figure("force --output: writing over reading", format!("{ratio:.2}"), "1 at most"));
+    figures.push(figure(
+        "force --output: writing over reading",
+        format!("{ratio:.2}"),
+        "1 at most",
+    ));
     Ok(())
 }
 
@@ -237,8 +241,9 @@ fn driven_chain(n: usize, samples: usize, lines: usize, periods: usize) -> Strin
             1 => off,
             _ => 0.0,
         };
-        let rows: Vec<String> =
-            (0..n).map(|i| format!("{:?}", (0..n).map(|j| entry(i, j)).collect::<Vec<_>>())).collect();
+        let rows: Vec<String> = (0..n)
+            .map(|i| format!("{:?}", (0..n).map(|j| entry(i, j)).collect::<Vec<_>>()))
+            .collect();
         format!("[{}]", rows.join(","))
     };
     let driven: Vec<String> = (1..=n)
@@ -261,9 +266,8 @@ fn driven_chain(n: usize, samples: usize, lines: usize, periods: usize) -> Strin
 
 /// Identifies every entry of M, C and K of machines with many degrees of freedom.
 fn identification(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
-    let channels = |kind: &str, n: usize| {
-        (1..=n).map(|i| format!("{kind}_{i}")).collect::<Vec<_>>().join(",")
-    };
+    let channels =
+        |kind: &str, n: usize| (1..=n).map(|i| format!("{kind}_{i}")).collect::<Vec<_>>().join(",");
     // With as many masses as forces are independent, and lines enough for all of them.
     let cases = [
         (50, 2048, 1, "least-squares", "2 s and 200 MB at most"),

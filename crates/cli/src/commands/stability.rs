@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::analysis::text::compact;
 use mechid::integrate::{
-    Bathe, CentralDifference, GeneralisedAlpha, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta,
+    Bathe, CentralDifference, GeneralisedAlpha, Houbolt, MatrixExponential, Newmark, RungeKutta4,
+    Scheme, WilsonTheta,
 };
 use mechid::io::Experiment;
 use mechid::{NamedScheme, SteppedMachine, compare_schemes, stability_figure};
@@ -98,7 +99,7 @@ impl StabilityArgs {
         };
         let of_wilson = format!("Wilson θ = {}", compact(self.theta, 6));
         let of_alpha = format!("generalised-α {}", compact(self.rho_infinity, 6));
-        let schemes: [(String, Box<dyn Scheme>); 8] = [
+        let schemes: [(String, Box<dyn Scheme>); 9] = [
             (of_newmark, Box::new(newmark)),
             ("linear acceleration".into(), Box::new(Newmark::LINEAR_ACCELERATION)),
             ("central difference".into(), Box::new(CentralDifference::default())),
@@ -107,6 +108,7 @@ impl StabilityArgs {
             (of_alpha, Box::new(alpha)),
             ("Bathe".into(), Box::new(Bathe::HALVES)),
             ("Runge–Kutta 4".into(), Box::new(RungeKutta4::LINEAR)),
+            ("matrix exponential".into(), Box::new(MatrixExponential::LINEAR)),
         ];
         Ok(schemes.into_iter().map(|(label, scheme)| NamedScheme { label, scheme }).collect())
     }

@@ -64,7 +64,7 @@ where
         let scratch = symbolic.solve_in_place_scratch::<T>(1, Par::Seq);
         let scratch = MemBuffer::try_new(scratch).map_err(|_| SINGULAR)?;
         let mut factors = Self { symbolic, numeric, scales, scratch };
-        match factors.reciprocal_condition() {
+        match reciprocal_condition(factors.scales.len(), |vector| factors.solve_scaled(vector)) {
             // NaN (from a pivot of zero) fails the test too.
             reciprocal if reciprocal > f64::EPSILON => Ok(factors),
             reciprocal => Err(NotFactored::Singular(reciprocal)),
@@ -86,25 +86,27 @@ where
             MemStack::new(&mut self.scratch),
         );
     }
+}
 
-    /// Smallest shrinking of a vector by the matrix of scaled rows, whose largest entry is 1 at most, that
-    /// some inverse iteration finds.
-    fn reciprocal_condition(&mut self) -> f64 {
-        let n = self.scales.len();
-        let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
-        let mut growth = 0.0_f64;
-        for _ in 0..INVERSE_STEPS {
-            let before = largest(&vector);
-            vector.iter_mut().for_each(|v| *v /= T::from_real(before));
-            self.solve_scaled(&mut vector);
-            let after = largest(&vector);
-            if !after.is_finite() {
-                return 0.0;
-            }
-            growth = growth.max(after);
+/// Smallest shrinking of a vector by a scaled matrix, whose largest entry is 1 at most, that some inverse
+/// iteration with `solve` finds.
+pub(super) fn reciprocal_condition<T>(n: usize, mut solve: impl FnMut(&mut [T])) -> f64
+where
+    T: ComplexField<RealField = f64>,
+{
+    let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
+    let mut growth = 0.0_f64;
+    for _ in 0..INVERSE_STEPS {
+        let before = largest(&vector);
+        vector.iter_mut().for_each(|v| *v /= T::from_real(before));
+        solve(&mut vector);
+        let after = largest(&vector);
+        if !after.is_finite() {
+            return 0.0;
         }
-        growth.recip()
+        growth = growth.max(after);
     }
+    growth.recip()
 }
 
 /// Returns whether the symmetric `matrix` has a Cholesky factor.
@@ -112,7 +114,7 @@ pub(super) fn has_cholesky_factor(matrix: &CscMatrix<f64>) -> bool {
     SparseColMatRef::new(pattern(matrix), matrix.values()).sp_cholesky(Side::Lower).is_ok()
 }
 
-fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, usize> {
+pub(super) fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, usize> {
     let (offsets, rows) = (matrix.col_offsets(), matrix.row_indices());
     SymbolicSparseColMatRef::new_checked(matrix.nrows(), matrix.ncols(), offsets, None, rows)
 }
