@@ -75,7 +75,7 @@ impl StabilityArgs {
 
     /// Compares the schemes.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let schemes = self.schemes()?;
+        let mut schemes = self.schemes()?;
         let machine = match &self.experiment {
             None => None,
             Some(file) => {
@@ -84,6 +84,11 @@ impl StabilityArgs {
             }
         };
         let machine = machine.as_ref().map(|(system, dt)| SteppedMachine { system, dt: *dt });
+        let dof = machine.map_or(1, |machine| machine.system.dof());
+        if dof <= MatrixExponential::MOST_DOF {
+            let (label, scheme) = ("matrix exponential".into(), MatrixExponential::LINEAR);
+            schemes.push(NamedScheme { label, scheme: Box::new(scheme) });
+        }
         let compared = compare_schemes(&schemes, self.damping, &self.step, machine)?;
         Outcome::new(compared.to_string(), &compared)?
             .with_plot(&self.plot, || Ok(stability_figure(&schemes, self.damping)?))
@@ -99,7 +104,7 @@ impl StabilityArgs {
         };
         let of_wilson = format!("Wilson θ = {}", compact(self.theta, 6));
         let of_alpha = format!("generalised-α {}", compact(self.rho_infinity, 6));
-        let schemes: [(String, Box<dyn Scheme>); 9] = [
+        let schemes: [(String, Box<dyn Scheme>); 8] = [
             (of_newmark, Box::new(newmark)),
             ("linear acceleration".into(), Box::new(Newmark::LINEAR_ACCELERATION)),
             ("central difference".into(), Box::new(CentralDifference::default())),
@@ -108,7 +113,6 @@ impl StabilityArgs {
             (of_alpha, Box::new(alpha)),
             ("Bathe".into(), Box::new(Bathe::HALVES)),
             ("Runge–Kutta 4".into(), Box::new(RungeKutta4::LINEAR)),
-            ("matrix exponential".into(), Box::new(MatrixExponential::LINEAR)),
         ];
         Ok(schemes.into_iter().map(|(label, scheme)| NamedScheme { label, scheme }).collect())
     }
