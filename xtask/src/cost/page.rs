@@ -65,7 +65,7 @@ fn grouped(value: f64) -> String {
     let digits = format!("{value:.0}");
     let first = digits.len() % 3;
     let mut text = digits[..first].to_owned();
-    for chunk in digits[first..].as_bytes().chunks(3) {
+    for chunk in digits.as_bytes()[first..].chunks(3) {
         if !text.is_empty() {
             text.push(',');
         }

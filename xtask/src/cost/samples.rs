@@ -6,9 +6,9 @@ use std::path::Path;
 use mechid::estimate::{EquationOfMotion, Unknowns};
 use mechid::integrate::{AllowUnstable, Newmark, integrate};
 use mechid::io::{ReadOptions, RecordFile, TimeAxis, csv_text};
-use mechid::model::{InitialState, Response};
+use mechid::model::{InitialState, KyxSign, Response};
 use mechid::signal::{Record, Sampling};
-use mechid_problems::{KyxSign, dissertation_bearing};
+use mechid_problems::dissertation_bearing;
 use nalgebra::DMatrix;
 
 use super::measure::{Growth, shortest};
