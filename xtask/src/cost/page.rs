@@ -18,18 +18,29 @@ The power of n is fitted to the larger half of the sizes.
 
 ";
 
-const END: &str = "A dense step has two products and a solve, n² each, of matrices that leave the caches of the \
-processor beyond some hundred degrees of freedom; its preparation is a factorisation, n³.
-A step of a chain or a grid goes through the non-zero entries and those of the factors: n of a chain, n^1.5 of a \
-grid by band.
+const END: &str = "A dense step has two products and a solve, n² each; its preparation is a factorisation, n³.
+A step of a chain or a grid goes through the non-zero entries and those of the factors: n of a chain, \
+n log n of a grid in the order of minimum degree.
 Least squares factors the rows once for all equations; maximum likelihood searches every equation by itself \
 with what they have in common computed once.
-Over samples everything is linear beyond what a run costs at all; of a text that fits in memory only the \
-first pass is counted, of a longer one both.
+Over samples everything is linear beyond what a run costs at all.
+Where time grows faster than that, the numbers have left the caches of the processor, or others used it.
 ";
 
+/// What kept the machine busy, where the system tells.
+fn load() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let average = std::fs::read_to_string("/proc/loadavg").ok();
+    let average = average.as_deref().and_then(|text| text.split_whitespace().next());
+    average.map_or(String::new(), |load| {
+        format!(
+            "At the end of the run {load} programs on average wanted its {cores} processors.\n\n"
+        )
+    })
+}
+
 pub fn text(groups: &[Group]) -> String {
-    let mut text = BEGIN.to_owned();
+    let mut text = BEGIN.to_owned() + &load();
     for group in groups {
         let _ = writeln!(text, "| {} | n from | to | time at the last | grows as |", group.title);
         text.push_str("|---|---|---|---|---|\n");
