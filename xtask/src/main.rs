@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use clap::{Parser, Subcommand};
 use indicatif::ProgressBar;
+use xtask::cost;
 use xtask::thesis::reproduce::{self, Reproduction};
 
 /// Project tasks.
@@ -35,24 +36,23 @@ enum Task {
         #[arg(long, value_name = "FOLDER")]
         out: Option<PathBuf>,
     },
+    /// Measure how time grows with degrees of freedom and samples, and write the page of the book about it
+    /// (with --release, on a machine with nothing else to do).
+    MeasureCost {
+        /// Seconds for each point.
+        #[arg(long, default_value_t = 0.5)]
+        seconds: f64,
+    },
 }
 
 fn main() -> ExitCode {
-    let Task::ReproduceThesis { only, check, bless, out } = Tasks::parse().task;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new("."));
-    let out = out.unwrap_or_else(|| root.join("docs/thesis"));
-    let outcome = computed(root, only.as_deref()).and_then(|reproduction| {
-        if check {
-            return compared(root, &reproduction, only.is_none());
+    let outcome = match Tasks::parse().task {
+        Task::MeasureCost { seconds } => cost::write(root, seconds),
+        Task::ReproduceThesis { only, check, bless, out } => {
+            reproduce_thesis(root, only.as_deref(), check, bless, out)
         }
-        let files = reproduction.write(&out)?;
-        println!("{files} files written to {}", out.display());
-        if bless {
-            reproduction.bless(root)?;
-            println!("{} golden files rewritten", reproduction.golden_files());
-        }
-        Ok(())
-    });
+    };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(words) => {
@@ -60,6 +60,27 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn reproduce_thesis(
+    root: &Path,
+    only: Option<&str>,
+    check: bool,
+    bless: bool,
+    out: Option<PathBuf>,
+) -> Result<(), String> {
+    let out = out.unwrap_or_else(|| root.join("docs/thesis"));
+    let reproduction = computed(root, only)?;
+    if check {
+        return compared(root, &reproduction, only.is_none());
+    }
+    let files = reproduction.write(&out)?;
+    println!("{files} files written to {}", out.display());
+    if bless {
+        reproduction.bless(root)?;
+        println!("{} golden files rewritten", reproduction.golden_files());
+    }
+    Ok(())
 }
 
 fn computed(root: &Path, only: Option<&str>) -> Result<Reproduction, String> {

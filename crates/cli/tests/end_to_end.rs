@@ -224,6 +224,8 @@ fn every_scheme_simulates_what_it_says() {
         (r#""rho-infinity-bathe", "rho_infinity": 0.5, "load": "exact""#, "Bathe (ρ∞ = 0.5", 2),
         (r#""matrix-exponential", "load": "linear""#, "matrix exponential", 2),
         (r#""runge-kutta-4", "load": "linear""#, "Runge", 1),
+        (r#""runge-kutta-4", "load": "band-limited""#, "Runge", 1),
+        (r#""runge-kutta-4", "load": "spline""#, "Runge", 1),
     ] {
         let description = format!(
             r#"{{

@@ -1,18 +1,25 @@
-//! Cost of identifying the bearing in the frequency domain, records included.
+//! Cost of identifying the bearing in the frequency domain, records included, and of the search of machines
+//! with many degrees of freedom, which the last lines tell.
+
+#![allow(clippy::print_stdout, reason = "the last lines are the result")]
 
 #[allow(dead_code, reason = "the tests use the rest")]
 #[path = "../tests/suite/common/mod.rs"]
 mod common;
 
-use mechid_model::ResponseQuantity;
 use std::hint::black_box;
+use std::time::Instant;
 
 use common::monte_carlo::{Estimator, Experiment};
 use common::{bearing, displacements, forces, synthesise};
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
-use mechid_signal::{Sampling, Spectrum};
+use mechid_estimate::frequency_domain::{
+    FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, output_error,
+};
+use mechid_model::ResponseQuantity;
+use mechid_problems::machines::{self, Support};
+use mechid_signal::{NoiseLevel, Sampling, Spectrum, noise};
 
 /// 1,024 samples of two forces and two displacements to C and K with their covariance.
 fn identify(c: &mut Criterion) {
@@ -71,5 +78,36 @@ fn estimators(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, identify, estimators);
+/// The maximum-likelihood search for all of M, C and K of a held chain with every mass driven, from 4
+/// periods.
+fn many_degrees_of_freedom(_: &mut Criterion) {
+    const LINES: usize = 500;
+    let mut before: Option<(usize, f64)> = None;
+    for (dof, goal) in [(2, ""), (5, ""), (10, ", 2 s at most"), (20, ", 20 s at most")] {
+        let system = machines::chain(dof, Support::Held, 0.02, 1);
+        let test = machines::steady_test("held chain", system, false, LINES, 1).unwrap();
+        let response = machines::repeated(&test.displacement, 4).unwrap();
+        let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 1).unwrap();
+        let force = machines::repeated(&test.force, 4).unwrap();
+        let lines = Lines::new(test.force.sampling(), test.lines.iter().copied()).unwrap();
+        let quantity = ResponseQuantity::Displacement;
+        let periods = RepeatedPeriods::new(&lines, &force, &response, quantity).unwrap();
+        let data = periods.mean_with_noise(Pooling::AllLines).unwrap();
+        let unknowns = Unknowns::unknown_mass(dof).unwrap();
+        let seconds = (0..3).map(|_| {
+            let start = Instant::now();
+            black_box(output_error(&data, &unknowns).unwrap());
+            start.elapsed().as_secs_f64()
+        });
+        let seconds = seconds.fold(f64::INFINITY, f64::min);
+        let slope = before.map_or(String::new(), |(m, then)| {
+            let slope = (seconds / then).ln() / (dof as f64 / m as f64).ln();
+            format!(", grows as n^{slope:.1}")
+        });
+        println!("maximum likelihood of {dof} degrees of freedom: {seconds:.3} s{slope}{goal}");
+        before = Some((dof, seconds));
+    }
+}
+
+criterion_group!(benches, identify, estimators, many_degrees_of_freedom);
 criterion_main!(benches);

@@ -26,7 +26,36 @@ pub fn integrate<'a>(
 ) -> Result<Response, IntegrateError> {
     let table = ForceTable::ending(scheme, system.dof(), force.into())?;
     let motion = Motion::zeros(table.sampling().len(), system.dof());
-    run(scheme, system, &table, initial, motion)
+    run(scheme, system, &table, initial, motion)?.into_response(&table)
+}
+
+/// The displacement alone of what [`integrate`] computes, samples × n in m: a third of the memory,
+/// which is what most of the time of few degrees of freedom goes into.
+///
+/// ```
+/// use mechid_integrate::{Newmark, integrate, integrate_displacement};
+/// use mechid_model::{InitialState, Sdof};
+/// use mechid_signal::{Record, Sampling};
+///
+/// let system = Sdof::new(1.0, 0.2, 40.0)?.system();
+/// let force = Record::from_channel(Sampling::new(0.01, 500)?, vec![1.0; 500])?;
+/// let (scheme, rest) = (Newmark::AVERAGE_ACCELERATION, InitialState::rest(1));
+/// let displacement = integrate_displacement(&scheme, &system, &force, &rest)?;
+/// assert_eq!(&displacement, integrate(&scheme, &system, &force, &rest)?.displacement());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Those of [`integrate`].
+pub fn integrate_displacement<'a>(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    force: impl Into<SampledForce<'a>>,
+    initial: &InitialState,
+) -> Result<Record, IntegrateError> {
+    let table = ForceTable::ending(scheme, system.dof(), force.into())?;
+    let motion = Motion::displacement(table.sampling().len(), system.dof());
+    run(scheme, system, &table, initial, motion)?.into_displacement(&table)
 }
 
 /// Degrees of freedom, counted from 0, at which forces act and responses are kept.
@@ -90,7 +119,7 @@ pub fn integrate_selected<'a>(
     dofs.check(system.dof())?;
     let table = ForceTable::acting_on(scheme, system.dof(), dofs.forced, force.into())?;
     let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
-    run(scheme, system, &table, initial, motion)
+    run(scheme, system, &table, initial, motion)?.into_response(&table)
 }
 
 /// The motion of `system` from `initial` under a force given as a function of time:
@@ -113,7 +142,8 @@ pub fn integrate_function(
     force(end, &mut next);
     check_finite("the force", &next, end)?;
     let table = ForceTable::ending(scheme, system.dof(), sampled.force())?.continued(next);
-    run(scheme, system, &table, initial, Motion::zeros(sampling.len(), system.dof()))
+    let motion = Motion::zeros(sampling.len(), system.dof());
+    run(scheme, system, &table, initial, motion)?.into_response(&table)
 }
 
 /// A function of time sampled where a scheme needs it.
@@ -161,13 +191,13 @@ fn sample(
     Ok(Record::new(sampling, data)?)
 }
 
-fn run(
+fn run<'a>(
     scheme: &dyn Scheme,
     system: &dyn System,
     table: &ForceTable<'_>,
     initial: &InitialState,
-    mut motion: Motion<'_>,
-) -> Result<Response, IntegrateError> {
+    mut motion: Motion<'a>,
+) -> Result<Motion<'a>, IntegrateError> {
     let dof = system.dof();
     initial.check_dof(dof)?;
     let sampling = table.sampling();
@@ -179,5 +209,5 @@ fn run(
         motion.set(k, values);
     }
     run.advance(table, first, (sampling.len() - 1).max(first), &mut motion)?;
-    motion.into_response(table)
+    Ok(motion)
 }

@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, DVectorView, DVectorViewMut, Dyn, LU};
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::newton::{LocalForces, LocalNewton};
-use crate::sparse::{Product, SparseLu, combination};
+use crate::sparse::{NotFactored, Product, SparseLu, combination};
 use crate::{IntegrateError, System};
 
 /// The equations of motion of a system, in the form in which a step uses them.
@@ -30,6 +30,8 @@ struct SparseEquations {
     stiffness: CsrMatrix<f64>,
     /// C and K for products with vectors.
     products: [Product; 2],
+    /// Memory that factors may take, in bytes.
+    factor_limit: u64,
 }
 
 impl Equations {
@@ -42,7 +44,8 @@ impl Equations {
         let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
             .map(|which| matrices.sparse(which).into_owned());
         let products = [&damping, &stiffness].map(Product::of);
-        let equations = SparseEquations { mass, damping, stiffness, products };
+        let factor_limit = system.factor_limit();
+        let equations = SparseEquations { mass, damping, stiffness, products, factor_limit };
         Self { linear: Linear::Sparse(Arc::new(equations)), forces }
     }
 
@@ -62,7 +65,9 @@ impl Equations {
         beta_hat: f64,
     ) -> Result<Effective, IntegrateError> {
         let factored = match &self.linear {
-            Linear::Dense(system) => factor_dense(system, gamma_hat, beta_hat),
+            Linear::Dense(system) => {
+                factor_dense(system, gamma_hat, beta_hat).map_err(NotFactored::Singular)
+            }
             Linear::Sparse(system) => {
                 let terms = [
                     (1.0, &system.mass),
@@ -70,13 +75,15 @@ impl Equations {
                     (beta_hat, &system.stiffness),
                 ];
                 let (matrix, sizes) = combination(&terms);
-                SparseLu::new(&matrix, &sizes).map(Factored::Sparse)
+                SparseLu::new(&matrix, &sizes, system.factor_limit).map(Factored::Sparse)
             }
         };
-        let mut factored = factored.map_err(|smallest| IntegrateError::SingularEffectiveMass {
-            scheme,
-            dt,
-            smallest,
+        let mut factored = factored.map_err(|error| {
+            error.or_singular(self.dof(), |smallest| IntegrateError::SingularEffectiveMass {
+                scheme,
+                dt,
+                smallest,
+            })
         })?;
         let newton = self.forces.as_ref().map(|forces| {
             let mut influence = DMatrix::zeros(self.dof(), forces.dofs().len());

@@ -105,6 +105,22 @@ pub enum IntegrateError {
         /// Smallest pivot of its factorisation, rows divided by the size of their terms.
         smallest: f64,
     },
+    /// Factors of a matrix take more memory than they may.
+    #[error(
+        "the LU factors of the {} need at least {:.2} GB, more than the limit of {:.2} GB: a body in three \
+         dimensions fills in. Use a coarser model, a scheme or a search that factors a diagonal matrix \
+         (central-difference with lumped masses), or raise the limit (`factor_memory_gb` of the system, \
+         `SparseSystem::with_factor_limit`); the time grows faster than the memory",
+        message::count(*dof, "degree of freedom"), 1e-9 * *bytes as f64, 1e-9 * *limit as f64
+    )]
+    FactorsTooLarge {
+        /// Degrees of freedom of the system.
+        dof: usize,
+        /// Memory that factors without exchanges of rows take, in bytes; exchanges add to it.
+        bytes: u64,
+        /// Limit, in bytes.
+        limit: u64,
+    },
     /// The matrix K + σC + σ²M, by which modes are searched for, is singular.
     #[error(
         "the dynamic stiffness of the {} at {omega} rad/s is singular (pivot {smallest:.1e} of its terms): \

@@ -109,13 +109,20 @@ impl<'a> ForceTable<'a> {
             Instant::Beyond => (Some(self.samples), k + 2),
         };
         let Some(record) = record else { return };
-        let value = |c: usize| match k.checked_sub(record.len()) {
-            None => record.data()[(k, c)],
-            Some(after) => self.after[after][c],
-        };
+        match k.checked_sub(record.len()) {
+            None => {
+                let row = record.data().as_slice()[k..].iter().step_by(record.len());
+                self.act(row, out);
+            }
+            Some(after) => self.act(self.after[after].iter(), out),
+        }
+    }
+
+    /// Writes one value for each channel into `out`.
+    fn act<'v>(&self, values: impl Iterator<Item = &'v f64>, out: &mut [f64]) {
         match self.forced {
-            None => out.iter_mut().enumerate().for_each(|(c, out)| *out = value(c)),
-            Some(forced) => forced.iter().enumerate().for_each(|(c, &at)| out[at] = value(c)),
+            None => out.iter_mut().zip(values).for_each(|(out, value)| *out = *value),
+            Some(forced) => forced.iter().zip(values).for_each(|(&at, value)| out[at] = *value),
         }
     }
 

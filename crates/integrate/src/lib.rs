@@ -47,6 +47,7 @@ mod connection;
 mod driver;
 mod effective;
 mod error;
+mod fixed_size;
 mod force;
 mod generalised_alpha;
 mod houbolt;
@@ -72,7 +73,9 @@ pub use accuracy::{Accuracy, accuracy};
 pub use bathe::{Bathe, SubStepForce};
 pub use central_difference::{CentralDifference, CentralDifferenceStart};
 pub use connection::{Connection, NonlinearElement};
-pub use driver::{SelectedDofs, integrate, integrate_function, integrate_selected};
+pub use driver::{
+    SelectedDofs, integrate, integrate_displacement, integrate_function, integrate_selected,
+};
 pub use error::IntegrateError;
 pub use force::SampledForce;
 pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};

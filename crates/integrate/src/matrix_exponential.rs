@@ -37,7 +37,7 @@ impl MatrixExponential {
     pub const LINEAR: Self = Self { linear: true };
 
     /// Largest number of degrees of freedom.
-    const MOST_DOF: usize = 250;
+    pub const MOST_DOF: usize = 250;
 }
 
 impl Scheme for MatrixExponential {

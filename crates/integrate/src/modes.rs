@@ -7,7 +7,7 @@ use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
 use crate::IntegrateError;
-use crate::sparse::{GeneralLu, SparseLu, combination};
+use crate::sparse::{GeneralLu, NotFactored, SparseLu, combination};
 use crate::stability::krylov::{eigenvector, scattered_number};
 
 /// The modes of a sparse system that [`sparse_modes`] looks for.
@@ -75,7 +75,7 @@ const RESIDUAL: f64 = 1e-12;
 ///
 /// # Errors
 /// [`IntegrateError::SearchFrequency`] for an ω that is not positive and finite, [`IntegrateError::SingularShift`]
-/// if the matrix is singular, [`IntegrateError::ModesNotConverged`].
+/// if the matrix is singular, [`IntegrateError::FactorsTooLarge`], [`IntegrateError::ModesNotConverged`].
 ///
 /// # Source
 /// Bai, Demmel, Dongarra, Ruhe and van der Vorst, *Templates for the Solution of Algebraic Eigenvalue
@@ -134,15 +134,18 @@ enum Factors {
 
 impl<'a> Inverse<'a> {
     fn of(system: &'a SparseSystem, search: ModeSearch) -> Result<Self, IntegrateError> {
-        let singular = |shift: Complex<f64>, smallest: f64| IntegrateError::SingularShift {
-            omega: shift.im,
-            smallest,
-            dof: system.dof(),
+        let dof = system.dof();
+        let singular = |shift: Complex<f64>, error: NotFactored| {
+            error.or_singular(dof, |smallest| IntegrateError::SingularShift {
+                omega: shift.im,
+                smallest,
+                dof,
+            })
         };
         let real = |shift: f64| {
             let (matrix, sizes) = real_part(system, shift.into());
-            let factors = SparseLu::new(&matrix, &sizes)
-                .map_err(|smallest| singular(shift.into(), smallest))?;
+            let factors = SparseLu::new(&matrix, &sizes, system.factor_limit())
+                .map_err(|error| singular(shift.into(), error))?;
             let mut inverse = Self {
                 system,
                 shift: shift.into(),
@@ -155,7 +158,10 @@ impl<'a> Inverse<'a> {
             Ok(inverse)
         };
         match search {
-            ModeSearch::Lowest => real(0.0).or_else(|_: IntegrateError| {
+            ModeSearch::Lowest => real(0.0).or_else(|error: IntegrateError| {
+                if !matches!(error, IntegrateError::SingularShift { .. }) {
+                    return Err(error);
+                }
                 // A machine that is free to drift.
                 let omega = match fastest(system) {
                     0.0 => 1.0,
@@ -166,8 +172,8 @@ impl<'a> Inverse<'a> {
             ModeSearch::NearOmega(omega) if omega > 0.0 && omega.is_finite() => {
                 let shift = Complex::new(0.0, omega);
                 let (matrix, sizes) = dynamic_stiffness(system, shift);
-                let factors =
-                    GeneralLu::new(matrix, &sizes).map_err(|smallest| singular(shift, smallest))?;
+                let factors = GeneralLu::new(matrix, &sizes, system.factor_limit())
+                    .map_err(|error| singular(shift, error))?;
                 let factors = Factors::Complex(Box::new(factors));
                 Ok(Self { system, shift, scale: omega, factors })
             }

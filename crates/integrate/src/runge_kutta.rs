@@ -14,7 +14,8 @@ pub enum MidStepForce {
     Held,
     /// ½ [F(t) + F(t+Δt)]: second order.
     Linear,
-    /// The force itself, from a function of time or from samples supplied at mid-step: fourth order.
+    /// The force itself, from a function of time or from samples supplied at mid-step
+    /// ([`mechid_signal::resample::within_steps`] interpolates them): fourth order.
     Supplied,
 }
 

@@ -19,6 +19,14 @@ pub trait System: Sync {
         &[]
     }
 
+    /// Memory that factors of its matrices may take, in bytes.
+    fn factor_limit(&self) -> u64 {
+        match self.matrices() {
+            Matrices::Dense(_) => SparseSystem::FACTOR_LIMIT,
+            Matrices::Sparse(system) => system.factor_limit(),
+        }
+    }
+
     /// Number of degrees of freedom n.
     fn dof(&self) -> usize {
         match self.matrices() {

@@ -1,10 +1,10 @@
 //! Records as comma-separated text.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use mechid_signal::Sampling;
 
+use crate::number_text::push_number;
 use crate::{BegunFile, IoError};
 
 /// Number of bytes of text that are collected before they are written.
@@ -114,9 +114,10 @@ fn header<'a>(names: impl Iterator<Item = &'a str>) -> String {
 }
 
 fn push_row(text: &mut String, time: f64, values: impl Iterator<Item = f64>) {
-    let _ = write!(text, "{time:?}");
+    push_number(text, time);
     for value in values {
-        let _ = write!(text, ",{value:?}");
+        text.push(',');
+        push_number(text, value);
     }
     text.push('\n');
 }

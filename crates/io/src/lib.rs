@@ -28,6 +28,7 @@ mod limits;
 mod line_spec;
 mod mat;
 mod matrix_market;
+mod number_text;
 mod output;
 #[cfg(feature = "parquet")]
 mod parquet;

@@ -145,6 +145,8 @@ pub(crate) struct SystemDescription {
     stiffness: Option<Entries>,
     natural_frequency_hz: Option<f64>,
     damping_ratio: Option<f64>,
+    /// Memory that factors of a large machine may take, in GB.
+    factor_memory_gb: Option<f64>,
 }
 
 impl SystemDescription {
@@ -172,9 +174,16 @@ impl SystemDescription {
             return Err(IoError::Description { file: file.into(), what });
         };
         let [mass, damping, stiffness] = [&self.mass, damping, stiffness].map(Entries::sparse);
-        SparseSystem::new(mass, damping, stiffness)
-            .map(Some)
-            .map_err(|source| IoError::Model { file: file.into(), source })
+        let sparse = SparseSystem::new(mass, damping, stiffness)
+            .map_err(|source| IoError::Model { file: file.into(), source })?;
+        Ok(Some(match self.factor_memory_gb {
+            None => sparse,
+            Some(gb) if gb > 0.0 && gb.is_finite() => sparse.with_factor_limit((1e9 * gb) as u64),
+            Some(gb) => {
+                let what = format!("factor_memory_gb must be positive, got {gb}");
+                return Err(IoError::Description { file: file.into(), what });
+            }
+        }))
     }
 
     pub(crate) fn system(&self, file: &str) -> Result<SecondOrderSystem, IoError> {

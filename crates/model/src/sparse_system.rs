@@ -25,9 +25,13 @@ pub struct SparseSystem {
     mass: CsrMatrix<f64>,
     damping: CsrMatrix<f64>,
     stiffness: CsrMatrix<f64>,
+    factor_limit: u64,
 }
 
 impl SparseSystem {
+    /// Memory that factors of its matrices may take if nothing else is said, in bytes.
+    pub const FACTOR_LIMIT: u64 = 4_000_000_000;
+
     /// Checks and takes the n×n matrices M (kg), C (N·s/m) and K (N/m).
     ///
     /// # Errors
@@ -56,7 +60,18 @@ impl SparseSystem {
         if reciprocal_condition < 1e-15 {
             return Err(ModelError::SingularMass { reciprocal_condition });
         }
-        Ok(Self { mass, damping, stiffness })
+        Ok(Self { mass, damping, stiffness, factor_limit: Self::FACTOR_LIMIT })
+    }
+
+    /// Returns the system with another limit, in bytes, of the memory that factors of its matrices may
+    /// take: those of bodies in three dimensions fill in, with the time that this takes.
+    pub fn with_factor_limit(self, bytes: u64) -> Self {
+        Self { factor_limit: bytes, ..self }
+    }
+
+    /// Memory that factors of its matrices may take, in bytes.
+    pub fn factor_limit(&self) -> u64 {
+        self.factor_limit
     }
 
     /// Number of degrees of freedom n.
@@ -81,6 +96,7 @@ impl From<&SecondOrderSystem> for SparseSystem {
             mass: CsrMatrix::from(dense.mass()),
             damping: CsrMatrix::from(dense.damping()),
             stiffness: CsrMatrix::from(dense.stiffness()),
+            factor_limit: Self::FACTOR_LIMIT,
         }
     }
 }

@@ -36,6 +36,26 @@ impl Record {
         Ok(Self { sampling, data })
     }
 
+    /// A record of values that are known to be finite, so that a long result is not read once more; shape and
+    /// unit as in [`Record::new`].
+    ///
+    /// # Errors
+    /// [`SignalError::Length`] if the rows do not match the sampling.
+    ///
+    /// # Panics
+    /// With debug assertions, if a value is not finite.
+    pub fn of_finite(sampling: Sampling, data: DMatrix<f64>) -> Result<Self, SignalError> {
+        debug_assert!(first_unusable(data.as_slice()).is_none(), "the values are finite");
+        if data.nrows() != sampling.len() {
+            return Err(SignalError::Length {
+                channel: 0,
+                got: data.nrows(),
+                expected: sampling.len(),
+            });
+        }
+        Ok(Self { sampling, data })
+    }
+
     /// A record of one channel.
     ///
     /// # Errors

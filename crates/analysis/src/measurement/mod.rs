@@ -230,7 +230,7 @@ impl Measurement {
 
     /// Takes columns of a file that is open.
     pub(crate) fn of_file(
-        file: RecordFile,
+        mut file: RecordFile,
         path: Option<&Path>,
         channels: &Channels,
         reading: &Reading,
@@ -242,6 +242,7 @@ impl Measurement {
         })?;
         let survey = file.survey(&time, &channels.used())?;
         let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
+        file.forget_head();
         let mut units = units;
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));
         let name = |column: &String| {

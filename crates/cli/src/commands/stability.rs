@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use mechid::analysis::text::compact;
 use mechid::integrate::{
-    Bathe, CentralDifference, GeneralisedAlpha, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta,
+    Bathe, CentralDifference, GeneralisedAlpha, Houbolt, MatrixExponential, Newmark, RungeKutta4,
+    Scheme, WilsonTheta,
 };
 use mechid::io::Experiment;
 use mechid::{NamedScheme, SteppedMachine, compare_schemes, stability_figure};
@@ -74,7 +75,7 @@ impl StabilityArgs {
 
     /// Compares the schemes.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let schemes = self.schemes()?;
+        let mut schemes = self.schemes()?;
         let machine = match &self.experiment {
             None => None,
             Some(file) => {
@@ -83,6 +84,11 @@ impl StabilityArgs {
             }
         };
         let machine = machine.as_ref().map(|(system, dt)| SteppedMachine { system, dt: *dt });
+        let dof = machine.map_or(1, |machine| machine.system.dof());
+        if dof <= MatrixExponential::MOST_DOF {
+            let (label, scheme) = ("matrix exponential".into(), MatrixExponential::LINEAR);
+            schemes.push(NamedScheme { label, scheme: Box::new(scheme) });
+        }
         let compared = compare_schemes(&schemes, self.damping, &self.step, machine)?;
         Outcome::new(compared.to_string(), &compared)?
             .with_plot(&self.plot, || Ok(stability_figure(&schemes, self.damping)?))

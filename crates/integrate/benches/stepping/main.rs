@@ -1,31 +1,41 @@
 //! Cost of a step: every scheme against hand-written loops, and how it grows with n.
 //!
-//! Prints a table of ns per step and ratios before criterion's own report.
+//! Prints ns per step; the last lines are the ratios to the fastest loop written by hand. Everything
+//! that is compared takes turns within one run.
 
 #![allow(clippy::print_stdout, reason = "a bench reports")]
 
 mod by_hand;
 
 use std::hint::black_box;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use mechid_integrate::*;
 use mechid_model::{InitialState, SecondOrderSystem};
 use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
 const SAMPLES: usize = 1_000_000;
-const SHORT: Duration = Duration::from_millis(500);
+
+/// Seconds that the runs of what is compared take together.
+const SECONDS: f64 = 4.0;
+
+/// Largest ratio of our step to the fastest by hand.
+const GOAL: f64 = 1.2;
 
 fn schemes() -> Vec<(&'static str, Box<dyn Scheme>)> {
     let wilson = WilsonTheta::new(1.4).expect("θ ≥ 1");
+    let alpha = GeneralisedAlpha::new(0.8).expect("in range");
     vec![
         ("Newmark", Box::new(Newmark::AVERAGE_ACCELERATION)),
+        ("Runge-Kutta, linear", Box::new(RungeKutta4::LINEAR)),
+        ("Runge-Kutta, supplied", Box::new(RungeKutta4::SUPPLIED)),
         ("central difference", Box::new(CentralDifference::default())),
         ("Houbolt", Box::new(Houbolt::default())),
         ("Wilson", Box::new(wilson)),
-        ("Runge-Kutta, linear", Box::new(RungeKutta4::LINEAR)),
+        ("generalised-α", Box::new(alpha)),
+        ("Bathe", Box::new(Bathe::HALVES)),
+        ("matrix exponential", Box::new(MatrixExponential::LINEAR)),
     ]
 }
 
@@ -50,93 +60,133 @@ fn noise(samples: usize, channels: usize) -> Record {
     Record::new(Sampling::new(1e-3, samples).expect("valid"), data).expect("finite")
 }
 
-/// Returns whether every measurement is only to run once, as `cargo test` lets it; criterion looks for the
-/// same word.
+/// Returns whether every measurement is only to run once, as `cargo test` lets it.
 fn is_tried_only() -> bool {
     !std::env::args().any(|word| word == "--bench")
 }
 
-/// Fastest of several runs, in ns per step: what else the machine does only ever adds.
-fn ns_per_step<T>(steps: usize, mut run: impl FnMut() -> T) -> f64 {
-    let mut once = || {
-        let start = Instant::now();
-        black_box(run());
-        start.elapsed().as_secs_f64()
-    };
-    let first = once();
-    if is_tried_only() {
-        return first * 1e9 / steps as f64;
-    }
-    // About a fifth of a second, at least 5 and at most 1000 runs.
-    let runs = (0.2 / first).clamp(5.0, 1000.0) as usize;
-    (0..runs).map(|_| once()).fold(first, f64::min) * 1e9 / steps as f64
+/// Something to be timed, under its name.
+type Timed<'a> = (String, Box<dyn FnMut() + 'a>);
+
+fn timed<'a, T>(name: impl Into<String>, mut run: impl FnMut() -> T + 'a) -> Timed<'a> {
+    (name.into(), Box::new(move || drop(black_box(run()))))
 }
 
-fn ours(scheme: &dyn Scheme, system: &SecondOrderSystem, force: &Record) -> mechid_model::Response {
-    integrate(scheme, system, force, &InitialState::rest(system.dof())).expect("stable")
-}
-
-fn table(_: &mut Criterion) {
-    println!(
-        "\nns per step, x, ẋ, ẍ stored, memory allocated within; ratio to the fastest by hand"
-    );
-    for dof in [1, 2, 3, 10, 30, 100] {
-        // Enough of them for the factorisations not to count.
-        let samples = if dof <= 2 { SAMPLES } else { (2_000_000 / (dof * dof)).max(4000) };
-        let (system, force) = (chain(dof), noise(samples, dof));
-        let hand: Vec<(&str, f64)> = by_hand::loops(dof)
-            .into_iter()
-            .map(|(name, run)| (name, ns_per_step(samples, || run(&system, &force))))
-            .collect();
-        let fastest = hand.iter().map(|(_, t)| *t).fold(f64::INFINITY, f64::min);
-        for (name, time) in &hand {
-            println!("n = {dof:<4} by hand: {name:<32} {time:8.2}   {:5.2}", time / fastest);
+/// Fastest of several turns of each, in ns per step: what else the machine does only ever adds, and
+/// comes and goes for all of them.
+fn ns_per_step(steps: usize, seconds: f64, jobs: &mut [Timed<'_>]) -> Vec<f64> {
+    let mut fastest = vec![f64::INFINITY; jobs.len()];
+    let begin = Instant::now();
+    for turn in 0..1000 {
+        for (fastest, (_, job)) in fastest.iter_mut().zip(&mut *jobs) {
+            let start = Instant::now();
+            job();
+            *fastest = fastest.min(start.elapsed().as_secs_f64());
         }
-        for (name, scheme) in schemes() {
+        if is_tried_only() || turn >= 5 && begin.elapsed().as_secs_f64() > seconds {
+            break;
+        }
+    }
+    fastest.into_iter().map(|seconds| seconds * 1e9 / steps as f64).collect()
+}
+
+/// One line of the last table.
+struct Ratio {
+    dof: usize,
+    kept: &'static str,
+    scheme: &'static str,
+    ratio: f64,
+}
+
+/// Times a size with everything kept or with x alone; the ratios of Newmark and Runge–Kutta.
+fn steps<const ALL: bool>(dof: usize, ratios: &mut Vec<Ratio>) {
+    let kept = if ALL { "x, ẋ, ẍ" } else { "x alone" };
+    // Enough of them for the factorisations not to count.
+    let samples = if dof <= 2 { SAMPLES } else { (2_000_000 / (dof * dof)).max(4000) };
+    let samples = if is_tried_only() { samples / 100 } else { samples };
+    let (system, force, middle) = (chain(dof), noise(samples, dof), noise(samples, dof));
+    let rest = InitialState::rest(dof);
+    let (system, force, middle, rest) = (&system, &force, &middle, &rest);
+    let schemes = schemes();
+    let hand = by_hand::loops::<ALL>(dof);
+    let by_hand = hand.len();
+    let mut jobs: Vec<Timed<'_>> = hand
+        .into_iter()
+        .map(|(name, run)| timed(format!("by hand: {name}"), move || run(system, force)))
+        .collect();
+    for (name, scheme) in &schemes {
+        let force = match scheme.inner_instant() {
+            None => SampledForce::from(force),
+            Some(_) => SampledForce::with_mid_step(force, middle),
+        };
+        jobs.push(timed(*name, move || {
             // Preparing, stability check included, is paid once and is not the cost of a step.
-            let any = AllowUnstable(scheme.as_ref());
-            let time = ns_per_step(samples, || ours(&any, &system, &force));
-            // Beyond two degrees of freedom a scheme is held against its own sequence of kernels.
-            let own = if name.starts_with("Runge") { hand[1].1 } else { hand[0].1 };
-            let against = if dof <= 2 { fastest } else { own };
-            println!("n = {dof:<4} {name:<41} {time:8.2}   {:5.2}", time / against);
+            let scheme = AllowUnstable(scheme.as_ref());
+            match ALL {
+                true => Some(integrate(&scheme, system, force, rest).expect("stable")),
+                false => {
+                    black_box(
+                        integrate_displacement(&scheme, system, force, rest).expect("stable"),
+                    );
+                    None
+                }
+            }
+        }));
+    }
+    let times = ns_per_step(samples, SECONDS, &mut jobs);
+    let fastest = times[..by_hand].iter().copied().fold(f64::INFINITY, f64::min);
+    println!(
+        "\nn = {dof}, {kept}: ns per step, memory allocated within; ratio to the loop by hand"
+    );
+    for ((name, _), time) in jobs.iter().zip(&times) {
+        // Beyond two degrees of freedom a scheme is held against its own sequence of kernels.
+        let own = times[usize::from(name.contains("Runge"))];
+        let ratio = time / if dof <= 2 { fastest } else { own };
+        println!("{name:<42} {time:9.2}   {ratio:5.2}");
+        let shown = ["Newmark", "Runge-Kutta, linear", "Runge-Kutta, supplied"];
+        if let Some(scheme) = shown.into_iter().find(|shown| shown == name) {
+            ratios.push(Ratio { dof, kept, scheme, ratio });
         }
     }
+}
+
+fn prepare() {
+    println!("\nµs to prepare, stability check included");
     for dof in [1, 2, 10, 100] {
         let system = chain(dof);
         for (name, scheme) in schemes() {
-            let time = ns_per_step(1, || scheme.prepare(&system, 1e-3).expect("stable"));
-            println!("n = {dof:<4} prepare {name:<33} {:8.1} µs", time / 1e3);
+            let mut jobs =
+                [timed(name, || scheme.prepare(&system, 1e-3).expect("stable").state_len())];
+            println!("n = {dof:<4} {name:<33} {:8.1}", ns_per_step(1, 0.1, &mut jobs)[0] / 1e3);
         }
     }
+}
+
+fn periodic() {
+    println!("\npasses of Newmark that a periodic response takes");
     for (dof, samples) in [(1, 256), (1, 100_000), (2, 256), (2, 100_000), (10, 4096), (50, 1024)] {
         let (system, force) = (chain(dof), noise(samples, dof));
+        let rest = InitialState::rest(dof);
         let scheme = AllowUnstable(&Newmark::AVERAGE_ACCELERATION);
-        let pass = ns_per_step(samples, || ours(&scheme, &system, &force));
-        let all = ns_per_step(samples, || integrate_periodic(&scheme, &system, &force));
-        println!("n = {dof:<4} N = {samples:<7} periodic: {:5.2} passes of Newmark", all / pass);
+        let mut jobs = [
+            timed("pass", || integrate(&scheme, &system, &force, &rest)),
+            timed("periodic", || integrate_periodic(&scheme, &system, &force)),
+        ];
+        let times = ns_per_step(samples, SECONDS, &mut jobs);
+        println!("n = {dof:<4} N = {samples:<7} {:5.2}", times[1] / times[0]);
     }
 }
 
-fn per_step(c: &mut Criterion) {
-    let mut group = c.benchmark_group("step");
-    group.sample_size(10).warm_up_time(SHORT).measurement_time(SHORT);
-    for (dof, samples) in [(1, SAMPLES), (2, SAMPLES), (10, 20_000), (100, 400)] {
-        let (system, force) = (chain(dof), noise(samples, dof));
-        group.throughput(Throughput::Elements(samples as u64));
-        for (name, scheme) in schemes() {
-            group.bench_function(BenchmarkId::new(name, dof), |b| {
-                b.iter(|| ours(&AllowUnstable(scheme.as_ref()), &system, black_box(&force)));
-            });
-        }
-        for (name, run) in by_hand::loops(dof) {
-            group.bench_function(BenchmarkId::new(format!("by hand, {name}"), dof), |b| {
-                b.iter(|| run(&system, black_box(&force)));
-            });
-        }
+fn main() {
+    let mut ratios = Vec::new();
+    prepare();
+    periodic();
+    for dof in [1, 2, 10, 30, 100] {
+        steps::<true>(dof, &mut ratios);
+        steps::<false>(dof, &mut ratios);
     }
-    group.finish();
+    println!("\nratio of a step to the fastest loop by hand, goal {GOAL}");
+    for Ratio { dof, kept, scheme, ratio } in ratios {
+        println!("n = {dof:<4} {kept:<8} {scheme:<22} {ratio:5.2}");
+    }
 }
-
-criterion_group!(benches, table, per_step);
-criterion_main!(benches);

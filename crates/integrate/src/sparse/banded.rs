@@ -169,6 +169,9 @@ impl BandedLu {
 
     /// Solves A x = `b`, both in the order of the factors, in place.
     pub(crate) fn solve(&self, b: &mut [f64]) {
+        if (self.lower, self.upper) == (1, 1) && self.exchanges.is_empty() {
+            return self.solve_tridiagonal(b);
+        }
         let n = self.reciprocals.len();
         for j in 0..n {
             if let Some(&k) = self.exchanges.get(j) {
@@ -185,6 +188,23 @@ impl BandedLu {
             let column = &self.above[(j + 1) * self.upper - height..(j + 1) * self.upper];
             let rows = &mut head[j - height..];
             rows.iter_mut().zip(column).for_each(|(b, u)| *b -= tail[0] * u);
+        }
+    }
+
+    /// The same with one diagonal on either side, the neighbour being kept at hand.
+    fn solve_tridiagonal(&self, b: &mut [f64]) {
+        let mut before = 0.0;
+        let mut multiplier = 0.0;
+        for (b, next) in b.iter_mut().zip(&self.multipliers) {
+            *b -= before * multiplier;
+            (before, multiplier) = (*b, *next);
+        }
+        let mut after = 0.0;
+        let mut above = 0.0;
+        let rows = b.iter_mut().zip(&self.reciprocals).zip(&self.above);
+        for ((b, reciprocal), next) in rows.rev() {
+            *b = (*b - after * above) * reciprocal;
+            (after, above) = (*b, *next);
         }
     }
 }

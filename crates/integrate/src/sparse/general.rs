@@ -7,7 +7,7 @@ use faer::{Conj, MatMut, Par, Side};
 use nalgebra::ComplexField;
 use nalgebra_sparse::csc::CscMatrix;
 
-use super::scattered;
+use super::{NotFactored, fill, scattered};
 
 /// Solutions from which the smallest singular value is judged.
 const INVERSE_STEPS: usize = 4;
@@ -26,11 +26,16 @@ impl<T> GeneralLu<T>
 where
     T: ComplexField<RealField = f64> + faer::traits::ComplexField,
 {
-    /// Factors `matrix`; its reciprocal condition, roughly, if that is no more than rounding. The rows are
-    /// sums of terms of the given `sizes`.
-    pub(crate) fn new(mut matrix: CscMatrix<T>, sizes: &[f64]) -> Result<Self, f64> {
+    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors take
+    /// more than `limit` bytes.
+    pub(crate) fn new(
+        mut matrix: CscMatrix<T>,
+        sizes: &[f64],
+        limit: u64,
+    ) -> Result<Self, NotFactored> {
+        const SINGULAR: NotFactored = NotFactored::Singular(0.0);
         if sizes.iter().any(|size| !(*size > 0.0 && size.is_finite())) {
-            return Err(0.0);
+            return Err(SINGULAR);
         }
         let scales: Vec<f64> = sizes.iter().map(|size| size.recip()).collect();
         for (i, _, value) in matrix.triplet_iter_mut() {
@@ -38,9 +43,14 @@ where
         }
         let pattern = pattern(&matrix);
         let view = SparseColMatRef::new(pattern, matrix.values());
-        let symbolic = factorize_symbolic_lu(pattern, Default::default()).map_err(|_| 0.0)?;
+        let symbolic = factorize_symbolic_lu(pattern, Default::default()).map_err(|_| SINGULAR)?;
+        let entries = fill::entries(matrix.pattern(), symbolic.col_perm().arrays().0);
+        let bytes = entries.saturating_mul(size_of::<T>() as u64);
+        if bytes > limit {
+            return Err(NotFactored::TooLarge { bytes, limit });
+        }
         let workspace = symbolic.factorize_numeric_lu_scratch::<T>(Par::Seq, Default::default());
-        let mut workspace = MemBuffer::try_new(workspace).map_err(|_| 0.0)?;
+        let mut workspace = MemBuffer::try_new(workspace).map_err(|_| SINGULAR)?;
         let mut numeric = NumericLu::new();
         symbolic
             .factorize_numeric_lu(
@@ -50,14 +60,14 @@ where
                 MemStack::new(&mut workspace),
                 Default::default(),
             )
-            .map_err(|_| 0.0)?;
+            .map_err(|_| SINGULAR)?;
         let scratch = symbolic.solve_in_place_scratch::<T>(1, Par::Seq);
-        let scratch = MemBuffer::try_new(scratch).map_err(|_| 0.0)?;
+        let scratch = MemBuffer::try_new(scratch).map_err(|_| SINGULAR)?;
         let mut factors = Self { symbolic, numeric, scales, scratch };
-        match factors.reciprocal_condition() {
+        match reciprocal_condition(factors.scales.len(), |vector| factors.solve_scaled(vector)) {
             // NaN (from a pivot of zero) fails the test too.
             reciprocal if reciprocal > f64::EPSILON => Ok(factors),
-            reciprocal => Err(reciprocal),
+            reciprocal => Err(NotFactored::Singular(reciprocal)),
         }
     }
 
@@ -76,25 +86,27 @@ where
             MemStack::new(&mut self.scratch),
         );
     }
+}
 
-    /// Smallest shrinking of a vector by the matrix of scaled rows, whose largest entry is 1 at most, that
-    /// some inverse iteration finds.
-    fn reciprocal_condition(&mut self) -> f64 {
-        let n = self.scales.len();
-        let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
-        let mut growth = 0.0_f64;
-        for _ in 0..INVERSE_STEPS {
-            let before = largest(&vector);
-            vector.iter_mut().for_each(|v| *v /= T::from_real(before));
-            self.solve_scaled(&mut vector);
-            let after = largest(&vector);
-            if !after.is_finite() {
-                return 0.0;
-            }
-            growth = growth.max(after);
+/// Smallest shrinking of a vector by a scaled matrix, whose largest entry is 1 at most, that some inverse
+/// iteration with `solve` finds.
+pub(super) fn reciprocal_condition<T>(n: usize, mut solve: impl FnMut(&mut [T])) -> f64
+where
+    T: ComplexField<RealField = f64>,
+{
+    let mut vector: Vec<T> = scattered(0).take(n).map(T::from_real).collect();
+    let mut growth = 0.0_f64;
+    for _ in 0..INVERSE_STEPS {
+        let before = largest(&vector);
+        vector.iter_mut().for_each(|v| *v /= T::from_real(before));
+        solve(&mut vector);
+        let after = largest(&vector);
+        if !after.is_finite() {
+            return 0.0;
         }
-        growth.recip()
+        growth = growth.max(after);
     }
+    growth.recip()
 }
 
 /// Returns whether the symmetric `matrix` has a Cholesky factor.
@@ -102,7 +114,7 @@ pub(super) fn has_cholesky_factor(matrix: &CscMatrix<f64>) -> bool {
     SparseColMatRef::new(pattern(matrix), matrix.values()).sp_cholesky(Side::Lower).is_ok()
 }
 
-fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, usize> {
+pub(super) fn pattern<T>(matrix: &CscMatrix<T>) -> SymbolicSparseColMatRef<'_, usize> {
     let (offsets, rows) = (matrix.col_offsets(), matrix.row_indices());
     SymbolicSparseColMatRef::new_checked(matrix.nrows(), matrix.ncols(), offsets, None, rows)
 }
@@ -147,7 +159,7 @@ mod tests {
             let x = DVector::from_fn(700, |i, _| (i as f64).sin());
             let b = &DMatrix::from(&matrix) * &x;
             let mut found = b.clone();
-            let mut factors = SparseLu::new(&matrix, &sizes(&matrix)).unwrap();
+            let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
             factors.solve(found.as_mut_slice());
             let residual = (&DMatrix::from(&matrix) * &found - b).amax();
             assert!(residual < 1e-12 * found.amax(), "{diagonal} {skew}: {residual:e}");
@@ -165,7 +177,7 @@ mod tests {
         let mut found = &dense * &x;
         let sizes: Vec<f64> =
             dense.row_iter().map(|row| row.iter().map(|v| v.norm()).sum()).collect();
-        let mut factors = GeneralLu::new(CscMatrix::from(&dense), &sizes).unwrap();
+        let mut factors = GeneralLu::new(CscMatrix::from(&dense), &sizes, u64::MAX).unwrap();
         factors.solve(found.as_mut_slice());
         assert!((found - x).camax() < 1e-12);
     }
@@ -184,7 +196,8 @@ mod tests {
                 .chain((0..n).map(|i| (i, i, degree(i)))),
         )
         .unwrap();
-        assert!(SparseLu::new(&free, &sizes(&free)).is_err_and(|reciprocal| reciprocal < 1e-15));
+        let refused = SparseLu::new(&free, &sizes(&free), u64::MAX).err();
+        assert!(matches!(refused, Some(NotFactored::Singular(r)) if r < 1e-15), "{refused:?}");
         // A row and a column without entries.
         let empty = triplets(
             n,
@@ -194,9 +207,9 @@ mod tests {
         );
         let empty = empty.unwrap();
         let mut row_sizes = sizes(&empty);
-        assert!(SparseLu::new(&empty, &row_sizes).is_err());
+        assert!(SparseLu::new(&empty, &row_sizes, u64::MAX).is_err());
         row_sizes[5] = 1.0;
-        assert!(SparseLu::new(&empty, &row_sizes).is_err());
+        assert!(SparseLu::new(&empty, &row_sizes, u64::MAX).is_err());
     }
 
     #[test]

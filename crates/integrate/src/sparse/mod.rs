@@ -1,21 +1,55 @@
-//! Sparse matrices: products, and factorisations by band or, where that is wide, by `faer`.
+//! Sparse matrices: products, and factorisations by band or, where that is wide, by `faer`: of Cholesky for
+//! matrices that are found to be symmetric and positive definite, LU for any others.
 
 mod banded;
+mod fill;
 mod general;
 mod ordering;
 mod product;
+mod symmetric;
 
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
+use crate::IntegrateError;
 use banded::BandedLu;
 pub(crate) use general::GeneralLu;
 use ordering::Ordering;
 pub(crate) use product::Product;
+use symmetric::{CholeskyFactors, Plan};
 
 /// Most diagonals of a matrix that is factored by band: about where solutions with a grid in two dimensions
 /// take as long either way, 0.4 GB for 100,000 degrees of freedom.
 const WIDEST_BAND: usize = 256;
+
+/// Number of diagonals up to which no other factors are looked for.
+const NARROW_BAND: usize = 32;
+
+/// Reason why a matrix was not factored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum NotFactored {
+    /// The smallest pivot relative to the size of its row (or the reciprocal condition) is no more than
+    /// rounding.
+    Singular(f64),
+    /// The factors take at least so many bytes, and may not.
+    TooLarge { bytes: u64, limit: u64 },
+}
+
+impl NotFactored {
+    /// The error of a system with `dof` degrees of freedom, that of a singular matrix being `singular`.
+    pub(crate) fn or_singular(
+        self,
+        dof: usize,
+        singular: impl FnOnce(f64) -> IntegrateError,
+    ) -> IntegrateError {
+        match self {
+            Self::Singular(smallest) => singular(smallest),
+            Self::TooLarge { bytes, limit } => {
+                IntegrateError::FactorsTooLarge { dof, bytes, limit }
+            }
+        }
+    }
+}
 
 /// A sparse matrix factored once for many solves.
 pub(crate) enum SparseLu {
@@ -28,26 +62,42 @@ pub(crate) enum SparseLu {
         /// The right-hand side in that order.
         scratch: Vec<f64>,
     },
+    /// Of a matrix that is symmetric and positive definite.
+    Symmetric(Box<CholeskyFactors>),
     /// Of any pattern.
     General(Box<GeneralLu<f64>>),
 }
 
 impl SparseLu {
-    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`; the smallest
-    /// pivot relative to the size of its row (or the reciprocal condition) if that is no more than rounding.
-    pub(crate) fn new(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Result<Self, f64> {
+    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors
+    /// take more than `limit` bytes.
+    pub(crate) fn new(
+        matrix: &CsrMatrix<f64>,
+        sizes: &[f64],
+        limit: u64,
+    ) -> Result<Self, NotFactored> {
         let ordering = Ordering::narrowing(matrix.pattern());
-        if ordering.diagonals(matrix.pattern()) > WIDEST_BAND {
-            let factors = GeneralLu::new(CscMatrix::from(matrix), sizes)?;
+        let diagonals = ordering.diagonals(matrix.pattern());
+        if diagonals > NARROW_BAND
+            && let Some(plan) = Plan::of(matrix, sizes)
+            // An entry that is looked up takes about as long as two of a band.
+            && (diagonals > WIDEST_BAND || 2 * plan.work() < diagonals * matrix.nrows())
+            && let Some(factors) = plan.factor(limit)?
+        {
+            return Ok(Self::Symmetric(Box::new(factors)));
+        }
+        if diagonals > WIDEST_BAND {
+            let factors = GeneralLu::new(CscMatrix::from(matrix), sizes, limit)?;
             return Ok(Self::General(Box::new(factors)));
         }
-        let factors = BandedLu::new(matrix, &ordering, sizes)?;
+        let factors = BandedLu::new(matrix, &ordering, sizes).map_err(NotFactored::Singular)?;
         Ok(Self::Banded { ordering, factors, scratch: vec![0.0; matrix.nrows()] })
     }
 
     /// Solves for `b`, in place.
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
         match self {
+            Self::Symmetric(factors) => factors.solve(b),
             Self::General(factors) => factors.solve(b),
             Self::Banded { ordering, factors, .. } if ordering.is_natural() => factors.solve(b),
             Self::Banded { ordering, factors, scratch } => {
@@ -63,6 +113,7 @@ impl std::fmt::Debug for SparseLu {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Banded { factors, .. } => factors.fmt(f),
+            Self::Symmetric(_) => f.write_str("CholeskyFactors"),
             Self::General(_) => f.write_str("GeneralLu"),
         }
     }

@@ -77,13 +77,13 @@ impl Ordering {
 }
 
 /// The graph of the pattern of A + Aᵀ.
-struct Graph {
+pub(super) struct Graph {
     starts: Vec<usize>,
     neighbours: Vec<u32>,
 }
 
 impl Graph {
-    fn of(pattern: &SparsityPattern) -> Self {
+    pub(super) fn of(pattern: &SparsityPattern) -> Self {
         let n = pattern.major_dim();
         let mut lists = vec![Vec::new(); n];
         for i in 0..n {
@@ -102,7 +102,7 @@ impl Graph {
         Self { starts, neighbours }
     }
 
-    fn neighbours(&self, node: u32) -> &[u32] {
+    pub(super) fn neighbours(&self, node: u32) -> &[u32] {
         let node = node as usize;
         &self.neighbours[self.starts[node]..self.starts[node + 1]]
     }

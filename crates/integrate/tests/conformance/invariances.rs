@@ -50,6 +50,23 @@ fn responses_superpose() {
 }
 
 #[test]
+fn the_displacement_alone_is_that_of_the_whole_response() {
+    for dof in [1, 2, 5] {
+        let system = mechid_problems::random_stable(dof, 2);
+        // Odd and even numbers of steps, from none on.
+        for len in [1, 2, 3, 64, 65] {
+            let force = force(Sampling::new(1e-3, len).unwrap(), dof);
+            for scheme in schemes() {
+                let (scheme, start) = (scheme.as_ref(), start(scheme.as_ref(), dof));
+                let whole = integrate(scheme, &system, &force, &start).unwrap();
+                let alone = integrate_displacement(scheme, &system, &force, &start).unwrap();
+                assert_eq!(&alone, whole.displacement(), "{} n {dof} {len}", scheme.name());
+            }
+        }
+    }
+}
+
+#[test]
 fn a_late_force_moves_the_machine_late() {
     // Three samples of nothing first, so that every starting procedure starts from nothing.
     let (late, len) = (17, 120);

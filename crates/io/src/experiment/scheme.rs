@@ -158,6 +158,10 @@ pub enum MiddleLoad {
     Linear,
     /// The value of the excitation itself.
     Exact,
+    /// The value of the Fourier series through the samples of one period.
+    BandLimited,
+    /// The value of the cubic spline through the samples of one period.
+    Spline,
 }
 
 /// The displacement before the first sample, for central difference.

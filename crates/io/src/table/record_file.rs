@@ -113,6 +113,19 @@ impl RecordFile {
         self.whole
     }
 
+    /// Frees the numbers of [`RecordFile::head`] of a file that is read again for each pass; names, units
+    /// and remarks stay.
+    pub fn forget_head(&mut self) {
+        if self.whole {
+            return;
+        }
+        for column in &mut self.head.contents.columns {
+            if let Ok(values) = &mut column.values {
+                *values = Vec::new();
+            }
+        }
+    }
+
     /// Reads the columns `wanted` to the end: their time axis, means and peaks.
     ///
     /// # Errors

@@ -24,7 +24,7 @@ use nalgebra::{Complex, DMatrix};
 
 #[cfg(feature = "parquet")]
 pub use self::runs::{RunsSummary, simulate_runs};
-use self::schemes::{has_given_start, scheme};
+use self::schemes::{has_given_start, interpolated, scheme};
 pub use self::summary::{
     FreeGrowth, SchemeConvention, SimulatedChannel, SimulatedMode, SimulatedTerms,
     SimulationSummary,
@@ -121,7 +121,11 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         None => machine.exact_periodic(&period)?,
         Some(scheme) => {
             let within = scheme.inner_instant();
-            let middle = within.map(|part| experiment.force_within_steps(part)).transpose()?;
+            let middle = within.map(|part| match interpolated(experiment, &period, part)? {
+                Some(middle) => Ok(middle),
+                None => Ok::<_, SimulateError>(experiment.force_within_steps(part)?),
+            });
+            let middle = middle.transpose()?;
             match experiment.response {
                 ResponseKind::Periodic => {
                     stepped(experiment, &**scheme, &machine, &period, middle.as_ref())?
@@ -206,7 +210,9 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
             ResponseKind::FromRest | ResponseKind::From(_) => Err(SimulateError::ExactFromRest),
         };
     };
-    stepped(experiment, &*scheme, &machine, force, None)
+    let within = scheme.inner_instant().map(|part| interpolated(experiment, force, part));
+    let middle = within.transpose()?.flatten();
+    stepped(experiment, &*scheme, &machine, force, middle.as_ref())
         .map_err(|error| error.of_unstable(instability))
 }
 

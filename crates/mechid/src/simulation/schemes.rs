@@ -10,6 +10,9 @@ use mechid_io::{
     ReturnedAcceleration, SchemeChoice, SubStepLoad,
 };
 
+use mechid_signal::resample::within_steps;
+use mechid_signal::{Interpolation, Record};
+
 use super::SimulateError;
 
 /// Returns whether the description gives the first displacements.
@@ -63,10 +66,27 @@ pub fn scheme(experiment: &Experiment) -> Result<Option<Box<dyn Scheme>>, Simula
         SchemeChoice::RungeKutta4 { load } => Box::new(match load {
             MiddleLoad::Held => RungeKutta4::HELD,
             MiddleLoad::Linear => RungeKutta4::LINEAR,
-            MiddleLoad::Exact => RungeKutta4::SUPPLIED,
+            MiddleLoad::Exact | MiddleLoad::BandLimited | MiddleLoad::Spline => {
+                RungeKutta4::SUPPLIED
+            }
         }),
         _ => return Ok(None),
     }))
+}
+
+/// The force within the steps of one period `force`, if the scheme takes it from the samples.
+pub fn interpolated(
+    experiment: &Experiment,
+    force: &Record,
+    part: f64,
+) -> Result<Option<Record>, SimulateError> {
+    let SchemeChoice::RungeKutta4 { load } = &experiment.scheme else { return Ok(None) };
+    let method = match load {
+        MiddleLoad::BandLimited => Interpolation::BandLimited,
+        MiddleLoad::Spline => Interpolation::NotAKnotSpline,
+        MiddleLoad::Held | MiddleLoad::Linear | MiddleLoad::Exact => return Ok(None),
+    };
+    Ok(Some(within_steps(force, part, method)?))
 }
 
 fn returning(scheme: GeneralisedAlpha, acceleration: ReturnedAcceleration) -> Box<dyn Scheme> {

@@ -31,3 +31,16 @@ pub(super) fn same_period(
     lines.rows_mut(0, spectrum.len()).copy_from(spectrum.lines());
     Some(Spectrum::from_lines(sampling, lines).and_then(|finer| finer.to_record()))
 }
+
+/// The same period begun `part` of a step later.
+pub(super) fn later(spectrum: &Spectrum, part: f64) -> Result<Record, SignalError> {
+    let sampling = spectrum.sampling();
+    let mut lines = spectrum.lines().clone();
+    for (n, mut line) in lines.row_iter_mut().enumerate() {
+        let turn = Complex::from_polar(1.0, TAU * n as f64 * part / sampling.len() as f64);
+        // Of a cosine at the Nyquist frequency the samples show the cosine alone.
+        let turn = if 2 * n == sampling.len() { turn.re.into() } else { turn };
+        line *= turn;
+    }
+    Spectrum::from_lines(sampling, lines)?.to_record()
+}

@@ -175,6 +175,51 @@ pub fn resample(
     Record::new(sampling, data)
 }
 
+/// Returns the values within the steps, at t = (k + `part`) Δt for every sample k, `part` being a pure number
+/// from 0 to 1: the force that a Runge-Kutta stage asks for. Behind the last sample of anything but a period
+/// stands that sample.
+///
+/// ```
+/// use mechid_signal::{Interpolation, Multisine, Phases, Sampling, resample::within_steps};
+///
+/// let sampling = Sampling::new(0.01, 64)?;
+/// let force = Multisine::flat(1..=31, 1.0, Phases::Schroeder)?;
+/// let middle = within_steps(&force.sample(sampling)?, 0.5, Interpolation::BandLimited)?;
+/// let exact = force.value(0.105, sampling.omega0());
+/// assert!((middle.channel(0)[10] - exact).abs() < 1e-12);
+/// # Ok::<(), mechid_signal::SignalError>(())
+/// ```
+///
+/// # Errors
+/// [`SignalError::Range`] for a `part` outside, and those of [`Interpolator::new`].
+pub fn within_steps(
+    record: &Record,
+    part: f64,
+    method: Interpolation,
+) -> Result<Record, SignalError> {
+    if !(0.0..=1.0).contains(&part) {
+        return Err(SignalError::Range {
+            what: "part of a step",
+            value: part,
+            low: 0.0,
+            high: 1.0,
+        });
+    }
+    let interpolator = Interpolator::new(record, method)?;
+    if let Pieces::Fourier(spectrum) = &interpolator.pieces {
+        return fourier::later(spectrum, part);
+    }
+    let (last, dt) = (record.len() - 1, record.sampling().dt());
+    let mut data = DMatrix::zeros(record.len(), record.channels());
+    for (channel, mut column) in data.column_iter_mut().enumerate() {
+        for (k, value) in column.iter_mut().enumerate() {
+            let steps = (k as f64 + part).min(last as f64);
+            *value = interpolator.value(steps * dt, channel)?;
+        }
+    }
+    Record::new(record.sampling(), data)
+}
+
 /// Returns the record with `factor − 1` further instants in every interval.
 ///
 /// A period keeps its duration and has `factor` times as many samples; any other record ends with

@@ -1,0 +1,178 @@
+//! Cholesky factors of matrices that are found to be symmetric and positive definite, by `faer`.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::cholesky::{
+    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::{Conj, MatMut, Par, Side};
+use nalgebra_sparse::csc::CscMatrix;
+use nalgebra_sparse::csr::CsrMatrix;
+
+use super::NotFactored;
+use super::general::{pattern, reciprocal_condition};
+
+/// Factors of a matrix in the order of minimum degree, its rows and columns scaled by the sizes of their
+/// terms. They have a fraction of the entries of a band, and of LU factors with exchanges of rows.
+pub(crate) struct CholeskyFactors {
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<f64>,
+    /// 1 / the root of the size of each row's terms.
+    scales: Vec<f64>,
+    scratch: MemBuffer,
+}
+
+/// The order of a symmetric matrix, before it is factored.
+pub(crate) struct Plan {
+    matrix: CscMatrix<f64>,
+    symbolic: SymbolicCholesky<usize>,
+    scales: Vec<f64>,
+}
+
+impl Plan {
+    /// The order of `matrix`, the rows of which are sums of terms of the given `sizes`, if it is symmetric.
+    pub(crate) fn of(matrix: &CsrMatrix<f64>, sizes: &[f64]) -> Option<Self> {
+        let columns = CscMatrix::from(matrix);
+        // The columns of a symmetric matrix are its rows.
+        let symmetric =
+            columns.pattern() == matrix.pattern() && columns.values() == matrix.values();
+        if !symmetric || sizes.iter().any(|size| !(*size > 0.0 && size.is_finite())) {
+            return None;
+        }
+        let scales: Vec<f64> = sizes.iter().map(|size| size.sqrt().recip()).collect();
+        let mut matrix = columns;
+        for (i, j, value) in matrix.triplet_iter_mut() {
+            *value *= scales[i] * scales[j];
+        }
+        let order = SymmetricOrdering::Amd;
+        let pattern = pattern(&matrix);
+        let symbolic =
+            factorize_symbolic_cholesky(pattern, Side::Lower, order, Default::default()).ok()?;
+        Some(Self { matrix, symbolic, scales })
+    }
+
+    /// Number of entries that a solution goes through.
+    pub(crate) fn work(&self) -> usize {
+        2 * self.symbolic.len_val()
+    }
+
+    /// Factors the matrix, unless the factors take more than `limit` bytes; nothing if it is not positive
+    /// definite.
+    pub(crate) fn factor(self, limit: u64) -> Result<Option<CholeskyFactors>, NotFactored> {
+        let Self { matrix, symbolic, scales } = self;
+        let bytes = (symbolic.len_val() as u64).saturating_mul(size_of::<f64>() as u64);
+        if bytes > limit {
+            return Err(NotFactored::TooLarge { bytes, limit });
+        }
+        let mut values = vec![0.0; symbolic.len_val()];
+        let workspace = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let Ok(mut workspace) = MemBuffer::try_new(workspace) else { return Ok(None) };
+        let factored = symbolic.factorize_numeric_llt(
+            &mut values,
+            SparseColMatRef::new(pattern(&matrix), matrix.values()),
+            Side::Lower,
+            LltRegularization::default(),
+            Par::Seq,
+            MemStack::new(&mut workspace),
+            Default::default(),
+        );
+        if factored.is_err() {
+            return Ok(None);
+        }
+        let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
+        let Ok(scratch) = MemBuffer::try_new(scratch) else { return Ok(None) };
+        let mut factors = CholeskyFactors { symbolic, values, scales, scratch };
+        match reciprocal_condition(factors.scales.len(), |vector| factors.solve_scaled(vector)) {
+            reciprocal if reciprocal > f64::EPSILON => Ok(Some(factors)),
+            reciprocal => Err(NotFactored::Singular(reciprocal)),
+        }
+    }
+}
+
+impl CholeskyFactors {
+    /// Solves for `b`, in place.
+    pub(crate) fn solve(&mut self, b: &mut [f64]) {
+        b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= scale);
+        self.solve_scaled(b);
+        b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= scale);
+    }
+
+    fn solve_scaled(&mut self, b: &mut [f64]) {
+        let n = b.len();
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(b, n, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::triplets;
+    use nalgebra::{DMatrix, DVector};
+
+    use super::super::SparseLu;
+    use super::*;
+
+    /// A grid of `side` × `side` × `layers`, each node bound to its neighbours.
+    fn grid(side: usize, layers: usize, diagonal: f64) -> CsrMatrix<f64> {
+        let at = |i: usize, j: usize, k: usize| (k * side + i) * side + j;
+        let mut entries = vec![];
+        for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+            for k in 0..layers {
+                entries.push((at(i, j, k), at(i, j, k), diagonal + 0.01 * i as f64));
+                let next = [(i + 1, j, k), (i, j + 1, k), (i, j, k + 1)];
+                for (i2, j2, k2) in next.into_iter().filter(|n| n.0 < side && n.1 < side) {
+                    if k2 < layers {
+                        entries.push((at(i, j, k), at(i2, j2, k2), -1.0));
+                        entries.push((at(i2, j2, k2), at(i, j, k), -1.0));
+                    }
+                }
+            }
+        }
+        triplets(side * side * layers, entries).unwrap()
+    }
+
+    fn sizes(matrix: &CsrMatrix<f64>) -> Vec<f64> {
+        matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
+    }
+
+    #[test]
+    fn solutions_of_grids_are_the_dense_ones() {
+        for (side, layers) in [(24, 1), (8, 8)] {
+            let matrix = grid(side, layers, 6.5);
+            let n = matrix.nrows();
+            let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
+            assert!(matches!(factors, SparseLu::Symmetric(_)), "{side}");
+            let x = DVector::from_fn(n, |i, _| (i as f64).sin());
+            let mut found = &DMatrix::from(&matrix) * &x;
+            factors.solve(found.as_mut_slice());
+            assert!((found - x).amax() < 1e-13);
+        }
+    }
+
+    #[test]
+    fn what_is_not_definite_is_factored_otherwise() {
+        // Shifted into the middle of its eigenvalues.
+        let matrix = grid(24, 1, 2.1);
+        let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
+        assert!(!matches!(factors, SparseLu::Symmetric(_)));
+        let x = DVector::from_fn(matrix.nrows(), |i, _| (i as f64).cos());
+        let mut found = &DMatrix::from(&matrix) * &x;
+        factors.solve(found.as_mut_slice());
+        assert!((found - x).amax() < 1e-9);
+    }
+
+    #[test]
+    fn factors_beyond_the_limit_are_refused_before_they_are_computed() {
+        let matrix = grid(8, 8, 6.5);
+        let refused = SparseLu::new(&matrix, &sizes(&matrix), 1000).err();
+        let Some(NotFactored::TooLarge { bytes, limit: 1000 }) = refused else {
+            panic!("{refused:?}")
+        };
+        assert!((50_000..1_000_000).contains(&bytes), "{bytes}");
+    }
+}

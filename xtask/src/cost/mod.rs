@@ -1,0 +1,64 @@
+//! How the cost of stepping, identification and reading grows: measured, drawn and told in the book.
+
+mod identification;
+mod measure;
+mod page;
+mod samples;
+mod stepping;
+
+use std::path::Path;
+
+use mechid::plot::{Axis, Curve, Figure, Panel};
+
+use self::measure::Growth;
+
+/// What is measured against what, with its curves.
+struct Group {
+    title: &'static str,
+    against: &'static str,
+    growths: Vec<Growth>,
+}
+
+/// Measures everything, for `seconds` at every point, and writes the figure and the page of the book.
+///
+/// # Errors
+/// What keeps a measurement from being done or a file from being written.
+pub fn write(root: &Path, seconds: f64) -> Result<(), String> {
+    let groups = [
+        Group {
+            title: "A step, and preparing for it",
+            against: "Degrees of freedom",
+            growths: stepping::measured(seconds)?,
+        },
+        Group {
+            title: "Identifying all of M, C and K",
+            against: "Degrees of freedom",
+            growths: identification::measured(seconds)?,
+        },
+        Group {
+            title: "Long records of two degrees of freedom",
+            against: "Samples",
+            growths: samples::measured(seconds)?,
+        },
+    ];
+    let folder = root.join("docs/book/src/choose");
+    let svg = figure(&groups).to_svg().map_err(|e| e.to_string())?;
+    for (name, text) in [("cost.svg", svg), ("cost.md", page::text(&groups))] {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn figure(groups: &[Group]) -> Figure {
+    let panels = groups.iter().map(|group| {
+        let panel = Panel::new(Axis::log10(group.against, ""), Axis::log10("Time", "s"));
+        let curves = group.growths.iter().map(|growth| {
+            let label = format!("{} ({})", growth.name, growth.power());
+            Curve::marked_line(label, &growth.sizes, &growth.seconds)
+        });
+        panel.title(group.title).curves(curves)
+    });
+    let figure = Figure::new("How the cost grows").columns(1).size(760.0, 1080.0);
+    panels.fold(figure, Figure::panel)
+}
