@@ -98,7 +98,12 @@ fn a_period_stays_one() {
 #[test]
 fn settings_that_contradict_open_records_are_refused() {
     let open = |method| Identify {
-        fit: Fit::Spectra { method, noise: Pooling::Automatic, extent: Some(Extent::Open) },
+        fit: Fit::Spectra {
+            method,
+            noise: Pooling::Automatic,
+            extent: Some(Extent::Open),
+            force_noise: None,
+        },
         ..Identify::default()
     };
     let refused = |test: Measurement, how: &Identify| {

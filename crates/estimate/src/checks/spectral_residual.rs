@@ -10,7 +10,7 @@ use super::concentration::{Part, concentration};
 use super::correlation::{Correlation, share_above_of};
 use super::finding::{Concentration, Finding, NoiseSource, PValue, Reference, Residual};
 use super::thresholds::{LAGS, ROUNDING};
-use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
+use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened, motion_level};
 use crate::relations::Relations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
@@ -61,7 +61,7 @@ pub struct AfterSpectralFit {
 /// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
 /// parameters together and the one that changes most alone.
 /// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
-/// response.
+/// response, beside that of the forces if the data know it.
 ///
 /// # Errors
 /// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
@@ -272,20 +272,25 @@ impl WeightedFit {
     }
 }
 
-/// RMS residual of each channel in the quantity measured, over all records.
+/// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
+/// stated noise of the forces, the most likely one.
 fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
     let system = estimate.system().ok()?;
-    let (mut power, mut rows) = (vec![0.0; system.dof()], 0);
+    let mut residuals = vec![Vec::new(); system.dof()];
     for data in records {
         for (row, omega) in data.omega().iter().enumerate() {
-            let modelled = system.receptance(*omega).ok()? * data.force().row(row).transpose();
+            let receptance = system.receptance(*omega).ok()?;
             let scale = data.measured().per_displacement(*omega).norm_sqr();
+            let modelled = &receptance * data.force().row(row).transpose();
             let residual = data.displacement().row(row).transpose() - modelled;
-            power.iter_mut().zip(residual.iter()).for_each(|(p, e)| *p += scale * e.norm_sqr());
+            let variance = data.force_variance().row(row).transpose();
+            let by_force = receptance.map(|g| g.norm_sqr()) * variance;
+            for (channel, pairs) in residuals.iter_mut().enumerate() {
+                pairs.push((scale * residual[channel].norm_sqr(), scale * by_force[channel]));
+            }
         }
-        rows += data.len();
     }
-    Some(power.iter().map(|p| (p / rows as f64).sqrt()).collect())
+    Some(residuals.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
 }
 
 /// Returns whether the residual of every channel is rounding.
@@ -301,7 +306,8 @@ fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
     levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
 }
 
-/// Covariance of displacement and force for white noise of these levels on the quantity measured.
+/// Covariance of displacement and force for white noise of these levels on the quantity measured, and what noise of
+/// the forces is stated.
 fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
     let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
     let scale = data.measured().per_displacement(data.omega()[row]).norm();
@@ -310,6 +316,8 @@ fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix
     for (channel, level) in levels.iter().enumerate().take(n) {
         let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
         covariance[(channel, channel)] = Complex::from(level * level);
+        let of_force = data.force_variance()[(row, channel)];
+        covariance[(n + channel, n + channel)] = Complex::from(of_force);
     }
     covariance
 }
