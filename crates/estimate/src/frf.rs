@@ -240,6 +240,23 @@ impl Frf {
         self.scatter.as_ref().map_or(own, |scatter| scatter.freedom)
     }
 
+    /// What the responses say of a machine: the sum over lines and motions of γ²/(1 − γ²), the power that the
+    /// forces explain over that they leave, without the bias of a sampled coherence, times the averages beyond
+    /// those that forces and weights take up (pure number). Longer segments have more lines and less leakage, but
+    /// fewer averages.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its coherence).
+    pub fn information(&self) -> f64 {
+        let inputs = self.response.first().map_or(0, |h| h.ncols()) as f64;
+        let spare = self.averages - inputs;
+        let of_one = |coherence: &f64| {
+            let left = (1.0 - coherence).max(COHERENCE_ROUNDING) * self.averages / spare;
+            (1.0 / left - 1.0).max(0.0)
+        };
+        (spare - 1.0).max(0.0) * self.coherence.iter().map(of_one).sum::<f64>()
+    }
+
     /// Angular frequencies, in rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega

@@ -233,7 +233,7 @@ impl Identify {
                     _ => periods(),
                 }
             }
-            Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
+            Fit::Responses(how) => responses::fit(records, unknowns, lines, how, period_given),
             Fit::Samples(_) if unknowns.is_related() => {
                 let why =
                     "symmetric matrices and proportional damping belong to `domain` frequency";

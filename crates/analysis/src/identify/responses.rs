@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use mechid_estimate::checks::{
     Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
-    delay_of_lines, linearity,
+    delay_of_lines, leakage, linearity,
 };
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
 use mechid_estimate::{
@@ -28,7 +28,7 @@ use crate::text::significant;
 const BLUNTED: f64 = 0.5;
 
 /// Fits the frequency responses of one or several records, weighted by their coherence unless least
-/// squares is asked for.
+/// squares is asked for. The length of segments that is not given, nor a period, is chosen for the first record.
 ///
 /// # Errors
 /// [`AnalysisError::InstrumentalResponses`] for instrumental variables.
@@ -37,12 +37,16 @@ pub fn fit(
     unknowns: &Unknowns,
     lines: LineRule<'_>,
     how: &ResponseFit,
+    period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
     let ResponseFit { estimator, segments, method } = how;
+    let chosen = if period_given { None } else { segments.chosen(&records[0], lines)? };
+    let segments = chosen.as_ref().map_or(segments, |(segments, _)| segments);
     let estimate =
         |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
     let mut responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
-    let Found { name, estimate, misfit, remark } = estimated(&mut responses, unknowns, *method)?;
+    let Found { name, estimate, misfit, remark, settled } =
+        estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
@@ -51,6 +55,7 @@ pub fn fit(
         frequency_hz: r.frf.omega().iter().map(|omega| omega / TAU).collect(),
         values: r.frf.coherence().clone(),
     });
+    let modes = estimate.modes()?;
     let (mut before, mut after, mut misfit) = (Vec::new(), Vec::new(), misfit);
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
         let mut checks = Vec::from_iter(coherence(&r.frf));
@@ -58,6 +63,7 @@ pub fn fit(
             checks.extend(claimed_period(&held.force, held.period));
         }
         let mut looked = looked_at(held, r, unknowns, &estimate, data.len(), periodic)?;
+        looked.extend(leakage(&r.frf, &modes, settled));
         // What differs between windows that are no periods is no noise.
         if checks.iter().any(no_period) {
             looked.retain(|finding| finding.subject() != Subject::Misfit);
@@ -78,7 +84,8 @@ pub fn fit(
     );
     let of_segments = (records.len() > 1).then_some(of_segments);
     let of_motion = one_motion_of(&records[0].held).into_iter();
-    let remarks = of_motion.chain(of_segments).chain(of_idle).chain(remark).collect();
+    let remarks = of_motion.chain(of_segments).chain(of_idle).chain(remark);
+    let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
     Ok(Fitted {
         domain: "frequency",
         estimator: name,
@@ -124,6 +131,8 @@ struct Found {
     /// What it leaves against the coherence.
     misfit: Option<Misfit>,
     remark: Option<String>,
+    /// Whether what the window blunts was told from the machine.
+    settled: bool,
 }
 
 /// Returns the estimate; of maximum likelihood the `responses` become those that it fitted, less what their window
@@ -138,13 +147,13 @@ fn estimated(
         Some(Method::LeastSquares) => {
             let name = "least squares on frequency responses, all lines alike";
             let estimate = equation_error(&joined(responses)?, unknowns)?;
-            Ok(Found { name, estimate, misfit: None, remark: None })
+            Ok(Found { name, estimate, misfit: None, remark: None, settled: true })
         }
         Some(Method::MaximumLikelihood) | None => {
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
             let records: Vec<_> =
                 responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
-            let ResponseEstimate { fit, responses: fitted, blunted, .. } =
+            let ResponseEstimate { fit, responses: fitted, blunted, settled } =
                 output_error_of_responses(&records, unknowns)?;
             for (response, frf) in responses.iter_mut().zip(fitted) {
                 response.frf = frf;
@@ -158,7 +167,7 @@ fn estimated(
                     significant(blunted, 2)
                 )
             });
-            Ok(Found { name, estimate: fit.estimate, misfit: Some(misfit), remark })
+            Ok(Found { name, estimate: fit.estimate, misfit: Some(misfit), remark, settled })
         }
     }
 }

@@ -29,6 +29,9 @@ const LINES_PER_CORRELATION: usize = 8;
 /// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
 const FREE_RESIDUALS: f64 = 8.0;
 
+/// Power of the noise of a response over that of its residual, below which the noise of the forces explains all.
+const ALONE: f64 = 1e-6;
+
 /// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
 const STEPS: usize = 8;
 
@@ -151,6 +154,9 @@ pub struct SpectralResidual {
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
     rounding: bool,
+    /// Power of the residual over that which the noise of the forces alone makes of it, and the probability that
+    /// it is as little; where no noise is left for the response.
+    force_alone: Option<(f64, f64)>,
     /// Few lines that hold the misfit of all records.
     concentration: Option<Concentration>,
 }
@@ -226,6 +232,7 @@ impl WeightedFit {
                 values,
                 explained,
                 rounding: is_rounding(data, &levels),
+                force_alone: if noise.is_none() { force_alone(data, estimate) } else { None },
                 concentration: None,
             }
         });
@@ -275,6 +282,13 @@ impl WeightedFit {
 /// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
 /// stated noise of the forces, the most likely one.
 fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
+    let each = residuals(records, estimate)?;
+    Some(each.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+}
+
+/// Power of the residual of each channel in the quantity measured, with the variance that the noise of the forces
+/// makes of it, over all records.
+fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
     let system = estimate.system().ok()?;
     let mut residuals = vec![Vec::new(); system.dof()];
     for data in records {
@@ -290,7 +304,30 @@ fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
             }
         }
     }
-    Some(residuals.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+    Some(residuals)
+}
+
+/// Power of the residual of the channel that the noise of the forces explains worst over what it makes of it, with
+/// the probability of so little times the number of channels; `None` where noise of the response explains the
+/// rest, or no noise of the forces is stated.
+fn force_alone(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
+    if data.force_variance().iter().all(|variance| *variance == 0.0) {
+        return None;
+    }
+    let residuals = residuals(std::slice::from_ref(data), estimate)?;
+    let channels = residuals.len() as f64;
+    let of_channel = |pairs: Vec<(f64, f64)>| {
+        let count = pairs.len() as f64;
+        let mean = pairs.iter().map(|(power, _)| power).sum::<f64>() / count;
+        if motion_level(pairs.iter().copied()).powi(2) > ALONE * mean {
+            return None;
+        }
+        let over: f64 = pairs.iter().map(|(power, known)| power / known).sum();
+        // A sum of squares of complex numbers has two degrees of freedom each.
+        let below = ChiSquared::new(2.0 * count).ok()?.cdf(2.0 * over);
+        Some((over / count, (channels * below).min(1.0)))
+    };
+    residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Returns whether the residual of every channel is rounding.
@@ -373,6 +410,10 @@ impl SpectralResidual {
         }
         if self.noise_stated && !self.rounding {
             findings.extend(self.data.noise().and_then(|noise| self.misfit(noise)));
+        }
+        if let Some((ratio, p_value)) = self.force_alone {
+            let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
+            findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
         }
         for residual in 0..self.data.dof() {
             if let Some(correlation) = self.line_to_line(residual) {

@@ -23,6 +23,8 @@ pub(super) struct Scatter {
     pub(super) freedom: f64,
     /// See [`Segments::smoothing`].
     smoothing: Vec<f64>,
+    /// Samples of a segment.
+    samples: usize,
 }
 
 impl Scatter {
@@ -55,7 +57,8 @@ impl Scatter {
         });
         let pooled = pooled.collect();
         let (freedom, smoothing) = (freedom(half), segments.smoothing());
-        Self { unexplained, inverse_force, pooled, freedom, smoothing }
+        let samples = segments.samples();
+        Self { unexplained, inverse_force, pooled, freedom, smoothing, samples }
     }
 
     /// The same of some of the lines.
@@ -67,6 +70,7 @@ impl Scatter {
             pooled: places.iter().map(|at| self.pooled[*at].clone()).collect(),
             freedom: self.freedom,
             smoothing: self.smoothing.clone(),
+            samples: self.samples,
         }
     }
 
@@ -126,6 +130,12 @@ impl Frf {
             sharp.response[at] -= smooth - exact;
         }
         sharp
+    }
+
+    /// Distance of the lines, in rad/s, and samples of the segments, if their window blunts the responses.
+    pub(crate) fn resolution(&self) -> Option<[f64; 2]> {
+        let scatter = self.scatter.as_ref().filter(|_| self.is_smoothed())?;
+        Some([self.line_spacing(), scatter.samples as f64])
     }
 
     /// Distance of the lines of a segment, in rad/s.
