@@ -5,7 +5,8 @@
 //! cargo run --release -p mechid-analysis --example random_study -- 1000
 //! cargo run --release -p mechid-analysis --example random_study -- 300 force
 //! ```
-//! The second argument chooses a table: `segments`, `force` or `colour`; without it, all are made.
+//! The second argument chooses a table, `segments`, `force` or `colour`, and the third the rows that contain it;
+//! without them, all are made.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::f64::consts::TAU;
@@ -95,12 +96,13 @@ fn heading(second: &str) {
     println!("|---|---|---|---|---|");
 }
 
-fn fits() -> [(&'static str, Identify); 3] {
+fn fits() -> [(&'static str, Identify); 4] {
     let segments = |len| Identify::responses(Estimator::H1, Segmentation::of(len));
     [
         ("ends of the record fitted", Identify::default()),
         ("H1, segments of 1024", segments(1024)),
         ("H1, segments of 4096", segments(4096)),
+        ("H1, length chosen", Identify::responses(Estimator::H1, Segmentation::default())),
     ]
 }
 
@@ -119,6 +121,9 @@ fn two() -> SecondOrderSystem {
 }
 
 fn study(row: &str, system: &SecondOrderSystem, runs: u64, how: &Identify, noise: Noise) {
+    if std::env::args().nth(3).is_some_and(|wanted| !row.contains(&wanted)) {
+        return;
+    }
     let all: Vec<Run> =
         (0..runs).into_par_iter().filter_map(|seed| one(system, seed, how, noise)).collect();
     let count = all.len() as f64;

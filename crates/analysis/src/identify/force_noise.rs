@@ -9,8 +9,8 @@ use crate::hits::HitNoise;
 use crate::measurement::Block;
 use crate::text::significant;
 
-/// Noise over the force, in the RMS, below which it is rounding.
-const ROUNDING: f64 = 1e-7;
+/// Noise over the force, in the RMS, below which it is taken for none: it moves no parameter.
+const ROUNDING: f64 = 1e-5;
 
 /// Noise of the forces of one record that a fit allows for.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -45,7 +45,7 @@ pub fn fit(
     let estimate =
         |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
     let mut responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
-    let Found { name, estimate, misfit, remark, settled } =
+    let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
     // Says what the data leave open, before anything is made of it.
@@ -124,7 +124,7 @@ fn joined(responses: &[Responses]) -> Result<FrequencyData, AnalysisError> {
 }
 
 /// An estimate from frequency responses.
-struct Found {
+struct Outcome {
     /// The estimator in words.
     name: &'static str,
     estimate: Estimate,
@@ -141,13 +141,13 @@ fn estimated(
     responses: &mut [Responses],
     unknowns: &Unknowns,
     method: Option<Method>,
-) -> Result<Found, AnalysisError> {
+) -> Result<Outcome, AnalysisError> {
     match method {
         Some(Method::Instrumental) => Err(AnalysisError::InstrumentalResponses),
         Some(Method::LeastSquares) => {
             let name = "least squares on frequency responses, all lines alike";
             let estimate = equation_error(&joined(responses)?, unknowns)?;
-            Ok(Found { name, estimate, misfit: None, remark: None, settled: true })
+            Ok(Outcome { name, estimate, misfit: None, remark: None, settled: true })
         }
         Some(Method::MaximumLikelihood) | None => {
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
@@ -167,7 +167,7 @@ fn estimated(
                     significant(blunted, 2)
                 )
             });
-            Ok(Found { name, estimate: fit.estimate, misfit: Some(misfit), remark, settled })
+            Ok(Outcome { name, estimate: fit.estimate, misfit: Some(misfit), remark, settled })
         }
     }
 }

@@ -212,10 +212,11 @@ pub struct SegmentArgs {
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     segment: Option<usize>,
     /// Window that weights the samples of a segment [default: hann]
-    #[arg(long, value_name = "WINDOW", value_enum)]
+    #[arg(long, value_name = "WINDOW", value_enum, requires = "segment")]
     segment_window: Option<WeightChoice>,
     /// Part of a segment that the next one repeats, in per cent [default: 50]
-    #[arg(long, value_name = "PERCENT", value_parser = share, allow_negative_numbers = true)]
+    #[arg(long, value_name = "PERCENT", value_parser = share, requires = "segment",
+          allow_negative_numbers = true)]
     segment_overlap: Option<f64>,
 }
 

@@ -1,5 +1,7 @@
 //! Errors of frequency responses from line to line, and between forces and motions.
 
+use std::collections::HashMap;
+
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
 
@@ -109,21 +111,25 @@ impl Frf {
             return self.clone();
         };
         let mut sharp = self.clone();
-        let spacing = self.line_spacing();
-        let response = |omega: f64| -> Option<ComplexMatrix> {
+        let step = self.line_spacing() / SMOOTHING_STEPS as f64;
+        let response = |place: i64| -> Option<ComplexMatrix> {
+            let omega = place as f64 * step;
             let receptance = system.receptance(omega).ok()?;
-            let unit = self.measured.per_displacement(omega);
-            let h = receptance.select_columns(force_dof) * unit;
+            let h = receptance.select_columns(force_dof) * self.measured.per_displacement(omega);
             h.iter().all(|z| z.is_finite()).then_some(h)
         };
-        for (at, omega) in self.omega.iter().enumerate() {
-            let Some(exact) = response(*omega) else { continue };
+        // Neighbouring lines share most of the frequencies at which the system is asked.
+        let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
+        for (at, line) in self.lines.iter().enumerate() {
+            let place = (line * SMOOTHING_STEPS) as i64;
+            let Some(exact) = known.entry(place).or_insert_with(|| response(place)).clone() else {
+                continue;
+            };
             let mut smooth = &exact * Complex::from(scatter.smoothing[0]);
-            for (step, weight) in scatter.smoothing.iter().enumerate().skip(1) {
-                let shift = step as f64 / SMOOTHING_STEPS as f64 * spacing;
-                for side in [omega - shift, omega + shift] {
-                    // At rest a free machine has no response.
-                    let there = if side == 0.0 { None } else { response(side) };
+            for (apart, weight) in scatter.smoothing.iter().enumerate().skip(1) {
+                for side in [place - apart as i64, place + apart as i64] {
+                    // A free machine has no response at rest.
+                    let there = known.entry(side).or_insert_with(|| response(side));
                     smooth += there.as_ref().unwrap_or(&exact) * Complex::from(*weight);
                 }
             }
