@@ -118,7 +118,10 @@ impl ForceNoise {
         let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
         let high = levels.iter().copied().fold(0.0, f64::max);
         if high == 0.0 {
-            return format!("the force was taken as exact: no noise, {of}");
+            return match source {
+                Some(ForceNoiseSource::Stated) => "the force was taken as exact, as stated".into(),
+                _ => "the force shows no noise of its own, and was taken as exact".into(),
+            };
         }
         let range = match significant(low, 3) == significant(high, 3) {
             true => significant(high, 3),
