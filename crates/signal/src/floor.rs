@@ -10,8 +10,14 @@ const LINES: usize = 64;
 /// Least number of such levels, from half the sampling rate down, that are alike.
 const ALIKE: usize = 3;
 
-/// Factor within which levels are alike: they scatter by a sixth under Hann's window.
-const FACTOR: f64 = 2.0;
+/// Factor within which levels are alike: of two it is more than four standard deviations.
+const FACTOR: f64 = 3.0;
+
+/// Standard deviation of the logarithm of a level, of 64 lines under Hann's window, of which neighbours share power.
+const SCATTER: f64 = 0.17;
+
+/// Standard deviations by which the upper and the lower half of the levels may differ.
+const UNEVEN: f64 = 4.0;
 
 /// Level over the largest one from which the band is driven.
 const DRIVEN: f64 = 0.01;
@@ -72,18 +78,23 @@ fn even_level(powers: &[f64]) -> Option<f64> {
     let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
     let levels: Vec<f64> = powers.rchunks_exact(LINES).map(mean).collect();
     let strongest = levels.iter().copied().fold(0.0, f64::max);
-    let mut sum = 0.0;
     let mut alike = 0;
-    for level in levels {
-        let so_far = if alike == 0 { level } else { sum / alike as f64 };
-        if level > FACTOR * so_far || level * FACTOR < so_far {
+    for level in &levels {
+        let so_far = mean(&levels[..alike.max(1)]);
+        if *level > FACTOR * so_far || level * FACTOR < so_far {
             break;
         }
-        sum += level;
         alike += 1;
     }
-    let level = sum / alike as f64;
-    (alike >= ALIKE && level <= DRIVEN * strongest).then_some(level)
+    let half = alike / 2;
+    if alike < ALIKE {
+        return None;
+    }
+    // A force that falls off slowly towards half the sampling rate is no noise.
+    let slope = (mean(&levels[alike - half..alike]) / mean(&levels[..half])).ln().abs();
+    let level = mean(&levels[..alike]);
+    let even = slope <= UNEVEN * SCATTER * (2.0 / half as f64).sqrt();
+    (even && level <= DRIVEN * strongest).then_some(level)
 }
 
 #[cfg(test)]
@@ -131,6 +142,16 @@ mod tests {
             noise::coloured(sampling, 1, 1.0, noise::Colour::PowerLaw { exponent: 8.0 }, 1);
         let found = noise_above_band(&falling.unwrap()).unwrap()[0];
         assert!(found.is_none_or(|level| level < 1e-3), "{found:?}");
+        // A force behind a filter of the second order falls by a factor of a hundred, and by none suddenly.
+        for seed in 0..10 {
+            let white = noise::white(sampling, 1, 1.0, seed).unwrap();
+            let mut lines = Spectrum::of(&white).lines().clone();
+            for (n, mut line) in lines.row_iter_mut().enumerate() {
+                line /= nalgebra::Complex::from(1.0 + (n as f64 / 300.0).powi(2));
+            }
+            let filtered = Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap();
+            assert_eq!(noise_above_band(&filtered).unwrap(), [None]);
+        }
         let still = Record::from_channel(sampling, vec![0.0; 4096]).unwrap();
         assert_eq!(noise_above_band(&still).unwrap(), [Some(0.0)]);
     }

@@ -365,7 +365,7 @@ pub enum NoiseSource {
     Periods,
     /// Coherence of averaged frequency responses.
     Coherence,
-    /// Noise of the force alone, stated or read above the band that it drives.
+    /// Noise of the force on the lines on which it decides, stated or read above the band that it drives.
     Force,
 }
 

@@ -376,6 +376,10 @@ fn misfit(
     }
     f.write_str(match verdict {
         Verdict::Good => "consistent with noise",
+        _ if ratio < 1.0 && source == NoiseSource::Force => {
+            "the noise of the force is less than was taken, which biases the estimate; state it with \
+             `force_noise`"
+        }
         _ if ratio < 1.0 => {
             "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \
              the standard errors are too large; average frequency responses instead"
@@ -491,7 +495,7 @@ impl Display for NoiseSource {
         f.write_str(match self {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
-            NoiseSource::Force => "that the noise of the force alone makes",
+            NoiseSource::Force => "where that of the force decides",
         })
     }
 }

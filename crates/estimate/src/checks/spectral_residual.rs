@@ -29,8 +29,11 @@ const LINES_PER_CORRELATION: usize = 8;
 /// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
 const FREE_RESIDUALS: f64 = 8.0;
 
-/// Power of the noise of a response over that of its residual, below which the noise of the forces explains all.
-const ALONE: f64 = 1e-6;
+/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
+const DECIDES: f64 = 10.0;
+
+/// Loads of the ends of a record that a channel is fitted with.
+const LOADS: f64 = 6.0;
 
 /// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
 const STEPS: usize = 8;
@@ -154,9 +157,9 @@ pub struct SpectralResidual {
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
     rounding: bool,
-    /// Power of the residual over that which the noise of the forces alone makes of it, and the probability that
-    /// it is as little; where no noise is left for the response.
-    force_alone: Option<(f64, f64)>,
+    /// Power of the residual over that of the noise, on the lines on which that of the forces decides, and the
+    /// probability that it is as little.
+    force_decides: Option<(f64, f64)>,
     /// Few lines that hold the misfit of all records.
     concentration: Option<Concentration>,
 }
@@ -232,7 +235,7 @@ impl WeightedFit {
                 values,
                 explained,
                 rounding: is_rounding(data, &levels),
-                force_alone: if noise.is_none() { force_alone(data, estimate) } else { None },
+                force_decides: if noise.is_none() { force_decides(data, estimate) } else { None },
                 concentration: None,
             }
         });
@@ -307,25 +310,29 @@ fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(
     Some(residuals)
 }
 
-/// Power of the residual of the channel that the noise of the forces explains worst over what it makes of it, with
-/// the probability of so little times the number of channels; `None` where noise of the response explains the
-/// rest, or no noise of the forces is stated.
-fn force_alone(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
+/// Power of the residual over that of the noise, on the lines on which that of the forces decides, with the
+/// probability of so little times the number of channels; of the channel where it is least probable. `None` where
+/// no noise of the forces is stated, or where it decides on too few lines.
+fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
     if data.force_variance().iter().all(|variance| *variance == 0.0) {
         return None;
     }
     let residuals = residuals(std::slice::from_ref(data), estimate)?;
     let channels = residuals.len() as f64;
+    let fitted = estimate.parameters().len() as f64 / channels + LOADS;
     let of_channel = |pairs: Vec<(f64, f64)>| {
-        let count = pairs.len() as f64;
-        let mean = pairs.iter().map(|(power, _)| power).sum::<f64>() / count;
-        if motion_level(pairs.iter().copied()).powi(2) > ALONE * mean {
+        let own = motion_level(pairs.iter().copied()).powi(2);
+        let decided = pairs.iter().filter(|(_, known)| *known > DECIDES * own);
+        let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
+            (count + 1.0, over + power / (own + known))
+        });
+        // A sum of squares of complex numbers has two degrees of freedom each.
+        let free = 2.0 * count - fitted;
+        if free < FREE_RESIDUALS {
             return None;
         }
-        let over: f64 = pairs.iter().map(|(power, known)| power / known).sum();
-        // A sum of squares of complex numbers has two degrees of freedom each.
-        let below = ChiSquared::new(2.0 * count).ok()?.cdf(2.0 * over);
-        Some((over / count, (channels * below).min(1.0)))
+        let below = ChiSquared::new(free).ok()?.cdf(2.0 * over);
+        Some((2.0 * over / free, (channels * below).min(1.0)))
     };
     residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
 }
@@ -411,7 +418,7 @@ impl SpectralResidual {
         if self.noise_stated && !self.rounding {
             findings.extend(self.data.noise().and_then(|noise| self.misfit(noise)));
         }
-        if let Some((ratio, p_value)) = self.force_alone {
+        if let Some((ratio, p_value)) = self.force_decides {
             let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
             findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
         }
