@@ -1,9 +1,12 @@
-//! Random tests of machines with light and heavy damping: do the intervals hold, and what does a fit of averaged
-//! frequency responses make of the same records?
+//! Random tests of machines with light and heavy damping: do the intervals hold, what does a fit of averaged
+//! frequency responses make of the same records, and what do noise on the force and colour of the noise do?
 //!
 //! ```text
 //! cargo run --release -p mechid-analysis --example random_study -- 1000
+//! cargo run --release -p mechid-analysis --example random_study -- 300 force
 //! ```
+//! The second argument chooses a table, `segments`, `force` or `colour`, and the third the rows that contain it;
+//! without them, all are made.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use std::f64::consts::TAU;
@@ -14,26 +17,93 @@ use mechid_analysis::{
 };
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::RandomTest;
-use mechid_signal::{NoiseLevel, Sampling, noise};
+use mechid_signal::noise::Colour;
+use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::dmatrix;
 use rayon::prelude::*;
 
 /// Samples of a record, 500 in a second.
 const SAMPLES: usize = 8192;
-/// Noise on the response over the response, in the RMS.
-const LEVEL: f64 = 0.01;
+/// Time step, in s.
+const DT: f64 = 0.002;
+const QUANTITY: ResponseQuantity = ResponseQuantity::Displacement;
+
+/// Noise on force and response over the signal, in the RMS.
+#[derive(Clone, Copy)]
+struct Noise {
+    force: f64,
+    response: f64,
+    colour: Colour,
+}
+
+impl Noise {
+    fn white(force: f64) -> Self {
+        Self { force, response: 0.01, colour: Colour::White }
+    }
+}
 
 fn main() {
     let runs = std::env::args().nth(1).and_then(|count| count.parse().ok()).unwrap_or(200);
-    println!("{runs} records of {SAMPLES} samples each, {} % of noise", 100.0 * LEVEL);
+    let table = std::env::args().nth(2);
+    let wanted = |name: &str| table.as_ref().is_none_or(|table| table == name);
+    let machines: Vec<(String, SecondOrderSystem)> = [0.001, 0.01, 0.1]
+        .map(|ratio| (format!("ζ = {} %", 100.0 * ratio), oscillator(ratio)))
+        .into_iter()
+        .chain([("two forces at a time".to_owned(), two())])
+        .collect();
+    println!("{runs} records of {SAMPLES} samples each");
+    if wanted("segments") {
+        heading("fit");
+        for (name, system) in &machines {
+            for (fit, how) in fits() {
+                study(&format!("{name} | {fit}"), system, runs, &how, Noise::white(0.0));
+            }
+        }
+    }
+    if wanted("force") {
+        heading("noise on the force");
+        for (name, system) in &machines {
+            for force in [0.0, 0.001, 0.005, 0.01, 0.02] {
+                let row = format!("{name} | {} %", 100.0 * force);
+                study(&row, system, runs, &Identify::default(), Noise::white(force));
+            }
+        }
+    }
+    if wanted("colour") {
+        heading("noise on the response");
+        // x_k = 0.9 x_(k−1) + e_k.
+        let autoregressive = Colour::LowPass { corner_hz: -(0.9_f64.ln()) / (TAU * DT) };
+        let colours = [
+            ("white", Colour::White),
+            ("AR(0.9)", autoregressive),
+            ("1/f", Colour::PowerLaw { exponent: 1.0 }),
+        ];
+        for (name, system) in &machines {
+            for (of_colour, colour) in colours {
+                let noise = Noise { force: 0.0, response: 0.05, colour };
+                let row = format!("{name} | 5 % of {of_colour}");
+                study(&row, system, runs, &Identify::default(), noise);
+            }
+        }
+    }
+}
+
+fn heading(second: &str) {
+    println!();
     println!(
-        "| machine | fit | intervals that hold (%) | damping ratio: bias, scatter (%) | a warning (%) |"
+        "| machine | {second} | intervals that hold (%) | damping ratio: bias, scatter (%) | a warning (%) |"
     );
     println!("|---|---|---|---|---|");
-    for ratio in [0.001, 0.01, 0.1] {
-        study(&format!("ζ = {} %", 100.0 * ratio), &oscillator(ratio), runs);
-    }
-    study("two forces at a time", &two(), runs);
+}
+
+fn fits() -> [(&'static str, Identify); 4] {
+    let segments = |len| Identify::responses(Estimator::H1, Segmentation::of(len));
+    [
+        ("ends of the record fitted", Identify::default()),
+        ("H1, segments of 1024", segments(1024)),
+        ("H1, segments of 4096", segments(4096)),
+        ("H1, length chosen", Identify::responses(Estimator::H1, Segmentation::default())),
+    ]
 }
 
 /// 10 kg at 25 Hz.
@@ -50,24 +120,20 @@ fn two() -> SecondOrderSystem {
     SecondOrderSystem::new(mass, damping, stiffness).expect("an invertible mass")
 }
 
-fn study(name: &str, system: &SecondOrderSystem, runs: u64) {
-    let fits = [
-        ("ends of the record fitted", Identify::default()),
-        ("H1, segments of 1024", Identify::responses(Estimator::H1, Segmentation::of(1024))),
-        ("H1, segments of 4096", Identify::responses(Estimator::H1, Segmentation::of(4096))),
-    ];
-    for (fit, how) in fits {
-        let all: Vec<Run> =
-            (0..runs).into_par_iter().filter_map(|seed| one(system, seed, &how)).collect();
-        let count = all.len() as f64;
-        let mean = |of: &dyn Fn(&Run) -> f64| all.iter().map(of).sum::<f64>() / count;
-        let (holding, bias) = (100.0 * mean(&|run| run.holding), 100.0 * mean(&|run| run.damping));
-        let scatter = (1e4 * mean(&|run| run.damping.powi(2)) - bias * bias).max(0.0).sqrt();
-        let warned = 100.0 * mean(&|run| f64::from(u8::from(run.warned)));
-        println!("| {name} | {fit} | {holding:.1} | {bias:.3}, {scatter:.3} | {warned:.1} |");
-        if all.len() as u64 != runs {
-            println!("{} of {runs} fits failed", runs - all.len() as u64);
-        }
+fn study(row: &str, system: &SecondOrderSystem, runs: u64, how: &Identify, noise: Noise) {
+    if std::env::args().nth(3).is_some_and(|wanted| !row.contains(&wanted)) {
+        return;
+    }
+    let all: Vec<Run> =
+        (0..runs).into_par_iter().filter_map(|seed| one(system, seed, how, noise)).collect();
+    let count = all.len() as f64;
+    let mean = |of: &dyn Fn(&Run) -> f64| all.iter().map(of).sum::<f64>() / count;
+    let (holding, bias) = (100.0 * mean(&|run| run.holding), 100.0 * mean(&|run| run.damping));
+    let scatter = (1e4 * mean(&|run| run.damping.powi(2)) - bias * bias).max(0.0).sqrt();
+    let warned = 100.0 * mean(&|run| f64::from(u8::from(run.warned)));
+    println!("| {row} | {holding:.1} | {bias:.3}, {scatter:.3} | {warned:.1} |");
+    if all.len() as u64 != runs {
+        println!("{} of {runs} fits failed", runs - all.len() as u64);
     }
 }
 
@@ -79,14 +145,19 @@ struct Run {
     warned: bool,
 }
 
-fn one(system: &SecondOrderSystem, seed: u64, how: &Identify) -> Option<Run> {
-    let quantity = ResponseQuantity::Displacement;
-    let sampling = Sampling::new(0.002, SAMPLES).ok()?;
-    let rig = RandomTest { system: system.clone(), sampling, quantity, force: 100.0 };
+fn measure(system: &SecondOrderSystem, seed: u64, level: Noise) -> Option<[Record; 2]> {
+    let sampling = Sampling::new(DT, SAMPLES).ok()?;
+    let rig = RandomTest { system: system.clone(), sampling, quantity: QUANTITY, force: 100.0 };
     let [force, response] = rig.measure(seed).ok()?;
-    let level = NoiseLevel::FractionOfRms(LEVEL);
-    let noisy = noise::add_white(&response, level, seed + 1_000_000).ok()?;
-    let test = Measurement::from_records(&force, &[(quantity, &noisy)]).ok()?;
+    let part = NoiseLevel::FractionOfRms;
+    let force = noise::add_white(&force, part(level.force), seed + 2_000_000).ok()?;
+    let seed = seed + 1_000_000;
+    Some([force, noise::add(&response, part(level.response), level.colour, seed).ok()?])
+}
+
+fn one(system: &SecondOrderSystem, seed: u64, how: &Identify, noise: Noise) -> Option<Run> {
+    let [force, response] = measure(system, seed, noise)?;
+    let test = Measurement::from_records(&force, &[(QUANTITY, &response)]).ok()?;
     let identified = identify(&[test], how).ok()?;
     let parameters = identified.estimate().parameters();
     let count = parameters.len() as f64;

@@ -87,7 +87,18 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
 /// Good hits of records, each a record of its own, and a row for every hit.
 pub(crate) struct Cut {
     pub hits: Vec<Windowed>,
+    /// Noise of the force of each of these hits.
+    pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
+}
+
+/// Noise of the force in the window of a hit, which is set to zero away from the pulse.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HitNoise {
+    /// Standard deviation between the hits, in N.
+    pub deviation: f64,
+    /// Part of the samples of the window that belong to the pulse, a ratio.
+    pub share: f64,
 }
 
 impl Cut {
@@ -103,7 +114,7 @@ impl Cut {
 /// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act,
 /// [`AnalysisError::NoHit`] if a record has none that is good.
 pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
-    let mut all = Cut { hits: Vec::new(), rows: Vec::new() };
+    let mut all = Cut { hits: Vec::new(), noise: Vec::new(), rows: Vec::new() };
     for record in records {
         let held = &record.held;
         let [dof] = held.driven[..] else {
@@ -137,7 +148,11 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
         for (hit, row) in found.all.iter().zip(&rows).filter(|(_, row)| row.used) {
             let mut pulse = held.force.window(hit.window.start, hit.window.len())?.into_data();
             pulse.fill(0.0);
-            pulse.column_mut(dof).copy_from_slice(&found.pulse_alone(force, hit));
+            let alone = found.pulse_alone(force, hit);
+            let samples = alone.iter().filter(|f| **f != 0.0).count() as f64;
+            all.noise
+                .push(HitNoise { deviation: found.noise, share: samples / alone.len() as f64 });
+            pulse.column_mut(dof).copy_from_slice(&alone);
             let pulse = Record::new(held.force.sampling().with_len(hit.window.len())?, pulse)?;
             let mut part = record.part(hit.window.clone(), pulse)?;
             part.held.file = format!("{}, hit {}", held.file, row.number);

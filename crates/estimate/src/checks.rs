@@ -13,6 +13,7 @@ mod family;
 mod finding;
 mod instability;
 mod kinematics;
+mod leakage;
 mod linearity;
 mod period;
 mod power;
@@ -35,6 +36,7 @@ pub use finding::{
 };
 pub use instability::instability;
 pub use kinematics::kinematics;
+pub use leakage::leakage;
 pub use linearity::linearity;
 pub use period::claimed_period;
 pub use power::power;
@@ -80,6 +82,8 @@ pub enum Subject {
     Step,
     /// Coherence of force and response.
     Coherence,
+    /// Width of the resonances against the lines of the segments.
+    Leakage,
     /// Delay between force and response.
     Delay,
     /// Bias of the estimate by noise on the response.

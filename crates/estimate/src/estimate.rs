@@ -96,6 +96,24 @@ impl Estimate {
         })
     }
 
+    /// The same fit at other values, in the order of [`Unknowns::free`], with another covariance.
+    pub(crate) fn moved(
+        &self,
+        values: Vec<f64>,
+        covariance: DMatrix<f64>,
+        degrees_of_freedom: usize,
+    ) -> Result<Self, EstimateError> {
+        Self::new(Findings {
+            unknowns: self.unknowns.clone(),
+            values,
+            covariance: covariance.into(),
+            degrees_of_freedom,
+            residual_nrmse: self.residual_nrmse.clone(),
+            condition: self.condition,
+            undetermined: self.undetermined.clone(),
+        })
+    }
+
     /// Free and known entries.
     pub fn unknowns(&self) -> &Unknowns {
         &self.unknowns

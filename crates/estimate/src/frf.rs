@@ -2,6 +2,8 @@
 
 mod average;
 mod cross_spectra;
+mod fit;
+mod scatter;
 mod segments;
 
 use mechid_model::ResponseQuantity;
@@ -10,6 +12,8 @@ use nalgebra::{Complex, DMatrix};
 
 pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
+pub use self::fit::{ResponseEstimate, output_error_of_responses};
+use self::scatter::Scatter;
 pub use self::segments::{Segments, Window};
 use crate::EstimateError;
 use crate::frequency_domain::{FrequencyData, Lines};
@@ -44,6 +48,8 @@ pub struct Frf {
     coherence: DMatrix<f64>,
     variance: Vec<DMatrix<f64>>,
     averages: f64,
+    /// What is known of the errors beyond those variances; `None` of responses measured elsewhere.
+    scatter: Option<Scatter>,
 }
 
 /// No coherence is known closer to 1 than this: the rounding of the sums behind it.
@@ -135,15 +141,17 @@ impl Frf {
             coherence,
             variance,
             averages,
+            scatter: None,
         })
     }
 
+    /// Adds a line; returns the covariance of what the forces leave of the motions, and S_FF⁻¹.
     fn push_line(
         &mut self,
         line: usize,
         spectra: &CrossSpectra,
         estimator: FrfEstimator,
-    ) -> Result<(), EstimateError> {
+    ) -> Result<[ComplexMatrix; 2], EstimateError> {
         let frequency_hz = self.omega[line] / std::f64::consts::TAU;
         let inverse = spectra.inverse_force(frequency_hz)?;
         let h1 = &spectra.motion_force * &inverse;
@@ -176,12 +184,14 @@ impl Frf {
         }
         self.response.push(response);
         self.variance.push(variance);
-        Ok(())
+        let unexplained = (&spectra.motion - &explained)
+            * Complex::from(self.averages / (self.averages - inputs as f64));
+        Ok([unexplained, inverse])
     }
 
     /// Returns data for the estimators: every force channel in turn is an experiment with unit
     /// force at its degree of freedom (`force_dof`, one per channel, counted from 0), and
-    /// the coherence gives the noise of the motion.
+    /// the coherence gives the noise of the motion, from few averages its mean over neighbouring lines.
     ///
     /// # Errors
     /// [`EstimateError::Size`] if there is not one degree of freedom per force or one of
@@ -192,11 +202,14 @@ impl Frf {
             let (expected, got) = (inputs, force_dof.len());
             return Err(EstimateError::Size { what: "driven degrees of freedom", expected, got });
         }
-        let variance = Some(self.variance.as_slice());
+        let variance = match &self.scatter {
+            Some(scatter) => &scatter.pooled,
+            None => &self.variance,
+        };
         FrequencyData::from_responses(
             &self.omega,
             &self.response,
-            variance,
+            Some(variance),
             self.measured,
             force_dof,
         )
@@ -216,7 +229,32 @@ impl Frf {
             coherence: self.coherence.select_rows(places),
             variance: places.iter().map(|at| self.variance[*at].clone()).collect(),
             averages: self.averages,
+            scatter: self.scatter.as_ref().map(|scatter| scatter.at(places)),
         }
+    }
+
+    /// Number of independent complex deviations behind the variances that weigh an estimate.
+    pub(crate) fn deviations(&self) -> f64 {
+        let inputs = self.response.first().map_or(0, |h| h.ncols());
+        let own = self.averages - inputs as f64;
+        self.scatter.as_ref().map_or(own, |scatter| scatter.freedom)
+    }
+
+    /// What the responses say of a machine: the sum over lines and motions of γ²/(1 − γ²), the power that the
+    /// forces explain over that they leave, without the bias of a sampled coherence, times the averages beyond
+    /// those that forces and weights take up (pure number). Longer segments have more lines and less leakage, but
+    /// fewer averages.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (variance of a response by its coherence).
+    pub fn information(&self) -> f64 {
+        let inputs = self.response.first().map_or(0, |h| h.ncols()) as f64;
+        let spare = self.averages - inputs;
+        let of_one = |coherence: &f64| {
+            let left = (1.0 - coherence).max(COHERENCE_ROUNDING) * self.averages / spare;
+            (1.0 / left - 1.0).max(0.0)
+        };
+        (spare - 1.0).max(0.0) * self.coherence.iter().map(of_one).sum::<f64>()
     }
 
     /// Angular frequencies, in rad/s.

@@ -53,7 +53,9 @@ pub use equation_of_motion::EquationOfMotion;
 pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
 pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
-pub use frf::{Frf, FrfAverage, FrfEstimator, Segments, Window};
+pub use frf::{
+    Frf, FrfAverage, FrfEstimator, ResponseEstimate, Segments, Window, output_error_of_responses,
+};
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
 pub use modal::{IdentifiedMode, Uncertain, identified_modes};

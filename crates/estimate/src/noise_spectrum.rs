@@ -91,11 +91,10 @@ impl NoiseSpectrum {
         motion_deviation: &[f64],
         force_deviation: &[f64],
     ) -> Result<Self, EstimateError> {
-        let scale = 4.0 / sampling.len() as f64;
         let diagonal: Vec<_> = motion_deviation
             .iter()
             .chain(force_deviation)
-            .map(|s| Complex::new(scale * s * s, 0.0))
+            .map(|s| Complex::from(variance_on_lines(*s, sampling.len())))
             .collect();
         let one = DMatrix::from_diagonal(&diagonal.into());
         let omega: Vec<f64> = lines.iter().map(|&n| n as f64 * sampling.omega0()).collect();
@@ -131,6 +130,17 @@ impl NoiseSpectrum {
         for c in &mut self.covariance {
             c.rows_mut(n, n).fill(Complex::default());
             c.columns_mut(n, n).fill(Complex::default());
+        }
+        self
+    }
+
+    /// The same noise with these variances of the forces, rows × n, in N², independent of all others.
+    pub(crate) fn with_force_variance(mut self, variance: &DMatrix<f64>) -> Self {
+        let n = self.dof();
+        for (c, variance) in self.covariance.iter_mut().zip(variance.row_iter()) {
+            for (channel, variance) in variance.iter().enumerate() {
+                c[(n + channel, n + channel)] = Complex::from(*variance);
+            }
         }
         self
     }
@@ -220,6 +230,11 @@ impl NoiseSpectrum {
             parts: [&self.parts[..], &other.parts].concat(),
         }
     }
+}
+
+/// E|X_n|² = 4 s²/N of a line of N samples that have white noise of the standard deviation s.
+pub(crate) fn variance_on_lines(deviation: f64, samples: usize) -> f64 {
+    4.0 * deviation * deviation / samples as f64
 }
 
 /// Turns covariances of the quantity measured into covariances of displacement.

@@ -1,6 +1,7 @@
 //! Frequency responses of a record: response per unit force, frequency by frequency.
 
 mod of_hits;
+mod segment_length;
 pub mod table;
 
 use mechid_estimate::frequency_domain::Lines;
@@ -83,8 +84,15 @@ pub fn frf_of_records(
     {
         return Ok(FrfTable::interleaved(&records, &parts, how));
     }
-    let responses = Responses::of(&records, &how.segments, how.estimator, lines)?;
-    Ok(FrfTable::new(&records, &responses, how))
+    let chosen = match &records[..] {
+        [recorded] if !period_given => how.segments.chosen(recorded, lines)?,
+        _ => None,
+    };
+    let segments = chosen.as_ref().map_or(&how.segments, |(segments, _)| segments);
+    let responses = Responses::of(&records, segments, how.estimator, lines)?;
+    let mut table = FrfTable::new(&records, &responses, how);
+    table.remarks.extend(chosen.map(|(_, remark)| remark));
+    Ok(table)
 }
 
 /// Returns the records with what must be held of each; one at least, with as many forces in each.
@@ -186,7 +194,8 @@ impl Estimator {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Segmentation {
-    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments.
+    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments or, of one
+    /// record without a period, as many as its coherence asks for.
     pub segment: Option<usize>,
     /// Window that weights the samples of a segment.
     pub window: Weight,

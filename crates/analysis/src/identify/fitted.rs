@@ -11,6 +11,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
 use nalgebra::DMatrix;
 
+use super::force_noise::ForceNoise;
 use super::nonlinear::SelectionSummary;
 use super::prediction::{Model, Prediction};
 use crate::AnalysisError;
@@ -52,6 +53,8 @@ pub struct Fitted {
     pub misfit: Option<Misfit>,
     /// Noise spectra that were estimated: one of each record, or one from the residual.
     pub noise: Vec<NoiseModel>,
+    /// Noise of the forces of each record, where it is not in those spectra and was allowed for.
+    pub force_noise: Vec<ForceNoise>,
     /// `true` of windows that are no periods, whose ends were fitted, too.
     pub open: bool,
     /// Remarks on how the fit was done.

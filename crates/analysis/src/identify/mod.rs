@@ -14,6 +14,7 @@
 //! | `validation` | prediction of a record that was not fitted |
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
+//! | `force_noise` | noise of the forces, stated or as the record shows it |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
@@ -22,6 +23,7 @@ pub mod checks;
 mod derivatives;
 pub(crate) mod fitted;
 mod fitted_lines;
+mod force_noise;
 pub mod left_out;
 pub mod lines;
 pub mod mass;
@@ -52,11 +54,12 @@ use serde::{Serialize, Serializer};
 use self::checks::CheckRow;
 pub use self::fitted::{Fitted, Misfit, Residual, ResponseCoherence, SampleResidual, WithTerms};
 pub use self::fitted_lines::FittedLine;
+pub use self::force_noise::{ForceNoise, ForceNoiseSource};
 use self::left_out::LineRule;
 pub use self::left_out::{Disturbance, LeftOut};
 pub use self::lines::{Band, LineChoice};
 pub use self::mass::KnownMass;
-use self::open_records::Excitation;
+use self::open_records::{Excitation, NoiseRule};
 pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
@@ -97,13 +100,17 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     }
     let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
-    let mut hits = Vec::new();
+    let (mut hits, mut hit_noise) = (Vec::new(), Vec::new());
     if let Some(rule) = &how.hits {
         how.check_hits(period_given)?;
         let cut = hits::cut(&records, rule)?;
-        (records, hits) = (cut.hits, cut.rows);
+        (records, hits, hit_noise) = (cut.hits, cut.rows, cut.noise);
     }
-    let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given);
+    let excitation = match &how.hits {
+        Some(_) => Excitation::Hits(&hit_noise),
+        None => Excitation::Lasting,
+    };
+    let fit = |unknowns: &Unknowns| how.fitted(&records, unknowns, period_given, excitation);
     let driven: Vec<usize> = records.iter().flat_map(|r| r.held.driven.iter().copied()).collect();
     let fitted = match how.finds_modes_alone() {
         true => Unscaled::or_fitted(&unknowns, &driven, fit),
@@ -138,7 +145,8 @@ impl Identify {
         match &self.fit {
             _ if self.hits.is_some() => Hold::Whole,
             Fit::Spectra { .. } if self.nonlinear.is_some() => Hold::Whole,
-            Fit::Spectra { extent: Some(Extent::Open), .. } => Hold::Whole,
+            Fit::Spectra { extent: Some(Extent::Open), .. }
+            | Fit::Spectra { force_noise: Some(_), .. } => Hold::Whole,
             Fit::Spectra { .. } => Hold::Periods,
             Fit::Responses(how) => how.segments.hold(),
             Fit::Samples(how) => how.hold(),
@@ -167,10 +175,11 @@ impl Identify {
         records: &[Windowed],
         unknowns: &Unknowns,
         period_given: bool,
+        excitation: Excitation<'_>,
     ) -> Result<Fitted, AnalysisError> {
         let lines = LineRule { choice: &self.lines, without: &self.without };
         if let Some(how) = &self.nonlinear {
-            let Fit::Spectra { method, noise, extent } = &self.fit else {
+            let Fit::Spectra { method, noise, extent, force_noise } = &self.fit else {
                 let why = "nonlinear terms are fitted to spectra of whole periods: leave `domain` time \
                            and `from_frf` out";
                 return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
@@ -179,6 +188,10 @@ impl Identify {
                 let why = "fits with nonlinear terms have weights of their own: leave it out";
                 return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
             }
+            if force_noise.is_some() {
+                let why = "fits with nonlinear terms take the force as exact: leave it out";
+                return Err(AnalysisError::Setting { setting: "force_noise", why: why.into() });
+            }
             if *extent == Some(Extent::Open) {
                 let why = "nonlinear terms are fitted to whole periods";
                 return Err(AnalysisError::Setting { setting: "extent", why: why.into() });
@@ -186,40 +199,41 @@ impl Identify {
             return nonlinear::fit(records, unknowns, lines, *method, how);
         }
         match &self.fit {
-            Fit::Spectra { method, noise, extent } => {
+            Fit::Spectra { method, noise, extent, force_noise } => {
                 let likelihood = matches!(method, None | Some(Method::MaximumLikelihood));
                 let wrong =
-                    |why: &str| AnalysisError::Setting { setting: "extent", why: why.into() };
-                // A hit dies out in its window or not.
-                let extent = extent.or(self.hits.as_ref().map(|_| Extent::Open));
+                    |setting, why: &str| Err(AnalysisError::Setting { setting, why: why.into() });
+                let rule = NoiseRule { response: *noise, force: force_noise.as_deref() };
+                let open = || open_records::fit(records, unknowns, lines, rule, excitation);
+                let periods = || spectra::fit(records, unknowns, lines, *method, *noise);
+                // A hit dies out in its window or not, and periods are not asked about the noise of their force.
+                let is_open = self.hits.is_some() || (force_noise.is_some() && !period_given);
+                let extent = extent.or(is_open.then_some(Extent::Open));
                 match extent {
                     Some(Extent::Open) if period_given => {
-                        Err(wrong("an open record has no `period`: leave one of them out"))
+                        wrong("extent", "an open record has no `period`: leave one of them out")
                     }
                     Some(Extent::Open) if !likelihood => {
-                        Err(wrong("the ends of open records take `method` maximum-likelihood"))
+                        wrong("extent", "the ends of open records take `method` maximum-likelihood")
                     }
-                    Some(Extent::Open) => {
-                        let excitation = match self.hits {
-                            Some(_) => Excitation::Hit,
-                            None => Excitation::Lasting,
-                        };
-                        Ok(open_records::fit(records, unknowns, lines, *noise, excitation)?.fitted)
-                    }
+                    Some(Extent::Open) => Ok(open()?.fitted),
+                    _ if force_noise.is_some() => wrong(
+                        "force_noise",
+                        "it is for open records: periods show the noise of their force by their scatter",
+                    ),
                     None if likelihood
                         && !period_given
                         && open_records::suit(records, unknowns) =>
                     {
-                        let lasting = Excitation::Lasting;
-                        match open_records::fit(records, unknowns, lines, *noise, lasting) {
+                        match open() {
                             Ok(open) if open.ends_show => Ok(open.fitted),
-                            _ => spectra::fit(records, unknowns, lines, *method, *noise),
+                            _ => periods(),
                         }
                     }
-                    _ => spectra::fit(records, unknowns, lines, *method, *noise),
+                    _ => periods(),
                 }
             }
-            Fit::Responses(how) => responses::fit(records, unknowns, lines, how),
+            Fit::Responses(how) => responses::fit(records, unknowns, lines, how, period_given),
             Fit::Samples(_) if unknowns.is_related() => {
                 let why =
                     "symmetric matrices and proportional damping belong to `domain` frequency";

@@ -222,6 +222,7 @@ pub(super) fn fit(
         prediction: Prediction::Steady,
         misfit: None,
         noise: Vec::new(),
+        force_noise: Vec::new(),
         open: false,
         remarks,
         estimate: estimated.linear().clone(),

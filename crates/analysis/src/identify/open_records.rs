@@ -11,12 +11,14 @@ use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
 use super::fitted::{Fitted, Residual};
+use super::force_noise::ForceNoise;
 use super::left_out::LineRule;
 use super::lines::LineChoice;
 use super::prediction::Prediction;
 use super::responses::of_linearity;
 use super::spectra::{of_noise, one_motion_of};
 use crate::AnalysisError;
+use crate::hits::HitNoise;
 use crate::measurement::{Block, Windowed};
 
 /// Probability with which the ends of a period look as if they showed.
@@ -36,13 +38,22 @@ const PARAMETERS: usize = 100;
 /// The custom of analysers; what the ends of a record fold back grows beyond.
 const RATE_OVER_BAND: f64 = 2.56;
 
-/// Force of an open record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Excitation {
+/// Force of open records.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Excitation<'a> {
     /// Force all the time, of which the test for nonlinearity takes powers of the response.
     Lasting,
-    /// A hit.
-    Hit,
+    /// A hit in each record, with the noise of its force.
+    Hits(&'a [HitNoise]),
+}
+
+/// Noise by which the lines of open records are weighted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct NoiseRule<'a> {
+    /// Spectrum of the noise of the response, from the residual.
+    pub(super) response: Pooling,
+    /// Standard deviation of the noise of the forces, in N; `None`: as each record shows it.
+    pub(super) force: Option<&'a [f64]>,
 }
 
 /// A fit of open records, and whether their ends show at all.
@@ -59,24 +70,31 @@ pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
 }
 
 /// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
-/// record; `excitation` says what the forces are like.
+/// record, beside the noise that `noise` says; `excitation` says what the forces are like.
 pub(super) fn fit(
     records: &[Windowed],
     unknowns: &Unknowns,
     rule: LineRule<'_>,
-    noise: Pooling,
-    excitation: Excitation,
+    noise: NoiseRule<'_>,
+    excitation: Excitation<'_>,
 ) -> Result<OpenFit, AnalysisError> {
-    let mut spectra = Vec::new();
-    for Windowed { held, .. } in records {
+    let (mut spectra, mut of_force) = (Vec::new(), Vec::new());
+    for (at, Windowed { held, .. }) in records.iter().enumerate() {
         let lines = Lines::new(held.force.sampling(), band(held, rule)?)?;
         let (motion, kind) = held.response();
+        let hit = match excitation {
+            Excitation::Lasting => None,
+            Excitation::Hits(noise) => noise.get(at),
+        };
+        let force_noise = ForceNoise::of(held, noise.force, hit)?;
         let data = FrequencyData::read(&lines, &held.force, motion, kind)?.of_open_record();
+        let data = force_noise.known_to(data, held.force.len())?;
+        of_force.push(force_noise);
         spectra.push((data, lines));
     }
     let (data, lines): (Vec<FrequencyData>, Vec<Lines>) = spectra.into_iter().unzip();
     let all = joined(&data)?;
-    let fit = output_error_pooling(&all, unknowns, noise)?;
+    let fit = output_error_pooling(&all, unknowns, noise.response)?;
     fit.estimate.system()?;
     let closed = match &fit.ends {
         Some(ends) => ends.taken_off(&data)?,
@@ -86,7 +104,7 @@ pub(super) fn fit(
     for ((Windowed { held, .. }, data), lines) in records.iter().zip(&closed).zip(&lines) {
         let mut checks = Vec::from_iter(fitted_band(&fit.estimate, lines)?);
         checks.extend(delay_of_lines(data, lines.sampling().dt(), unknowns));
-        if excitation == Excitation::Lasting {
+        if matches!(excitation, Excitation::Lasting) {
             checks.extend(of_linearity(held, lines, &fit.estimate)?);
         }
         after.push(checks);
@@ -94,12 +112,15 @@ pub(super) fn fit(
     let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&closed, &fit.estimate)?;
     let windows = match excitation {
         Excitation::Lasting => "the windows are no periods",
-        Excitation::Hit => "hits are no periods",
+        Excitation::Hits(_) => "hits are no periods",
     };
     let remark = format!(
         "{windows}: the loads of their ends were fitted with the machine, on all lines of the band"
     );
-    let remarks = one_motion_of(&records[0].held).into_iter();
+    let of_motion = one_motion_of(&records[0].held).into_iter();
+    let known: Vec<(&Block, &ForceNoise)> =
+        records.iter().map(|record| &record.held).zip(&of_force).collect();
+    let remarks = [remark, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)];
     let all = joined(&closed)?;
     let fitted = Fitted {
         domain: "frequency",
@@ -118,8 +139,9 @@ pub(super) fn fit(
             extent: Extent::Open,
         },
         misfit: None,
-        remarks: remarks.chain([remark, of_noise(1, false, &fit.noise)]).collect(),
+        remarks: of_motion.chain(remarks).collect(),
         noise: fit.noise,
+        force_noise: of_force,
         open: true,
         nonlinear: None,
         estimate: fit.estimate,

@@ -68,6 +68,12 @@ pub enum Fit {
         /// with the machine. `None`: whole periods where a period is given; otherwise open if the ends show.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         extent: Option<Extent>,
+        /// Standard deviation of the white noise on the samples of the force, in N, of records that do not show
+        /// it by the scatter of periods, which are fitted as open ones then: one level for all forces, or one for
+        /// each degree of freedom. `None`: of open records that above the band that the force drives, of hits
+        /// that between them.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        force_noise: Option<Vec<f64>>,
     },
     /// Frequency responses, averaged over segments.
     Responses(ResponseFit),
@@ -77,7 +83,7 @@ pub enum Fit {
 
 impl Default for Fit {
     fn default() -> Self {
-        Fit::Spectra { method: None, noise: Pooling::Automatic, extent: None }
+        Fit::Spectra { method: None, noise: Pooling::Automatic, extent: None, force_noise: None }
     }
 }
 
@@ -267,7 +273,8 @@ impl fmt::Display for Derivatives {
 impl Identify {
     /// Fits spectral lines of whole periods.
     pub fn spectra(method: Method) -> Self {
-        let fit = Fit::Spectra { method: Some(method), noise: Pooling::Automatic, extent: None };
+        let (noise, method) = (Pooling::Automatic, Some(method));
+        let fit = Fit::Spectra { method, noise, extent: None, force_noise: None };
         Self { fit, ..Self::default() }
     }
 
@@ -377,6 +384,7 @@ mod tests {
                     method: None,
                     noise: Pooling::Neighbours(3),
                     extent: Some(Extent::Open),
+                    force_noise: Some(vec![0.5, 0.1]),
                 },
                 ..Identify::default()
             },

@@ -4,10 +4,12 @@ use std::f64::consts::TAU;
 
 use mechid_estimate::checks::{
     Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
-    delay_of_lines, linearity,
+    delay_of_lines, leakage, linearity,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
-use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
+use mechid_estimate::{
+    Estimate, EstimateError, ResponseEstimate, Unknowns, output_error_of_responses,
+};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
@@ -20,9 +22,13 @@ use super::spectra::{no_period, one_motion_of};
 use crate::AnalysisError;
 use crate::frf::Responses;
 use crate::measurement::{Block, Windowed};
+use crate::text::significant;
+
+/// Standard errors by which the window of segments moves a parameter before the result says so.
+const BLUNTED: f64 = 0.5;
 
 /// Fits the frequency responses of one or several records, weighted by their coherence unless least
-/// squares is asked for.
+/// squares is asked for. The length of segments that is not given, nor a period, is chosen for the first record.
 ///
 /// # Errors
 /// [`AnalysisError::InstrumentalResponses`] for instrumental variables.
@@ -31,16 +37,17 @@ pub fn fit(
     unknowns: &Unknowns,
     lines: LineRule<'_>,
     how: &ResponseFit,
+    period_given: bool,
 ) -> Result<Fitted, AnalysisError> {
     let ResponseFit { estimator, segments, method } = how;
+    let chosen = if period_given { None } else { segments.chosen(&records[0], lines)? };
+    let segments = chosen.as_ref().map_or(segments, |(segments, _)| segments);
     let estimate =
         |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
-    let responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
-    let mut all: Vec<FrequencyData> =
-        responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
-    let first = all.remove(0);
-    let data = all.iter().try_fold(first, |data, next| data.and(next))?;
-    let (name, estimate, misfit) = estimated(&data, unknowns, *method)?;
+    let mut responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
+    let Outcome { name, estimate, misfit, remark, settled } =
+        estimated(&mut responses, unknowns, *method)?;
+    let data = joined(&responses)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let periodic = segments.are_periods();
@@ -48,6 +55,7 @@ pub fn fit(
         frequency_hz: r.frf.omega().iter().map(|omega| omega / TAU).collect(),
         values: r.frf.coherence().clone(),
     });
+    let modes = estimate.modes()?;
     let (mut before, mut after, mut misfit) = (Vec::new(), Vec::new(), misfit);
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
         let mut checks = Vec::from_iter(coherence(&r.frf));
@@ -55,6 +63,7 @@ pub fn fit(
             checks.extend(claimed_period(&held.force, held.period));
         }
         let mut looked = looked_at(held, r, unknowns, &estimate, data.len(), periodic)?;
+        looked.extend(leakage(&r.frf, &modes, settled));
         // What differs between windows that are no periods is no noise.
         if checks.iter().any(no_period) {
             looked.retain(|finding| finding.subject() != Subject::Misfit);
@@ -75,7 +84,8 @@ pub fn fit(
     );
     let of_segments = (records.len() > 1).then_some(of_segments);
     let of_motion = one_motion_of(&records[0].held).into_iter();
-    let remarks = of_motion.chain(of_segments).chain(of_idle).collect();
+    let remarks = of_motion.chain(of_segments).chain(of_idle).chain(remark);
+    let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
     Ok(Fitted {
         domain: "frequency",
         estimator: name,
@@ -97,6 +107,7 @@ pub fn fit(
         },
         misfit,
         noise: Vec::new(),
+        force_noise: Vec::new(),
         open: false,
         remarks,
         estimate,
@@ -104,24 +115,59 @@ pub fn fit(
     })
 }
 
-/// The estimator in words, what it finds, and what it leaves against the coherence.
+/// The responses of all records, one after the other.
+fn joined(responses: &[Responses]) -> Result<FrequencyData, AnalysisError> {
+    let mut all: Vec<FrequencyData> =
+        responses.iter().map(|r| r.frf.data(&r.driven)).collect::<Result<_, _>>()?;
+    let first = all.remove(0);
+    Ok(all.iter().try_fold(first, |data, next| data.and(next))?)
+}
+
+/// An estimate from frequency responses.
+struct Outcome {
+    /// The estimator in words.
+    name: &'static str,
+    estimate: Estimate,
+    /// What it leaves against the coherence.
+    misfit: Option<Misfit>,
+    remark: Option<String>,
+    /// Whether what the window blunts was told from the machine.
+    settled: bool,
+}
+
+/// Returns the estimate; of maximum likelihood the `responses` become those that it fitted, less what their window
+/// blunts.
 fn estimated(
-    data: &FrequencyData,
+    responses: &mut [Responses],
     unknowns: &Unknowns,
     method: Option<Method>,
-) -> Result<(&'static str, Estimate, Option<Misfit>), AnalysisError> {
+) -> Result<Outcome, AnalysisError> {
     match method {
         Some(Method::Instrumental) => Err(AnalysisError::InstrumentalResponses),
         Some(Method::LeastSquares) => {
             let name = "least squares on frequency responses, all lines alike";
-            Ok((name, equation_error(data, unknowns)?, None))
+            let estimate = equation_error(&joined(responses)?, unknowns)?;
+            Ok(Outcome { name, estimate, misfit: None, remark: None, settled: true })
         }
         Some(Method::MaximumLikelihood) | None => {
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
-            let fit = output_error(data, unknowns)?;
+            let records: Vec<_> =
+                responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
+            let ResponseEstimate { fit, responses: fitted, blunted, settled } =
+                output_error_of_responses(&records, unknowns)?;
+            for (response, frf) in responses.iter_mut().zip(fitted) {
+                response.frf = frf;
+            }
             let misfit =
                 Misfit { ratio: fit.misfit_ratio, noise: "that follows from the coherence" };
-            Ok((name, fit.estimate, Some(misfit)))
+            let remark = (blunted > BLUNTED).then(|| {
+                format!(
+                    "the window of the segments blunts the responses: that was taken off them, by which a \
+                     parameter moves by {} standard errors",
+                    significant(blunted, 2)
+                )
+            });
+            Ok(Outcome { name, estimate: fit.estimate, misfit: Some(misfit), remark, settled })
         }
     }
 }

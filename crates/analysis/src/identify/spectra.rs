@@ -75,6 +75,7 @@ pub(super) fn fit(
         prediction: Prediction::Steady,
         misfit,
         noise: models,
+        force_noise: Vec::new(),
         open: false,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),

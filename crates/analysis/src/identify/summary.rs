@@ -14,6 +14,7 @@ use super::CONSPICUOUS;
 use super::checks::{self, CheckRow, When};
 use super::fitted::Fitted;
 use super::fitted_lines::FittedLine;
+use super::force_noise::ForceNoise;
 use super::nonlinear::{ExtrapolationRow, NonlinearSummary};
 use super::options::Identify;
 use super::prediction::Prediction;
@@ -115,6 +116,8 @@ pub struct FitRow {
     /// Noise spectra by which maximum likelihood was weighted where they were estimated: one of each record,
     /// from its periods, or one from the residual.
     pub noise: Vec<NoiseModel>,
+    /// Noise of the forces of each record where these spectra are of the response alone, as of open records.
+    pub force_noise: Vec<ForceNoise>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of real equations per degree of freedom.
@@ -158,6 +161,7 @@ impl IdentificationSummary {
                 unexplained_motion,
                 misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
                 noise: fitted.noise.clone(),
+                force_noise: fitted.force_noise.clone(),
                 condition_number: estimate.condition(),
                 equations: fitted.equations,
                 unknowns: match &fitted.nonlinear {

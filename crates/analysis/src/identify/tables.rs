@@ -120,6 +120,7 @@ pub fn identify_responses(
             unexplained_motion: unexplained_motion(&data, &system)?,
             misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
             noise: fit.noise.clone(),
+            force_noise: Vec::new(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
             unknowns: estimate.unknowns().independent(),

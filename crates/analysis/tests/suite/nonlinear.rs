@@ -209,6 +209,7 @@ fn output_error_takes_noise_on_the_response() {
             method: Some(Method::MaximumLikelihood),
             noise: Pooling::default(),
             extent: None,
+            force_noise: None,
         },
         ..how()
     };
@@ -319,6 +320,7 @@ fn what_nonlinear_terms_cannot_be_fitted_to_is_refused() {
             method: Some(Method::Instrumental),
             noise: Pooling::default(),
             extent: None,
+            force_noise: None,
         },
     ] {
         let error = identify(std::slice::from_ref(&test), &Identify { fit, ..how() }).unwrap_err();

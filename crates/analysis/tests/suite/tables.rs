@@ -86,6 +86,7 @@ fn a_record_and_its_table_agree() {
         method: Some(Method::MaximumLikelihood),
         noise: Pooling::PerLine,
         extent: None,
+        force_noise: None,
     };
     let how = Identify { fit, ..Identify::default() };
     let of_record = identify(std::slice::from_ref(&test), &how).unwrap();

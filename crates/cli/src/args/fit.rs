@@ -52,6 +52,11 @@ pub struct FitArgs {
     /// N lines to either side), per-line, or auto, which chooses
     #[arg(long, value_name = "NOISE")]
     noise: Option<Pooling>,
+    /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one per
+    /// degree of freedom; for open records, which are fitted as such then [default: that above the band
+    /// that the force drives, or between hits]
+    #[arg(long, value_name = "N,…", value_delimiter = ',', conflicts_with = "period")]
+    force_noise: Vec<f64>,
     /// Extent of the window: of open records the unknown loads of their ends are fitted with the machine
     /// [default: period with --period; otherwise period unless the ends show, and in the time domain open
     /// but for spectral derivatives]
@@ -202,7 +207,8 @@ struct TimeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Samples of a segment, for a random excitation [default: the periods are the segments]
+    /// Samples of a segment, for a random excitation [default: the periods are the segments; of one record
+    /// without --period, chosen by the coherence]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     segment: Option<usize>,
     /// Window that weights the samples of a segment [default: hann]
@@ -222,7 +228,7 @@ pub struct TableArgs {
     /// as `mechid frf --output` writes it, or universal files (datasets 58 of types 4 and 6)
     #[arg(long, conflicts_with_all = ["force", "displacement", "velocity", "acceleration",
           "sample_rate", "time", "period", "detrend", "lines", "without_lines", "without_hz", "from_frf", "segment", "nonlinear", "candidates", "more_starts",
-          "between_samples", "extent", "hits", "struck", "derivatives", "refine", "validate", "validate_start",
+          "between_samples", "extent", "force_noise", "hits", "struck", "derivatives", "refine", "validate", "validate_start",
           "validate_samples", "skip_lines", "record_column"])]
     frf_table: bool,
     /// Measured quantity of the responses, where the table does not state it
@@ -426,7 +432,9 @@ impl FitArgs {
             }),
             (Domain::Frequency, None) => {
                 let (noise, extent) = (self.noise.unwrap_or_default(), self.extent);
-                Fit::Spectra { method, noise, extent: extent.map(Into::into) }
+                let stated = !self.force_noise.is_empty();
+                let force_noise = stated.then(|| self.force_noise.clone());
+                Fit::Spectra { method, noise, extent: extent.map(Into::into), force_noise }
             }
         };
         Identify {
@@ -447,6 +455,7 @@ impl FitArgs {
             self.lines.given(),
             self.method.map(|_| "--method"),
             self.noise.map(|_| "--noise"),
+            self.force_noise.first().map(|_| "--force-noise"),
             self.from_frf.map(|_| "--from-frf"),
             self.nonlinear.given(),
         ];
@@ -457,7 +466,11 @@ impl FitArgs {
         };
         let alone =
             (self.from_frf.is_none() && self.segments.segment.is_some()).then_some("--segment");
-        let of_spectra = [(self.noise.is_some(), "--noise"), (self.extent.is_some(), "--extent")];
+        let of_spectra = [
+            (self.noise.is_some(), "--noise"),
+            (!self.force_noise.is_empty(), "--force-noise"),
+            (self.extent.is_some(), "--extent"),
+        ];
         let of_spectra =
             of_spectra.into_iter().find(|(given, _)| *given && self.from_frf.is_some());
         let alone = alone.map(|o| (o, "belongs to --from-frf"));

@@ -91,6 +91,20 @@ pub enum Finding {
         /// Number of independent averages (pure number).
         averages: f64,
     },
+    /// Width of the narrowest resonance, in lines of the segments that were averaged.
+    Leakage {
+        /// The mode, by rising natural frequency.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        mode: usize,
+        /// Natural frequency, in Hz.
+        frequency_hz: f64,
+        /// Half-power bandwidth 2ζf over the distance of the lines (pure number).
+        lines: f64,
+        /// Number of samples of a segment that would have as many lines in it as are needed.
+        samples_needed: usize,
+        /// Whether what the window blunts could be told from the resonance.
+        settled: bool,
+    },
     /// A channel was cut off by an amplifier or a converter.
     Clipping {
         /// The channel.
@@ -195,7 +209,7 @@ pub enum Finding {
         /// Residual power over its expectation for noise alone (pure number).
         ratio: f64,
         /// Probability that noise alone deviates as much, to either side against periods, above
-        /// against coherence.
+        /// against coherence, below against the noise of the force.
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
         /// Source of the noise power.
@@ -351,6 +365,8 @@ pub enum NoiseSource {
     Periods,
     /// Coherence of averaged frequency responses.
     Coherence,
+    /// Noise of the force on the lines on which it decides, stated or read above the band that it drives.
+    Force,
 }
 
 /// Estimator that noise on the response does not bias.
@@ -468,6 +484,7 @@ impl Finding {
             | Finding::WrongPeriod { .. } => Subject::Periodicity,
             Finding::HighestMode { .. } | Finding::NoLogarithm { .. } => Subject::Step,
             Finding::Coherence { .. } => Subject::Coherence,
+            Finding::Leakage { .. } => Subject::Leakage,
             Finding::Clipping { .. }
             | Finding::ConstantChannel { .. }
             | Finding::Quantisation { .. }
@@ -510,6 +527,10 @@ impl Finding {
             Finding::HighestMode { frequency_hz, samples_per_period, limit } => {
                 limit.verdict(frequency_hz, samples_per_period)
             }
+            Finding::Leakage { lines, settled, .. } => match settled {
+                true if lines >= RESONANCE_LINES => Verdict::Good,
+                _ => Verdict::Doubtful,
+            },
             Finding::Coherence { median, .. } => {
                 grade(1.0 - median, INCOHERENCE_DOUBTFUL, INCOHERENCE_BAD)
             }
@@ -547,6 +568,7 @@ impl Finding {
             Finding::HighestMode { samples_per_period, .. } => samples_per_period,
             Finding::NoLogarithm { eigenvalue } => eigenvalue,
             Finding::Coherence { median, .. } => median,
+            Finding::Leakage { lines, .. } => lines,
             Finding::Clipping { samples, .. } => samples as f64,
             Finding::ConstantChannel { level, .. } => level,
             Finding::Quantisation { levels, .. } => levels as f64,

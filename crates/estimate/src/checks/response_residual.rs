@@ -52,8 +52,7 @@ pub fn after_response_fit(
     let Some(residual) = in_units_of_noise(&data, estimate) else { return Ok(Vec::new()) };
     let n = residual.ncols();
     let series = Series::of(&residual, frf);
-    let mut findings =
-        Vec::from_iter(series.misfit(frf.averages() - force_dof.len() as f64, fitted));
+    let mut findings = Vec::from_iter(series.misfit(frf.deviations(), fitted));
     for (at, lines) in series.each.iter().enumerate() {
         if let Some((correlation, distance)) = series.line_to_line(lines) {
             let (response, force) = (at % n, force_dof[at / n]);

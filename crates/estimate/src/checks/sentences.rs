@@ -127,6 +127,29 @@ impl Display for Sentence<'_> {
                     _ => ": noise, leakage, or other forces; use longer segments, or more of them",
                 })
             }
+            Finding::Leakage { mode, frequency_hz, lines, samples_needed, settled } => {
+                write!(
+                    f,
+                    "the resonance of mode {} ({frequency_hz:.4} Hz) is {} lines of a segment wide",
+                    mode + 1,
+                    three_digits(*lines)
+                )?;
+                match (self.verdict(), settled) {
+                    (Verdict::Good, _) => Ok(()),
+                    (_, true) => write!(
+                        f,
+                        ": its damping follows from leakage, and the intervals are not reliable; use segments of \
+                         {samples_needed} samples or more, or fit the record with the loads of its ends (without \
+                         `from_frf`)"
+                    ),
+                    (_, false) => write!(
+                        f,
+                        ", and what the window blunts could not be told from it: the intervals are not reliable; \
+                         use segments of {samples_needed} samples or more, or fit the record with the loads of \
+                         its ends (without `from_frf`)"
+                    ),
+                }
+            }
             Finding::Clipping { channel, level, samples } => write!(
                 f,
                 "{channel} is clipped at {}: {} at that level, three or more in a row; choose a wider \
@@ -387,6 +410,10 @@ fn misfit(
     }
     f.write_str(match verdict {
         Verdict::Good => "consistent with noise",
+        _ if ratio < 1.0 && source == NoiseSource::Force => {
+            "the noise of the force is less than was taken, which biases the estimate; state it with \
+             `force_noise`"
+        }
         _ if ratio < 1.0 => {
             "the periods differ by more than noise (hits of unequal strength, a drift, a transient), and \
              the standard errors are too large; average frequency responses instead"
@@ -503,6 +530,7 @@ impl Display for NoiseSource {
         f.write_str(match self {
             NoiseSource::Periods => "estimated from the periods",
             NoiseSource::Coherence => "that follows from the coherence",
+            NoiseSource::Force => "where that of the force decides",
         })
     }
 }
@@ -561,6 +589,7 @@ impl Display for Subject {
             Subject::Periodicity => "periodicity",
             Subject::Step => "step",
             Subject::Coherence => "coherence",
+            Subject::Leakage => "leakage",
             Subject::Delay => "delay",
             Subject::Bias => "bias",
             Subject::Instability => "instability",

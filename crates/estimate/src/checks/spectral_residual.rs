@@ -10,7 +10,7 @@ use super::concentration::{Part, concentration};
 use super::correlation::{Correlation, share_above_of};
 use super::finding::{Concentration, Finding, NoiseSource, PValue, Reference, Residual};
 use super::thresholds::{LAGS, ROUNDING};
-use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened};
+use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened, motion_level};
 use crate::relations::Relations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
@@ -28,6 +28,12 @@ const LINES_PER_CORRELATION: usize = 8;
 
 /// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
 const FREE_RESIDUALS: f64 = 8.0;
+
+/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
+const DECIDES: f64 = 10.0;
+
+/// Loads of the ends of a record that a channel is fitted with.
+const LOADS: f64 = 6.0;
 
 /// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
 const STEPS: usize = 8;
@@ -61,7 +67,7 @@ pub struct AfterSpectralFit {
 /// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
 /// parameters together and the one that changes most alone.
 /// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
-/// response.
+/// response, beside that of the forces if the data know it.
 ///
 /// # Errors
 /// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
@@ -151,6 +157,9 @@ pub struct SpectralResidual {
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
     rounding: bool,
+    /// Power of the residual over that of the noise, on the lines on which that of the forces decides, and the
+    /// probability that it is as little.
+    force_decides: Option<(f64, f64)>,
     /// Few lines that hold the misfit of all records.
     concentration: Option<Concentration>,
 }
@@ -226,6 +235,7 @@ impl WeightedFit {
                 values,
                 explained,
                 rounding: is_rounding(data, &levels),
+                force_decides: if noise.is_none() { force_decides(data, estimate) } else { None },
                 concentration: None,
             }
         });
@@ -272,20 +282,59 @@ impl WeightedFit {
     }
 }
 
-/// RMS residual of each channel in the quantity measured, over all records.
+/// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
+/// stated noise of the forces, the most likely one.
 fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
+    let each = residuals(records, estimate)?;
+    Some(each.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+}
+
+/// Power of the residual of each channel in the quantity measured, with the variance that the noise of the forces
+/// makes of it, over all records.
+fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
     let system = estimate.system().ok()?;
-    let (mut power, mut rows) = (vec![0.0; system.dof()], 0);
+    let mut residuals = vec![Vec::new(); system.dof()];
     for data in records {
         for (row, omega) in data.omega().iter().enumerate() {
-            let modelled = system.receptance(*omega).ok()? * data.force().row(row).transpose();
+            let receptance = system.receptance(*omega).ok()?;
             let scale = data.measured().per_displacement(*omega).norm_sqr();
+            let modelled = &receptance * data.force().row(row).transpose();
             let residual = data.displacement().row(row).transpose() - modelled;
-            power.iter_mut().zip(residual.iter()).for_each(|(p, e)| *p += scale * e.norm_sqr());
+            let variance = data.force_variance().row(row).transpose();
+            let by_force = receptance.map(|g| g.norm_sqr()) * variance;
+            for (channel, pairs) in residuals.iter_mut().enumerate() {
+                pairs.push((scale * residual[channel].norm_sqr(), scale * by_force[channel]));
+            }
         }
-        rows += data.len();
     }
-    Some(power.iter().map(|p| (p / rows as f64).sqrt()).collect())
+    Some(residuals)
+}
+
+/// Power of the residual over that of the noise, on the lines on which that of the forces decides, with the
+/// probability of so little times the number of channels; of the channel where it is least probable. `None` where
+/// no noise of the forces is stated, or where it decides on too few lines.
+fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
+    if data.force_variance().iter().all(|variance| *variance == 0.0) {
+        return None;
+    }
+    let residuals = residuals(std::slice::from_ref(data), estimate)?;
+    let channels = residuals.len() as f64;
+    let fitted = estimate.parameters().len() as f64 / channels + LOADS;
+    let of_channel = |pairs: Vec<(f64, f64)>| {
+        let own = motion_level(pairs.iter().copied()).powi(2);
+        let decided = pairs.iter().filter(|(_, known)| *known > DECIDES * own);
+        let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
+            (count + 1.0, over + power / (own + known))
+        });
+        // A sum of squares of complex numbers has two degrees of freedom each.
+        let free = 2.0 * count - fitted;
+        if free < FREE_RESIDUALS {
+            return None;
+        }
+        let below = ChiSquared::new(free).ok()?.cdf(2.0 * over);
+        Some((2.0 * over / free, (channels * below).min(1.0)))
+    };
+    residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Returns whether the residual of every channel is rounding.
@@ -301,7 +350,8 @@ fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
     levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
 }
 
-/// Covariance of displacement and force for white noise of these levels on the quantity measured.
+/// Covariance of displacement and force for white noise of these levels on the quantity measured, and what noise of
+/// the forces is stated.
 fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
     let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
     let scale = data.measured().per_displacement(data.omega()[row]).norm();
@@ -310,6 +360,8 @@ fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix
     for (channel, level) in levels.iter().enumerate().take(n) {
         let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
         covariance[(channel, channel)] = Complex::from(level * level);
+        let of_force = data.force_variance()[(row, channel)];
+        covariance[(n + channel, n + channel)] = Complex::from(of_force);
     }
     covariance
 }
@@ -365,6 +417,10 @@ impl SpectralResidual {
         }
         if self.noise_stated && !self.rounding {
             findings.extend(self.data.noise().and_then(|noise| self.misfit(noise)));
+        }
+        if let Some((ratio, p_value)) = self.force_decides {
+            let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
+            findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
         }
         for residual in 0..self.data.dof() {
             if let Some(correlation) = self.line_to_line(residual) {

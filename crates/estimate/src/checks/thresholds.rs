@@ -38,6 +38,10 @@ pub const INCOHERENCE_DOUBTFUL: f64 = 0.1;
 /// The same, beyond which they are mostly noise.
 pub const INCOHERENCE_BAD: f64 = 0.5;
 
+/// Lines of a segment in the half-power bandwidth of a resonance, below which its intervals do not hold, whatever
+/// is known of the window.
+pub const RESONANCE_LINES: f64 = 1.0;
+
 /// Samples per period of the highest mode, below which a transition from sample to sample depends on
 /// what the force does between them: 2π/1.
 pub const SAMPLES_PER_PERIOD_DOUBTFUL: f64 = std::f64::consts::TAU;

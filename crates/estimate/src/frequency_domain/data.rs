@@ -7,6 +7,7 @@ use nalgebra::{Complex, DMatrix};
 use super::ends::Ends;
 use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
+use crate::noise_spectrum::variance_on_lines;
 
 /// Noise relative to the signal (RMS), below which it is rounding.
 const SCATTER_ROUNDING: f64 = 1e-10;
@@ -22,6 +23,8 @@ pub struct FrequencyData {
     displacement: DMatrix<Complex<f64>>,
     measured: ResponseQuantity,
     noise: Option<NoiseSpectrum>,
+    /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
+    force_variance: DMatrix<f64>,
     /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
     /// on the rows of others.
     ends: DMatrix<Complex<f64>>,
@@ -98,7 +101,9 @@ impl FrequencyData {
             motion.row_mut(r).apply(|x| *x *= to_displacement);
         }
         let ends = DMatrix::zeros(omega.len(), 0);
-        Ok(Self { omega, force, displacement: motion, measured, noise: None, ends })
+        let force_variance = DMatrix::zeros(omega.len(), force.ncols());
+        let displacement = motion;
+        Ok(Self { omega, force, displacement, measured, noise: None, force_variance, ends })
     }
 
     /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
@@ -171,6 +176,42 @@ impl FrequencyData {
         }
         self.noise = Some(noise);
         Ok(self)
+    }
+
+    /// The same data with white noise of known standard deviation (N) on the samples of each force channel, of
+    /// a record of so many samples that does not show its noise: of that on the response the spectrum is found
+    /// from the residual, and the force is no longer taken as exact. What [`FrequencyData::with_noise`] states
+    /// comes first.
+    ///
+    /// Noise on a part of the samples only counts with the root of their share.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] unless there is one deviation per degree of freedom,
+    /// [`EstimateError::NoiseVariance`] if one is negative or not finite.
+    ///
+    /// # Source
+    /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
+    /// likelihood in errors-in-variables.
+    pub fn with_force_noise(
+        mut self,
+        deviation: &[f64],
+        samples: usize,
+    ) -> Result<Self, EstimateError> {
+        crate::least_squares::size("noise levels of the force", self.dof(), deviation.len())?;
+        for (channel, &value) in deviation.iter().enumerate() {
+            if !(value >= 0.0 && value.is_finite()) {
+                let column = self.dof() + channel;
+                return Err(EstimateError::NoiseVariance { row: 0, column, value });
+            }
+            let variance = variance_on_lines(value, samples);
+            self.force_variance.column_mut(channel).fill(variance);
+        }
+        Ok(self)
+    }
+
+    /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
+    pub(crate) fn force_variance(&self) -> &DMatrix<f64> {
+        &self.force_variance
     }
 
     /// The same data as those of a record that is no period: begins and ends in motion that differs.
@@ -271,16 +312,11 @@ impl FrequencyData {
                 right: other.measured,
             });
         }
-        let stack = |upper: &DMatrix<Complex<f64>>, lower: &DMatrix<Complex<f64>>| {
-            let mut both =
-                upper.clone().resize_vertically(self.len() + other.len(), Complex::default());
-            both.rows_mut(self.len(), other.len()).copy_from(lower);
-            both
-        };
         Ok(Self {
             omega: [&self.omega[..], &other.omega].concat(),
-            force: stack(&self.force, &other.force),
-            displacement: stack(&self.displacement, &other.displacement),
+            force: stacked(&self.force, &other.force),
+            displacement: stacked(&self.displacement, &other.displacement),
+            force_variance: stacked(&self.force_variance, &other.force_variance),
             measured: self.measured,
             noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
             ends: self.ends_of_both(other),
@@ -356,6 +392,15 @@ impl FrequencyData {
         let rounding = SCATTER_ROUNDING * SCATTER_ROUNDING;
         scatter.iter().zip(sizes).any(|(scatter, size)| *scatter > rounding * size).then_some(noise)
     }
+}
+
+/// The rows of one matrix below those of another.
+fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatrix<T> {
+    let rows = upper.nrows();
+    DMatrix::from_fn(rows + lower.nrows(), upper.ncols(), |row, column| {
+        let from = if row < rows { &upper[(row, column)] } else { &lower[(row - rows, column)] };
+        from.clone()
+    })
 }
 
 pub(crate) fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), EstimateError> {

@@ -4,6 +4,7 @@ use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
 
 use super::misfit::Misfit;
+use super::motion_level::motion_level;
 use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
@@ -35,8 +36,8 @@ struct Weighted {
     noise: NoiseSpectrum,
 }
 
-/// Noise of unknown level of each channel, white or of the spectrum that the residual shows, found in turn
-/// with the parameters.
+/// Noise of unknown level of each channel of the motion, white or of the spectrum that the residual shows, found
+/// in turn with the parameters; the forces have the noise that the data state of them.
 pub(super) fn with_residual_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -82,6 +83,7 @@ fn with_white_noise(
     nominal: Option<&SecondOrderSystem>,
 ) -> Result<(Weighted, bool), EstimateError> {
     let measured = measured_size(data, data.displacement());
+    let known_force = data.force_variance().iter().all(|variance| *variance == 0.0);
     let mut levels = measured.clone();
     let mut last: Option<GlobalMinimum> = None;
     for _ in 0..MAX_ROUNDS {
@@ -95,14 +97,17 @@ fn with_white_noise(
             }
             Some(before) => before.followed(&mut misfit)?,
         };
-        let sizes = measured_size(data, &misfit.errors());
-        // Only the ratios between the channels weigh; the common level is the residual's.
-        let common = sizes[0] / levels[0];
+        let sizes = match known_force {
+            true => measured_size(data, &misfit.errors()),
+            false => levels_beside_force(data, &misfit),
+        };
+        // With an exact force only the ratios between the channels weigh; the common level is the residual's.
+        let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
             sizes.iter().zip(&levels).all(|(f, l)| (f - l * common).abs() <= WEIGHT_TOLERANCE * f);
         // Rounding has no level that could settle.
         let exact = sizes.iter().zip(&measured).all(|(f, x)| *f <= ROUNDING * x);
-        if settled || exact || data.dof() == 1 {
+        if settled || exact || (known_force && data.dof() == 1) {
             drop(misfit);
             return Ok((Weighted { fit, noise }, exact));
         }
@@ -139,7 +144,8 @@ fn with_coloured_noise(
     Ok(last)
 }
 
-/// The noise that a residual shows, of each channel by itself.
+/// The noise that a residual shows, of each channel by itself: at each line as much more than that of the round
+/// before as the residual is more than its noise. What the noise of the force accounts for is not counted twice.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -151,19 +157,23 @@ fn spectrum_of_residual(
     misfit.try_at(theta).ok_or(EstimateError::Overflow)?;
     misfit.accept();
     let (errors, leverage) = (misfit.errors(), leverage(data, unknowns, before));
+    let by_force = misfit.variance_by_force();
     let covariance = data.omega().iter().enumerate().map(|(row, omega)| {
         let scale = data.measured().per_displacement(*omega).norm_sqr();
         let mut covariance = DMatrix::zeros(2 * n, 2 * n);
         for channel in 0..n {
+            let own = before.noise.covariance(row)[(channel, channel)].re;
+            let share = own / (own + by_force[(row, channel)]);
             // No residual at all would take all the weight.
-            let least = LEAST * before.noise.covariance(row)[(channel, channel)].re;
-            let power = scale * errors[(row, channel)].norm_sqr().max(least);
+            let power = scale * (share * errors[(row, channel)].norm_sqr()).max(LEAST * own);
             let kept = leverage.as_ref().map_or(1.0, |h| (1.0 - h[(row, channel)]).max(KEPT));
             covariance[(channel, channel)] = Complex::from(power / kept);
         }
         covariance
     });
-    NoiseSpectrum::of_measured(data.omega(), covariance.collect(), data.measured(), 1, pooling)
+    let covariance = covariance.collect();
+    let noise = NoiseSpectrum::of_measured(data.omega(), covariance, data.measured(), 1, pooling)?;
+    Ok(noise.with_force_variance(data.force_variance()))
 }
 
 /// Share of the noise at each row and channel that the parameters take up, rows × n; `None` of large fits,
@@ -204,7 +214,20 @@ fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Ve
     (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
 }
 
-/// White noise of the given levels of the quantity measured, the force exact.
+/// Standard deviation of the noise of each channel, in the quantity measured, beside which that of the forces
+/// makes the residual most likely.
+fn levels_beside_force(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
+    let (errors, by_force) = (misfit.errors(), misfit.variance_by_force());
+    let level = |channel: usize| {
+        let scale = |row: usize| data.measured().per_displacement(data.omega()[row]).norm_sqr();
+        let power = |row: usize| scale(row) * errors[(row, channel)].norm_sqr();
+        let known = |row: usize| scale(row) * by_force[(row, channel)];
+        motion_level((0..data.len()).map(|row| (power(row), known(row))))
+    };
+    (0..data.dof()).map(level).collect()
+}
+
+/// White noise of the given levels of the quantity measured beside that of the forces.
 fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, EstimateError> {
     let n = data.dof();
     let covariance = data.omega().iter().map(|w| {
@@ -214,5 +237,6 @@ fn white_noise(data: &FrequencyData, levels: &[f64]) -> Result<NoiseSpectrum, Es
             Complex::from(level * level)
         })
     });
-    NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())
+    let noise = NoiseSpectrum::new(data.omega().to_vec(), covariance.collect())?;
+    Ok(noise.with_force_variance(data.force_variance()))
 }

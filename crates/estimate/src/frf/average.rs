@@ -5,6 +5,7 @@ use mechid_signal::Record;
 use nalgebra::DMatrix;
 
 use super::cross_spectra::CrossSpectra;
+use super::scatter::Scatter;
 use super::segments::{overlap_loss, weigh};
 use super::{ComplexMatrix, Frf, FrfEstimator, Segments};
 use crate::EstimateError;
@@ -213,10 +214,15 @@ impl FrfAverage {
             omega,
             measured: self.measured,
             averages: self.averages(),
+            scatter: None,
         };
+        let (mut unexplained, mut inverse) = (Vec::new(), Vec::new());
         for (line, sum) in self.sums.iter().enumerate() {
-            frf.push_line(line, &sum.mean(self.pieces), estimator)?;
+            let [left, of_force] = frf.push_line(line, &sum.mean(self.pieces), estimator)?;
+            unexplained.push(left);
+            inverse.push(of_force);
         }
+        frf.scatter = Some(Scatter::new(&frf, unexplained, inverse, self.segments));
         Ok(frf)
     }
 }

@@ -12,6 +12,12 @@ const INDEPENDENT: f64 = 0.01;
 /// Lines further apart than this are not looked at: no window ties them together.
 const FARTHEST_LINES: usize = 16;
 
+/// Steps of a line by which a response is smoothed: that to a force three segments ago is still told from others.
+pub(super) const SMOOTHING_STEPS: usize = 4;
+
+/// Lines to either side over which a window smooths.
+const SMOOTHED_LINES: usize = 6;
+
 /// Segments of a record to average over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -100,6 +106,28 @@ impl Segments {
         let tied = correlation.iter().rposition(|c| *c >= INDEPENDENT).unwrap_or(0);
         correlation.truncate(tied + 1);
         correlation
+    }
+
+    /// Weights by which averages over pieces smooth a frequency response under a random force, over the
+    /// distances of a line in steps of 1/[`SMOOTHING_STEPS`], and symmetric: |W|² of the window. None where nothing is smoothed:
+    /// of periods, and of pieces that begin and end at rest, for which the rectangular window is.
+    ///
+    /// # Source
+    /// Bendat & Piersol, *Random Data*, 4th ed. (2010), section 8.5 (bias errors of spectral estimates); the
+    /// response is that to what a window leaves of the past: h(τ) times the autocorrelation of the window.
+    pub(super) fn smoothing(self) -> Vec<f64> {
+        let Segments::Windowed { len, window, .. } = self else { return Vec::new() };
+        if window == Window::Rectangular {
+            return Vec::new();
+        }
+        let power = |step: usize| {
+            let turn = TAU * step as f64 / (SMOOTHING_STEPS * len) as f64;
+            let terms = (0..len).map(|k| Complex::cis(-turn * k as f64) * window.weight(k, len));
+            terms.sum::<Complex<f64>>().norm_sqr()
+        };
+        let half: Vec<f64> = (0..=SMOOTHED_LINES * SMOOTHING_STEPS).map(power).collect();
+        let total = half[0] + 2.0 * half[1..].iter().sum::<f64>();
+        half.into_iter().map(|weight| weight / total).collect()
     }
 
     /// Samples from the start of one piece to that of the next.

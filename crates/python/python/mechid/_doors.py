@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, Unpack
@@ -79,6 +79,7 @@ def identify(
     *sources: object,
     method: Method | None = None,
     noise: str | None = None,
+    force_noise: float | Sequence[float] | None = None,
     lines: str | None = None,
     band_hz: tuple[float, float] | None = None,
     without_lines: str | None = None,
@@ -125,6 +126,10 @@ def identify(
         Noise spectrum by which maximum likelihood weighs the lines of whole periods: ``"white"``,
         ``"smooth"``, ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or
         ``"auto"``, which chooses.
+    force_noise : float or sequence of float, optional
+        Standard deviation of the noise on the samples of the force, in N, one for all forces or one
+        per degree of freedom; for open records, which are fitted as such then. Without, that above
+        the band that the force drives, or between hits.
     lines : str, optional
         Spectral lines: ``"all"``, ``"odd"``, ``"even"``, or numbers and ranges such as
         ``"1:2:335"``; every line at which the force exceeds its noise, without.
@@ -209,7 +214,7 @@ def identify(
     if settings is None:
         band = None if band_hz is None else (float(band_hz[0]), float(band_hz[1]))
         told = _identify_settings(
-            method, noise, domain, from_frf, segment, segment_window, segment_overlap, between_samples,
+            method, noise, _levels(force_noise), domain, from_frf, segment, segment_window, segment_overlap, between_samples,
             extent, derivatives, refine, interpolation, lines, band,
             _without(without_lines, without_hz), tuple(_mass(mass)),
             tuple(_structure(structure)), _hits(hits), nonlinear, candidates, criterion,
@@ -923,6 +928,7 @@ def multisine(
 def _identify_settings(
     method: str | None,
     noise: str | None,
+    force_noise: tuple[float, ...] | None,
     domain: str,
     from_frf: str | None,
     segment: int | None,
@@ -947,7 +953,7 @@ def _identify_settings(
 ) -> str:
     """Return the settings of `identify` as JSON; kept, for studies call with the same ones."""
     fit = _fit(
-        method, noise, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
+        method, noise, force_noise, domain, from_frf, _segments(from_frf, segment, segment_window, segment_overlap),
         between_samples, extent, derivatives, refine, interpolation,
     )
     if domain == "time" and (lines is not None or band_hz is not None):
@@ -966,9 +972,18 @@ def _identify_settings(
     return json.dumps(settings)
 
 
+def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | None:
+    """Return the noise levels of the forces as they are saved."""
+    if force_noise is None:
+        return None
+    several = isinstance(force_noise, Iterable)
+    return tuple(float(level) for level in (force_noise if several else [force_noise]))
+
+
 def _fit(
     method: str | None,
     noise: str | None,
+    force_noise: tuple[float, ...] | None,
     domain: str,
     from_frf: str | None,
     segments: dict[str, Any],
@@ -986,7 +1001,10 @@ def _fit(
         "interpolation": interpolation,
     }
     if domain == "time":
-        _refuse({"method": method, "noise": noise, "from_frf": from_frf}, "belongs to domain='frequency'")
+        of_frequency = {
+            "method": method, "noise": noise, "force_noise": force_noise, "from_frf": from_frf,
+        }
+        _refuse(of_frequency, "belongs to domain='frequency'")
         if (refine is None) != (interpolation is None):
             raise TypeError("`refine` and `interpolation` go together")
         return {
@@ -1002,14 +1020,22 @@ def _fit(
         raise ValueError(f"`domain` is frequency or time, got {domain!r}")
     _refuse(of_time, "belongs to domain='time'")
     if from_frf is not None:
-        _refuse({"noise": noise, "extent": extent}, "belongs to fits without `from_frf`")
+        of_spectra = {"noise": noise, "force_noise": force_noise, "extent": extent}
+        _refuse(of_spectra, "belongs to fits without `from_frf`")
         return {
             "domain": "responses",
             "estimator": from_frf,
             "segments": segments,
             "method": method,
         }
-    return {"domain": "spectra", "method": method, "noise": noise or "auto", "extent": saved_extent}
+    levels = None if force_noise is None else list(force_noise)
+    return {
+        "domain": "spectra",
+        "method": method,
+        "noise": noise or "auto",
+        "extent": saved_extent,
+        "force_noise": levels,
+    }
 
 
 def _refuse(options: dict[str, Any], why: str) -> None:

@@ -105,6 +105,16 @@ impl<'a> Misfit<'a> {
         errors.transpose()
     }
 
+    /// Variance that the noise of the forces, where that of the displacement is not known, makes of the
+    /// displacement, rows × n, in m²: the diagonal of G S_FF Gᴴ at the parameters last accepted.
+    pub(super) fn variance_by_force(&self) -> DMatrix<f64> {
+        let of_force = self.data.force_variance();
+        DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
+            let gain = self.rows[row].receptance().row(channel).map(|g| g.norm_sqr());
+            gain.iter().zip(of_force.row(row).iter()).map(|(gain, variance)| gain * variance).sum()
+        })
+    }
+
     /// L⁻¹(X − G F), rows × n, at the parameters last accepted.
     pub(super) fn white(&self) -> ComplexMatrix {
         let rows: Vec<_> = self.rows.iter().map(|row| row.white().transpose()).collect();

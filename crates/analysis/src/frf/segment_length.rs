@@ -1,0 +1,67 @@
+//! The length of the segments that a record of a random test is cut into, where none is given.
+
+use mechid_estimate::FrfEstimator;
+use mechid_estimate::frequency_domain::Lines;
+
+use super::{Segmentation, average_of};
+use crate::AnalysisError;
+use crate::identify::left_out::LineRule;
+use crate::measurement::Windowed;
+
+/// Shortest segment, in samples.
+const SHORTEST: usize = 64;
+
+/// Independent averages beyond the number of forces at least.
+const AVERAGES: f64 = 5.0;
+
+/// Part of the most information that is enough: of segments that say nearly as much the shorter ones have more
+/// averages.
+const ENOUGH: f64 = 0.9;
+
+impl Segmentation {
+    /// Returns these segments with a length, and a remark on how it was chosen; `None` where it is given, and
+    /// where no segments would have averages enough.
+    ///
+    /// Of the powers of two that leave averages enough it is the shortest whose responses say at least nine tenths
+    /// of what the best say, by their coherence, averages and number of lines
+    /// ([`Frf::information`](mechid_estimate::Frf::information)). The samples held in memory are looked at.
+    ///
+    /// # Errors
+    /// As those of an average over segments.
+    pub(crate) fn chosen(
+        &self,
+        recorded: &Windowed,
+        rule: LineRule<'_>,
+    ) -> Result<Option<(Self, String)>, AnalysisError> {
+        let held = &recorded.held;
+        if self.segment.is_some() {
+            return Ok(None);
+        }
+        let mut tried: Vec<(usize, f64)> = Vec::new();
+        let mut len = SHORTEST;
+        while 2 * len <= held.force.len() {
+            let how = Self { segment: Some(len), ..self.clone() };
+            let segments = how.segments(held.period)?;
+            let lines = rule.lines(&held.force.window(0, len)?, len)?;
+            let lines = Lines::new(held.force.sampling().with_len(len)?, lines)?;
+            let average = average_of(recorded, &lines, segments, &held.driven)?;
+            // Two forces that one segment cannot tell apart may be told by longer ones.
+            if let Ok(frf) = average.frf(FrfEstimator::H1) {
+                if frf.averages() < AVERAGES + held.driven.len() as f64 {
+                    break;
+                }
+                tried.push((len, frf.information()));
+            }
+            len *= 2;
+        }
+        let most = tried.iter().map(|(_, information)| *information).fold(0.0, f64::max);
+        let enough = tried.iter().find(|(_, information)| *information >= ENOUGH * most);
+        Ok(enough.map(|(len, _)| {
+            let remark = format!(
+                "segments of {len} samples were chosen: the shortest whose coherence, averages and lines say nine \
+                 tenths of what those of any length say"
+            );
+            (Self { segment: Some(*len), ..self.clone() }, remark)
+        }))
+    }
+}

@@ -1,0 +1,140 @@
+//! Noise of the forces of a record that does not show it by its scatter.
+
+use mechid_estimate::frequency_domain::FrequencyData;
+use mechid_signal::noise_above_band;
+use serde::Serialize;
+
+use crate::AnalysisError;
+use crate::hits::HitNoise;
+use crate::measurement::Block;
+use crate::text::significant;
+
+/// Noise over the force, in the RMS, below which it is taken for none: it moves no parameter.
+const ROUNDING: f64 = 1e-5;
+
+/// Noise of the forces of one record that a fit allows for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ForceNoise {
+    /// Standard deviation on the samples of the force on each degree of freedom, in N; `None` where it is not
+    /// known and taken for none.
+    pub levels_n: Vec<Option<f64>>,
+    /// Source of the levels.
+    pub source: ForceNoiseSource,
+    /// Part of the samples that have the noise, a ratio: those of the pulse of a hit, otherwise all.
+    #[serde(skip)]
+    share: f64,
+}
+
+/// Source of the noise level of a force.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceNoiseSource {
+    /// A setting.
+    Stated,
+    /// Lines above the band that the force drives.
+    AboveBand,
+    /// Samples between the hits of a hammer.
+    BetweenHits,
+}
+
+impl ForceNoise {
+    /// Returns the noise of a record: as `stated`, otherwise that between the hits or that above the band.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Setting`] unless one level is stated for all forces or for each.
+    pub(super) fn of(
+        held: &Block,
+        stated: Option<&[f64]>,
+        hit: Option<&HitNoise>,
+    ) -> Result<Self, AnalysisError> {
+        let share = hit.map_or(1.0, |hit| hit.share);
+        let dofs = held.force.channels();
+        if let Some(stated) = stated {
+            let levels_n = Self::stated(held, stated)?;
+            return Ok(Self { levels_n, source: ForceNoiseSource::Stated, share });
+        }
+        let driven = |dof: &usize| held.driven.contains(dof);
+        if let Some(hit) = hit {
+            let level = |dof: usize| Some(if driven(&dof) { hit.deviation } else { 0.0 });
+            let levels_n = (0..dofs).map(level).collect();
+            return Ok(Self { levels_n, source: ForceNoiseSource::BetweenHits, share });
+        }
+        let mut levels_n = noise_above_band(&held.force)?;
+        for (dof, level) in levels_n.iter_mut().enumerate() {
+            if level.is_some_and(|level| level <= ROUNDING * rms(held, dof)) {
+                *level = Some(0.0);
+            }
+        }
+        Ok(Self { levels_n, source: ForceNoiseSource::AboveBand, share })
+    }
+
+    fn stated(held: &Block, stated: &[f64]) -> Result<Vec<Option<f64>>, AnalysisError> {
+        let dofs = held.force.channels();
+        let wrong = |why| AnalysisError::Setting { setting: "force_noise", why };
+        if let Some(value) = stated.iter().find(|value| !(**value >= 0.0 && value.is_finite())) {
+            return Err(wrong(format!("a standard deviation is zero or positive, got {value}")));
+        }
+        if stated.len() != 1 && stated.len() != dofs {
+            let got = stated.len();
+            return Err(wrong(format!(
+                "give one level, or one for each of {dofs} forces, not {got}"
+            )));
+        }
+        let level = |dof: usize| match held.driven.contains(&dof) {
+            true => stated[if stated.len() == 1 { 0 } else { dof }],
+            false => 0.0,
+        };
+        Ok((0..dofs).map(|dof| Some(level(dof))).collect())
+    }
+
+    /// Returns the data with this noise of the forces, of a record of so many samples.
+    pub(super) fn known_to(
+        &self,
+        data: FrequencyData,
+        samples: usize,
+    ) -> Result<FrequencyData, AnalysisError> {
+        let levels = self.levels_n.iter().map(|level| level.unwrap_or(0.0) * self.share.sqrt());
+        Ok(data.with_force_noise(&levels.collect::<Vec<f64>>(), samples)?)
+    }
+
+    /// Returns the remark on the noise of all records.
+    pub(super) fn remark(records: &[(&Block, &Self)]) -> String {
+        let driven = |(held, noise): &(&Block, &Self)| -> Vec<(Option<f64>, f64)> {
+            held.driven.iter().map(|dof| (noise.levels_n[*dof], rms(held, *dof))).collect()
+        };
+        let all: Vec<(Option<f64>, f64)> = records.iter().flat_map(driven).collect();
+        let source = records.first().map(|(_, noise)| noise.source);
+        let Some(levels) = all.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>() else {
+            return "the force is driven up to half the sampling rate, or the record is too short, so that its \
+                    noise is not known: it is taken for none, and biases the estimate if there is any; state it \
+                    (`force_noise`)"
+                .into();
+        };
+        let of = match source {
+            Some(ForceNoiseSource::Stated) => "as stated",
+            Some(ForceNoiseSource::BetweenHits) => "as between the hits",
+            Some(ForceNoiseSource::AboveBand) | None => "as above the band that it drives",
+        };
+        let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = levels.iter().copied().fold(0.0, f64::max);
+        if high == 0.0 {
+            return match source {
+                Some(ForceNoiseSource::Stated) => "the force was taken as exact, as stated".into(),
+                _ => "the force shows no noise of its own, and was taken as exact".into(),
+            };
+        }
+        let range = match significant(low, 3) == significant(high, 3) {
+            true => significant(high, 3),
+            false => format!("{} to {}", significant(low, 3), significant(high, 3)),
+        };
+        let parts = all.iter().filter_map(|(level, rms)| Some(100.0 * (*level)? / rms));
+        let part = significant(parts.fold(0.0, f64::max), 2);
+        let most = if levels.len() > 1 { "at most " } else { "" };
+        format!("noise of the force: {range} N, {of} ({most}{part} % of the RMS force)")
+    }
+}
+
+/// RMS of a force about its mean, in N.
+fn rms(held: &Block, dof: usize) -> f64 {
+    held.force.column(dof).variance().sqrt().max(f64::MIN_POSITIVE)
+}

@@ -1,0 +1,83 @@
+//! The level of white noise beside noise that is known.
+
+/// Rounds of scoring; it converges in a few.
+const ROUNDS: usize = 60;
+/// Relative change of the variance at which the search ends.
+const SETTLED: f64 = 1e-6;
+/// Least variance, relative to the mean power of the residual: a channel without any noise of its own must not
+/// take all the weight.
+const LEAST: f64 = 1e-12;
+
+/// Standard deviation s for which residuals of the powers |e|² and known variances g, in pairs (|e|², g) of one
+/// unit, are most likely as circular Gaussian numbers of the variances s² + g; next to nothing where g alone
+/// explains them.
+///
+/// # Source
+/// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring).
+pub(crate) fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let residuals: Vec<(f64, f64)> = residuals.collect();
+    let mean = residuals.iter().map(|(power, _)| power).sum::<f64>() / residuals.len() as f64;
+    let least = LEAST * mean;
+    let mut variance = mean;
+    for _ in 0..ROUNDS {
+        let (mut excess, mut weights) = (0.0, 0.0);
+        for (power, known) in &residuals {
+            let total = (variance + known).max(f64::MIN_POSITIVE);
+            let weight = (total * total).recip();
+            excess += weight * (power - known);
+            weights += weight;
+        }
+        let next = (excess / weights).max(least);
+        if !next.is_finite() || (next - variance).abs() <= SETTLED * variance {
+            break;
+        }
+        // From a variance far too small the weights of few lines would throw it to and fro.
+        variance = next.max(0.1 * variance);
+    }
+    variance.sqrt().max(f64::MIN_POSITIVE)
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::{Sampling, noise};
+
+    use super::motion_level;
+
+    /// Powers of lines with the variances s² + g.
+    fn powers(level: f64, known: &[f64], seed: u64) -> Vec<(f64, f64)> {
+        let sampling = Sampling::new(1.0, known.len()).unwrap();
+        let drawn = noise::white(sampling, 2, 0.5_f64.sqrt(), seed).unwrap();
+        let power = |(row, g): (usize, &f64)| {
+            ((level * level + g) * drawn.data().row(row).norm_squared(), *g)
+        };
+        known.iter().enumerate().map(power).collect()
+    }
+
+    #[test]
+    fn without_known_noise_the_level_is_the_root_of_the_mean_power() {
+        let residuals = powers(3.0, &[0.0; 400], 1);
+        let mean = residuals.iter().map(|(power, _)| power).sum::<f64>() / 400.0;
+        let level = motion_level(residuals.into_iter());
+        assert!((level - mean.sqrt()).abs() < 1e-6 * level, "{level}");
+    }
+
+    /// A resonance a hundred times as high as the noise does not hide its level: of 400 lines 3.5 % of scatter in
+    /// the root, and 40 experiments have a ninth of it in their mean.
+    #[test]
+    fn the_level_is_found_beside_a_resonance() {
+        let known: Vec<f64> =
+            (0..400).map(|l| 1e4 / (1.0 + (0.2 * (f64::from(l) - 200.0)).powi(2))).collect();
+        let levels: Vec<f64> =
+            (0..40).map(|seed| motion_level(powers(1.0, &known, seed).into_iter())).collect();
+        let mean = levels.iter().sum::<f64>() / 40.0;
+        assert!((mean - 1.0).abs() < 0.1, "{mean}");
+    }
+
+    #[test]
+    fn known_noise_that_explains_all_leaves_next_to_nothing() {
+        let known: Vec<f64> = (0..100).map(|l| 1.0 + f64::from(l)).collect();
+        let residuals: Vec<(f64, f64)> = known.iter().map(|g| (0.5 * g, *g)).collect();
+        let level = motion_level(residuals.into_iter());
+        assert!((0.0..1e-4).contains(&level), "{level}");
+    }
+}

@@ -1,0 +1,249 @@
+//! Maximum likelihood on averaged frequency responses, with what their segments do to them.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::Frf;
+use crate::frequency_domain::{
+    FrequencyData, NoiseSpectrum, OutputErrorFit, Whitened, output_error,
+};
+use crate::relations::Relations;
+use crate::{Estimate, EstimateError, Unknowns};
+
+/// Rounds of sharpening at most; each takes most of what is left of the bias.
+const ROUNDS: usize = 20;
+/// Step, in standard errors of the parameters, below which nothing is left.
+const SETTLED: f64 = 0.02;
+/// Maximum number of sensitivities, residuals times parameters; of larger fits errors of lines are taken as
+/// independent, and the responses as they are.
+const SENSITIVITIES: usize = 1 << 22;
+
+/// An estimate from averaged frequency responses.
+#[derive(Debug, Clone)]
+pub struct ResponseEstimate {
+    /// The fit, whose covariance knows that neighbouring lines err together.
+    pub fit: OutputErrorFit,
+    /// The responses of each record as they were fitted: less what their window blunts.
+    pub responses: Vec<Frf>,
+    /// Largest change of a parameter by that, in its standard errors; zero where nothing is blunted.
+    pub blunted: f64,
+    /// Whether the rounds in which the blunting and the parameters are found came to an end.
+    pub settled: bool,
+}
+
+/// Fits the frequency responses of one or several records of a machine, each with the degrees of freedom of its
+/// forces, counted from 0.
+///
+/// Averages over segments smooth a response by |W|² of their window. What that does to the responses of the
+/// machine found is taken off the data, and the fit repeated, until neither changes. The covariance is that of
+/// errors which the window ties together from line to line, and which motions and forces share, with weights that
+/// are sampled from few segments.
+///
+/// # Errors
+/// As [`output_error`] and [`Frf::data`]; [`EstimateError::NoExcitedLine`] without a record.
+///
+/// # Source
+/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73, for the correlation of lines; Bendat & Piersol,
+/// *Random Data*, 4th ed. (2010), section 8.5, for the bias by a window; White (1980), Econometrica 48, 817–838,
+/// for the covariance; Satterthwaite (1946), Biometrics Bulletin 2, 110–114.
+pub fn output_error_of_responses(
+    records: &[(Frf, Vec<usize>)],
+    unknowns: &Unknowns,
+) -> Result<ResponseEstimate, EstimateError> {
+    let raw: Vec<Frf> = records.iter().map(|(frf, _)| frf.clone()).collect();
+    let data = joined(records, &raw)?;
+    let fit = output_error(&data, unknowns)?;
+    let noise = data.noise().cloned().ok_or(EstimateError::NoExcitedLine)?;
+    let count = unknowns.independent();
+    let plain = |fit| ResponseEstimate { fit, responses: raw.clone(), blunted: 0.0, settled: true };
+    if records.iter().any(|(frf, _)| frf.scatter.is_none())
+        || 2 * data.dof() * data.len() * count > SENSITIVITIES
+    {
+        return Ok(plain(fit));
+    }
+    let relations = Relations::of(unknowns);
+    let entries = |theta: &DVector<f64>| match &relations {
+        None => theta.clone(),
+        Some(relations) => relations.entries(theta.as_slice()),
+    };
+    let values: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
+    let start = match &relations {
+        None => DVector::from_column_slice(&values),
+        Some(relations) => relations.unknowns(&values),
+    };
+    let (mut theta, mut responses) = (start, raw.clone());
+    let Some(mut errors) = Errors::of(records, &responses, unknowns, &entries(&theta), &noise)
+    else {
+        return Ok(plain(fit));
+    };
+    let (mut settled, mut blunted) = (true, 0.0);
+    if raw.iter().any(Frf::is_smoothed) {
+        settled = false;
+        let first = theta.clone();
+        for _ in 0..ROUNDS {
+            let system = match unknowns.assemble(entries(&theta).as_slice()) {
+                [m, c, k] => mechid_model::SecondOrderSystem::new(m, c, k)?,
+            };
+            let sharp = records.iter().map(|(frf, dofs)| frf.sharpened(&system, dofs)).collect();
+            let Some(next) = Errors::of(records, &sharp, unknowns, &entries(&theta), &noise) else {
+                break;
+            };
+            let step = next.step();
+            (errors, responses) = (next, sharp);
+            let deviations = errors.deviations();
+            let in_errors = |step: &DVector<f64>| step.component_div(&deviations).amax();
+            let (length, so_far) = (in_errors(&step), &theta + &step - &first);
+            if !length.is_finite() {
+                break;
+            }
+            theta += step;
+            blunted = in_errors(&so_far);
+            if length <= SETTLED {
+                settled = true;
+                break;
+            }
+        }
+    }
+    let (covariance, degrees_of_freedom) = errors.covariance(records);
+    let covariance = match &relations {
+        None => covariance,
+        Some(relations) => {
+            let tangent = relations.tangent(theta.as_slice());
+            &tangent * covariance * tangent.transpose()
+        }
+    };
+    let values = entries(&theta).as_slice().to_vec();
+    let estimate: Estimate = fit.estimate.moved(values, covariance, degrees_of_freedom)?;
+    let power = 0.5 * errors.white.residual.norm_squared() / (data.dof() * data.len()) as f64;
+    let misfit_ratio = if blunted > 0.0 { power } else { fit.misfit_ratio };
+    let fit = OutputErrorFit { estimate, misfit_ratio, ..fit };
+    Ok(ResponseEstimate { fit, responses, blunted, settled })
+}
+
+/// Responses, one after the other, as data of one fit.
+fn joined(
+    records: &[(Frf, Vec<usize>)],
+    responses: &[Frf],
+) -> Result<FrequencyData, EstimateError> {
+    let mut all: Option<FrequencyData> = None;
+    for ((_, dofs), frf) in records.iter().zip(responses) {
+        let data = frf.data(dofs)?;
+        all = Some(match all {
+            None => data,
+            Some(before) => before.and(&data)?,
+        });
+    }
+    all.ok_or(EstimateError::NoExcitedLine)
+}
+
+/// Weighted residuals at some parameters, with their sensitivities J = Q R.
+struct Errors {
+    white: Whitened,
+    dof: usize,
+    q: DMatrix<f64>,
+    /// R⁻¹.
+    root: DMatrix<f64>,
+}
+
+impl Errors {
+    fn of(
+        records: &[(Frf, Vec<usize>)],
+        responses: &Vec<Frf>,
+        unknowns: &Unknowns,
+        entries: &DVector<f64>,
+        noise: &NoiseSpectrum,
+    ) -> Option<Self> {
+        let data = joined(records, responses).ok()?;
+        let white = Whitened::of(&data, unknowns, entries, |row| noise.covariance(row).clone())?;
+        let mut sensitivity = white.sensitivity.clone();
+        let lengths: Vec<f64> = sensitivity.column_iter().map(|c| c.norm()).collect();
+        for (mut column, length) in sensitivity.column_iter_mut().zip(&lengths) {
+            if *length > 0.0 {
+                column.unscale_mut(*length);
+            }
+        }
+        let (q, r) = sensitivity.qr().unpack();
+        let mut root = DMatrix::identity(r.nrows(), r.ncols());
+        r.solve_upper_triangular_mut(&mut root).then_some(())?;
+        for (mut row, length) in root.row_iter_mut().zip(&lengths) {
+            row.unscale_mut(*length);
+        }
+        root.iter().all(|v| v.is_finite()).then_some(Self { white, dof: data.dof(), q, root })
+    }
+
+    /// The Gauss–Newton step.
+    fn step(&self) -> DVector<f64> {
+        &self.root * self.q.tr_mul(&self.white.residual)
+    }
+
+    /// Standard errors for independent lines.
+    fn deviations(&self) -> DVector<f64> {
+        DVector::from_iterator(self.root.nrows(), self.root.row_iter().map(|row| row.norm()))
+    }
+
+    /// Covariance of the parameters, and the degrees of freedom of the variance that has the fewest.
+    fn covariance(&self, records: &[(Frf, Vec<usize>)]) -> (DMatrix<f64>, usize) {
+        let count = self.q.ncols();
+        let influence = &self.q * self.root.transpose();
+        let mut covariance = DMatrix::<f64>::zeros(count, count);
+        let (mut spread, mut inflation) = (DVector::<f64>::zeros(count), 1.0_f64);
+        let mut first = 0;
+        for (frf, dofs) in records {
+            let lines = frf.omega.len();
+            let Some(scatter) = frf.scatter.as_ref() else { continue };
+            let pairs: Vec<(usize, usize)> =
+                (0..dofs.len()).flat_map(|i| (0..self.dof).map(move |o| (o, i))).collect();
+            // Row of a line, of an output and an input, in units of its weight.
+            let at = |line: usize, (output, input): (usize, usize)| {
+                2 * (self.dof * (first + input * lines + line) + output)
+            };
+            let of = |line: usize, pair: (usize, usize), parameter: usize| {
+                let row = at(line, pair);
+                Complex::new(influence[(row, parameter)], influence[(row + 1, parameter)])
+            };
+            let own = (frf.averages - dofs.len() as f64).max(1.0);
+            let mut shares = DMatrix::<f64>::zeros(lines, count);
+            for line in 0..lines {
+                let local = DMatrix::from_fn(pairs.len(), pairs.len(), |a, b| {
+                    scatter.covariance(line, frf.averages, [pairs[a], pairs[b]])
+                });
+                let here = DMatrix::from_fn(pairs.len(), count, |a, p| of(line, pairs[a], p));
+                let mut around = DMatrix::zeros(pairs.len(), count);
+                for (other, c) in frf.tied(line) {
+                    around += DMatrix::from_fn(pairs.len(), count, |a, p| {
+                        of(other, pairs[a], p) * Complex::from(c)
+                    });
+                }
+                let part = (here.adjoint() * local * around).map(|z| z.re);
+                shares.row_mut(line).copy_from(&part.diagonal().transpose());
+                covariance += (&part + part.transpose()) * 0.5;
+            }
+            for line in 0..lines {
+                for (other, c) in frf.tied(line) {
+                    for parameter in 0..count {
+                        spread[parameter] +=
+                            c * shares[(line, parameter)] * shares[(other, parameter)] / own;
+                    }
+                }
+            }
+            let freedom = frf.deviations().max(3.0);
+            inflation = inflation.max(freedom / (freedom - 2.0));
+            first += lines * dofs.len();
+        }
+        let variances = covariance.diagonal();
+        let freedom = variances.iter().zip(spread.iter()).map(|(v, s)| 2.0 * v * v / s.max(0.0));
+        let fewest = freedom.fold(f64::INFINITY, f64::min).clamp(1.0, 1e6);
+        (covariance * inflation, fewest as usize)
+    }
+}
+
+impl Frf {
+    /// Lines whose errors are correlated with those of a line, itself among them, and by how much.
+    fn tied(&self, line: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let reach = self.line_correlation.len() - 1;
+        let around = line.saturating_sub(reach)..(line + reach + 1).min(self.lines.len());
+        around.filter_map(move |other| {
+            let apart = self.lines[other].abs_diff(self.lines[line]);
+            Some((other, *self.line_correlation.get(apart)?))
+        })
+    }
+}

@@ -1,0 +1,151 @@
+//! Errors of frequency responses from line to line, and between forces and motions.
+
+use std::collections::HashMap;
+
+use mechid_model::SecondOrderSystem;
+use nalgebra::{Complex, DMatrix};
+
+use super::segments::SMOOTHING_STEPS;
+use super::{COHERENCE_ROUNDING, ComplexMatrix, Frf, Segments};
+
+/// Complex deviations that a variance is made of at least where neighbouring lines can lend theirs: weights of
+/// fewer cost more than a tenth of the scatter.
+const DEVIATIONS: f64 = 20.0;
+
+/// What averages over segments tell of the errors of their responses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scatter {
+    /// Covariance of what the forces leave of the motions, at each line outputs × outputs.
+    unexplained: Vec<ComplexMatrix>,
+    /// S_FF⁻¹ at each line.
+    inverse_force: Vec<ComplexMatrix>,
+    /// Variances for weights, each of a mean over as many neighbouring lines as it takes.
+    pub(super) pooled: Vec<DMatrix<f64>>,
+    /// Independent complex deviations behind them.
+    pub(super) freedom: f64,
+    /// See [`Segments::smoothing`].
+    smoothing: Vec<f64>,
+    /// Samples of a segment.
+    samples: usize,
+}
+
+impl Scatter {
+    /// `frf` has the lines already, with variances of their own.
+    pub(super) fn new(
+        frf: &Frf,
+        unexplained: Vec<ComplexMatrix>,
+        inverse_force: Vec<ComplexMatrix>,
+        segments: Segments,
+    ) -> Self {
+        let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
+        let own = frf.averages - inputs as f64;
+        let lines = unexplained.len();
+        let widest = lines.saturating_sub(1) / 2;
+        let freedom = |half: usize| own * independent(2 * half + 1, &frf.line_correlation);
+        let half = (0..=widest).find(|half| freedom(*half) >= DEVIATIONS).unwrap_or(widest);
+        let pooled = (0..lines).map(|line| {
+            let first = line.saturating_sub(half).min(lines - (2 * half + 1).min(lines));
+            let around = first..(first + 2 * half + 1).min(lines);
+            let mut variance = frf.variance[line].clone();
+            for (output, mut row) in variance.row_iter_mut().enumerate() {
+                let power = |at: usize| unexplained[at][(output, output)].re.max(0.0);
+                let mean = around.clone().map(power).sum::<f64>() / around.len() as f64;
+                // Of one line this is 1; of a line without any power the variance is rounding and stays.
+                if half > 0 && power(line) > COHERENCE_ROUNDING * mean {
+                    row *= mean / power(line);
+                }
+            }
+            variance
+        });
+        let pooled = pooled.collect();
+        let (freedom, smoothing) = (freedom(half), segments.smoothing());
+        let samples = segments.samples();
+        Self { unexplained, inverse_force, pooled, freedom, smoothing, samples }
+    }
+
+    /// The same of some of the lines.
+    pub(super) fn at(&self, places: &[usize]) -> Self {
+        let of = |all: &[ComplexMatrix]| places.iter().map(|at| all[*at].clone()).collect();
+        Self {
+            unexplained: of(&self.unexplained),
+            inverse_force: of(&self.inverse_force),
+            pooled: places.iter().map(|at| self.pooled[*at].clone()).collect(),
+            freedom: self.freedom,
+            smoothing: self.smoothing.clone(),
+            samples: self.samples,
+        }
+    }
+
+    /// Covariance of the errors of two responses at a line, (output, input) each, over the standard deviations
+    /// that weigh them.
+    pub(super) fn covariance(
+        &self,
+        line: usize,
+        averages: f64,
+        [left, right]: [(usize, usize); 2],
+    ) -> Complex<f64> {
+        let deviation = |(output, input)| self.pooled[line][(output, input)].sqrt();
+        self.unexplained[line][(left.0, right.0)] * self.inverse_force[line][(right.1, left.1)]
+            / (averages * deviation(left) * deviation(right))
+    }
+}
+
+/// Number of independent ones among the powers of neighbouring lines of this correlation.
+fn independent(lines: usize, correlation: &[f64]) -> f64 {
+    let all = lines as f64;
+    let pairs = correlation.iter().enumerate().skip(1).take(lines.saturating_sub(1));
+    let common: f64 = pairs.map(|(apart, c)| c * (1.0 - apart as f64 / all)).sum();
+    all / (1.0 + 2.0 * common)
+}
+
+impl Frf {
+    /// Returns whether the window of the segments smooths the responses.
+    pub(super) fn is_smoothed(&self) -> bool {
+        self.scatter.as_ref().is_some_and(|scatter| scatter.smoothing.len() > 1)
+    }
+
+    /// The same responses less what the window of the segments makes of those of `system`: averages over pieces
+    /// smooth a response, and blunt a resonance. Forces act at the degrees of freedom `force_dof`.
+    pub(super) fn sharpened(&self, system: &SecondOrderSystem, force_dof: &[usize]) -> Self {
+        let Some(scatter) = self.scatter.as_ref().filter(|_| self.is_smoothed()) else {
+            return self.clone();
+        };
+        let mut sharp = self.clone();
+        let step = self.line_spacing() / SMOOTHING_STEPS as f64;
+        let response = |place: i64| -> Option<ComplexMatrix> {
+            let omega = place as f64 * step;
+            let receptance = system.receptance(omega).ok()?;
+            let h = receptance.select_columns(force_dof) * self.measured.per_displacement(omega);
+            h.iter().all(|z| z.is_finite()).then_some(h)
+        };
+        // Neighbouring lines share most of the frequencies at which the system is asked.
+        let mut known: HashMap<i64, Option<ComplexMatrix>> = HashMap::new();
+        for (at, line) in self.lines.iter().enumerate() {
+            let place = (line * SMOOTHING_STEPS) as i64;
+            let Some(exact) = known.entry(place).or_insert_with(|| response(place)).clone() else {
+                continue;
+            };
+            let mut smooth = &exact * Complex::from(scatter.smoothing[0]);
+            for (apart, weight) in scatter.smoothing.iter().enumerate().skip(1) {
+                for side in [place - apart as i64, place + apart as i64] {
+                    // A free machine has no response at rest.
+                    let there = known.entry(side).or_insert_with(|| response(side));
+                    smooth += there.as_ref().unwrap_or(&exact) * Complex::from(*weight);
+                }
+            }
+            sharp.response[at] -= smooth - exact;
+        }
+        sharp
+    }
+
+    /// Distance of the lines, in rad/s, and samples of the segments, if their window blunts the responses.
+    pub(crate) fn resolution(&self) -> Option<[f64; 2]> {
+        let scatter = self.scatter.as_ref().filter(|_| self.is_smoothed())?;
+        Some([self.line_spacing(), scatter.samples as f64])
+    }
+
+    /// Distance of the lines of a segment, in rad/s.
+    fn line_spacing(&self) -> f64 {
+        self.omega[0] / self.lines[0].max(1) as f64
+    }
+}
