@@ -1,5 +1,6 @@
 //! Prints the tables of `docs/book/src/choose/force.md`:
-//! `cargo run --release -p mechid-force --example noise_study`.
+//! `cargo run --release -p mechid-force --example noise_study`, and with `-- coverage 200` that of
+//! the intervals, over 200 records each.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 #[allow(dead_code, reason = "the test uses the rest")]
@@ -7,6 +8,13 @@
 mod study;
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.first().is_some_and(|first| first == "coverage") {
+        let runs = arguments.get(1).and_then(|runs| runs.parse().ok()).unwrap_or(100);
+        let of = arguments.get(2).map_or("", String::as_str);
+        println!("{}", study::coverage::coverage_table(runs, of));
+        return;
+    }
     let [known, unknown] = study::tables();
     println!("{known}\n{unknown}\n{}", study::rule_table(&study::rule_rows()));
 }

@@ -17,6 +17,8 @@ pub struct IdentifiedForce {
     standard_error: Option<Record>,
     /// Remainder of the measured channels; `None` where there are no more of them than forces.
     rest: Option<Rest>,
+    /// Band of record and standard error; `None`: all frequencies.
+    band_hz: Option<[f64; 2]>,
 }
 
 impl PartialEq for IdentifiedForce {
@@ -28,7 +30,7 @@ impl PartialEq for IdentifiedForce {
 impl IdentifiedForce {
     /// A force whose uncertainty is not known.
     pub(crate) fn of(record: Record) -> Self {
-        Self { record, spectrum: OnceLock::new(), standard_error: None, rest: None }
+        Self { record, spectrum: OnceLock::new(), standard_error: None, rest: None, band_hz: None }
     }
 
     /// The same force with its standard error, on the same time axis.
@@ -40,6 +42,17 @@ impl IdentifiedForce {
     /// The same force with what it leaves of the measured channels.
     pub(crate) fn with_rest(mut self, rest: Option<Rest>) -> Self {
         self.rest = rest;
+        self
+    }
+
+    /// The same with another record.
+    pub(crate) fn replaced(self, record: Record) -> Self {
+        Self { record, spectrum: OnceLock::new(), ..self }
+    }
+
+    /// The same, said to be the force of this band only.
+    pub(crate) fn with_band(mut self, band_hz: [f64; 2]) -> Self {
+        self.band_hz = Some(band_hz);
         self
     }
 
@@ -61,6 +74,15 @@ impl IdentifiedForce {
     /// method had no way to know it.
     pub fn standard_error(&self) -> Option<&Record> {
         self.standard_error.as_ref()
+    }
+
+    /// Lowest and highest frequency, in Hz, between which force and standard error hold; `None`: at
+    /// all frequencies.
+    ///
+    /// It is the band asked for ([`Measurement::in_band`](crate::Measurement::in_band)) or, where
+    /// no displacement was measured, the one in which the channels show more of a force than noise.
+    pub fn band_hz(&self) -> Option<[f64; 2]> {
+        self.band_hz
     }
 
     /// Part of each measured channel that the force leaves unexplained.

@@ -50,11 +50,14 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod augmented;
+mod band;
 mod components;
 mod continuous;
 mod discretised;
 mod error;
 mod evidence;
+mod force_model;
 mod frequency_domain;
 mod identified;
 mod kalman;
@@ -69,15 +72,18 @@ mod open_operator;
 mod period_operator;
 mod regularised;
 mod rule;
+mod seen;
 mod smoother;
 mod state_space;
 mod transfer;
 mod uncertainty;
 mod unexplained;
 
+pub use band::within_band;
 pub use continuous::continuous;
 pub use discretised::{discretised, discretised_by_taylor};
 pub use error::ForceError;
+pub use force_model::ForceModel;
 pub use frequency_domain::frequency_domain;
 pub use identified::IdentifiedForce;
 pub use kalman::{KalmanForce, Tuning, kalman};
