@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_model::linear_algebra::exponential;
+use mechid_model::linear_algebra::{exponential, hermitian_eigen};
 use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use mechid_signal::Sampling;
 use nalgebra::DMatrix;
@@ -15,9 +15,9 @@ use crate::state_space::Machine;
 use crate::{ForceError, ForceModel, Measurement, Start};
 
 /// Orders tried, each from where the one before was most likely; the first two from a grid.
-const ORDERS: [usize; 4] = [1, 2, 4, 8];
+const ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
 /// States that the forces may have together: more of them make long records slow.
-const FORCE_STATES: usize = 8;
+const FORCE_STATES: usize = 16;
 /// Ratio between the corner frequencies tried first, from half a period in the record up.
 const CORNER_RATIO: f64 = 4.0;
 /// Highest corner, in radians per sample: the Nyquist frequency.
@@ -26,6 +26,15 @@ const HIGHEST: f64 = PI;
 const RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 /// The noise has no digits left above this ratio, and is all there is below the other.
 const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
+
+/// Step of the logarithms for the curvature of the likelihood.
+const STEP: f64 = 0.15;
+/// Standard deviation of a logarithm of which nothing is known.
+const WIDEST: f64 = 1.5;
+/// Standard deviation of a logarithm that moves no standard error by more than a hundredth.
+const NARROW: f64 = 0.02;
+/// Largest logarithm by which the likelihood of a point may exceed that of the approximation.
+const MOST_GAINED: f64 = 1.0;
 
 /// The machine with forces of any model. A force is carried as that part of x + ½ẍΔt² which it
 /// adds within a step, so that no entry is large whatever the unit of the machine.
@@ -49,6 +58,9 @@ pub(crate) struct Tuned {
     pub model: ForceModel,
     pub noise: f64,
     pub log_likelihood: f64,
+    /// Logarithms of the signal-to-noise ratio of each force and of the corner in radians per
+    /// sample; none of a model given.
+    free: Vec<f64>,
 }
 
 impl Augmented {
@@ -179,7 +191,8 @@ impl Augmented {
         if noise != unit {
             model.rms.iter_mut().for_each(|rms| *rms *= noise);
         }
-        log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood })
+        let free = free.to_vec();
+        log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
     }
 
     /// A model given, with the noise of the scales.
@@ -187,7 +200,7 @@ impl Augmented {
         let process = LowPass::new(model.order)?;
         let space = self.space(model, &process, 1.0, 10.0)?;
         let log_likelihood = space.innovations(&self.data).log_likelihood();
-        Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood })
+        Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
     }
 
     /// Lowest corner, in radians per sample: half a period in twenty records.
@@ -224,6 +237,58 @@ impl Augmented {
             }
         }
         best.ok_or(ForceError::NoLikelihood)
+    }
+
+    /// Models as likely as the best one, with their weights: what is known of it, at as many points
+    /// as it takes to have mean and covariance of the parameters right. One model alone where the
+    /// record tells it so well that the others do not matter, or where it was given.
+    ///
+    /// # Source
+    /// Laplace's approximation, spherical cubature of degree 3 (Arasaratnam & Haykin, 2009), each
+    /// point weighted by its likelihood over that of the approximation.
+    pub fn alike(&self, best: &Tuned, noise: Option<f64>) -> Result<Vec<(f64, Tuned)>, ForceError> {
+        let alone = vec![(1.0, best.clone())];
+        let dimension = best.free.len();
+        if dimension == 0 {
+            return Ok(alone);
+        }
+        let process = LowPass::new(best.model.order)?;
+        let at = |point: &[f64]| self.trial(&process, noise, point);
+        let fall = |moves: &[(usize, f64)]| {
+            let mut point = best.free.clone();
+            moves.iter().for_each(|(i, by)| point[*i] += by);
+            at(&point).map_or(0.0, |t| best.log_likelihood - t.log_likelihood)
+        };
+        let ahead: Vec<f64> = (0..dimension).map(|i| fall(&[(i, STEP)])).collect();
+        let curvature = DMatrix::from_fn(dimension, dimension, |i, j| {
+            let twice = match i == j {
+                true => ahead[i] + fall(&[(i, -STEP)]),
+                false => fall(&[(i, STEP), (j, STEP)]) - ahead[i] - ahead[j],
+            };
+            twice / (STEP * STEP)
+        });
+        let axes = hermitian_eigen((&curvature + curvature.transpose()) * 0.5)?;
+        let spread = axes.eigenvalues.map(|value| value.max(WIDEST.powi(-2)).sqrt().recip());
+        if spread.amax() < NARROW {
+            return Ok(alone);
+        }
+        let mut all = Vec::with_capacity(2 * dimension);
+        let reach = (dimension as f64).sqrt();
+        for (axis, spread) in axes.eigenvectors.column_iter().zip(&spread) {
+            for sign in [-1.0, 1.0] {
+                let moved = axis.iter().zip(&best.free);
+                let point: Vec<f64> = moved.map(|(a, x)| x + sign * reach * spread * a).collect();
+                let Some(tuned) = at(&point) else { continue };
+                let gained = tuned.log_likelihood - best.log_likelihood + 0.5 * reach * reach;
+                all.push((gained.min(MOST_GAINED).exp(), tuned));
+            }
+        }
+        let sum: f64 = all.iter().map(|(weight, _)| weight).sum();
+        if !(sum > 0.0) {
+            return Ok(alone);
+        }
+        all.iter_mut().for_each(|(weight, _)| *weight /= sum);
+        Ok(all)
     }
 
     /// The best point of a grid, all forces alike.

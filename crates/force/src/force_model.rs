@@ -30,8 +30,8 @@ pub struct ForceModel {
 }
 
 impl ForceModel {
-    /// Highest order: as sharp an end as 256 samples can tell from a band.
-    pub const MOST: usize = 8;
+    /// Highest order: the end of the band is then as sharp as 256 samples can show.
+    pub const MOST: usize = 16;
 
     pub(crate) fn check(&self, forces: usize) -> Result<(), ForceError> {
         if !(1..=Self::MOST).contains(&self.order) {
@@ -69,7 +69,7 @@ pub(crate) struct LowPass {
 }
 
 impl LowPass {
-    /// Time constants 1/ω_c after which nothing is left of the start: e^(−0.19·512) of order 8.
+    /// Time constants 1/ω_c after which nothing is left of the start: e^(−0.1·512) of order 16.
     const FOREVER: f64 = 512.0;
 
     /// Sections of second order, for an odd order one of first order, one driving the next.

@@ -118,7 +118,12 @@ pub fn kalman(
         Tuning::NoiseKnown(_) => augmented.most_likely(Some(1.0))?,
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
-    let smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
+    let noise = (*tuning != Tuning::Likelihood).then_some(1.0);
+    let mut smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
+    let alike = augmented.alike(&tuned, noise)?;
+    if alike.len() > 1 {
+        smoothed.force = mixed(&augmented, &smoothed.force, system.dof(), forced, &alike)?;
+    }
     let stated = (*tuning != Tuning::Likelihood).then_some(&smoothed.noise_std[..]);
     let rest = measured.exceeds(forced).then(|| {
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
@@ -184,6 +189,47 @@ pub(crate) fn check_seen(
     }
 }
 
+/// Means and variances of every state at every sample under a tuning, sample after sample, and how
+/// many states there are.
+fn states(augmented: &Augmented, tuned: &Tuned) -> Result<(Vec<f64>, Vec<f64>, usize), ForceError> {
+    let process = LowPass::new(tuned.model.order)?;
+    let space = augmented.started(augmented.space(&tuned.model, &process, tuned.noise, 10.0)?);
+    let (mean, variance) = space.smooth(space.filter(augmented.data()));
+    if mean.iter().chain(&variance).any(|value| !value.is_finite()) {
+        return Err(ForceError::NoLikelihood);
+    }
+    Ok((mean, variance, space.states))
+}
+
+/// Forces of the whole record under models that are alike: mean and standard deviation of their
+/// mixture, from that of the best of them.
+fn mixed(
+    augmented: &Augmented,
+    best: &IdentifiedForce,
+    dofs: usize,
+    forced: &[usize],
+    alike: &[(f64, Tuned)],
+) -> Result<IdentifiedForce, ForceError> {
+    let reference = best.record();
+    let shape = reference.data().shape();
+    let mut shift = DMatrix::<f64>::zeros(shape.0, shape.1);
+    let mut square = shift.clone();
+    for (weight, tuned) in alike {
+        let (means, variances, m) = states(augmented, tuned)?;
+        for (f, (&dof, unit)) in forced.iter().zip(augmented.units()).enumerate() {
+            let at = 2 * dofs + f * tuned.model.order;
+            for k in 0..shape.0 {
+                let by = means[k * m + at] * unit - reference.channel(dof)[k];
+                shift[(k, dof)] += weight * by;
+                square[(k, dof)] += weight * (variances[k * m + at] * unit * unit + by * by);
+            }
+        }
+    }
+    let error = square.zip_map(&shift, |square, shift| (square - shift * shift).max(0.0).sqrt());
+    let force = IdentifiedForce::of(Record::new(reference.sampling(), reference.data() + shift)?);
+    Ok(force.with_standard_error(Some(Record::new(reference.sampling(), error)?)))
+}
+
 /// Motion and forces of the whole record under a tuning, over all frequencies.
 fn smoothed(
     augmented: &Augmented,
@@ -193,13 +239,8 @@ fn smoothed(
     scale: &[f64],
     tuned: &Tuned,
 ) -> Result<KalmanForce, ForceError> {
-    let process = LowPass::new(tuned.model.order)?;
-    let space = augmented.started(augmented.space(&tuned.model, &process, tuned.noise, 10.0)?);
-    let (n, m, sampling) = (system.dof(), space.states, measured.sampling());
-    let (mean, variance) = space.smooth(space.filter(augmented.data()));
-    if mean.iter().chain(&variance).any(|value| !value.is_finite()) {
-        return Err(ForceError::NoLikelihood);
-    }
+    let (mean, variance, m) = states(augmented, tuned)?;
+    let (n, sampling) = (system.dof(), measured.sampling());
     let mut force = DMatrix::zeros(sampling.len(), n);
     let mut error = DMatrix::zeros(sampling.len(), n);
     for (f, (&dof, unit)) in forced.iter().zip(augmented.units()).enumerate() {
@@ -215,6 +256,7 @@ fn smoothed(
     };
     let force = IdentifiedForce::of(Record::new(sampling, force)?);
     let scaling: f64 = scale.iter().map(|s| s.ln()).sum();
+    let process = LowPass::new(tuned.model.order)?;
     let errors = augmented.seen().errors(&tuned.model, &process, tuned.noise);
     Ok(KalmanForce {
         force: force.with_standard_error(Some(Record::new(sampling, error)?)),
