@@ -2,11 +2,12 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_model::linear_algebra::{exponential, hermitian_eigen};
+use mechid_model::linear_algebra::exponential;
 use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
 use mechid_signal::Sampling;
 use nalgebra::DMatrix;
 
+use crate::alike::alike;
 use crate::force_model::{LowPass, step_noise};
 use crate::nelder_mead::minimise;
 use crate::seen::Seen;
@@ -26,15 +27,6 @@ const HIGHEST: f64 = PI;
 const RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
 /// The noise has no digits left above this ratio, and is all there is below the other.
 const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
-
-/// Step of the logarithms for the curvature of the likelihood.
-const STEP: f64 = 0.15;
-/// Standard deviation of a logarithm of which nothing is known.
-const WIDEST: f64 = 1.5;
-/// Standard deviation of a logarithm that moves no standard error by more than a hundredth.
-const NARROW: f64 = 0.02;
-/// Largest logarithm by which the likelihood of a point may exceed that of the approximation.
-const MOST_GAINED: f64 = 1.0;
 
 /// The machine with forces of any model. A force is carried as that part of x + ½ẍΔt² which it
 /// adds within a step, so that no entry is large whatever the unit of the machine.
@@ -239,56 +231,16 @@ impl Augmented {
         best.ok_or(ForceError::NoLikelihood)
     }
 
-    /// Models as likely as the best one, with their weights: what is known of it, at as many points
-    /// as it takes to have mean and covariance of the parameters right. One model alone where the
-    /// record tells it so well that the others do not matter, or where it was given.
-    ///
-    /// # Source
-    /// Laplace's approximation, spherical cubature of degree 3 (Arasaratnam & Haykin, 2009), each
-    /// point weighted by its likelihood over that of the approximation.
+    /// Models as likely as the best one, with their weights; that one alone where it was given.
     pub fn alike(&self, best: &Tuned, noise: Option<f64>) -> Result<Vec<(f64, Tuned)>, ForceError> {
-        let alone = vec![(1.0, best.clone())];
-        let dimension = best.free.len();
-        if dimension == 0 {
-            return Ok(alone);
+        if best.free.is_empty() {
+            return Ok(vec![(1.0, best.clone())]);
         }
         let process = LowPass::new(best.model.order)?;
-        let at = |point: &[f64]| self.trial(&process, noise, point);
-        let fall = |moves: &[(usize, f64)]| {
-            let mut point = best.free.clone();
-            moves.iter().for_each(|(i, by)| point[*i] += by);
-            at(&point).map_or(0.0, |t| best.log_likelihood - t.log_likelihood)
-        };
-        let ahead: Vec<f64> = (0..dimension).map(|i| fall(&[(i, STEP)])).collect();
-        let curvature = DMatrix::from_fn(dimension, dimension, |i, j| {
-            let twice = match i == j {
-                true => ahead[i] + fall(&[(i, -STEP)]),
-                false => fall(&[(i, STEP), (j, STEP)]) - ahead[i] - ahead[j],
-            };
-            twice / (STEP * STEP)
-        });
-        let axes = hermitian_eigen((&curvature + curvature.transpose()) * 0.5)?;
-        let spread = axes.eigenvalues.map(|value| value.max(WIDEST.powi(-2)).sqrt().recip());
-        if spread.amax() < NARROW {
-            return Ok(alone);
-        }
-        let mut all = Vec::with_capacity(2 * dimension);
-        let reach = (dimension as f64).sqrt();
-        for (axis, spread) in axes.eigenvectors.column_iter().zip(&spread) {
-            for sign in [-1.0, 1.0] {
-                let moved = axis.iter().zip(&best.free);
-                let point: Vec<f64> = moved.map(|(a, x)| x + sign * reach * spread * a).collect();
-                let Some(tuned) = at(&point) else { continue };
-                let gained = tuned.log_likelihood - best.log_likelihood + 0.5 * reach * reach;
-                all.push((gained.min(MOST_GAINED).exp(), tuned));
-            }
-        }
-        let sum: f64 = all.iter().map(|(weight, _)| weight).sum();
-        if !(sum > 0.0) {
-            return Ok(alone);
-        }
-        all.iter_mut().for_each(|(weight, _)| *weight /= sum);
-        Ok(all)
+        let points =
+            alike(&best.free, |point| Some(self.trial(&process, noise, point)?.log_likelihood))?;
+        let tuned = |(weight, point): (f64, Vec<f64>)| Some((weight, self.trial(&process, noise, &point)?));
+        Ok(points.into_iter().filter_map(tuned).collect())
     }
 
     /// The best point of a grid, all forces alike.

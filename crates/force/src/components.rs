@@ -15,6 +15,8 @@ pub(crate) struct Components {
     pub energy: Vec<f64>,
     /// Real unknowns per component, 1 or 2.
     pub weight: Vec<f64>,
+    /// Frequency at which the force of each component varies, positive, in any unit.
+    pub frequency: Vec<f64>,
     /// Energy of the measurement that no force explains.
     pub outside_energy: f64,
     /// Real data in it.

@@ -66,15 +66,28 @@ impl OpenOperator {
         let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
         let coefficients =
             parts.iter().zip(&singular).map(|(y, s)| if *s > 0.0 { y / s } else { 0.0 }).collect();
+        let shapes = v_t.transpose();
+        let frequency = shapes.column_iter().map(|shape| frequency(shape.as_slice(), samples));
         let components = Components {
+            frequency: frequency.collect(),
             energy: parts.iter().map(|y| y * y).collect(),
             weight: vec![1.0; singular.len()],
             singular,
             outside_energy: (data.norm_squared() - parts.norm_squared()).max(0.0),
             outside_weight: rows.saturating_sub(freed + parts.len()) as f64,
         };
-        Ok(Self { components, coefficients, shapes: v_t.transpose(), samples, forces })
+        Ok(Self { components, coefficients, shapes, samples, forces })
     }
+}
+
+/// Frequency of a force, in radians per sample: of a sine the part of a circle between its samples.
+/// Half a period per record is the least.
+fn frequency(shape: &[f64], samples: usize) -> f64 {
+    let steps = shape.chunks(samples).flat_map(|force| force.windows(2));
+    let change: f64 = steps.map(|w| (w[1] - w[0]).powi(2)).sum();
+    let size: f64 = shape.iter().map(|v| v * v).sum();
+    let part = 0.5 * (change / size.max(f64::MIN_POSITIVE)).sqrt();
+    (2.0 * part.min(1.0).asin()).max(std::f64::consts::PI / samples as f64)
 }
 
 impl Operator for OpenOperator {

@@ -62,6 +62,8 @@ impl PeriodOperator {
         let components = Components {
             singular: terms.iter().map(|term| term.0).collect(),
             energy: terms.iter().map(|term| term.1).collect(),
+            // A mean is taken to be as strong as the first line.
+            frequency: terms.iter().map(|term| term.3.line.max(1) as f64).collect(),
             weight: terms.iter().map(|term| term.2).collect(),
             outside_energy,
             outside_weight,

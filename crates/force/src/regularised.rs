@@ -3,9 +3,10 @@
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::DMatrix;
+use statrs::function::erf::erfc;
 
 use crate::components::Operator;
-use crate::evidence::Evidence;
+use crate::evidence::Posterior;
 use crate::noise::channel_sizes;
 use crate::open_operator::OpenOperator;
 use crate::period_operator::PeriodOperator;
@@ -81,10 +82,10 @@ pub fn regularised(
     let level = level.as_deref();
     let solution = if let ForceUnknowns::Samples(start) = unknowns {
         let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
-        solve(&operator, system, measured, forced, filter, &scale)?
+        solve(&operator, system, measured, forced, filter, &scale, level.is_some())?
     } else {
         let operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
-        solve(&operator, system, measured, forced, filter, &scale)?
+        solve(&operator, system, measured, forced, filter, &scale, level.is_some())?
     };
     let force = solution.force;
     let rest = measured.exceeds(forced).then(|| match unknowns {
@@ -103,6 +104,7 @@ fn solve(
     forced: &[usize],
     filter: Filter,
     scale: &[f64],
+    noise_known: bool,
 ) -> Result<RegularisedForce, ForceError> {
     let components = operator.components();
     if components.singular.first().is_none_or(|s| *s == 0.0)
@@ -110,27 +112,16 @@ fn solve(
     {
         return Err(ForceError::Silent);
     }
-    let parameter = choose(filter, components);
-    let evidence = parameter.is_none().then(|| Evidence::of(components));
-    let factors: Vec<f64> = (0..components.singular.len())
-        .map(|i| match (parameter, &evidence) {
-            (Some(lambda), _) => factor(filter, components, i, lambda),
-            (None, Some(evidence)) => evidence.factor(components, i),
-            (None, None) => 0.0,
-        })
-        .collect();
-    let fit = components.fit(|i| factors[i]);
-    let noise = evidence.map_or_else(|| fit.noise(components), |evidence| evidence.noise);
-    let variance: Vec<f64> = (0..factors.len())
-        .map(|i| match (filter, &evidence, parameter) {
-            (_, Some(evidence), _) => evidence.variance(components, i),
-            (Filter::Tikhonov(_), _, Some(lambda)) => {
-                noise / (components.singular[i].powi(2) + lambda * lambda)
-            }
-            _ if factors[i] > 0.0 => noise / components.singular[i].powi(2),
-            _ => 0.0,
-        })
-        .collect();
+    let posterior = Posterior::of(components, noise_known)?;
+    let parameter = choose(filter, components, &posterior);
+    let count = components.singular.len();
+    let mean: Vec<f64> = (0..count).map(|i| posterior.factor(components, i)).collect();
+    let factors = match parameter {
+        Some(lambda) => (0..count).map(|i| factor(filter, components, i, lambda)).collect(),
+        None => mean.clone(),
+    };
+    let variance: Vec<f64> = (0..count).map(|i| posterior.variance(components, i)).collect();
+    let noise = posterior.noise();
 
     let spread = |part: DMatrix<f64>| {
         let mut all = DMatrix::zeros(part.nrows(), system.dof());
@@ -139,12 +130,57 @@ fn solve(
         }
         Record::new(measured.sampling(), all)
     };
-    let force = IdentifiedForce::of(spread(operator.force(&factors)?)?);
-    let error = spread(operator.variance(&variance).map(f64::sqrt))?;
+    let found = operator.force(&factors)?;
+    let mut error = operator.variance(&variance).map(f64::sqrt);
+    if parameter.is_some() {
+        let apart = operator.force(&mean)? - &found;
+        error.zip_apply(&apart, |error, apart| *error = half_width(apart, *error) / TWO_SIDED);
+    }
+    let force = IdentifiedForce::of(spread(found)?);
     Ok(RegularisedForce {
-        force: force.with_standard_error(Some(error)),
+        force: force.with_standard_error(Some(spread(error)?)),
         parameter,
-        unknowns: fit.unknowns,
+        unknowns: components.fit(|i| factors[i]).unknowns,
         noise_std: scale.iter().map(|s| s * noise.sqrt()).collect(),
     })
+}
+
+/// Standard errors to either side that hold a normal variable with probability [`CONFIDENCE`].
+const TWO_SIDED: f64 = 1.959_963_984_540_054;
+const CONFIDENCE: f64 = 0.95;
+/// Halvings of an interval of one standard error: no digit is left.
+const HALVINGS: usize = 50;
+
+/// Half the width of the interval about 0 that holds a normal variable of this mean and standard
+/// deviation with probability [`CONFIDENCE`].
+fn half_width(mean: f64, deviation: f64) -> f64 {
+    let mean = mean.abs();
+    if deviation <= 1e-9 * mean {
+        return mean;
+    }
+    let below = |x: f64| 0.5 * erfc(-x * std::f64::consts::FRAC_1_SQRT_2);
+    let offset = mean / deviation;
+    let held = |width: f64| below(width - offset) - below(-width - offset);
+    let (mut low, mut high) = (offset.max(TWO_SIDED - offset), offset + TWO_SIDED);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        *(if held(middle) < CONFIDENCE { &mut low } else { &mut high }) = middle;
+    }
+    0.5 * (low + high) * deviation
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half_width;
+
+    #[test]
+    fn intervals_about_another_place_than_the_mean_hold_as_much() {
+        // No offset: 1.96; a large one: one tail, 1.645; between them a table of the normal law.
+        assert!((half_width(0.0, 2.0) / 2.0 - 1.959964).abs() < 1e-6);
+        assert!((half_width(-30.0, 2.0) - 30.0 - 2.0 * 1.644854).abs() < 1e-5);
+        // P(|N(1, 1)| < 2.7) = Φ(1.7) − Φ(−3.7) = 0.955435 − 0.000108.
+        let width = half_width(1.0, 1.0);
+        assert!((2.6..2.7).contains(&width), "{width}");
+        assert_eq!(half_width(3.0, 0.0), 3.0);
+    }
 }
