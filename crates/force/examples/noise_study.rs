@@ -11,8 +11,8 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|first| first == "coverage") {
         let runs = arguments.get(1).and_then(|runs| runs.parse().ok()).unwrap_or(100);
-        let of = arguments.get(2).map_or("", String::as_str);
-        println!("{}", study::coverage::coverage_table(runs, of));
+        let methods = arguments.get(2..).unwrap_or_default();
+        println!("{}", study::coverage::coverage_table(runs, methods));
         return;
     }
     let [known, unknown] = study::tables();

@@ -62,6 +62,13 @@ pub(crate) fn is_within([low_hz, high_hz]: [f64; 2], frequency_hz: f64, spacing_
     (low_hz - slack..=high_hz + slack).contains(&frequency_hz)
 }
 
+/// The error for a band that holds no line of a period.
+pub(crate) fn empty_band([low_hz, high_hz]: [f64; 2], sampling: Sampling) -> ForceError {
+    let spacing_hz = sampling.line_spacing_hz();
+    let last_hz = (sampling.lines() - 1) as f64 * spacing_hz;
+    ForceError::EmptyBand { low_hz, high_hz, spacing_hz, last_hz }
+}
+
 /// A projection: twice applied it does no more than once.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BandFilter {

@@ -15,8 +15,10 @@ pub(crate) struct Components {
     pub energy: Vec<f64>,
     /// Real unknowns per component, 1 or 2.
     pub weight: Vec<f64>,
-    /// Frequency at which the force of each component varies, positive, in any unit.
+    /// Rate at which the force of each component varies, positive, in any unit.
     pub frequency: Vec<f64>,
+    /// Lowest frequency in it, in Hz.
+    pub lowest_hz: Vec<f64>,
     /// Energy of the measurement that no force explains.
     pub outside_energy: f64,
     /// Real data in it.
@@ -28,6 +30,8 @@ pub(crate) trait Operator {
     fn components(&self) -> &Components;
     /// Samples × forces of the components times these factors (f̂_i = φ_i y_i / s_i).
     fn force(&self, factors: &[f64]) -> Result<DMatrix<f64>, ForceError>;
+    /// Keeps of every component what lies within a band of frequencies in Hz.
+    fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError>;
     /// Samples × forces: variance, given that of each component per real unknown.
     fn variance(&self, components: &[f64]) -> DMatrix<f64>;
 }

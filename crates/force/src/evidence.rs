@@ -27,6 +27,7 @@ pub(crate) struct Evidence {
 
 /// What a measurement says of the numbers: values with their weights.
 pub(crate) struct Posterior {
+    best: Evidence,
     parts: Vec<(f64, Evidence)>,
 }
 
@@ -40,6 +41,8 @@ const ROUNDS: usize = 300;
 const SETTLED: f64 = 1e-3;
 /// Logarithm of the likelihood below the greatest at which a reach or colour no longer counts.
 const NEGLIGIBLE: f64 = 6.0;
+/// Probability that a white force has no end, relative to all reaches.
+const ENDLESS: f64 = 0.25;
 /// Reaches on either side of the best that are averaged over.
 const BESIDE: usize = 16;
 
@@ -49,7 +52,8 @@ impl Posterior {
     pub fn of(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
         let bests = COLOURS.map(|colour| Evidence::of(components, colour, noise));
-        let greatest = bests.iter().map(|best| best.likelihood).fold(f64::NEG_INFINITY, f64::max);
+        let best = bests[1..].iter().fold(bests[0], |best, other| best.better(*other));
+        let greatest = best.likelihood;
         let mut near = Vec::new();
         for best in bests.iter().filter(|best| best.likelihood > greatest - NEGLIGIBLE) {
             best.beside(components, noise, greatest, &mut near);
@@ -63,7 +67,7 @@ impl Posterior {
                 parts.push((share * weight, evidence));
             }
         }
-        Ok(Self { parts })
+        Ok(Self { best, parts })
     }
 
     /// Mean of the noise variance, per real datum.
@@ -71,7 +75,13 @@ impl Posterior {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.noise).sum()
     }
 
-    /// Factor φ_i of the mean of f_i given the measurement, f̄_i = φ_i y_i / s_i.
+    /// Factor φ_i of the mean of f_i given the measurement and the numbers that make it most
+    /// likely, f̄_i = φ_i y_i / s_i.
+    pub fn best_factor(&self, components: &Components, i: usize) -> f64 {
+        self.best.factor(components, i)
+    }
+
+    /// Factor of the mean of f_i given the measurement alone.
     pub fn factor(&self, components: &Components, i: usize) -> f64 {
         self.parts.iter().map(|(weight, evidence)| weight * evidence.factor(components, i)).sum()
     }
@@ -88,10 +98,14 @@ impl Posterior {
         each.sum()
     }
 
-    /// Prior variance of a component that carries a force, times the probability that one at the
-    /// end of the reach does: what a frequency may carry before the measurement is seen.
-    pub fn prior(&self, components: &Components, i: usize) -> f64 {
-        self.parts.iter().map(|(weight, e)| weight * e.share * e.driven(components, i)).sum()
+    /// Frequency, in Hz, below which no component shows a force as strong as those found better
+    /// than noise; `None` where none does.
+    pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
+        let endless = Evidence { reach: components.singular.len(), ..self.best };
+        let shown = (0..components.singular.len()).filter(|i| {
+            endless.driven(components, *i) * components.singular[*i].powi(2) >= self.best.noise
+        });
+        shown.map(|i| components.lowest_hz[i]).min_by(f64::total_cmp)
     }
 }
 
@@ -101,12 +115,13 @@ impl Evidence {
         let most = components.transmitted();
         let mut reach = most;
         let mut best = Self::at_reach(components, most, colour, noise);
-        while reach > 2 {
+        // A spectrum that falls has no end.
+        while colour == 0 && reach > 2 {
             reach = ((reach as f64 * REACH_RATIO) as usize).max(2);
             best = best.better(Self::at_reach(components, reach, colour, noise));
         }
         let mut step = best.reach / 10;
-        while step > 0 {
+        while colour == 0 && step > 0 {
             for reach in [best.reach.saturating_sub(step).max(2), best.reach + step] {
                 if reach <= most {
                     best = best.better(Self::at_reach(components, reach, colour, noise));
@@ -130,8 +145,17 @@ impl Evidence {
         greatest: f64,
         near: &mut Vec<(f64, Self)>,
     ) {
-        let (most, stride) = (components.transmitted(), (self.reach / BESIDE).max(1));
+        let most = components.transmitted();
+        if self.colour > 0 {
+            near.push((most as f64, self));
+            return;
+        }
+        let stride = (self.reach / BESIDE).max(1);
         near.push((stride as f64, self));
+        if self.reach < most {
+            let all = Self::at_reach(components, most, 0, noise);
+            near.push((ENDLESS * most as f64, all));
+        }
         for up in [false, true] {
             let mut last = self;
             for _ in 0..BESIDE {

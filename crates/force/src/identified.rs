@@ -2,8 +2,11 @@
 
 use std::sync::OnceLock;
 
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{Extent, Record, Spectrum};
 
+use crate::ForceError;
+use crate::band::{is_within, within_band};
+use crate::lines::noise_weight;
 use crate::unexplained::{Rest, Unexplained};
 
 /// A reconstructed force: one channel per degree of freedom of the machine, in N.
@@ -54,6 +57,35 @@ impl IdentifiedForce {
     pub(crate) fn with_band(mut self, band_hz: [f64; 2]) -> Self {
         self.band_hz = Some(band_hz);
         self
+    }
+
+    /// The part of the force between two frequencies in Hz, ends included, its error taken as white.
+    ///
+    /// The standard error, in N, is then that of as many lines as lie in the band. It is for the
+    /// equation of motion ([`continuous`](crate::continuous()) and its like), which makes white noise
+    /// of white noise; the other methods take the band of their measurement
+    /// ([`Measurement::in_band`](crate::Measurement::in_band)).
+    ///
+    /// # Errors
+    /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+    pub fn white_in_band(self, band_hz: [f64; 2], extent: Extent) -> Result<Self, ForceError> {
+        let record = within_band(&self.record, band_hz, extent)?;
+        let sampling = record.sampling();
+        let nyquist = 0.5 * sampling.rate_hz();
+        let share = match extent {
+            Extent::Open => (band_hz[1].min(nyquist) - band_hz[0]).max(0.0) / nyquist,
+            Extent::WholePeriod => {
+                let spacing = sampling.line_spacing_hz();
+                let weight = |n: usize| noise_weight(record.len(), n);
+                let inside = |n: &usize| is_within(band_hz, *n as f64 * spacing, spacing);
+                (0..sampling.lines()).filter(inside).map(weight).sum()
+            }
+        };
+        let error = self.standard_error.as_ref().map(|error| {
+            Record::new(sampling, error.data() * share.sqrt())
+        });
+        let error = error.transpose()?;
+        Ok(self.replaced(record).with_standard_error(error).with_band(band_hz))
     }
 
     pub(crate) fn rest(&self) -> Option<&Rest> {

@@ -37,8 +37,12 @@ pub struct RegularisedForce {
     pub parameter: Option<f64>,
     /// Effective number of real unknowns that pass the filter, a pure number and rarely a whole one.
     pub unknowns: f64,
-    /// Standard deviation of the noise in each channel, as the residual has it, in the channel's unit.
+    /// Standard deviation of the noise in each channel, in the channel's unit: as stated, or as the
+    /// measurement makes it likely.
     pub noise_std: Vec<f64>,
+    /// Frequency, in Hz, below which the channels show less of a force as strong as this one than
+    /// noise; `None` where they show it at no frequency.
+    pub seen_from_hz: Option<f64>,
 }
 
 /// The force that explains the measured channels without amplifying their noise.
@@ -47,9 +51,14 @@ pub struct RegularisedForce {
 /// it is not stated, by their size). A period falls apart into its lines; an open record is one
 /// dense problem, the force linear between samples.
 ///
-/// The standard error of [`Filter::Tikhonov`] and [`Filter::Shrinkage`] counts the noise let
-/// through and, on average over forces of the size found, the force held back; that of
-/// [`Filter::TruncatedSvd`] counts the noise only.
+/// The standard error is such that 1.96 of it to either side hold the force with a probability of
+/// 95 % given the measurement: noise let through, force held back, and all that the measurement does
+/// not tell of the sizes of force and noise. A noise level that is stated or measured apart
+/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known.
+///
+/// Channels without a displacement do not show a constant force. The force is then that above
+/// [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the measurement asks
+/// for a band of its own ([`Measurement::in_band`]).
 ///
 /// Cost: a period takes one small SVD per line; an open record of N samples and p forces takes
 /// O((Np)³) once and (Np)² memory, so it is limited to [`OPEN_UNKNOWNS`](crate::OPEN_UNKNOWNS) unknowns. Longer open
@@ -58,7 +67,8 @@ pub struct RegularisedForce {
 /// # Errors
 /// As [`frequency_domain`](crate::frequency_domain()); [`ForceError::TooLarge`] for an open record
 /// beyond the limit; [`ForceError::Unstable`] for one over which the free response of an unstable
-/// machine grows by more than 10⁶ (a period asks for no stability); [`ForceError::Silent`] where no force reaches any channel, or all are zero.
+/// machine grows by more than 10⁶ (a period asks for no stability); [`ForceError::Silent`] where no
+/// force reaches any channel, or all are zero; [`ForceError::EmptyBand`].
 ///
 /// # Source
 /// Tikhonov & Arsenin (1977); Hansen (1998), Rank-Deficient and Discrete Ill-Posed Problems.
@@ -80,32 +90,32 @@ pub fn regularised(
     let level = noise.resolve(measured, &Spectrum::of(measured.record()), &lines)?;
     let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let level = level.as_deref();
-    let solution = if let ForceUnknowns::Samples(start) = unknowns {
-        let operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
-        solve(&operator, system, measured, forced, filter, &scale, level.is_some())?
+    let (solution, whole) = if let ForceUnknowns::Samples(start) = unknowns {
+        let mut operator = OpenOperator::new(system, measured, forced, *start, &scale)?;
+        solve(&mut operator, system, measured, forced, filter, &scale, level.is_some())?
     } else {
-        let operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
-        solve(&operator, system, measured, forced, filter, &scale, level.is_some())?
+        let mut operator = PeriodOperator::new(system, measured, forced, &lines, &scale)?;
+        solve(&mut operator, system, measured, forced, filter, &scale, level.is_some())?
     };
-    let force = solution.force;
     let rest = measured.exceeds(forced).then(|| match unknowns {
         ForceUnknowns::Samples(start) => {
-            Rest::of_open(system, measured, forced, force.record(), *start, &scale, level)
+            Rest::of_open(system, measured, forced, &whole, *start, &scale, level)
         }
-        _ => Rest::of_lines(system, measured, forced, force.spectrum(), &lines, level),
+        _ => Rest::of_lines(system, measured, forced, &Spectrum::of(&whole), &lines, level),
     });
-    Ok(RegularisedForce { force: force.with_rest(rest.transpose()?), ..solution })
+    let force = solution.force.with_rest(rest.transpose()?);
+    Ok(RegularisedForce { force, ..solution })
 }
 
 fn solve(
-    operator: &impl Operator,
+    operator: &mut impl Operator,
     system: &SecondOrderSystem,
     measured: &Measurement,
     forced: &[usize],
     filter: Filter,
     scale: &[f64],
     noise_known: bool,
-) -> Result<RegularisedForce, ForceError> {
+) -> Result<(RegularisedForce, Record), ForceError> {
     let components = operator.components();
     if components.singular.first().is_none_or(|s| *s == 0.0)
         || components.energy.iter().all(|energy| *energy == 0.0)
@@ -116,12 +126,18 @@ fn solve(
     let parameter = choose(filter, components, &posterior);
     let count = components.singular.len();
     let mean: Vec<f64> = (0..count).map(|i| posterior.factor(components, i)).collect();
-    let factors = match parameter {
+    let factors: Vec<f64> = match parameter {
         Some(lambda) => (0..count).map(|i| factor(filter, components, i, lambda)).collect(),
-        None => mean.clone(),
+        None => (0..count).map(|i| posterior.best_factor(components, i)).collect(),
     };
     let variance: Vec<f64> = (0..count).map(|i| posterior.variance(components, i)).collect();
-    let noise = posterior.noise();
+    let (noise, unknowns) = (posterior.noise(), components.fit(|i| factors[i]).unknowns);
+    let seen_from_hz = posterior.seen_from_hz(components);
+    let whole = operator.force(&factors)?;
+    let band_hz = measured.band_hz().or_else(|| measured.shown(seen_from_hz));
+    if let Some(band_hz) = band_hz {
+        operator.keep(band_hz)?;
+    }
 
     let spread = |part: DMatrix<f64>| {
         let mut all = DMatrix::zeros(part.nrows(), system.dof());
@@ -132,17 +148,16 @@ fn solve(
     };
     let found = operator.force(&factors)?;
     let mut error = operator.variance(&variance).map(f64::sqrt);
-    if parameter.is_some() {
-        let apart = operator.force(&mean)? - &found;
-        error.zip_apply(&apart, |error, apart| *error = half_width(apart, *error) / TWO_SIDED);
-    }
-    let force = IdentifiedForce::of(spread(found)?);
-    Ok(RegularisedForce {
-        force: force.with_standard_error(Some(spread(error)?)),
-        parameter,
-        unknowns: components.fit(|i| factors[i]).unknowns,
-        noise_std: scale.iter().map(|s| s * noise.sqrt()).collect(),
-    })
+    let apart = operator.force(&mean)? - &found;
+    error.zip_apply(&apart, |error, apart| *error = half_width(apart, *error) / TWO_SIDED);
+    let force = IdentifiedForce::of(spread(found)?).with_standard_error(Some(spread(error)?));
+    let force = match band_hz {
+        Some(band_hz) => force.with_band(band_hz),
+        None => force,
+    };
+    let noise_std = scale.iter().map(|s| s * noise.sqrt()).collect();
+    let found = RegularisedForce { force, parameter, unknowns, noise_std, seen_from_hz };
+    Ok((found, spread(whole)?))
 }
 
 /// Standard errors to either side that hold a normal variable with probability [`CONFIDENCE`].

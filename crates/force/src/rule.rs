@@ -16,8 +16,8 @@ pub enum Rule {
     /// The λ whose force is nearest to the mean of the force given the measurement.
     ///
     /// That mean needs the variances of force and noise, the colour of the force, the share of
-    /// components that are driven and how far down the singular values they reach; it is averaged
-    /// over all values of them that the measurement makes likely. It is the rule to use: the only one here that looks at the error of the
+    /// components that are driven and how far down the singular values they reach; all are
+    /// taken where the measurement is most likely. It is the rule to use: the only one here that looks at the error of the
     /// force and not at the fit of the response. The book (`choose/force.md`) compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
@@ -107,7 +107,7 @@ pub(crate) fn choose(
         Rule::Given(lambda) => return Some(lambda),
         Rule::Likelihood => {
             let mean: Vec<f64> =
-                (0..components.singular.len()).map(|i| posterior.factor(components, i)).collect();
+                (0..components.singular.len()).map(|i| posterior.best_factor(components, i)).collect();
             least(candidates.iter().map(|lambda| {
                 let loss = components.fit(|i| (factor(i, *lambda) - mean[i]).abs());
                 loss.size

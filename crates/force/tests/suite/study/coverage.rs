@@ -5,7 +5,7 @@ use mechid_force::{
     frequency_domain, kalman, regularised,
 };
 use mechid_model::{InitialState, ResponseQuantity};
-use mechid_problems::{exact_foh, exact_harmonic_periodic};
+use mechid_problems::{exact_foh, exact_foh_periodic, exact_harmonic_periodic};
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, noise};
 use nalgebra::DMatrix;
 
@@ -45,18 +45,30 @@ impl Shape {
     }
 }
 
+/// What a record is of.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Extent {
+    /// A period in steady state, no frequency above the last line of the force.
+    Period,
+    /// The same samples, of which nobody knows that they are a period.
+    Open,
+    /// An open record with a force that is linear between its samples.
+    Linear,
+}
+
 /// A record with its force.
 pub struct Draw {
     pub measured: Measurement,
     pub truth: Record,
+    /// Standard deviation of the noise in each channel.
+    pub noise: Vec<f64>,
     pub forced: [usize; 1],
 }
 
 /// One of the machines under a drawn force, displacements with noise of `level` times their size.
 ///
-/// Open records of walks begin at rest, with the force linear between samples; all others are a
-/// period in steady state, with a force that has no frequency above its last line.
-pub fn draw(bearing: bool, shape: Shape, level: f64, open: bool, seed: u64) -> Draw {
+/// Walks of open records begin at rest and are linear between samples.
+pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) -> Draw {
     let (system, sampling) = machine(bearing);
     let dof = system.dof();
     let path: Vec<f64> = match shape {
@@ -75,25 +87,30 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: bool, seed: u64) -> D
             let walk: Vec<f64> = walk.collect();
             let last = walk[walk.len() - 1] + 20.0 * noise::white(sampling, 1, 1.0, 7777 + seed).unwrap().channel(0)[0];
             // Closed to a period by taking out the line from its start to its end.
-            let closing = |k: usize| if open { 0.0 } else { last * k as f64 / walk.len() as f64 };
+            let closing = |k: usize| if open != Extent::Period { 0.0 } else { last * k as f64 / walk.len() as f64 };
             walk.iter().enumerate().map(|(k, f)| f - closing(k)).collect()
         }
     };
     let force = DMatrix::from_fn(sampling.len(), dof, |k, i| if i + 1 == dof { path[k] } else { 0.0 });
     let truth = Record::new(sampling, force).unwrap();
-    let response = if open && shape == Shape::Walk {
-        exact_foh(&system, &truth, &InitialState::rest(dof)).unwrap()
-    } else {
-        exact_harmonic_periodic(&system, &truth).unwrap()
-    };
+    let response = match (open, shape) {
+        (Extent::Open, Shape::Walk) => exact_foh(&system, &truth, &InitialState::rest(dof)),
+        (Extent::Linear, Shape::Walk) => exact_foh(&system, &truth, &InitialState::rest(dof)),
+        (Extent::Linear, _) => exact_foh_periodic(&system, &truth),
+        _ => exact_harmonic_periodic(&system, &truth),
+    }
+    .unwrap();
+    let exact = response.displacement();
+    let rms = |x: nalgebra::DVectorView<'_, f64>| x.norm() / (exact.len() as f64).sqrt();
+    let noise_std = exact.data().column_iter().map(|x| level * rms(x)).collect();
     let level = NoiseLevel::FractionOfRms(level);
     let noisy = noise::add_white(response.displacement(), level, seed).unwrap();
     let measured = Measurement::of_all(ResponseQuantity::Displacement, noisy);
-    Draw { measured, truth, forced: [dof - 1] }
+    Draw { measured, truth, noise: noise_std, forced: [dof - 1] }
 }
 
 /// A method of the coverage study.
-pub type Interval = (&'static str, bool, fn(bool, Shape, &Draw) -> Option<IdentifiedForce>);
+pub type Interval = (&'static str, Extent, fn(bool, Shape, &Draw) -> Option<IdentifiedForce>);
 
 fn known(bearing: bool, shape: Shape, draw: &Draw, filter: Option<Filter>) -> Option<IdentifiedForce> {
     let lines = shape.lines();
@@ -119,19 +136,32 @@ const TIKHONOV: Filter = Filter::Tikhonov(Rule::Likelihood);
 const TRUNCATED: Filter = Filter::TruncatedSvd(Rule::Likelihood);
 
 /// The methods whose standard error counts all there is, with whether the record is open.
-pub const INTERVALS: [Interval; 10] = [
-    ("frequency domain, lines known", false, |b, s, d| known(b, s, d, None)),
-    ("Tikhonov, lines known", false, |b, s, d| known(b, s, d, Some(TIKHONOV))),
-    ("truncated SVD, lines known", false, |b, s, d| known(b, s, d, Some(TRUNCATED))),
-    ("shrinkage", false, |b, _, d| unknown(b, d, Filter::Shrinkage, false)),
-    ("Tikhonov", false, |b, _, d| unknown(b, d, TIKHONOV, false)),
-    ("truncated SVD", false, |b, _, d| unknown(b, d, TRUNCATED, false)),
-    ("shrinkage, open", true, |b, _, d| unknown(b, d, Filter::Shrinkage, true)),
-    ("Tikhonov, open", true, |b, _, d| unknown(b, d, TIKHONOV, true)),
-    ("truncated SVD, open", true, |b, _, d| unknown(b, d, TRUNCATED, true)),
-    ("Kalman smoother", true, |b, _, d| {
+pub const INTERVALS: [Interval; 12] = [
+    ("frequency domain, lines known", Extent::Period, |b, s, d| known(b, s, d, None)),
+    ("Tikhonov, lines known", Extent::Period, |b, s, d| known(b, s, d, Some(TIKHONOV))),
+    ("truncated SVD, lines known", Extent::Period, |b, s, d| known(b, s, d, Some(TRUNCATED))),
+    ("shrinkage", Extent::Period, |b, _, d| unknown(b, d, Filter::Shrinkage, false)),
+    ("shrinkage, noise known", Extent::Period, |b, _, d| {
+        let (system, _) = machine(b);
+        let (noise, filter) = (Noise::PerChannel(d.noise.clone()), Filter::Shrinkage);
+        let lines = ForceUnknowns::EveryLine;
+        let found = regularised(&system, &d.measured, &d.forced, &lines, filter, &noise);
+        Some(found.unwrap().force)
+    }),
+    ("Tikhonov", Extent::Period, |b, _, d| unknown(b, d, TIKHONOV, false)),
+    ("truncated SVD", Extent::Period, |b, _, d| unknown(b, d, TRUNCATED, false)),
+    ("shrinkage, open", Extent::Linear, |b, _, d| unknown(b, d, Filter::Shrinkage, true)),
+    ("Tikhonov, open", Extent::Linear, |b, _, d| unknown(b, d, TIKHONOV, true)),
+    ("truncated SVD, open", Extent::Linear, |b, _, d| unknown(b, d, TRUNCATED, true)),
+    ("Kalman smoother", Extent::Open, |b, _, d| {
         let (system, _) = machine(b);
         let found = kalman(&system, &d.measured, &d.forced, Start::InMotion, &Tuning::Likelihood);
+        Some(found.unwrap().force)
+    }),
+    ("Kalman smoother, noise known", Extent::Open, |b, _, d| {
+        let (system, _) = machine(b);
+        let tuning = Tuning::NoiseKnown(d.noise.clone());
+        let found = kalman(&system, &d.measured, &d.forced, Start::InMotion, &tuning);
         Some(found.unwrap().force)
     }),
 ];
@@ -158,10 +188,11 @@ pub fn coverage(interval: &Interval, bearing: bool, shape: Shape, level: f64, ru
 }
 
 /// The table of the coverage, in per cent.
-pub fn coverage_table(runs: u64, of: &str) -> String {
+pub fn coverage_table(runs: u64, of: &[String]) -> String {
     let mut out = String::from("| Method | Force | SDOF, 1 % | SDOF, 5 % | bearing, 1 % | bearing, 5 % |\n");
     out.push_str("|---|---|---|---|---|---|\n");
-    for interval in INTERVALS.iter().filter(|i| i.0.contains(of)) {
+    let asked = |i: &&Interval| of.is_empty() || of.iter().any(|name| name == i.0);
+    for interval in INTERVALS.iter().filter(asked) {
         for shape in SHAPES {
             out.push_str(&format!("| {} | {} |", interval.0, shape.name()));
             for (bearing, level) in [(false, 0.01), (false, 0.05), (true, 0.01), (true, 0.05)] {
