@@ -3,8 +3,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use mechid_force::{
-    Filter, ForceModel, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, continuous, discretised,
-    frequency_domain, inner_lines, kalman, regularised,
+    Filter, ForceModel, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, continuous,
+    discretised, frequency_domain, inner_lines, kalman, regularised,
 };
 use mechid_model::{
     Discretisation, InitialState, KyxSign, Response, ResponseQuantity, SecondOrderSystem,

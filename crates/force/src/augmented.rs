@@ -17,6 +17,8 @@ use crate::{ForceError, ForceModel, Measurement, Start};
 
 /// Orders tried, each from where the one before was most likely; the first two from a grid.
 const ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
+/// Logarithm of the likelihood that a higher order must gain for the next to be tried.
+const ENOUGH: f64 = 1.0;
 /// States that the forces may have together: more of them make long records slow.
 const FORCE_STATES: usize = 16;
 /// Ratio between the corner frequencies tried first, from half a period in the record up.
@@ -221,11 +223,17 @@ impl Augmented {
                 },
             };
             // A hundredth in the log-likelihood moves no parameter by a tenth of its own uncertainty.
-            let point = minimise(cost, &start, 1.0, 0.01, 60 * (forces + 1));
+            let step = if order > 2 { 0.3 } else { 1.0 };
+            let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
             let Some(tuned) = self.trial(&process, noise, &point) else { continue };
             from = Some((tuned.log_likelihood, point));
-            if best.as_ref().is_none_or(|best| tuned.log_likelihood > best.log_likelihood) {
+            let gain = best.as_ref().map(|best| tuned.log_likelihood - best.log_likelihood);
+            if gain.is_none_or(|gain| gain > 0.0) {
                 best = Some(tuned);
+            }
+            // Where twice the order says no more, four times says no more either.
+            if order > 2 && gain.is_some_and(|gain| gain < ENOUGH) {
+                break;
             }
         }
         best.ok_or(ForceError::NoLikelihood)
@@ -239,7 +247,8 @@ impl Augmented {
         let process = LowPass::new(best.model.order)?;
         let points =
             alike(&best.free, |point| Some(self.trial(&process, noise, point)?.log_likelihood))?;
-        let tuned = |(weight, point): (f64, Vec<f64>)| Some((weight, self.trial(&process, noise, &point)?));
+        let tuned =
+            |(weight, point): (f64, Vec<f64>)| Some((weight, self.trial(&process, noise, &point)?));
         Ok(points.into_iter().filter_map(tuned).collect())
     }
 

@@ -39,8 +39,7 @@ pub fn within_band(
     extent: Extent,
 ) -> Result<Record, ForceError> {
     check_band(band_hz)?;
-    let columns: Vec<_> =
-        record.data().column_iter().map(|c| c.as_slice().to_vec()).collect();
+    let columns: Vec<_> = record.data().column_iter().map(|c| c.as_slice().to_vec()).collect();
     let len = record.len();
     let filter = BandFilter { sampling: record.sampling(), band_hz, extent };
     let kept = columns.iter().map(|c| filter.apply(c)).collect::<Result<Vec<_>, _>>()?;
@@ -84,7 +83,8 @@ impl BandFilter {
         if self.extent == Extent::Open {
             all.extend(values.iter().rev());
         }
-        let spectrum = Spectrum::of(&Record::from_channel(self.sampling.with_len(all.len())?, all)?);
+        let spectrum =
+            Spectrum::of(&Record::from_channel(self.sampling.with_len(all.len())?, all)?);
         let spacing = spectrum.sampling().line_spacing_hz();
         let mut lines = spectrum.lines().clone();
         for (n, mut line) in lines.row_iter_mut().enumerate() {

@@ -65,6 +65,12 @@ impl Components {
         self.singular.partition_point(|s| *s > floor)
     }
 
+    /// Lowest frequency, in Hz, of the components that show a force.
+    pub fn lowest_hz(&self, shows: impl Fn(usize) -> bool) -> Option<f64> {
+        let shown = (0..self.singular.len()).filter(|i| shows(*i));
+        shown.map(|i| self.lowest_hz[i]).min_by(f64::total_cmp)
+    }
+
     /// Residual, size and unknowns for filter factors φ_i (f̂_i = φ_i y_i / s_i).
     pub fn fit(&self, factor: impl Fn(usize) -> f64) -> Fit {
         let mut fit = Fit { residual: self.outside_energy, size: 0.0, unknowns: 0.0 };

@@ -58,7 +58,8 @@ impl Posterior {
         for best in bests.iter().filter(|best| best.likelihood > greatest - NEGLIGIBLE) {
             best.beside(components, noise, greatest, &mut near);
         }
-        let weight = |(steps, evidence): &(f64, Evidence)| steps * (evidence.likelihood - greatest).exp();
+        let weight =
+            |(steps, evidence): &(f64, Evidence)| steps * (evidence.likelihood - greatest).exp();
         let sum: f64 = near.iter().map(weight).sum();
         let mut parts = Vec::new();
         for part in &near {
@@ -102,10 +103,9 @@ impl Posterior {
     /// than noise; `None` where none does.
     pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
         let endless = Evidence { reach: components.singular.len(), ..self.best };
-        let shown = (0..components.singular.len()).filter(|i| {
-            endless.driven(components, *i) * components.singular[*i].powi(2) >= self.best.noise
-        });
-        shown.map(|i| components.lowest_hz[i]).min_by(f64::total_cmp)
+        components.lowest_hz(|i| {
+            endless.driven(components, i) * components.singular[i].powi(2) >= self.best.noise
+        })
     }
 }
 
@@ -159,12 +159,14 @@ impl Evidence {
         for up in [false, true] {
             let mut last = self;
             for _ in 0..BESIDE {
-                let reach = if up { last.reach + stride } else { last.reach.saturating_sub(stride) };
+                let reach =
+                    if up { last.reach + stride } else { last.reach.saturating_sub(stride) };
                 if !(1..=most).contains(&reach) {
                     break;
                 }
-                last = Self { reach, likelihood: f64::NEG_INFINITY, ..last }.maximised(components, noise);
-                if !(last.likelihood > greatest - NEGLIGIBLE) {
+                last = Self { reach, likelihood: f64::NEG_INFINITY, ..last }
+                    .maximised(components, noise);
+                if last.likelihood.is_nan() || last.likelihood <= greatest - NEGLIGIBLE {
                     break;
                 }
                 near.push((stride as f64, last));
@@ -173,8 +175,14 @@ impl Evidence {
     }
 
     /// Share and variances as likely as these, with their weights; all shares are alike beforehand.
-    fn alike(self, components: &Components, noise: Option<f64>) -> Result<Vec<(f64, Self)>, ForceError> {
-        let mut best = vec![(self.share / (1.0 - self.share)).ln(), self.force.ln()];
+    fn alike(
+        self,
+        components: &Components,
+        noise: Option<f64>,
+    ) -> Result<Vec<(f64, Self)>, ForceError> {
+        let reach = self.reach as f64;
+        let odds = (self.share * reach + 1.0) / ((1.0 - self.share) * reach + 1.0);
+        let mut best = vec![odds.ln(), self.force.ln()];
         best.extend(noise.is_none().then(|| self.noise.ln()));
         let at = |point: &[f64]| Self {
             share: (1.0 + (-point[0]).exp()).recip().clamp(1e-12, 1.0 - 1e-12),
@@ -184,7 +192,9 @@ impl Evidence {
         };
         let points = alike(&best, |point| {
             let trial = at(point);
-            Some(trial.log_likelihood(components)).filter(|value| value.is_finite())
+            // In the logarithm of the odds, shares that are all alike are not.
+            let alike = trial.share.ln() + (1.0 - trial.share).ln();
+            Some(trial.log_likelihood(components) + alike).filter(|value| value.is_finite())
         })?;
         Ok(points.into_iter().map(|(weight, point)| (weight, at(&point))).collect())
     }
@@ -220,7 +230,14 @@ impl Evidence {
     }
 
     fn at_reach(components: &Components, reach: usize, colour: i32, noise: Option<f64>) -> Self {
-        let blank = Self { share: 0.999, force: 1.0, noise: 1.0, reach, colour, likelihood: f64::NEG_INFINITY };
+        let blank = Self {
+            share: 0.999,
+            force: 1.0,
+            noise: 1.0,
+            reach,
+            colour,
+            likelihood: f64::NEG_INFINITY,
+        };
         let mut starts = vec![blank.white(components, noise)];
         let head = |i: usize| {
             components.weight[i] * components.singular[i].powi(2) * blank.driven(components, i)
@@ -306,12 +323,10 @@ impl Evidence {
         self
     }
 
-    /// Logarithm of the likelihood of all components and of their share, whose logit is uniform
-    /// where it is: all shares are alike.
+    /// Logarithm of the likelihood of all components.
     fn log_likelihood(&self, components: &Components) -> f64 {
         let within: f64 = components.weight[..self.reach].iter().sum();
-        let mut likelihood = self.share.ln() + (1.0 - self.share).ln();
-        likelihood -= 0.5 * (components.data() - within) * self.noise.ln();
+        let mut likelihood = -0.5 * (components.data() - within) * self.noise.ln();
         likelihood -= tail_energy(components, self.reach) / (2.0 * self.noise);
         (0..self.reach).for_each(|i| likelihood += self.component(components, i).0);
         likelihood
@@ -336,7 +351,7 @@ impl Evidence {
                 + probability * ((1.0 - gain).powi(2) * energy + s * s * spread);
         }
         Self {
-            share: (driven + 1.0) / (self.reach + 2) as f64,
+            share: (driven / self.reach as f64).clamp(1e-3, 1.0 - 1e-6),
             force: (force / driven_weight.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE),
             noise: known.unwrap_or((noise / components.data()).max(f64::MIN_POSITIVE)),
             likelihood,

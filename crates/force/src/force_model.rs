@@ -91,7 +91,8 @@ impl LowPass {
             at += 2;
         }
         // Each section is driven by the first state of the one behind it.
-        let firsts = (0..order).filter(|i| if order % 2 == 1 { *i == 0 || i % 2 == 1 } else { i % 2 == 0 });
+        let firsts =
+            (0..order).filter(|i| if order % 2 == 1 { *i == 0 || i % 2 == 1 } else { i % 2 == 0 });
         for first in firsts.skip(1) {
             rate[(first - 1, first)] = 1.0;
         }

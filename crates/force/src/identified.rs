@@ -81,9 +81,10 @@ impl IdentifiedForce {
                 (0..sampling.lines()).filter(inside).map(weight).sum()
             }
         };
-        let error = self.standard_error.as_ref().map(|error| {
-            Record::new(sampling, error.data() * share.sqrt())
-        });
+        let error = self
+            .standard_error
+            .as_ref()
+            .map(|error| Record::new(sampling, error.data() * share.sqrt()));
         let error = error.transpose()?;
         Ok(self.replaced(record).with_standard_error(error).with_band(band_hz))
     }

@@ -118,18 +118,18 @@ pub fn kalman(
         Tuning::NoiseKnown(_) => augmented.most_likely(Some(1.0))?,
         Tuning::Given { model, .. } => augmented.given(model)?,
     };
-    let noise = (*tuning != Tuning::Likelihood).then_some(1.0);
-    let mut smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
-    let alike = augmented.alike(&tuned, noise)?;
-    if alike.len() > 1 {
-        smoothed.force = mixed(&augmented, &smoothed.force, system.dof(), forced, &alike)?;
-    }
-    let stated = (*tuning != Tuning::Likelihood).then_some(&smoothed.noise_std[..]);
+    let smoothed = smoothed(&augmented, system, measured, forced, &scale, &tuned)?;
+    let known = *tuning != Tuning::Likelihood;
     let rest = measured.exceeds(forced).then(|| {
         let motion = [&smoothed.displacement, &smoothed.velocity, smoothed.force.record()];
-        Rest::of_motion(system, measured, motion, stated)
+        Rest::of_motion(system, measured, motion, known.then_some(&smoothed.noise_std[..]))
     });
-    let force = smoothed.force.with_rest(rest);
+    let alike = augmented.alike(&tuned, known.then_some(1.0))?;
+    let force = match alike.len() {
+        0 | 1 => smoothed.force,
+        _ => mixed(&augmented, &smoothed.force, system.dof(), forced, &alike)?,
+    };
+    let force = force.with_rest(rest);
     let band_hz = measured.band_hz().or_else(|| measured.shown(smoothed.seen_from_hz));
     let force = match band_hz {
         None => force,
@@ -154,8 +154,10 @@ fn in_band(
     let whole = force.standard_error().map(|error| error.data());
     let mut error = DMatrix::zeros(record.len(), record.channels());
     for (f, &dof) in forced.iter().enumerate() {
-        let squares: Vec<f64> =
-            whole.iter().flat_map(|e| e.column(dof).iter().map(|e| e * e).collect::<Vec<_>>()).collect();
+        let squares: Vec<f64> = whole
+            .iter()
+            .flat_map(|e| e.column(dof).iter().map(|e| e * e).collect::<Vec<_>>())
+            .collect();
         let mut sorted = squares.clone();
         sorted.sort_by(f64::total_cmp);
         let middle = sorted[sorted.len() / 2];

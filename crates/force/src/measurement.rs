@@ -105,8 +105,7 @@ impl Measurement {
 
     /// The band in which channels without a displacement show a force, where it is not all of it.
     pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
-        let displaced =
-            self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
+        let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
         let nyquist = 0.5 * self.sampling().rate_hz();
         let low_hz = seen_from_hz.filter(|low| !displaced && (0.0..nyquist).contains(low))?;
         (low_hz > 0.0).then_some([low_hz, nyquist])

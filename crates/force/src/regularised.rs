@@ -54,7 +54,9 @@ pub struct RegularisedForce {
 /// The standard error is such that 1.96 of it to either side hold the force with a probability of
 /// 95 % given the measurement: noise let through, force held back, and all that the measurement does
 /// not tell of the sizes of force and noise. A noise level that is stated or measured apart
-/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known.
+/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. Of a given λ ([`Rule::Given`])
+/// it is that of a force of variance (noise/λ)² in every component, and of truncation that of the
+/// noise: there nothing else is asked of the measurement.
 ///
 /// Channels without a displacement do not show a constant force. The force is then that above
 /// [`RegularisedForce::seen_from_hz`] ([`IdentifiedForce::band_hz`]), unless the measurement asks
@@ -122,17 +124,44 @@ fn solve(
     {
         return Err(ForceError::Silent);
     }
-    let posterior = Posterior::of(components, noise_known)?;
-    let parameter = choose(filter, components, &posterior);
     let count = components.singular.len();
-    let mean: Vec<f64> = (0..count).map(|i| posterior.factor(components, i)).collect();
-    let factors: Vec<f64> = match parameter {
-        Some(lambda) => (0..count).map(|i| factor(filter, components, i, lambda)).collect(),
-        None => (0..count).map(|i| posterior.best_factor(components, i)).collect(),
+    let given = filter.given();
+    let posterior = match given {
+        Some(_) => None,
+        None => Some(Posterior::of(components, noise_known)?),
     };
-    let variance: Vec<f64> = (0..count).map(|i| posterior.variance(components, i)).collect();
-    let (noise, unknowns) = (posterior.noise(), components.fit(|i| factors[i]).unknowns);
-    let seen_from_hz = posterior.seen_from_hz(components);
+    let parameter = given.or_else(|| choose(filter, components, posterior.as_ref()?));
+    let factors: Vec<f64> = (0..count)
+        .map(|i| match (parameter, &posterior) {
+            (Some(lambda), _) => factor(filter, components, i, lambda),
+            (None, Some(posterior)) => posterior.best_factor(components, i),
+            (None, None) => 0.0,
+        })
+        .collect();
+    let fit = components.fit(|i| factors[i]);
+    let noise = match &posterior {
+        Some(posterior) => posterior.noise(),
+        None if noise_known => 1.0,
+        None => fit.noise(components),
+    };
+    // A given λ is a prior of its own: a force of variance σ²/λ² in every component.
+    let lambda = given.unwrap_or(0.0);
+    let mean: Vec<f64> = (0..count)
+        .map(|i| posterior.as_ref().map_or(factors[i], |posterior| posterior.factor(components, i)))
+        .collect();
+    let variance: Vec<f64> = (0..count)
+        .map(|i| match &posterior {
+            Some(posterior) => posterior.variance(components, i),
+            None if factors[i] == 0.0 => 0.0,
+            None if factors[i] == 1.0 => noise / components.singular[i].powi(2),
+            None => noise / (components.singular[i].powi(2) + lambda * lambda),
+        })
+        .collect();
+    let seen_from_hz = match &posterior {
+        Some(posterior) => posterior.seen_from_hz(components),
+        None => components.lowest_hz(|i| components.singular[i] >= lambda),
+    };
+    let unknowns = fit.unknowns;
     let whole = operator.force(&factors)?;
     let band_hz = measured.band_hz().or_else(|| measured.shown(seen_from_hz));
     if let Some(band_hz) = band_hz {

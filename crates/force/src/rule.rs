@@ -57,6 +57,16 @@ pub enum Filter {
 }
 
 impl Filter {
+    /// λ, if it is given.
+    pub(crate) fn given(self) -> Option<f64> {
+        match self {
+            Filter::Tikhonov(Rule::Given(lambda)) | Filter::TruncatedSvd(Rule::Given(lambda)) => {
+                Some(lambda)
+            }
+            _ => None,
+        }
+    }
+
     /// An error for a given λ that cannot be one.
     pub(crate) fn check(self) -> Result<(), ForceError> {
         match self {
@@ -106,8 +116,9 @@ pub(crate) fn choose(
     let best = match rule {
         Rule::Given(lambda) => return Some(lambda),
         Rule::Likelihood => {
-            let mean: Vec<f64> =
-                (0..components.singular.len()).map(|i| posterior.best_factor(components, i)).collect();
+            let mean: Vec<f64> = (0..components.singular.len())
+                .map(|i| posterior.best_factor(components, i))
+                .collect();
             least(candidates.iter().map(|lambda| {
                 let loss = components.fit(|i| (factor(i, *lambda) - mean[i]).abs());
                 loss.size

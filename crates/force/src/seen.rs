@@ -15,11 +15,19 @@ const FREQUENCIES: usize = 1024;
 
 /// The information HᴴH of the scaled channels on forces, at frequencies from 0 to Nyquist.
 pub(crate) struct Seen {
-    /// Angular frequency, its width Δω, and HᴴH; no matrix at an undamped resonance, where any
-    /// force would show.
-    terms: Vec<(f64, f64, Option<DMatrix<Complex<f64>>>)>,
+    terms: Vec<Term>,
     channels: f64,
     dt: f64,
+    /// Half the distance of the lines where the channels do not show a constant force, else 0, in Hz.
+    least_hz: f64,
+}
+
+/// An interval of angular frequencies.
+struct Term {
+    omega: f64,
+    width: f64,
+    /// HᴴH of the scaled channels; `None` at an undamped resonance, where any force would show.
+    information: Option<DMatrix<Complex<f64>>>,
 }
 
 /// Part of a force that a measurement shows, by frequency.
@@ -30,6 +38,7 @@ pub(crate) struct ErrorSpectrum {
     pub variance: DMatrix<f64>,
     /// Whether the interval tells more of every force than the model of it does.
     seen: Vec<bool>,
+    least_hz: f64,
 }
 
 impl Seen {
@@ -54,15 +63,19 @@ impl Seen {
                 let (low, high) = (at(i), at(i + 1));
                 let omega = 0.5 * (low + high);
                 let information = transfer.scaled(0, omega).ok().map(|h| h.ad_mul(&h));
-                (omega, high - low, information)
+                Term { omega, width: high - low, information }
             })
             .collect();
-        Ok(Self { terms, channels: scale.len() as f64, dt: sampling.dt() })
+        // A machine without springs has no static response, and accelerates all the more.
+        let constant =
+            transfer.scaled(0, 0.0).map_or(true, |h| h.column_iter().all(|f| f.camax() > 0.0));
+        let least_hz = if constant { 0.0 } else { 0.5 * sampling.line_spacing_hz() };
+        Ok(Self { terms, channels: scale.len() as f64, dt: sampling.dt(), least_hz })
     }
 
     /// RMS value of the scaled channels, their mean, that a force of this spectrum makes alone.
     pub fn gain(&self, model: &ForceModel, process: &LowPass, f: usize) -> f64 {
-        let shown = self.terms.iter().filter_map(|(omega, width, information)| {
+        let shown = self.terms.iter().filter_map(|Term { omega, width, information }| {
             let power = information.as_ref()?[(f, f)].re / self.channels;
             Some(power * model.density(f, *omega, process) * width / PI)
         });
@@ -79,14 +92,15 @@ impl Seen {
         let mut variance = DMatrix::zeros(forces, self.terms.len());
         let mut seen = Vec::with_capacity(self.terms.len());
         let mut edges = Vec::with_capacity(self.terms.len());
-        for (i, (omega, width, information)) in self.terms.iter().enumerate() {
+        for (i, Term { omega, width, information }) in self.terms.iter().enumerate() {
             edges.push([(omega - 0.5 * width) / TAU, (omega + 0.5 * width) / TAU]);
             let Some(information) = information else {
                 seen.push(true);
                 continue;
             };
             // In units of each force's density: (I + D HᴴH D)⁻¹ with D² = S_f/S_n.
-            let density: Vec<f64> = (0..forces).map(|f| model.density(f, *omega, process)).collect();
+            let density: Vec<f64> =
+                (0..forces).map(|f| model.density(f, *omega, process)).collect();
             let root = |f: usize| (density[f] / (noise * noise * self.dt)).sqrt();
             let mut matrix = information.map_with_location(|f, g, h| h * root(f) * root(g));
             (0..forces).for_each(|f| matrix[(f, f)] += 1.0);
@@ -97,7 +111,7 @@ impl Seen {
                 variance[(f, i)] = left(f).clamp(0.0, 1.0) * density[f] * width / PI;
             }
         }
-        ErrorSpectrum { edges, variance, seen }
+        ErrorSpectrum { edges, variance, seen, least_hz: self.least_hz }
     }
 }
 
@@ -106,7 +120,7 @@ impl ErrorSpectrum {
     /// show it down to a constant one, `None` where they show it nowhere.
     pub fn lowest_hz(&self) -> Option<f64> {
         let first = self.seen.iter().position(|seen| *seen)?;
-        Some(self.edges[first][0])
+        Some(self.edges[first][0].max(self.least_hz))
     }
 
     /// Variance of the error of force `f` between two frequencies, in N².

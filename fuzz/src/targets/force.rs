@@ -1,10 +1,11 @@
 //! Calls of `mechid-force`.
 
 use mechid_force::{
-    Channel, Filter, ForceModel, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise, Rule, Start,
-    Tuning, channel_errors, continuous, continuous_with_noise, discretised, discretised_by_taylor,
-    discretised_with_noise, frequency_domain, inner_lines, kalman, line_errors, regularised,
-    relative_error, spectrum_ratio, spurious_ratio, with_uncertain_system,
+    Channel, Filter, ForceModel, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
+    Rule, Start, Tuning, channel_errors, continuous, continuous_with_noise, discretised,
+    discretised_by_taylor, discretised_with_noise, frequency_domain, inner_lines, kalman,
+    line_errors, regularised, relative_error, spectrum_ratio, spurious_ratio,
+    with_uncertain_system,
 };
 use mechid_model::{Discretisation, Response, UncertainSystem};
 use mechid_signal::{Sampling, Spectrum};

@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each test program of its own would compile nalgebra anew.
 
+mod accelerations;
 mod common;
 mod discretised;
 mod dissertation;

@@ -85,13 +85,17 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) ->
                 sum
             });
             let walk: Vec<f64> = walk.collect();
-            let last = walk[walk.len() - 1] + 20.0 * noise::white(sampling, 1, 1.0, 7777 + seed).unwrap().channel(0)[0];
+            let last = walk[walk.len() - 1]
+                + 20.0 * noise::white(sampling, 1, 1.0, 7777 + seed).unwrap().channel(0)[0];
             // Closed to a period by taking out the line from its start to its end.
-            let closing = |k: usize| if open != Extent::Period { 0.0 } else { last * k as f64 / walk.len() as f64 };
+            let closing = |k: usize| {
+                if open != Extent::Period { 0.0 } else { last * k as f64 / walk.len() as f64 }
+            };
             walk.iter().enumerate().map(|(k, f)| f - closing(k)).collect()
         }
     };
-    let force = DMatrix::from_fn(sampling.len(), dof, |k, i| if i + 1 == dof { path[k] } else { 0.0 });
+    let force =
+        DMatrix::from_fn(sampling.len(), dof, |k, i| if i + 1 == dof { path[k] } else { 0.0 });
     let truth = Record::new(sampling, force).unwrap();
     let response = match (open, shape) {
         (Extent::Open, Shape::Walk) => exact_foh(&system, &truth, &InitialState::rest(dof)),
@@ -112,7 +116,12 @@ pub fn draw(bearing: bool, shape: Shape, level: f64, open: Extent, seed: u64) ->
 /// A method of the coverage study.
 pub type Interval = (&'static str, Extent, fn(bool, Shape, &Draw) -> Option<IdentifiedForce>);
 
-fn known(bearing: bool, shape: Shape, draw: &Draw, filter: Option<Filter>) -> Option<IdentifiedForce> {
+fn known(
+    bearing: bool,
+    shape: Shape,
+    draw: &Draw,
+    filter: Option<Filter>,
+) -> Option<IdentifiedForce> {
     let lines = shape.lines();
     let (system, _) = machine(bearing);
     let noise = if lines.len() > 100 { return None } else { Noise::OutsideLines };
@@ -120,15 +129,19 @@ fn known(bearing: bool, shape: Shape, draw: &Draw, filter: Option<Filter>) -> Op
         None => frequency_domain(&system, &draw.measured, &draw.forced, &lines, &noise).unwrap(),
         Some(filter) => {
             let lines = ForceUnknowns::Lines(lines);
-            regularised(&system, &draw.measured, &draw.forced, &lines, filter, &noise).unwrap().force
+            regularised(&system, &draw.measured, &draw.forced, &lines, filter, &noise)
+                .unwrap()
+                .force
         }
     })
 }
 
 fn unknown(bearing: bool, draw: &Draw, filter: Filter, open: bool) -> Option<IdentifiedForce> {
     let (system, _) = machine(bearing);
-    let extent = if open { ForceUnknowns::Samples(Start::InMotion) } else { ForceUnknowns::EveryLine };
-    let found = regularised(&system, &draw.measured, &draw.forced, &extent, filter, &Noise::Unknown);
+    let extent =
+        if open { ForceUnknowns::Samples(Start::InMotion) } else { ForceUnknowns::EveryLine };
+    let found =
+        regularised(&system, &draw.measured, &draw.forced, &extent, filter, &Noise::Unknown);
     Some(found.unwrap().force)
 }
 
@@ -168,14 +181,21 @@ pub const INTERVALS: [Interval; 12] = [
 
 /// Of so many records: share of samples within 1.96 standard errors of the truth, RMS error over
 /// that of the force, and RMS standard error over RMS error.
-pub fn coverage(interval: &Interval, bearing: bool, shape: Shape, level: f64, runs: u64) -> Option<[f64; 3]> {
+pub fn coverage(
+    interval: &Interval,
+    bearing: bool,
+    shape: Shape,
+    level: f64,
+    runs: u64,
+) -> Option<[f64; 3]> {
     let (mut held, mut samples) = (0, 0);
     let (mut error, mut stated, mut size) = (0.0, 0.0, 0.0);
     for seed in 1..=runs {
         let draw = draw(bearing, shape, level, interval.1, seed);
         let found = (interval.2)(bearing, shape, &draw)?;
         let dof = draw.forced[0];
-        let (record, se) = (found.record().channel(dof), found.standard_error().unwrap().channel(dof));
+        let (record, se) =
+            (found.record().channel(dof), found.standard_error().unwrap().channel(dof));
         for ((f, t), se) in record.iter().zip(draw.truth.channel(dof)).zip(se) {
             held += usize::from((f - t).abs() <= 1.96 * se);
             samples += 1;
@@ -189,7 +209,8 @@ pub fn coverage(interval: &Interval, bearing: bool, shape: Shape, level: f64, ru
 
 /// The table of the coverage, in per cent.
 pub fn coverage_table(runs: u64, of: &[String]) -> String {
-    let mut out = String::from("| Method | Force | SDOF, 1 % | SDOF, 5 % | bearing, 1 % | bearing, 5 % |\n");
+    let mut out =
+        String::from("| Method | Force | SDOF, 1 % | SDOF, 5 % | bearing, 1 % | bearing, 5 % |\n");
     out.push_str("|---|---|---|---|---|---|\n");
     let asked = |i: &&Interval| of.is_empty() || of.iter().any(|name| name == i.0);
     for interval in INTERVALS.iter().filter(asked) {
@@ -197,7 +218,9 @@ pub fn coverage_table(runs: u64, of: &[String]) -> String {
             out.push_str(&format!("| {} | {} |", interval.0, shape.name()));
             for (bearing, level) in [(false, 0.01), (false, 0.05), (true, 0.01), (true, 0.05)] {
                 match coverage(interval, bearing, shape, level, runs) {
-                    Some([c, e, s]) => out.push_str(&format!(" {:.1} ({e:.3}, {s:.2}) |", 100.0 * c)),
+                    Some([c, e, s]) => {
+                        out.push_str(&format!(" {:.1} ({e:.3}, {s:.2}) |", 100.0 * c))
+                    }
                     None => out.push_str(" – |"),
                 }
             }

@@ -10,11 +10,10 @@ use mechid_model::{
     Discretisation, KyxSign, Response, ResponseQuantity, SecondOrderSystem, npi_sampling,
 };
 use mechid_problems::{dissertation_bearing, dissertation_sdof, exact_harmonic_periodic};
-use mechid_signal::{
-    Extent, Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, noise,
-};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, noise};
 use nalgebra::DMatrix;
 
+pub mod accelerations;
 pub mod coverage;
 
 /// The single oscillator or the bearing of the dissertation, and the time axis of its period.
