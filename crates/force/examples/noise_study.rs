@@ -11,7 +11,7 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let runs = arguments.get(1).and_then(|runs| runs.parse().ok()).unwrap_or(100);
     if arguments.first().is_some_and(|first| first == "accelerations") {
-        println!("{}", study::accelerations::table(runs));
+        study::accelerations::table(runs, |row| println!("{row}"));
         return;
     }
     if arguments.first().is_some_and(|first| first == "coverage") {

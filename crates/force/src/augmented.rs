@@ -216,7 +216,7 @@ impl Augmented {
                 self.trial(&process, noise, free).map_or(f64::INFINITY, |t| -t.log_likelihood)
             };
             let start = match &from {
-                Some((_, point)) if order > 2 => point.clone(),
+                Some((_, point)) if order > 2 => sharper(point, &cost),
                 _ => match self.coarse(forces, &cost) {
                     Some(point) => point,
                     None => continue,
@@ -232,7 +232,7 @@ impl Augmented {
                 best = Some(tuned);
             }
             // Where twice the order says no more, four times says no more either.
-            if order > 2 && gain.is_some_and(|gain| gain < ENOUGH) {
+            if order > 4 && gain.is_some_and(|gain| gain < ENOUGH) {
                 break;
             }
         }
@@ -290,6 +290,22 @@ impl Augmented {
         }
         space
     }
+}
+
+/// A start for a higher order: the corner of the one before, and the ratio that suits a sharper end.
+/// A band whose end is too gentle takes noise for force.
+fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
+    let mut best = (cost(point), point.to_vec());
+    let last = point.len() - 1;
+    for ratio in RATIOS {
+        let mut trial = vec![ratio.ln(); last];
+        trial.push(point[last]);
+        let value = cost(&trial);
+        if value < best.0 {
+            best = (value, trial);
+        }
+    }
+    best.1
 }
 
 /// Upper sizes of the motion, from what was measured: velocities by differences of the samples

@@ -5,9 +5,10 @@ use mechid_signal::{Extent, Record, Spectrum};
 use nalgebra::DMatrix;
 
 use crate::augmented::{Augmented, Tuned};
-use crate::band::within_band;
+use crate::band::{BandFilter, within_band};
 use crate::force_model::LowPass;
 use crate::noise::channel_sizes;
+use crate::seen::ErrorSpectrum;
 use crate::transfer::Transfer;
 use crate::unexplained::Rest;
 use crate::{ForceError, ForceModel, IdentifiedForce, Measurement, Noise, Start};
@@ -136,36 +137,40 @@ pub fn kalman(
         Some(band_hz) => {
             let process = LowPass::new(tuned.model.order)?;
             let errors = augmented.seen().errors(&tuned.model, &process, tuned.noise);
-            in_band(force, forced, band_hz, |f| errors.within(f, band_hz))?
+            in_band(force, forced, band_hz, &errors)?
         }
     };
     Ok(KalmanForce { force, ..smoothed })
 }
 
-/// The part of the force in a band; `variance` of each is that far from the ends of the record, to
-/// which is added what the whole force has there more than in the middle.
+/// The part of the force in a band. Its variance is that far from the ends of the record, with what
+/// the whole force has more at an instant than in the middle, and what slower errors leave of
+/// themselves in the band where the record ends.
 fn in_band(
     force: IdentifiedForce,
     forced: &[usize],
     band_hz: [f64; 2],
-    variance: impl Fn(usize) -> f64,
+    errors: &ErrorSpectrum,
 ) -> Result<IdentifiedForce, ForceError> {
     let record = within_band(force.record(), band_hz, Extent::Open)?;
-    let whole = force.standard_error().map(|error| error.data());
-    let mut error = DMatrix::zeros(record.len(), record.channels());
+    let (sampling, len) = (record.sampling(), record.len());
+    // A slope of 1 at the first sample that is gone at the last: its mirror image has a corner.
+    let corner: Vec<f64> =
+        (0..len).map(|k| sampling.time(k) * (1.0 - 0.5 * k as f64 / len as f64)).collect();
+    let corner = BandFilter { sampling, band_hz, extent: Extent::Open }.apply(&corner)?;
+    let mut error = DMatrix::zeros(len, record.channels());
     for (f, &dof) in forced.iter().enumerate() {
-        let squares: Vec<f64> = whole
-            .iter()
-            .flat_map(|e| e.column(dof).iter().map(|e| e * e).collect::<Vec<_>>())
-            .collect();
-        let mut sorted = squares.clone();
+        let whole = force.standard_error().map_or(&[][..], |error| error.channel(dof));
+        let mut sorted: Vec<f64> = whole.iter().map(|error| error * error).collect();
         sorted.sort_by(f64::total_cmp);
-        let middle = sorted[sorted.len() / 2];
-        for (k, square) in squares.iter().enumerate() {
-            error[(k, dof)] = (variance(f) + (square - middle).max(0.0)).sqrt();
+        let middle = sorted.get(len / 2).copied().unwrap_or(0.0);
+        let (variance, rate) = (errors.within(f, band_hz), errors.rate_below(f, band_hz[0]));
+        for (k, value) in whole.iter().enumerate() {
+            let ends = rate * (corner[k].powi(2) + corner[len - 1 - k].powi(2));
+            error[(k, dof)] = (variance + (value * value - middle).max(0.0) + ends).sqrt();
         }
     }
-    let error = Record::new(record.sampling(), error)?;
+    let error = Record::new(sampling, error)?;
     Ok(force.replaced(record).with_standard_error(Some(error)).with_band(band_hz))
 }
 

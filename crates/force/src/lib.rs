@@ -7,7 +7,7 @@
 //! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
 //! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
-//! | [`kalman`] | any channels, any length | the record is long |
+//! | [`kalman`] | any channels, any length | the record is no period |
 //!
 //! [`with_uncertain_system`] adds to any of them what the covariance of an identified machine means
 //! for the force. The book's chapter on forces has the reasons, and every method's error side by

@@ -13,12 +13,17 @@ use crate::{ForceError, ForceModel, Measurement};
 /// resonances, at which the force is known best.
 const FREQUENCIES: usize = 1024;
 
+/// Periods in the record of the slowest force that is told from a constant one, where that is not
+/// shown: what is not known of the mean reaches into lines below.
+const PERIODS: f64 = 2.0;
+
 /// The information HᴴH of the scaled channels on forces, at frequencies from 0 to Nyquist.
 pub(crate) struct Seen {
     terms: Vec<Term>,
     channels: f64,
     dt: f64,
-    /// Half the distance of the lines where the channels do not show a constant force, else 0, in Hz.
+    /// Lowest frequency that a record of this length tells from a constant one, in Hz; 0 where the
+    /// channels show a constant force.
     least_hz: f64,
 }
 
@@ -69,7 +74,7 @@ impl Seen {
         // A machine without springs has no static response, and accelerates all the more.
         let constant =
             transfer.scaled(0, 0.0).map_or(true, |h| h.column_iter().all(|f| f.camax() > 0.0));
-        let least_hz = if constant { 0.0 } else { 0.5 * sampling.line_spacing_hz() };
+        let least_hz = if constant { 0.0 } else { PERIODS * sampling.line_spacing_hz() };
         Ok(Self { terms, channels: scale.len() as f64, dt: sampling.dt(), least_hz })
     }
 
@@ -121,6 +126,15 @@ impl ErrorSpectrum {
     pub fn lowest_hz(&self) -> Option<f64> {
         let first = self.seen.iter().position(|seen| *seen)?;
         Some(self.edges[first][0].max(self.least_hz))
+    }
+
+    /// Mean square rate of change of the error of force `f` below a frequency, in N²/s².
+    pub fn rate_below(&self, f: usize, low_hz: f64) -> f64 {
+        let parts = self.edges.iter().enumerate().map(|(i, [from, to])| {
+            let inside = (to.min(low_hz) - from).max(0.0) / (to - from);
+            (PI * (from + to)).powi(2) * self.variance[(f, i)] * inside
+        });
+        parts.sum()
     }
 
     /// Variance of the error of force `f` between two frequencies, in N².

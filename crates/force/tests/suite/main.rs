@@ -12,6 +12,7 @@ mod linearity;
 mod motion_noise;
 mod noise_study;
 mod regularised;
+#[allow(dead_code, reason = "the example uses the rest")]
 mod study;
 mod uncertainty;
 mod unexplained;
