@@ -196,6 +196,17 @@ pub enum AnalysisError {
     /// The Kalman smoother has no periods.
     #[error("the Kalman smoother takes an open record: leave `period` and `lines` out")]
     KalmanIsOpen,
+    /// The method has no standard error of a band of frequencies.
+    #[error(
+        "the force from sample to sample (`discretised`) cannot be kept within the band from {low_hz} \
+         to {high_hz} Hz: leave `band_hz` out, or choose another `method`"
+    )]
+    BandMethod {
+        /// Lower end of the band, in Hz.
+        low_hz: f64,
+        /// Upper end of the band, in Hz.
+        high_hz: f64,
+    },
     /// A bearing cannot be as described.
     #[error(transparent)]
     Bearing(#[from] mechid_bearing::BearingError),

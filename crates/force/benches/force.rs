@@ -3,8 +3,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use mechid_force::{
-    Filter, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, continuous, discretised,
-    frequency_domain, inner_lines, kalman, regularised,
+    Filter, ForceModel, ForceUnknowns, Measurement, Noise, Rule, Start, Tuning, continuous,
+    discretised, frequency_domain, inner_lines, kalman, regularised,
 };
 use mechid_model::{
     Discretisation, InitialState, KyxSign, Response, ResponseQuantity, SecondOrderSystem,
@@ -82,7 +82,10 @@ fn open_records(c: &mut Criterion) {
     }
     for len in [1_000, 10_000, 100_000] {
         let measured = displacements(len);
-        let tuning = Tuning::Given { noise_std: vec![1e-3; 2], walk: vec![1.0] };
+        let tuning = Tuning::Given {
+            noise_std: vec![1e-3; 2],
+            model: ForceModel { order: 2, corner_hz: 1.0, rms: vec![1.0] },
+        };
         group.throughput(Throughput::Elements(len as u64));
         group.bench_function(BenchmarkId::new("Kalman smoother, tuned", len), |b| {
             b.iter(|| kalman(&bearing(), &measured, &[1], Start::InMotion, &tuning));

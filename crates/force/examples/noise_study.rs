@@ -1,5 +1,6 @@
 //! Prints the tables of `docs/book/src/choose/force.md`:
-//! `cargo run --release -p mechid-force --example noise_study`.
+//! `cargo run --release -p mechid-force --example noise_study`, and with `-- coverage 200` that of
+//! the intervals, over 200 records each, or `-- accelerations 100` for accelerations alone.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 #[allow(dead_code, reason = "the test uses the rest")]
@@ -7,6 +8,17 @@
 mod study;
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let runs = arguments.get(1).and_then(|runs| runs.parse().ok()).unwrap_or(100);
+    if arguments.first().is_some_and(|first| first == "accelerations") {
+        study::accelerations::table(runs, |row| println!("{row}"));
+        return;
+    }
+    if arguments.first().is_some_and(|first| first == "coverage") {
+        let methods = arguments.get(2..).unwrap_or_default();
+        println!("{}", study::coverage::coverage_table(runs, methods));
+        return;
+    }
     let [known, unknown] = study::tables();
     println!("{known}\n{unknown}\n{}", study::rule_table(&study::rule_rows()));
 }

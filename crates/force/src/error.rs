@@ -191,13 +191,49 @@ pub enum ForceError {
         /// The forced degree of freedom, counted from 0.
         dof: usize,
     },
-    /// The number of random walks is not that of the forces.
-    #[error("as many random-walk intensities as forces are needed: {forces}, got {walks}")]
-    WalkCount {
-        /// Intensities given.
-        walks: usize,
+    /// A model of the forces of another number of forces.
+    #[error("the model of the forces has {models} RMS values for {}: give one for each", message::count(*forces, "force"))]
+    ModelCount {
+        /// RMS values given.
+        models: usize,
         /// Forces sought.
         forces: usize,
+    },
+    /// A model of the forces of an order that there is not.
+    #[error("a force model of order {order}: choose 1 (reverts to zero) to {most} (a sharp band)")]
+    ModelOrder {
+        /// The order given.
+        order: usize,
+        /// The highest.
+        most: usize,
+    },
+    /// A band of frequencies that is none.
+    #[error(
+        "the band from {low_hz} to {high_hz} Hz is none: give a lower end from 0 Hz on and an upper \
+         end above it"
+    )]
+    NoBand {
+        /// Lower end, in Hz.
+        low_hz: f64,
+        /// Upper end, in Hz.
+        high_hz: f64,
+    },
+    /// A band of frequencies without a spectral line.
+    #[error(
+        "no spectral line lies between {low_hz} and {high_hz} Hz: the lines of this record are \
+         {} Hz apart and end at {} Hz",
+        message::number_to(*spacing_hz, 6),
+        message::number_to(*last_hz, 6)
+    )]
+    EmptyBand {
+        /// Lower end, in Hz.
+        low_hz: f64,
+        /// Upper end, in Hz.
+        high_hz: f64,
+        /// Distance of the lines, in Hz.
+        spacing_hz: f64,
+        /// Frequency of the last line, in Hz.
+        last_hz: f64,
     },
     /// The Kalman filter overflows at every tuning tried, or at the one given.
     #[error(

@@ -1,45 +1,136 @@
 //! Marginal likelihood of force and noise, before any parameter is chosen.
 //!
 //! Each component is y_i = s_i f_i + e_i with e of variance σ². Of the `reach` strongest
-//! components a share π carries a force of variance τ², the others and all weaker ones carry none:
-//! a band of frequencies is a reach, single lines are a share, a white force is reach = all and
-//! π = 1. The four numbers are those under which the measurement is most likely.
+//! components a share π carries a force of variance τ² g_i, the others and all weaker ones carry
+//! none: a band of frequencies is a reach, single lines are a share, a white force is reach = all
+//! and π = 1. The colour g_i = (ω_i/ω₁)^(−2a) makes a force of falling spectrum: a = 1 is a random
+//! walk. The numbers are not taken where the measurement is most likely, but averaged over all
+//! values that make it about as likely: a force that is given with its error must not depend on
+//! numbers that the measurement does not tell.
 
+use crate::ForceError;
+use crate::alike::alike;
 use crate::components::Components;
 
-/// Share, variances and reach of greatest likelihood.
+/// Share, variances, reach and colour.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Evidence {
     share: f64,
     force: f64,
     /// σ², per real datum.
-    pub noise: f64,
+    noise: f64,
     reach: usize,
+    /// Exponent a of the amplitude.
+    colour: i32,
     likelihood: f64,
 }
 
+/// What a measurement says of the numbers: values with their weights.
+pub(crate) struct Posterior {
+    best: Evidence,
+    parts: Vec<(f64, Evidence)>,
+}
+
+/// Colours tried: white, random walk, integrated random walk.
+const COLOURS: [i32; 3] = [0, 1, 2];
+/// Fewest components that tell a colour: a few amplitudes lie near some slope by chance.
+const COLOURED_FROM: usize = 16;
 /// Reaches tried first: all components, then each 0.8 of the one before.
 const REACH_RATIO: f64 = 0.8;
 /// EM rounds at most; from the starts below it needs a few dozen.
 const ROUNDS: usize = 300;
 /// The likelihood has settled when a round adds less than this to its logarithm.
 const SETTLED: f64 = 1e-3;
+/// Logarithm of the likelihood below the greatest at which a reach or colour no longer counts.
+const NEGLIGIBLE: f64 = 6.0;
+/// Probability that a white force has no end, relative to all reaches.
+const ENDLESS: f64 = 0.25;
+/// Reaches on either side of the best that are averaged over.
+const BESIDE: usize = 16;
+
+impl Posterior {
+    /// Averages over reach, colour and, at the most likely of them, share and variances; the noise
+    /// is 1 where it is known.
+    pub fn of(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
+        let noise = noise_known.then_some(1.0);
+        let tried = if components.transmitted() < COLOURED_FROM { 1 } else { COLOURS.len() };
+        let bests: Vec<Evidence> = COLOURS[..tried]
+            .iter()
+            .map(|colour| Evidence::of(components, *colour, noise))
+            .collect();
+        let best = bests[1..].iter().fold(bests[0], |best, other| best.better(*other));
+        let greatest = best.likelihood;
+        let mut near = Vec::new();
+        for best in bests.iter().filter(|best| best.likelihood > greatest - NEGLIGIBLE) {
+            best.beside(components, noise, greatest, &mut near);
+        }
+        let weight =
+            |(steps, evidence): &(f64, Evidence)| steps * (evidence.likelihood - greatest).exp();
+        let sum: f64 = near.iter().map(weight).sum();
+        let mut parts = Vec::new();
+        for part in &near {
+            let share = weight(part) / sum;
+            for (weight, evidence) in part.1.alike(components, noise)? {
+                parts.push((share * weight, evidence));
+            }
+        }
+        Ok(Self { best, parts })
+    }
+
+    /// Mean of the noise variance, per real datum.
+    pub fn noise(&self) -> f64 {
+        self.parts.iter().map(|(weight, evidence)| weight * evidence.noise).sum()
+    }
+
+    /// Factor φ_i of the mean of f_i given the measurement and the numbers that make it most
+    /// likely, f̄_i = φ_i y_i / s_i.
+    pub fn best_factor(&self, components: &Components, i: usize) -> f64 {
+        self.best.factor(components, i)
+    }
+
+    /// Factor of the mean of f_i given the measurement alone.
+    pub fn factor(&self, components: &Components, i: usize) -> f64 {
+        self.parts.iter().map(|(weight, evidence)| weight * evidence.factor(components, i)).sum()
+    }
+
+    /// Variance of f_i given the measurement, per real unknown.
+    pub fn variance(&self, components: &Components, i: usize) -> f64 {
+        let (s, mean) = (components.singular[i], self.factor(components, i));
+        let energy = components.energy[i] / components.weight[i];
+        let square = if s > 0.0 { energy / (s * s) } else { 0.0 };
+        let each = self.parts.iter().map(|(weight, evidence)| {
+            let apart = evidence.factor(components, i) - mean;
+            weight * (evidence.variance(components, i) + apart * apart * square)
+        });
+        each.sum()
+    }
+
+    /// Frequency, in Hz, below which no component shows a force as strong as those found better
+    /// than noise; `None` where none does.
+    pub fn seen_from_hz(&self, components: &Components) -> Option<f64> {
+        let endless = Evidence { reach: components.singular.len(), ..self.best };
+        components.lowest_hz(|i| {
+            endless.driven(components, i) * components.singular[i].powi(2) >= self.best.noise
+        })
+    }
+}
 
 impl Evidence {
     /// The most likely of all reaches: a coarse descent, then ever smaller steps about the best.
-    pub fn of(components: &Components) -> Self {
+    fn of(components: &Components, colour: i32, noise: Option<f64>) -> Self {
         let most = components.transmitted();
         let mut reach = most;
-        let mut best = Self::at_reach(components, most);
-        while reach > 2 {
+        let mut best = Self::at_reach(components, most, colour, noise);
+        // A spectrum that falls has no end.
+        while colour == 0 && reach > 2 {
             reach = ((reach as f64 * REACH_RATIO) as usize).max(2);
-            best = best.better(Self::at_reach(components, reach));
+            best = best.better(Self::at_reach(components, reach, colour, noise));
         }
         let mut step = best.reach / 10;
-        while step > 0 {
+        while colour == 0 && step > 0 {
             for reach in [best.reach.saturating_sub(step).max(2), best.reach + step] {
                 if reach <= most {
-                    best = best.better(Self::at_reach(components, reach));
+                    best = best.better(Self::at_reach(components, reach, colour, noise));
                 }
             }
             step /= 2;
@@ -51,43 +142,127 @@ impl Evidence {
         if other.likelihood > self.likelihood { other } else { self }
     }
 
-    /// Factor φ_i of the mean of f_i given the measurement, f̄_i = φ_i y_i / s_i.
-    pub fn factor(&self, components: &Components, i: usize) -> f64 {
+    /// This and the reaches beside it as far as they count, with the number of reaches that each
+    /// stands for.
+    fn beside(
+        self,
+        components: &Components,
+        noise: Option<f64>,
+        greatest: f64,
+        near: &mut Vec<(f64, Self)>,
+    ) {
+        let most = components.transmitted();
+        if self.colour > 0 {
+            near.push((most as f64, self));
+            return;
+        }
+        let stride = (self.reach / BESIDE).max(1);
+        near.push((stride as f64, self));
+        if self.reach < most {
+            let all = Self::at_reach(components, most, 0, noise);
+            near.push((ENDLESS * most as f64, all));
+        }
+        for up in [false, true] {
+            let mut last = self;
+            for _ in 0..BESIDE {
+                let reach =
+                    if up { last.reach + stride } else { last.reach.saturating_sub(stride) };
+                if !(1..=most).contains(&reach) {
+                    break;
+                }
+                last = Self { reach, likelihood: f64::NEG_INFINITY, ..last }
+                    .maximised(components, noise);
+                if last.likelihood.is_nan() || last.likelihood <= greatest - NEGLIGIBLE {
+                    break;
+                }
+                near.push((stride as f64, last));
+            }
+        }
+    }
+
+    /// Share and variances as likely as these, with their weights; all shares are alike beforehand.
+    fn alike(
+        self,
+        components: &Components,
+        noise: Option<f64>,
+    ) -> Result<Vec<(f64, Self)>, ForceError> {
+        let reach = self.reach as f64;
+        let odds = (self.share * reach + 1.0) / ((1.0 - self.share) * reach + 1.0);
+        let mut best = vec![odds.ln(), self.force.ln()];
+        best.extend(noise.is_none().then(|| self.noise.ln()));
+        let at = |point: &[f64]| Self {
+            share: (1.0 + (-point[0]).exp()).recip().clamp(1e-12, 1.0 - 1e-12),
+            force: point[1].exp(),
+            noise: point.get(2).map_or(self.noise, |log| log.exp()),
+            ..self
+        };
+        let points = alike(&best, |point| {
+            let trial = at(point);
+            // In the logarithm of the odds, shares that are all alike are not.
+            let alike = trial.share.ln() + (1.0 - trial.share).ln();
+            Some(trial.log_likelihood(components) + alike).filter(|value| value.is_finite())
+        })?;
+        Ok(points.into_iter().map(|(weight, point)| (weight, at(&point))).collect())
+    }
+
+    /// Variance τ² g_i of the force of a driven component.
+    fn driven(&self, components: &Components, i: usize) -> f64 {
         if i >= self.reach {
             return 0.0;
         }
-        let driven = self.force * components.singular[i].powi(2);
-        let (_, probability) = self.component(components, i);
-        probability * driven / (driven + self.noise)
+        self.force * components.frequency[i].powi(-2 * self.colour)
     }
 
-    /// Variance of f_i given the measurement, per real unknown.
-    pub fn variance(&self, components: &Components, i: usize) -> f64 {
+    fn factor(&self, components: &Components, i: usize) -> f64 {
+        if i >= self.reach {
+            return 0.0;
+        }
+        let shown = self.driven(components, i) * components.singular[i].powi(2);
+        let (_, probability) = self.component(components, i);
+        probability * shown / (shown + self.noise)
+    }
+
+    fn variance(&self, components: &Components, i: usize) -> f64 {
         if i >= self.reach {
             return 0.0;
         }
         let (s, energy) = (components.singular[i], components.energy[i] / components.weight[i]);
-        let driven = self.force * s * s;
-        let gain = driven / (driven + self.noise);
+        let force = self.driven(components, i);
+        let shown = force * s * s;
+        let gain = shown / (shown + self.noise);
         let (_, probability) = self.component(components, i);
         let mean = (gain / s).powi(2) * energy;
-        probability * (self.force * (1.0 - gain) + (1.0 - probability) * mean)
+        probability * (force * (1.0 - gain) + (1.0 - probability) * mean)
     }
 
-    fn at_reach(components: &Components, reach: usize) -> Self {
-        let mut starts = vec![Self::white(components, reach)];
-        let head = |i: usize| components.weight[i] * components.singular[i].powi(2);
+    fn at_reach(components: &Components, reach: usize, colour: i32, noise: Option<f64>) -> Self {
+        let blank = Self {
+            share: 0.999,
+            force: 1.0,
+            noise: 1.0,
+            reach,
+            colour,
+            likelihood: f64::NEG_INFINITY,
+        };
+        let mut starts = vec![blank.white(components, noise)];
+        let head = |i: usize| {
+            components.weight[i] * components.singular[i].powi(2) * blank.driven(components, i)
+        };
         let gain: f64 = (0..reach).map(head).sum();
         let energy: f64 = components.energy[..reach].iter().sum();
-        for noise in Self::first_noises(components, reach) {
+        let noises = match noise {
+            Some(noise) => vec![noise],
+            None => Self::first_noises(components, reach),
+        };
+        for noise in noises {
             for share in [0.9, 0.3] {
                 let force = energy / (gain * share);
-                starts.push(Self { share, force, noise, reach, likelihood: f64::NEG_INFINITY });
+                starts.push(Self { share, force, noise, ..blank });
             }
         }
         starts
             .into_iter()
-            .map(|start| start.maximised(components))
+            .map(|start| start.maximised(components, noise))
             .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood))
             .expect("there are starts")
     }
@@ -106,24 +281,34 @@ impl Evidence {
     }
 
     /// Every component within reach driven: the ratio σ/τ on a grid, both variances from it.
-    fn white(components: &Components, reach: usize) -> Self {
-        let (data, tail) = (components.data(), tail_energy(components, reach));
-        let start = Self { share: 0.999, force: 1.0, noise: 1.0, reach, likelihood: f64::MIN };
-        let mut best = (f64::INFINITY, start);
+    fn white(self, components: &Components, noise: Option<f64>) -> Self {
+        let (data, tail) = (components.data(), tail_energy(components, self.reach));
+        let shown =
+            |i: usize| components.singular[i].powi(2) * self.driven(components, i) / self.force;
+        let largest = (0..self.reach).map(shown).fold(0.0, f64::max);
+        let within: f64 = components.weight[..self.reach].iter().sum();
+        let mut best = (f64::INFINITY, self);
         for step in 0..=80 {
-            let ratio = (components.singular[0] * 10f64.powf(-0.1 * f64::from(step))).powi(2);
+            let ratio = largest * 10f64.powf(-0.2 * f64::from(step));
             let (mut force, mut log) = (tail / ratio, 0.0);
-            for i in 0..reach {
-                let total = components.singular[i].powi(2) + ratio;
+            for i in 0..self.reach {
+                let total = shown(i) + ratio;
                 force += components.energy[i] / total;
                 log += components.weight[i] * total.ln();
             }
-            let within: f64 = components.weight[..reach].iter().sum();
             log += (data - within) * ratio.ln();
             force /= data;
-            let cost = data * force.ln() + log;
+            let cost = match noise {
+                // The level says what the ratio makes of it.
+                Some(noise) => {
+                    let given = noise / ratio;
+                    data * given.ln() + log + data * force / given
+                }
+                None => data * force.ln() + log + data,
+            };
+            let force = noise.map_or(force, |noise| noise / ratio);
             if cost < best.0 {
-                best = (cost, Self { force, noise: force * ratio, ..start });
+                best = (cost, Self { force, noise: force * ratio, ..self });
             }
         }
         best.1
@@ -133,10 +318,10 @@ impl Evidence {
     ///
     /// # Source
     /// Dempster, Laird & Rubin (1977), Maximum likelihood from incomplete data via the EM algorithm.
-    fn maximised(mut self, components: &Components) -> Self {
+    fn maximised(mut self, components: &Components, noise: Option<f64>) -> Self {
         for _ in 0..ROUNDS {
             let before = self.likelihood;
-            self = self.round(components);
+            self = self.round(components, noise);
             if (self.likelihood - before).abs() < SETTLED {
                 break;
             }
@@ -144,32 +329,39 @@ impl Evidence {
         self
     }
 
-    /// One round; the likelihood is that of the values before it.
-    fn round(self, components: &Components) -> Self {
-        let tail = tail_energy(components, self.reach);
+    /// Logarithm of the likelihood of all components.
+    fn log_likelihood(&self, components: &Components) -> f64 {
         let within: f64 = components.weight[..self.reach].iter().sum();
         let mut likelihood = -0.5 * (components.data() - within) * self.noise.ln();
-        likelihood -= tail / (2.0 * self.noise);
-        let (mut driven, mut driven_weight, mut force, mut noise) = (0.0, 0.0, 0.0, tail);
+        likelihood -= tail_energy(components, self.reach) / (2.0 * self.noise);
+        (0..self.reach).for_each(|i| likelihood += self.component(components, i).0);
+        likelihood
+    }
+
+    /// One round; the likelihood is that of the values before it.
+    fn round(self, components: &Components, known: Option<f64>) -> Self {
+        let likelihood = self.log_likelihood(components);
+        let (mut driven, mut driven_weight, mut force) = (0.0, 0.0, 0.0);
+        let mut noise = tail_energy(components, self.reach);
         for i in 0..self.reach {
             let (s, weight) = (components.singular[i], components.weight[i]);
             let energy = components.energy[i];
-            let (log, probability) = self.component(components, i);
-            likelihood += log;
-            let gain = self.force * s * s / (self.force * s * s + self.noise);
-            let spread = self.force * (1.0 - gain) * weight;
+            let (_, probability) = self.component(components, i);
+            let variance = self.driven(components, i);
+            let gain = variance * s * s / (variance * s * s + self.noise);
+            let spread = variance * (1.0 - gain) * weight;
             driven += probability;
             driven_weight += probability * weight;
-            force += probability * ((gain / s).powi(2) * energy + spread);
+            force += probability * ((gain / s).powi(2) * energy + spread) * self.force / variance;
             noise += (1.0 - probability) * energy
                 + probability * ((1.0 - gain).powi(2) * energy + s * s * spread);
         }
         Self {
             share: (driven / self.reach as f64).clamp(1e-3, 1.0 - 1e-6),
             force: (force / driven_weight.max(f64::MIN_POSITIVE)).max(f64::MIN_POSITIVE),
-            noise: (noise / components.data()).max(f64::MIN_POSITIVE),
-            reach: self.reach,
+            noise: known.unwrap_or((noise / components.data()).max(f64::MIN_POSITIVE)),
             likelihood,
+            ..self
         }
     }
 
@@ -179,7 +371,8 @@ impl Evidence {
         let log = |share: f64, variance: f64| {
             share.ln() - 0.5 * weight * variance.ln() - energy / (2.0 * variance)
         };
-        let driven = log(self.share, self.force * components.singular[i].powi(2) + self.noise);
+        let shown = self.driven(components, i) * components.singular[i].powi(2);
+        let driven = log(self.share, shown + self.noise);
         let silent = log(1.0 - self.share, self.noise);
         let larger = driven.max(silent);
         let sum = (driven - larger).exp() + (silent - larger).exp();

@@ -4,6 +4,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
+use crate::band::{empty_band, is_within};
 use crate::lines::{check_lines, noise_weight};
 use crate::noise::{Noise, channel_sizes};
 use crate::transfer::Transfer;
@@ -27,7 +28,8 @@ use crate::{ForceError, IdentifiedForce, Measurement};
 /// [`ForceError::NotTransmitted`] at a line that does not show the forces in the channels, as
 /// DC does not in velocities; [`ForceError::MoreForcesThanMeasurements`],
 /// [`ForceError::NoForcedDof`], [`ForceError::NoSuchDof`], [`ForceError::Resonance`],
-/// [`ForceError::TooFewOutsideLines`], [`ForceError::NoNoise`], [`ForceError::NotPositive`].
+/// [`ForceError::TooFewOutsideLines`], [`ForceError::NoNoise`], [`ForceError::NotPositive`];
+/// [`ForceError::EmptyBand`] where no line lies in the band of the measurement.
 ///
 /// # Source
 /// Dissertation section 6.2 suggests it; eq. (4.6.9) is its real form for one degree of freedom.
@@ -42,6 +44,7 @@ pub fn frequency_domain(
     let spectrum = Spectrum::of(measured.record());
     check_lines(&spectrum, lines)?;
     let level = noise.resolve(measured, &spectrum, lines)?;
+    let lines = &within(measured, lines)?;
     let scale = level.clone().unwrap_or_else(|| channel_sizes(measured.record()));
     let transfer = Transfer { system, channels: measured.channels(), forced, scale: &scale };
 
@@ -67,7 +70,22 @@ pub fn frequency_domain(
             DMatrix::from_fn(sampling.len(), system.dof(), |_, dof| variance[dof].sqrt());
         Record::new(sampling, constant)
     });
-    Ok(IdentifiedForce::of(force.to_record()?)
+    let force = IdentifiedForce::of(force.to_record()?)
         .with_standard_error(standard_error.transpose()?)
-        .with_rest(rest.transpose()?))
+        .with_rest(rest.transpose()?);
+    Ok(match measured.band_hz() {
+        Some(band_hz) => force.with_band(band_hz),
+        None => force,
+    })
+}
+
+/// The lines within the band of the measurement.
+fn within(measured: &Measurement, lines: &[usize]) -> Result<Vec<usize>, ForceError> {
+    let (sampling, Some(band_hz)) = (measured.sampling(), measured.band_hz()) else {
+        return Ok(lines.to_vec());
+    };
+    let spacing = sampling.line_spacing_hz();
+    let inside = |n: &&usize| is_within(band_hz, **n as f64 * spacing, spacing);
+    let kept: Vec<usize> = lines.iter().filter(inside).copied().collect();
+    if kept.is_empty() { Err(empty_band(band_hz, sampling)) } else { Ok(kept) }
 }

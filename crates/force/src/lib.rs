@@ -7,7 +7,7 @@
 //! | [`discretised`] | x, ẋ of every degree of freedom | accelerations are missing and noise is small |
 //! | [`frequency_domain`] | any channels, whole periods | the excited lines are known |
 //! | [`regularised`] | any channels, a period or up to 512 samples × forces | they are not, or there is no period |
-//! | [`kalman`] | any channels, any length | the record is long |
+//! | [`kalman`] | any channels, any length | the record is no period |
 //!
 //! [`with_uncertain_system`] adds to any of them what the covariance of an identified machine means
 //! for the force. The book's chapter on forces has the reasons, and every method's error side by
@@ -50,11 +50,15 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod alike;
+mod augmented;
+mod band;
 mod components;
 mod continuous;
 mod discretised;
 mod error;
 mod evidence;
+mod force_model;
 mod frequency_domain;
 mod identified;
 mod kalman;
@@ -69,15 +73,18 @@ mod open_operator;
 mod period_operator;
 mod regularised;
 mod rule;
+mod seen;
 mod smoother;
 mod state_space;
 mod transfer;
 mod uncertainty;
 mod unexplained;
 
+pub use band::within_band;
 pub use continuous::continuous;
 pub use discretised::{discretised, discretised_by_taylor};
 pub use error::ForceError;
+pub use force_model::ForceModel;
 pub use frequency_domain::frequency_domain;
 pub use identified::IdentifiedForce;
 pub use kalman::{KalmanForce, Tuning, kalman};

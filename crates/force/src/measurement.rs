@@ -5,6 +5,7 @@ use mechid_signal::{Record, Sampling};
 use nalgebra::DMatrix;
 
 use crate::ForceError;
+use crate::band::check_band;
 
 /// One measured channel: a quantity at a degree of freedom.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -35,6 +36,8 @@ pub enum Start {
 pub struct Measurement {
     record: Record,
     channels: Vec<Channel>,
+    /// Band in which the force is sought; `None`: all frequencies.
+    band_hz: Option<[f64; 2]>,
 }
 
 impl Measurement {
@@ -49,13 +52,13 @@ impl Measurement {
                 described: channels.len(),
             });
         }
-        Ok(Self { record, channels })
+        Ok(Self { record, channels, band_hz: None })
     }
 
     /// The same quantity on every channel, channel c at degree of freedom c.
     pub fn of_all(quantity: ResponseQuantity, record: Record) -> Self {
         let channels = (0..record.channels()).map(|dof| Channel { dof, quantity }).collect();
-        Self { record, channels }
+        Self { record, channels, band_hz: None }
     }
 
     /// Displacement, velocity and acceleration of every degree of freedom.
@@ -69,7 +72,7 @@ impl Measurement {
             Record::new(response.sampling(), data).expect("records of a response are finite");
         let channels =
             (0..3 * dof).map(|c| Channel { dof: c % dof, quantity: parts[c / dof].0 }).collect();
-        Self { record, channels }
+        Self { record, channels, band_hz: None }
     }
 
     /// The measured samples × channels, in m, m/s or m/s² as each channel's quantity says.
@@ -80,6 +83,32 @@ impl Measurement {
     /// Degree of freedom and response quantity of each channel.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
+    }
+
+    /// Seeks the force between two frequencies in Hz, ends included, and nowhere else.
+    ///
+    /// Force and standard error are then those of this band ([`within_band`](crate::within_band)
+    /// of the force); what the channels show outside of it counts for the noise and the spectrum of
+    /// the force, but is not returned.
+    ///
+    /// # Errors
+    /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+    pub fn in_band(self, band_hz: [f64; 2]) -> Result<Self, ForceError> {
+        check_band(band_hz)?;
+        Ok(Self { band_hz: Some(band_hz), ..self })
+    }
+
+    /// Lowest and highest frequency at which the force is sought, in Hz; `None`: all.
+    pub fn band_hz(&self) -> Option<[f64; 2]> {
+        self.band_hz
+    }
+
+    /// The band in which channels without a displacement show a force, where it is not all of it.
+    pub(crate) fn shown(&self, seen_from_hz: Option<f64>) -> Option<[f64; 2]> {
+        let displaced = self.channels.iter().any(|c| c.quantity == ResponseQuantity::Displacement);
+        let nyquist = 0.5 * self.sampling().rate_hz();
+        let low_hz = seen_from_hz.filter(|low| !displaced && (0.0..nyquist).contains(low))?;
+        (low_hz > 0.0).then_some([low_hz, nyquist])
     }
 
     /// The time axis.

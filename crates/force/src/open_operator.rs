@@ -2,8 +2,10 @@
 
 use mechid_model::SecondOrderSystem;
 use mechid_model::linear_algebra::svd;
+use mechid_signal::{Extent, Sampling};
 use nalgebra::{DMatrix, DVector};
 
+use crate::band::BandFilter;
 use crate::components::{Components, Operator};
 use crate::state_space::{Machine, growth_rate};
 use crate::{ForceError, Measurement, Start};
@@ -24,6 +26,7 @@ pub(crate) struct OpenOperator {
     shapes: DMatrix<f64>,
     samples: usize,
     forces: usize,
+    sampling: Sampling,
 }
 
 impl OpenOperator {
@@ -66,15 +69,32 @@ impl OpenOperator {
         let singular: Vec<f64> = svd.singular_values.iter().copied().collect();
         let coefficients =
             parts.iter().zip(&singular).map(|(y, s)| if *s > 0.0 { y / s } else { 0.0 }).collect();
+        let shapes = v_t.transpose();
+        let frequency: Vec<f64> =
+            shapes.column_iter().map(|shape| frequency(shape.as_slice(), samples)).collect();
+        let half_spacing = 0.5 * measured.sampling().line_spacing_hz();
         let components = Components {
+            lowest_hz: frequency.iter().map(|rate| rate * half_spacing).collect(),
+            frequency,
             energy: parts.iter().map(|y| y * y).collect(),
             weight: vec![1.0; singular.len()],
             singular,
             outside_energy: (data.norm_squared() - parts.norm_squared()).max(0.0),
             outside_weight: rows.saturating_sub(freed + parts.len()) as f64,
         };
-        Ok(Self { components, coefficients, shapes: v_t.transpose(), samples, forces })
+        let sampling = measured.sampling();
+        Ok(Self { components, coefficients, shapes, samples, forces, sampling })
     }
+}
+
+/// Frequency of a force: change from sample to sample over size, in half periods per record, at
+/// least one.
+fn frequency(shape: &[f64], samples: usize) -> f64 {
+    let steps = shape.chunks(samples).flat_map(|force| force.windows(2));
+    let change: f64 = steps.map(|w| (w[1] - w[0]).powi(2)).sum();
+    let size: f64 = shape.iter().map(|v| v * v).sum();
+    let part = (change / size.max(f64::MIN_POSITIVE)).sqrt();
+    (part * samples as f64 / std::f64::consts::PI).max(1.0)
 }
 
 impl Operator for OpenOperator {
@@ -86,6 +106,17 @@ impl Operator for OpenOperator {
         let damped = DVector::from_fn(factors.len(), |i, _| factors[i] * self.coefficients[i]);
         let (samples, forces) = (nalgebra::Dyn(self.samples), nalgebra::Dyn(self.forces));
         Ok((&self.shapes * damped).reshape_generic(samples, forces))
+    }
+
+    fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError> {
+        let filter = BandFilter { sampling: self.sampling, band_hz, extent: Extent::Open };
+        for mut shape in self.shapes.column_iter_mut() {
+            for force in shape.as_mut_slice().chunks_mut(self.samples) {
+                let kept = filter.apply(force)?;
+                force.copy_from_slice(&kept);
+            }
+        }
+        Ok(())
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

@@ -5,6 +5,7 @@ use mechid_model::linear_algebra::svd;
 use mechid_signal::{Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::band::{empty_band, is_within};
 use crate::components::{Components, Operator};
 use crate::lines::{check_lines, noise_weight};
 use crate::transfer::Transfer;
@@ -62,6 +63,11 @@ impl PeriodOperator {
         let components = Components {
             singular: terms.iter().map(|term| term.0).collect(),
             energy: terms.iter().map(|term| term.1).collect(),
+            frequency: terms.iter().map(|term| frequency(term.3.line, sampling.len())).collect(),
+            lowest_hz: terms
+                .iter()
+                .map(|term| (term.3.line as f64 - 0.5).max(0.0) * sampling.line_spacing_hz())
+                .collect(),
             weight: terms.iter().map(|term| term.2).collect(),
             outside_energy,
             outside_weight,
@@ -69,6 +75,13 @@ impl PeriodOperator {
         let places = terms.into_iter().map(|term| term.3).collect();
         Ok(Self { components, places, sampling, forces: forced.len() })
     }
+}
+
+/// Frequency of a line as the samples have it: change from sample to sample over size, times half the
+/// period in samples. A mean is taken to be as strong as the first line.
+fn frequency(line: usize, len: usize) -> f64 {
+    let half = std::f64::consts::PI / len as f64;
+    (half * line.max(1) as f64).sin() / half
 }
 
 impl Operator for PeriodOperator {
@@ -85,6 +98,19 @@ impl Operator for PeriodOperator {
             }
         }
         Ok(Spectrum::from_lines(self.sampling, lines)?.to_record()?.into_data())
+    }
+
+    fn keep(&mut self, band_hz: [f64; 2]) -> Result<(), ForceError> {
+        let spacing = self.sampling.line_spacing_hz();
+        let mut kept = false;
+        for place in &mut self.places {
+            let inside = is_within(band_hz, place.line as f64 * spacing, spacing);
+            kept |= inside;
+            if !inside {
+                place.shape.fill(Complex::ZERO);
+            }
+        }
+        if kept { Ok(()) } else { Err(empty_band(band_hz, self.sampling)) }
     }
 
     fn variance(&self, components: &[f64]) -> DMatrix<f64> {

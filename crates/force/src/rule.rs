@@ -2,7 +2,7 @@
 
 use crate::ForceError;
 use crate::components::{Components, Fit};
-use crate::evidence::Evidence;
+use crate::evidence::Posterior;
 
 /// Rule for the regularisation parameter λ.
 ///
@@ -15,9 +15,9 @@ use crate::evidence::Evidence;
 pub enum Rule {
     /// The λ whose force is nearest to the mean of the force given the measurement.
     ///
-    /// That mean needs the variances of force and noise, the share of components that are driven
-    /// and how far down the singular values they reach; all four are taken where the measurement
-    /// is most likely. It is the rule to use: the only one here that looks at the error of the
+    /// That mean needs the variances of force and noise, the colour of the force, the share of
+    /// components that are driven and how far down the singular values they reach; all are
+    /// taken where the measurement is most likely. It is the rule to use: the only one here that looks at the error of the
     /// force and not at the fit of the response. The book (`choose/force.md`) compares the others.
     Likelihood,
     /// Generalised cross-validation: least residual²/(data − unknowns)².
@@ -57,6 +57,16 @@ pub enum Filter {
 }
 
 impl Filter {
+    /// λ, if it is given.
+    pub(crate) fn given(self) -> Option<f64> {
+        match self {
+            Filter::Tikhonov(Rule::Given(lambda)) | Filter::TruncatedSvd(Rule::Given(lambda)) => {
+                Some(lambda)
+            }
+            _ => None,
+        }
+    }
+
     /// An error for a given λ that cannot be one.
     pub(crate) fn check(self) -> Result<(), ForceError> {
         match self {
@@ -89,7 +99,11 @@ const LEFT_BY_TIKHONOV: f64 = 1e-4;
 const TIE: f64 = 1e-6;
 
 /// The λ that a rule chooses; infinity means that no force at all is nearest.
-pub(crate) fn choose(filter: Filter, components: &Components) -> Option<f64> {
+pub(crate) fn choose(
+    filter: Filter,
+    components: &Components,
+    posterior: &Posterior,
+) -> Option<f64> {
     let (rule, candidates) = match filter {
         Filter::Tikhonov(rule) => (rule, grid(components.singular[0])),
         Filter::TruncatedSvd(rule) => (rule, thresholds(components)),
@@ -102,9 +116,9 @@ pub(crate) fn choose(filter: Filter, components: &Components) -> Option<f64> {
     let best = match rule {
         Rule::Given(lambda) => return Some(lambda),
         Rule::Likelihood => {
-            let evidence = Evidence::of(components);
-            let mean: Vec<f64> =
-                (0..components.singular.len()).map(|i| evidence.factor(components, i)).collect();
+            let mean: Vec<f64> = (0..components.singular.len())
+                .map(|i| posterior.best_factor(components, i))
+                .collect();
             least(candidates.iter().map(|lambda| {
                 let loss = components.fit(|i| (factor(i, *lambda) - mean[i]).abs());
                 loss.size

@@ -23,7 +23,15 @@ pub(crate) struct StateSpace {
     pub start: Vec<f64>,
 }
 
-/// Data for the backward pass: one block per sample, laid out once.
+/// Relative change of every variance over a step below which the covariance counts as settled.
+///
+/// Variances that approach their end by a part of 10⁻⁴ per step are then within 10⁻⁸ of it.
+const SETTLED: f64 = 1e-12;
+/// The same where only the likelihood is asked for.
+const NEARLY_SETTLED: f64 = 1e-7;
+
+/// Data for the backward pass: one block per sample, laid out once; covariance and gains up to the
+/// sample at which they settle, and no more.
 pub(crate) struct Passage {
     mean: Vec<f64>,
     covariance: Vec<f64>,
@@ -31,36 +39,61 @@ pub(crate) struct Passage {
     gain: Vec<f64>,
     /// Innovation and its variance.
     innovation: Vec<(f64, f64)>,
+    /// Last sample with a covariance and gains of its own.
+    last: usize,
 }
 
 impl Passage {
     /// Variance of each state before the measurement of sample k.
     pub fn variances(&self, k: usize, states: usize) -> impl Iterator<Item = f64> + '_ {
-        let block = &self.covariance[k * states * states..][..states * states];
+        let block = &self.covariance[k.min(self.last) * states * states..][..states * states];
         block.iter().step_by(states + 1).copied()
+    }
+}
+
+/// How well a model predicts the samples, each from those before it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Innovations {
+    /// Sum of the logarithms of their variances.
+    pub log_variance: f64,
+    /// Sum of their squares over their variances.
+    pub energy: f64,
+}
+
+impl Innovations {
+    /// Log-likelihood, constants left out.
+    pub fn log_likelihood(self) -> f64 {
+        -0.5 * (self.log_variance + self.energy)
     }
 }
 
 struct Filter {
     mean: Vec<f64>,
     covariance: Vec<f64>,
+    /// P Zᵀ of each channel, and its innovation's variance, at the last sample.
     gain: Vec<f64>,
+    variance: Vec<f64>,
+    /// Whether covariance, gains and variances are those of the sample before.
+    settled: bool,
+    tolerance: f64,
+    /// Variances before the measurements of the last sample.
+    before: Vec<f64>,
     moved: Vec<f64>,
     product: Vec<f64>,
-    log_likelihood: f64,
+    innovations: Innovations,
 }
 
 impl StateSpace {
-    /// Log-likelihood of the samples (channels of a sample side by side), constants left out.
-    pub fn log_likelihood(&self, samples: &[f64]) -> f64 {
-        let mut filter = Filter::new(self);
+    /// How well the samples (channels of a sample side by side) are predicted.
+    pub fn innovations(&self, samples: &[f64]) -> Innovations {
+        let mut filter = Filter::new(self, NEARLY_SETTLED);
         for sample in samples.chunks_exact(self.channels) {
             for (c, y) in sample.iter().enumerate() {
                 filter.measure(self, c, *y);
             }
             filter.advance(self);
         }
-        filter.log_likelihood
+        filter.innovations
     }
 
     /// The forward pass with what the smoother needs of it.
@@ -68,16 +101,23 @@ impl StateSpace {
         let (m, len) = (self.states, samples.len() / self.channels);
         let mut passage = Passage {
             mean: Vec::with_capacity(len * m),
-            covariance: Vec::with_capacity(len * m * m),
-            gain: Vec::with_capacity(samples.len() * m),
+            covariance: Vec::new(),
+            gain: Vec::new(),
             innovation: Vec::with_capacity(samples.len()),
+            last: 0,
         };
-        let mut filter = Filter::new(self);
-        for sample in samples.chunks_exact(self.channels) {
+        let mut filter = Filter::new(self, SETTLED);
+        for (k, sample) in samples.chunks_exact(self.channels).enumerate() {
             passage.mean.extend_from_slice(&filter.mean);
-            passage.covariance.extend_from_slice(&filter.covariance);
+            if !filter.settled {
+                passage.last = k;
+                passage.covariance.extend_from_slice(&filter.covariance);
+            }
+            let fresh = !filter.settled;
             for (c, y) in sample.iter().enumerate() {
                 passage.innovation.push(filter.measure(self, c, *y));
+            }
+            if fresh {
                 passage.gain.extend_from_slice(&filter.gain);
             }
             filter.advance(self);
@@ -94,13 +134,15 @@ impl StateSpace {
         let (mut r, mut n) = (vec![0.0; m], vec![0.0; m * m]);
         let (mut vector, mut product) = (vec![0.0; m], vec![0.0; m * m]);
         for k in (0..len).rev() {
+            let own = k.min(passage.last);
             for c in (0..channels).rev() {
-                let at = k * channels + c;
-                let (gain, z) = (&passage.gain[at * m..][..m], &self.output[c * m..][..m]);
-                back_over_measurement(&mut r, &mut n, &mut vector, z, gain, passage.innovation[at]);
+                let gain = &passage.gain[(own * channels + c) * m..][..m];
+                let (z, innovation) =
+                    (&self.output[c * m..][..m], passage.innovation[k * channels + c]);
+                back_over_measurement(&mut r, &mut n, &mut vector, z, gain, innovation);
             }
             let mean = &mut passage.mean[k * m..][..m];
-            let p = &passage.covariance[k * m * m..][..m * m];
+            let p = &passage.covariance[own * m * m..][..m * m];
             for i in 0..m {
                 let row = &p[i * m..][..m];
                 mean[i] += dot(row, &r);
@@ -137,15 +179,19 @@ impl StateSpace {
 }
 
 impl Filter {
-    fn new(space: &StateSpace) -> Self {
+    fn new(space: &StateSpace, tolerance: f64) -> Self {
         let m = space.states;
         Self {
             mean: space.start_mean.clone(),
             covariance: space.start.clone(),
-            gain: vec![0.0; m],
+            gain: vec![0.0; m * space.channels],
+            variance: vec![0.0; space.channels],
+            settled: false,
+            tolerance,
+            before: vec![0.0; m],
             moved: vec![0.0; m],
             product: vec![0.0; m * m],
-            log_likelihood: 0.0,
+            innovations: Innovations::default(),
         }
     }
 
@@ -153,16 +199,23 @@ impl Filter {
     fn measure(&mut self, space: &StateSpace, channel: usize, y: f64) -> (f64, f64) {
         let m = space.states;
         let z = &space.output[channel * m..][..m];
-        times(&self.covariance, z, &mut self.gain);
-        let variance = dot(z, &self.gain) + space.noise_variance;
+        let gain = &mut self.gain[channel * m..][..m];
+        if !self.settled {
+            times(&self.covariance, z, gain);
+            self.variance[channel] = dot(z, gain) + space.noise_variance;
+        }
+        let variance = self.variance[channel];
         let innovation = y - dot(z, &self.mean);
         let weight = innovation / variance;
-        self.mean.iter_mut().zip(&self.gain).for_each(|(a, g)| *a += g * weight);
-        for (row, g) in self.covariance.chunks_exact_mut(m).zip(&self.gain) {
-            let g = g / variance;
-            row.iter_mut().zip(&self.gain).for_each(|(p, h)| *p -= g * h);
+        self.mean.iter_mut().zip(gain.iter()).for_each(|(a, g)| *a += g * weight);
+        if !self.settled {
+            for (row, g) in self.covariance.chunks_exact_mut(m).zip(gain.iter()) {
+                let g = g / variance;
+                row.iter_mut().zip(gain.iter()).for_each(|(p, h)| *p -= g * h);
+            }
         }
-        self.log_likelihood -= 0.5 * (variance.ln() + innovation * weight);
+        self.innovations.log_variance += variance.ln();
+        self.innovations.energy += innovation * weight;
         (innovation, variance)
     }
 
@@ -171,6 +224,9 @@ impl Filter {
         let (m, t) = (space.states, &space.transition);
         times(t, &self.mean, &mut self.moved);
         self.mean.copy_from_slice(&self.moved);
+        if self.settled {
+            return;
+        }
         multiply(t, &self.covariance, &mut self.product, m);
         for (i, row) in self.product.chunks_exact(m).enumerate() {
             for j in i..m {
@@ -178,6 +234,12 @@ impl Filter {
                 self.covariance[i * m + j] = p;
                 self.covariance[j * m + i] = p;
             }
+        }
+        // What the filter knew before the measurements of the last sample and of this one.
+        self.settled = true;
+        for (before, now) in self.before.iter_mut().zip(self.covariance.iter().step_by(m + 1)) {
+            self.settled &= (now - *before).abs() <= self.tolerance * now.abs();
+            *before = *now;
         }
     }
 }
@@ -232,7 +294,8 @@ mod tests {
 
     const M: usize = 3;
     const CHANNELS: usize = 2;
-    const LEN: usize = 9;
+    /// So many that the variances settle.
+    const LEN: usize = 90;
 
     fn space() -> StateSpace {
         StateSpace {
@@ -283,12 +346,14 @@ mod tests {
     #[test]
     fn the_smoother_is_the_conditional_distribution_of_all_states() {
         let (mean, variance, likelihood) = conditioned();
-        let (smooth, spread) = space().smooth(space().filter(&samples()));
+        let passage = space().filter(&samples());
+        assert!(passage.last + 1 < LEN, "{}", passage.last);
+        let (smooth, spread) = space().smooth(passage);
         for i in 0..M * LEN {
-            assert!((smooth[i] - mean[i]).abs() < 1e-12, "state {i}");
-            assert!((spread[i] - variance[i]).abs() < 1e-12, "variance {i}");
+            assert!((smooth[i] - mean[i]).abs() < 1e-10, "state {i}");
+            assert!((spread[i] - variance[i]).abs() < 1e-10, "variance {i}");
         }
-        let found = space().log_likelihood(&samples());
-        assert!((found - likelihood).abs() < 1e-11, "{found} {likelihood}");
+        let found = space().innovations(&samples()).log_likelihood();
+        assert!((found - likelihood).abs() < 1e-6, "{found} {likelihood}");
     }
 }

@@ -1,10 +1,11 @@
 //! Calls of `mechid-force`.
 
 use mechid_force::{
-    Channel, Filter, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise, Rule, Start,
-    Tuning, channel_errors, continuous, continuous_with_noise, discretised, discretised_by_taylor,
-    discretised_with_noise, frequency_domain, inner_lines, kalman, line_errors, regularised,
-    relative_error, spectrum_ratio, spurious_ratio, with_uncertain_system,
+    Channel, Filter, ForceModel, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
+    Rule, Start, Tuning, channel_errors, continuous, continuous_with_noise, discretised,
+    discretised_by_taylor, discretised_with_noise, frequency_domain, inner_lines, kalman,
+    line_errors, regularised, relative_error, spectrum_ratio, spurious_ratio,
+    with_uncertain_system,
 };
 use mechid_model::{Discretisation, Response, UncertainSystem};
 use mechid_signal::{Sampling, Spectrum};
@@ -74,6 +75,13 @@ fn measured(d: &mut Draw) -> Result<(), String> {
     let dof = 1 + d.below(3);
     let (Some(system), Some(sampling)) = (d.system(dof)?, d.sampling()?) else { return Ok(()) };
     let Some(measured) = measurement(d, dof, sampling)? else { return Ok(()) };
+    let measured = if d.one_in(4) {
+        let band_hz = [d.number(), d.number()];
+        let Ok(banded) = measured.in_band(band_hz) else { return Ok(()) };
+        banded
+    } else {
+        measured
+    };
     let forced = if d.one_in(4) { d.indices(3) } else { vec![d.below(dof)] };
     let lines = if d.one_in(2) { inner_lines(&measured) } else { d.lines(sampling.len()) };
     let levels = (0..d.dof(measured.channels().len())).map(|_| d.number()).collect();
@@ -95,11 +103,12 @@ fn measured(d: &mut Draw) -> Result<(), String> {
             found(force.map(|found| found.force))
         }
         _ => {
-            let [noise, walk] = [0; 2].map(|_| d.numbers(3));
+            let [noise, rms] = [0; 2].map(|_| d.numbers(3));
+            let model = ForceModel { order: d.below(18), corner_hz: d.number(), rms };
             let tuning = d.of(&[
                 Tuning::Likelihood,
                 Tuning::NoiseKnown(noise.clone()),
-                Tuning::Given { noise_std: noise, walk },
+                Tuning::Given { noise_std: noise, model },
             ]);
             found(kalman(&system, &measured, &forced, start, &tuning).map(|found| found.force))
         }

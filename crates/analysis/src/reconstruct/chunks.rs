@@ -17,7 +17,8 @@ use crate::measurement::CHUNK_SAMPLES;
 pub fn are_enough_for(method: Method, request: &Request, machine: &Machine) -> bool {
     // The phase that channels add is that of the whole record.
     let phase = machine.nonlinear.as_ref().is_some_and(|p| p.channels != ChannelPhase::default());
-    !phase && !request.periodic && matches!(method, Method::Continuous | Method::Discretised)
+    let whole = request.periodic || request.band_hz.is_some();
+    !phase && !whole && matches!(method, Method::Continuous | Method::Discretised)
 }
 
 /// Callback for a chunk, the force on it, and the range of its samples that count.

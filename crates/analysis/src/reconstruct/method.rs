@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use mechid_force::{
     Channel, Filter, ForceError, ForceUnknowns, IdentifiedForce, Measurement, MotionNoise, Noise,
-    OPEN_UNKNOWNS, Rule, Start, Tuning, Unexplained, continuous, continuous_nonlinear,
+    Rule, Start, Tuning, Unexplained, continuous, continuous_nonlinear,
     continuous_nonlinear_with_noise, continuous_with_noise, discretised, discretised_with_noise,
     frequency_domain, inner_lines, kalman, regularised, with_uncertain_nonlinear_system,
     with_uncertain_system,
@@ -26,6 +26,8 @@ pub struct Request {
     /// Degrees of freedom with an unknown force, counted from 0.
     pub forced: Vec<usize>,
     pub lines: Option<Vec<usize>>,
+    /// Frequencies between which the force is sought, in Hz.
+    pub band_hz: Option<[f64; 2]>,
     pub periodic: bool,
     pub start: Start,
     pub rule: Rule,
@@ -53,14 +55,16 @@ pub struct How {
     pub chosen: Vec<(String, f64, &'static str)>,
     /// Unexplained part of each measured channel; `None` where there is no surplus channel.
     pub unexplained: Option<Vec<Unexplained>>,
+    /// Frequency, in Hz, below which the responses show less of a force than noise; `None` where the
+    /// method does not tell, or they show it nowhere.
+    pub seen_from_hz: Option<f64>,
+    /// Frequencies between which force and standard error hold, in Hz; `None`: all.
+    pub band_hz: Option<[f64; 2]>,
     /// Remarks to read before using the numbers.
     pub remarks: Vec<String>,
 }
 
-/// Open records of more unknowns than this go to the Kalman smoother unless told otherwise.
-const SHORT: usize = OPEN_UNKNOWNS / 2;
-
-/// The method for a record of these channels and so many samples, and the reason for it.
+/// The method for a record of these channels, and the reason for it.
 ///
 /// # Errors
 /// [`AnalysisError::NonlinearMachine`] where the machine is not linear and the motion not complete, or
@@ -69,7 +73,6 @@ pub fn choose(
     request: &Request,
     machine: &Machine,
     channels: &[Channel],
-    samples: usize,
 ) -> Result<(Method, String), AnalysisError> {
     let dofs = machine.system().dof();
     if machine.nonlinear.is_some() {
@@ -82,7 +85,6 @@ pub fn choose(
     if request.method != Method::Auto {
         return Ok((request.method, "it was asked for".into()));
     }
-    let unknowns = samples * request.forced.len();
     let (method, why) = if request.periodic && request.lines.is_some() {
         (Method::FrequencyDomain, "whole periods, and the lines with force are given".into())
     } else if complete(channels, dofs, true) && request.forced.len() == dofs {
@@ -92,10 +94,8 @@ pub fn choose(
         )
     } else if request.periodic {
         (Method::Shrinkage, "whole periods, the lines with force not given".into())
-    } else if unknowns <= SHORT {
-        (Method::Tikhonov, format!("an open record of {unknowns} unknowns, at most {SHORT}"))
     } else {
-        (Method::Kalman, format!("an open record of {unknowns} unknowns, more than {SHORT}"))
+        (Method::Kalman, "an open record".into())
     };
     Ok((method, why))
 }
@@ -106,8 +106,7 @@ pub fn find(
     machine: &Machine,
     motion: &Measurement,
 ) -> Result<Found, AnalysisError> {
-    let samples = motion.sampling().len();
-    let (method, why) = choose(request, machine, motion.channels(), samples)?;
+    let (method, why) = choose(request, machine, motion.channels())?;
     let known = &machine.uncertain;
     match method {
         Method::Continuous | Method::Discretised => {
@@ -155,12 +154,19 @@ pub fn equation(
     let ends = if request.periodic { Extent::WholePeriod } else { Extent::Open };
     let linear = Discretisation::FirstOrderHold;
     let noise = motion_noise(request, motion, machine.system().dof())?;
+    let kept = |force: IdentifiedForce| match request.band_hz {
+        Some(band_hz) => force.white_in_band(band_hz, ends),
+        None => Ok(force),
+    };
+    if let (false, Some([low_hz, high_hz])) = (with_acceleration, request.band_hz) {
+        return Err(AnalysisError::BandMethod { low_hz, high_hz });
+    }
     if let Some(part) = &machine.nonlinear {
-        return with_terms(part, &response, noise.as_ref());
+        return with_terms(part, &response, noise.as_ref(), &kept);
     }
     with_machine(&machine.uncertain, &|system| match (with_acceleration, &noise) {
-        (true, None) => continuous(system, &response),
-        (true, Some(noise)) => continuous_with_noise(system, &response, noise),
+        (true, None) => continuous(system, &response).and_then(kept),
+        (true, Some(noise)) => continuous_with_noise(system, &response, noise).and_then(kept),
         (false, None) => discretised(system, &response, linear, ends),
         (false, Some(noise)) => discretised_with_noise(system, &response, linear, ends, noise),
     })
@@ -171,6 +177,7 @@ fn with_terms(
     part: &NonlinearPart,
     response: &Response,
     noise: Option<&MotionNoise>,
+    kept: &dyn Fn(IdentifiedForce) -> Result<IdentifiedForce, ForceError>,
 ) -> Result<IdentifiedForce, AnalysisError> {
     let before = |record: &Record| -> Result<Record, AnalysisError> {
         Ok(part.channels.correct(record, record)?.1)
@@ -181,8 +188,8 @@ fn with_terms(
         before(response.acceleration())?,
     )?;
     Ok(with_uncertain_nonlinear_system(&part.uncertain, |system| match noise {
-        None => continuous_nonlinear(system, &response),
-        Some(noise) => continuous_nonlinear_with_noise(system, &response, noise),
+        None => continuous_nonlinear(system, &response).and_then(kept),
+        Some(noise) => continuous_nonlinear_with_noise(system, &response, noise).and_then(kept),
     })?)
 }
 
@@ -225,6 +232,8 @@ impl How {
             counts_noise: !request.noise.is_empty(),
             chosen: Vec::new(),
             unexplained: None,
+            seen_from_hz: None,
+            band_hz: request.band_hz,
             remarks: Vec::new(),
         }
     }
@@ -239,11 +248,8 @@ fn lines(
     if !request.periodic {
         return Err(AnalysisError::ForceNeedsPeriods);
     }
-    let all = inner_lines(motion);
-    let lines = request.lines.clone().unwrap_or_else(|| all.clone());
-    // Where nothing was driven the record shows its own noise.
-    let enough = all.len() >= lines.len() + mechid_force::MIN_OUTSIDE_LINES;
-    let noise = noise(request, if enough { Noise::OutsideLines } else { Noise::Unknown });
+    let lines = request.lines.clone().unwrap_or_else(|| inner_lines(motion));
+    let noise = noise(request, outside(request, motion));
     let find = |system: &SecondOrderSystem| {
         frequency_domain(system, motion, &request.forced, &lines, &noise)
     };
@@ -253,7 +259,22 @@ fn lines(
     let unexplained = force.unexplained().map(<[_]>::to_vec);
     let method = "dynamic stiffness, line by line";
     let remarks = elsewhere(motion, request).into_iter().collect();
-    Ok(Found { force, how: How { method, why, counts_noise, chosen, unexplained, remarks } })
+    let (seen_from_hz, band_hz) = (None, force.band_hz());
+    Ok(Found {
+        force,
+        how: How { method, why, counts_noise, chosen, unexplained, seen_from_hz, band_hz, remarks },
+    })
+}
+
+/// What shows the noise where it is not stated: lines that carry no force, if there are enough of
+/// them. Lines outside a band may carry one that is not asked for.
+fn outside(request: &Request, motion: &Measurement) -> Noise {
+    let given = request.lines.as_ref().filter(|_| request.periodic);
+    let needed = mechid_force::MIN_OUTSIDE_LINES;
+    match given.is_some_and(|lines| inner_lines(motion).len() >= lines.len() + needed) {
+        true => Noise::OutsideLines,
+        false => Noise::Unknown,
+    }
 }
 
 fn filtered(
@@ -269,7 +290,7 @@ fn filtered(
         (None, true) => ForceUnknowns::EveryLine,
         (_, false) => ForceUnknowns::Samples(request.start),
     };
-    let noise = noise(request, Noise::Unknown);
+    let noise = noise(request, outside(request, motion));
     let regular = regularised(machine.system(), motion, forced, &extent, filter, &noise)?;
     // The machine is moved with the parameter that was chosen, not with another choice.
     let fixed = match (filter, regular.parameter) {
@@ -277,13 +298,12 @@ fn filtered(
         (Filter::TruncatedSvd(_), Some(lambda)) => Filter::TruncatedSvd(Rule::Given(lambda)),
         _ => filter,
     };
-    let find = |system: &SecondOrderSystem| {
-        regularised(system, motion, forced, &extent, fixed, &noise).map(|regular| regular.force)
+    let banded = of_this_band(motion, &regular.force)?;
+    let find = |system: &SecondOrderSystem| match system == machine.system() {
+        true => Ok(regular.force.clone()),
+        false => regularised(system, &banded, forced, &extent, fixed, &noise).map(|r| r.force),
     };
-    let force = match machine.parameters().is_empty() {
-        true => regular.force,
-        false => with_machine(machine, &find)?,
-    };
+    let force = with_machine(machine, &find)?;
     let mut chosen = Vec::new();
     if let Some(lambda) = regular.parameter {
         chosen.push(("parameter λ".into(), lambda, "scaled channel/N"));
@@ -297,7 +317,23 @@ fn filtered(
         _ => "mean of the force given the measurement (shrinkage)",
     };
     let remarks = elsewhere(motion, request).into_iter().collect();
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
+    let (seen_from_hz, band_hz, counts_noise) = (regular.seen_from_hz, force.band_hz(), true);
+    Ok(Found {
+        force,
+        how: How { method, why, counts_noise, chosen, unexplained, seen_from_hz, band_hz, remarks },
+    })
+}
+
+/// The measurement, with the band in which the force was found as the one asked for: a change of the
+/// machine must not choose another.
+fn of_this_band(
+    motion: &Measurement,
+    force: &IdentifiedForce,
+) -> Result<Measurement, AnalysisError> {
+    Ok(match force.band_hz() {
+        Some(band_hz) => motion.clone().in_band(band_hz)?,
+        None => motion.clone(),
+    })
 }
 
 /// Part of the power of a response on the lines of the force below which it has another cause.
@@ -360,17 +396,19 @@ fn smoothed(
     };
     let smoothed = kalman(machine.system(), motion, forced, request.start, &tuning)?;
     let fixed =
-        Tuning::Given { noise_std: smoothed.noise_std.clone(), walk: smoothed.walk.clone() };
-    let find = |system: &SecondOrderSystem| {
-        kalman(system, motion, forced, request.start, &fixed).map(|smoothed| smoothed.force)
+        Tuning::Given { noise_std: smoothed.noise_std.clone(), model: smoothed.model.clone() };
+    let banded = of_this_band(motion, &smoothed.force)?;
+    let find = |system: &SecondOrderSystem| match system == machine.system() {
+        true => Ok(smoothed.force.clone()),
+        false => kalman(system, &banded, forced, request.start, &fixed).map(|found| found.force),
     };
-    let force = match machine.parameters().is_empty() {
-        true => smoothed.force,
-        false => with_machine(machine, &find)?,
-    };
-    let mut chosen = Vec::new();
-    for (dof, walk) in forced.iter().zip(&smoothed.walk) {
-        chosen.push((format!("random walk of force {}", dof + 1), *walk, "N/√s"));
+    let force = with_machine(machine, &find)?;
+    let mut chosen = vec![
+        ("order of the force model".into(), smoothed.model.order as f64, ""),
+        ("corner of the force model".into(), smoothed.model.corner_hz, "Hz"),
+    ];
+    for (dof, rms) in forced.iter().zip(&smoothed.model.rms) {
+        chosen.push((format!("RMS value of force {} in the model", dof + 1), *rms, "N"));
     }
     chosen.extend(noise_levels(motion, &smoothed.noise_std, 1));
     let mut unexplained = force.unexplained().map(<[_]>::to_vec);
@@ -379,6 +417,10 @@ fn smoothed(
         unexplained.iter_mut().flatten().for_each(|channel| channel.noise = None);
     }
     let method = "augmented Kalman filter and smoother, tuned by likelihood";
+    let (seen_from_hz, band_hz, counts_noise) = (smoothed.seen_from_hz, force.band_hz(), true);
     let remarks = Vec::new();
-    Ok(Found { force, how: How { method, why, counts_noise: true, chosen, unexplained, remarks } })
+    Ok(Found {
+        force,
+        how: How { method, why, counts_noise, chosen, unexplained, seen_from_hz, band_hz, remarks },
+    })
 }

@@ -6,6 +6,7 @@
 //! | `motion` | the measured responses |
 //! | `method` | which method suits a record, and what it finds |
 //! | `chunks` | the same where the record is not held in memory |
+//! | `shown` | the band in which responses without a displacement show a force |
 //! | `unexplained`, `periods`, `kinematics` | what speaks against the result |
 //! | `tally`, `peak_line` | levels and strongest line of the force |
 //! | `summary` | the result: numbers and remarks |
@@ -18,6 +19,7 @@ pub mod options;
 mod peak_line;
 mod periods;
 mod scatter;
+mod shown;
 pub mod summary;
 mod tally;
 mod unexplained;
@@ -100,7 +102,7 @@ pub fn numbered(base: &str, dof: usize, dofs: usize) -> String {
 /// [`AnalysisError::MotionCount`] or [`AnalysisError::NoMotion`] if the responses do not fit the
 /// machine, [`AnalysisError::NoiseCount`], [`AnalysisError::Forced`], what the method cannot be done
 /// with ([`AnalysisError::ForceMotions`], [`AnalysisError::ForceNeedsPeriods`],
-/// [`AnalysisError::KalmanIsOpen`]), and its own failure.
+/// [`AnalysisError::KalmanIsOpen`], [`AnalysisError::BandMethod`]), and its own failure.
 pub fn reconstruct(
     run: &Measurement,
     machine: &Machine,
@@ -199,9 +201,9 @@ impl Task {
         take: &mut Take<'_>,
     ) -> Result<(ForceSummary, Option<IdentifiedForce>), AnalysisError> {
         let Self { recorded, request } = self;
-        let (dofs, samples) = (machine.system().dof(), recorded.sampling.len());
+        let dofs = machine.system().dof();
         let mut tally = Tally::new(recorded.sampling, dofs, request.periodic, take)?;
-        let (method, why) = method::choose(request, machine, &recorded.channels, samples)?;
+        let (method, why) = method::choose(request, machine, &recorded.channels)?;
         let mut rates = KinematicConsistency::of(&recorded.channels);
         let (mut how, force) = if !all_at_once && chunks::are_enough_for(method, request, machine) {
             chunks::find(request, machine, recorded, method, &mut |chunk, force, kept| {
@@ -210,7 +212,10 @@ impl Task {
             })?;
             (How::of_equation(method, why, request, machine), None)
         } else {
-            let held = recorded.hold()?;
+            let mut held = recorded.hold()?;
+            if let Some(band_hz) = request.band_hz {
+                held.motion = held.motion.in_band(band_hz)?;
+            }
             rates.push(&held.motion);
             let Found { force, mut how } = method::find(request, machine, &held.motion)?;
             tally.push_all(&force, how.counts_noise)?;
@@ -218,6 +223,7 @@ impl Task {
             periods::tell_noise(how.unexplained.as_mut(), recorded, &held);
             (how, Some(force))
         };
+        how.remarks.extend(shown::remark(&recorded.channels, request, &how));
         how.remarks.extend(rates.remarks(recorded.columns()));
         Ok((self.summary(machine, settings, &how, &tally), force))
     }
@@ -265,6 +271,7 @@ impl Task {
                 .map(|(name, value, unit)| Chosen { name: name.clone(), value: *value, unit })
                 .collect(),
             channels,
+            band_hz: how.band_hz,
             forces: tally.forces(&request.forced),
             remarks,
             analysis: settings.clone(),
@@ -294,6 +301,7 @@ impl Request {
                 some => some.iter().map(|dof| dof - 1).collect(),
             },
             lines: lines.transpose()?,
+            band_hz: how.band_hz.map(|band| [band.low_hz, band.high_hz]),
             periodic,
             start: if how.at_rest { Start::FromRest } else { Start::InMotion },
             rule: how.rule.rule(),

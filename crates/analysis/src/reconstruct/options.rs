@@ -4,6 +4,8 @@ use mechid_force::Rule;
 use mechid_io::LineSpec;
 use serde::{Deserialize, Serialize};
 
+use crate::identify::Band;
+
 /// Settings of the reconstruction of the force that drove a known machine.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -14,6 +16,9 @@ pub struct Reconstruct {
     pub forced: Vec<usize>,
     /// Spectral lines with force; `None`: not known.
     pub lines: Option<LineSpec>,
+    /// Frequencies between which the force is sought, ends included; `None`: all, or without a
+    /// displacement those at which the responses show a force.
+    pub band_hz: Option<Band>,
     /// `true` if an open record begins at rest.
     pub at_rest: bool,
     /// Standard deviation of the noise in each measured column, in its unit, before periods are
@@ -82,6 +87,12 @@ impl Reconstruct {
     /// Returns the settings for one method.
     pub fn by(method: Method) -> Self {
         Self { method, ..Self::default() }
+    }
+
+    /// Seeks the force between two frequencies only.
+    #[must_use]
+    pub fn band(self, band_hz: Band) -> Self {
+        Self { band_hz: Some(band_hz), ..self }
     }
 
     /// Seeks forces on these degrees of freedom only, counted from 1.

@@ -34,6 +34,9 @@ pub struct ForceSummary {
     pub chosen: Vec<Chosen>,
     /// Channels, one each.
     pub channels: Vec<Measured>,
+    /// Lowest and highest frequency, in Hz, between which forces and standard errors hold; `None`: at
+    /// all frequencies.
+    pub band_hz: Option<[f64; 2]>,
     /// Forces, one per degree of freedom.
     pub forces: Vec<ForceRow>,
     /// Remarks to read before using the numbers.
@@ -97,6 +100,10 @@ impl ForceSummary {
         }
         for channel in self.channels.iter().filter_map(Measured::text) {
             let _ = writeln!(text, "  {channel}");
+        }
+        if let Some(band) = self.band_hz {
+            let [low, high] = band.map(|hz| significant(hz, 4));
+            let _ = writeln!(text, "  force and standard error: of {low} to {high} Hz");
         }
         let error = if self.counts_machine_alone() {
             "standard error of machine (N)"

@@ -45,6 +45,7 @@ impl Reconstruction {
             method: if lines.is_some() { Method::FrequencyDomain } else { Method::Auto },
             forced: forced.clone(),
             lines: lines.clone(),
+            band_hz: None,
             periodic: lines.is_some(),
             start: Start::InMotion,
             rule: Rule::Likelihood,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use mechid::Reconstruct;
+use mechid::analysis::identify::Band;
 use mechid::analysis::reconstruct::{
     ForceChunk, ParameterRule, reconstruct_in_chunks, reconstruct_with,
 };
@@ -49,6 +50,10 @@ pub struct ForceArgs {
     /// Spectral lines with force: all, odd, even, or numbers and ranges first:step:last
     #[arg(long, value_name = "LINES")]
     lines: Option<LineSpec>,
+    /// Seek the force between two frequencies only, in Hz; force and standard error are then those of
+    /// this band [default: all, or without a displacement those at which the responses show a force]
+    #[arg(long, value_name = "LOW:HIGH", conflicts_with = "lines")]
+    band_hz: Option<Band>,
     /// An open record begins at rest
     #[arg(long)]
     at_rest: bool,
@@ -111,6 +116,7 @@ impl ForceArgs {
             method: self.method.into(),
             forced: self.forced.clone(),
             lines: self.lines.clone(),
+            band_hz: self.band_hz,
             at_rest: self.at_rest,
             noise: self.noise.clone(),
             rule: match self.parameter {

@@ -1,7 +1,7 @@
 //! Every method without a choice of its own is a linear map of the measurement.
 
 use mechid_force::{
-    IdentifiedForce, Measurement, Noise, Start, Tuning, continuous, discretised,
+    ForceModel, IdentifiedForce, Measurement, Noise, Start, Tuning, continuous, discretised,
     discretised_by_taylor, frequency_domain, kalman,
 };
 use mechid_model::{Discretisation, Response, ResponseQuantity, SecondOrderSystem};
@@ -45,7 +45,8 @@ const METHODS: [(&str, Method); 7] = [
         frequency_domain(s, &measured(v), &[1], &[1, 2, 5], &noise).unwrap()
     }),
     ("Kalman", |s, v| {
-        let tuning = Tuning::Given { noise_std: vec![0.1, 0.1], walk: vec![5.0] };
+        let model = ForceModel { order: 2, corner_hz: 3.0, rms: vec![5.0] };
+        let tuning = Tuning::Given { noise_std: vec![0.1, 0.1], model };
         kalman(s, &measured(v), &[1], Start::FromRest, &tuning).unwrap().force
     }),
 ];

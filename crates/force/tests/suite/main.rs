@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each test program of its own would compile nalgebra anew.
 
+mod accelerations;
 mod common;
 mod discretised;
 mod dissertation;
@@ -11,6 +12,7 @@ mod linearity;
 mod motion_noise;
 mod noise_study;
 mod regularised;
+#[allow(dead_code, reason = "the example uses the rest")]
 mod study;
 mod uncertainty;
 mod unexplained;

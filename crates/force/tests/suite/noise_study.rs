@@ -1,5 +1,6 @@
 //! The promises of the book (`choose/force.md`), and that its tables are the ones the study gives.
 
+use crate::study::coverage::{INTERVALS, SHAPES, coverage};
 use crate::study::{Case, KNOWN, cases, rms_error, rule_rows, rule_table, tables};
 use mechid_force::{Filter, Rule};
 
@@ -69,6 +70,25 @@ fn the_likelihood_rule_stays_near_the_best_parameter_as_the_book_prints() {
     let lost = |rule: usize| rows.iter().map(|r| r.2[rule].mean).fold(0.0, f64::max);
     assert!(lost(1) > 3.0 && lost(3) > 5.0, "GCV {:.1}, textbook {:.1}", lost(1), lost(3));
     assert_printed("| Excited |", &rule_table(&rows));
+}
+
+/// Where the book says that 95 % intervals hold, twelve records each hold 89 to 99 % of the samples.
+#[test]
+fn intervals_hold_the_force_of_bands_lines_and_walks() {
+    for name in
+        ["Tikhonov, lines known", "shrinkage", "Tikhonov", "truncated SVD", "Kalman smoother"]
+    {
+        let interval = INTERVALS.iter().find(|interval| interval.0 == name).unwrap();
+        for (bearing, level) in [(false, 0.05), (true, 0.01)] {
+            for shape in [SHAPES[0], SHAPES[4]] {
+                let Some([held, ..]) = coverage(interval, bearing, shape, level, 12) else {
+                    continue;
+                };
+                let what = format!("{name}, {}, {bearing}, {level}", shape.name());
+                assert!((0.89..0.99).contains(&held), "{what}: {held:.3}");
+            }
+        }
+    }
 }
 
 /// The parameter does not have to be told what the noise is: half and twice the noise move it.

@@ -542,6 +542,7 @@ def reconstruct(
     method: ForceMethod = "auto",
     forced: Sequence[int] = (),
     lines: str | None = None,
+    band_hz: tuple[float, float] | None = None,
     at_rest: bool = False,
     noise: Sequence[float] = (),
     rule: Literal["likelihood", "gcv", "l-curve"] = "likelihood",
@@ -566,6 +567,9 @@ def reconstruct(
         Degrees of freedom on which a force acts, counted from 1; all, without.
     lines : str, optional
         Spectral lines with force.
+    band_hz : (float, float), optional
+        Frequencies between which the force is sought, in Hz; all, without, or of records without a
+        displacement those at which the responses show a force.
     at_rest : bool
         Whether an open record begins at rest.
     noise : sequence of float
@@ -587,11 +591,18 @@ def reconstruct(
         If the responses do not fit the machine or the method, or the method fails.
     """
     found = one(sources, "reconstruct", record)
+    if lines is not None and band_hz is not None:
+        raise TypeError("either `lines` or `band_hz`")
     if settings is None:
+        band = None
+        if band_hz is not None:
+            low, high = band_hz
+            band = {"low_hz": float(low), "high_hz": float(high)}
         settings = {
             "method": method,
             "forced": [_index("forced", dof) for dof in forced],
             "lines": lines,
+            "band_hz": band,
             "at_rest": at_rest,
             "noise": [float(level) for level in noise],
             "rule": rule if parameter is None else {"given": float(parameter)},

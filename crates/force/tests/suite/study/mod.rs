@@ -10,8 +10,23 @@ use mechid_model::{
     Discretisation, KyxSign, Response, ResponseQuantity, SecondOrderSystem, npi_sampling,
 };
 use mechid_problems::{dissertation_bearing, dissertation_sdof, exact_harmonic_periodic};
-use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Spectrum, noise};
+use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, noise};
 use nalgebra::DMatrix;
+
+pub mod accelerations;
+pub mod coverage;
+
+/// The single oscillator or the bearing of the dissertation, and the time axis of its period.
+pub fn machine(bearing: bool) -> (SecondOrderSystem, Sampling) {
+    if bearing {
+        let sampling = npi_sampling(10.0, 256, 1.799248).unwrap();
+        (dissertation_bearing(KyxSign::Minus).system(), sampling)
+    } else {
+        let machine = dissertation_sdof();
+        let sampling = npi_sampling(20.0, 256, machine.natural_frequency()).unwrap();
+        (machine.system(), sampling)
+    }
+}
 
 /// Noise realisations per case.
 pub const SEEDS: u64 = 10;
@@ -28,14 +43,7 @@ pub struct Case {
 
 impl Case {
     pub fn new(name: &'static str, bearing: bool, lines: Vec<usize>, level: f64) -> Self {
-        let (system, sampling) = if bearing {
-            let sampling = npi_sampling(10.0, 256, 1.799248).unwrap();
-            (dissertation_bearing(KyxSign::Minus).system(), sampling)
-        } else {
-            let machine = dissertation_sdof();
-            let sampling = npi_sampling(20.0, 256, machine.natural_frequency()).unwrap();
-            (machine.system(), sampling)
-        };
+        let (system, sampling) = machine(bearing);
         let drive = Multisine::flat(lines.clone(), 50.0, Phases::Schroeder).unwrap();
         let drive = drive.sample(sampling).unwrap();
         let dof = system.dof();

@@ -1,0 +1,37 @@
+//! The band in which responses without a displacement show a force.
+
+use mechid_force::Channel;
+use mechid_model::ResponseQuantity;
+
+use super::method::{How, Request};
+use crate::text::significant;
+
+/// Returns a remark on the frequencies at which the responses show less of a force than their noise.
+///
+/// Displacements show a force down to a constant one; where there is one there is nothing to say.
+pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<String> {
+    if channels.iter().any(|channel| channel.quantity == ResponseQuantity::Displacement) {
+        return None;
+    }
+    let accelerated = channels.iter().all(|c| c.quantity == ResponseQuantity::Acceleration);
+    let responses = if accelerated { "accelerations" } else { "velocities and accelerations" };
+    let hz = |value| significant(value, 4);
+    match (how.seen_from_hz?, how.band_hz?, request.band_hz) {
+        (seen, [low, high], None) if seen > 0.0 => Some(format!(
+            "the {responses} do not show a constant force, and below {} Hz less of a force than their \
+             noise: force and standard error are those of {} to {} Hz; for the slower part measure a \
+             displacement as well",
+            hz(seen),
+            hz(low),
+            hz(high)
+        )),
+        (seen, [low, _], Some(_)) if low < seen => Some(format!(
+            "below {0} Hz the {responses} show less of a force than their noise, and the band asked \
+             for begins at {1} Hz: the standard error has that part as unknown; begin the band at {0} \
+             Hz, or measure a displacement as well",
+            hz(seen),
+            hz(low)
+        )),
+        _ => None,
+    }
+}

@@ -1,0 +1,340 @@
+//! Machine and forces as one state space, and the model of the forces that suits a measurement.
+
+use std::f64::consts::{PI, TAU};
+
+use mechid_model::linear_algebra::exponential;
+use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
+use mechid_signal::Sampling;
+use nalgebra::DMatrix;
+
+use crate::alike::alike;
+use crate::force_model::{LowPass, step_noise};
+use crate::nelder_mead::minimise;
+use crate::seen::Seen;
+use crate::smoother::StateSpace;
+use crate::state_space::Machine;
+use crate::{ForceError, ForceModel, Measurement, Start};
+
+/// Orders tried, each from where the one before was most likely; the first two from a grid.
+const ORDERS: [usize; 5] = [1, 2, 4, 8, 16];
+/// Logarithm of the likelihood that a higher order must gain for the next to be tried.
+const ENOUGH: f64 = 1.0;
+/// States that the forces may have together: more of them make long records slow.
+const FORCE_STATES: usize = 16;
+/// Ratio between the corner frequencies tried first, from half a period in the record up.
+const CORNER_RATIO: f64 = 4.0;
+/// Highest corner, in radians per sample: the Nyquist frequency.
+const HIGHEST: f64 = PI;
+/// Signal-to-noise ratios tried first.
+const RATIOS: [f64; 4] = [3.0, 30.0, 300.0, 3000.0];
+/// The noise has no digits left above this ratio, and is all there is below the other.
+const RATIO_RANGE: std::ops::Range<f64> = 0.3..1e8;
+
+/// The machine with forces of any model. A force is carried as that part of x + ½ẍΔt² which it
+/// adds within a step, so that no entry is large whatever the unit of the machine.
+pub(crate) struct Augmented {
+    machine: Machine,
+    rate: DMatrix<f64>,
+    /// Newtons per unit of each force's state.
+    units: Vec<f64>,
+    start: Start,
+    /// Largest displacement, and velocity times Δt, that the measurement may stand for.
+    spreads: [f64; 2],
+    /// Samples, channels side by side, divided by their scale.
+    data: Vec<f64>,
+    sampling: Sampling,
+    seen: Seen,
+}
+
+/// A model of the forces with the noise it leaves, in channel scales.
+#[derive(Debug, Clone)]
+pub(crate) struct Tuned {
+    pub model: ForceModel,
+    pub noise: f64,
+    pub log_likelihood: f64,
+    /// Logarithms of the signal-to-noise ratio of each force and of the corner in radians per
+    /// sample; none of a model given.
+    free: Vec<f64>,
+}
+
+impl Augmented {
+    pub fn new(
+        system: &SecondOrderSystem,
+        measured: &Measurement,
+        forced: &[usize],
+        start: Start,
+        scale: &[f64],
+    ) -> Result<Self, ForceError> {
+        let sampling = measured.sampling();
+        let (channels, dt) = (scale.len(), sampling.dt());
+        let machine = Machine::new(system, measured, forced, scale)?;
+        let units = machine.input.column_iter().map(|column| column.amax().recip()).collect();
+        let sizes = Sizes::of(measured);
+        let data = (0..sampling.len() * channels)
+            .map(|at| {
+                measured.record().data()[(at / channels, at % channels)] / scale[at % channels]
+            })
+            .collect();
+        Ok(Self {
+            rate: StateTransition::rate(system, dt),
+            units,
+            start,
+            spreads: [sizes.displacement, sizes.velocity * dt],
+            data,
+            sampling,
+            seen: Seen::new(system, measured, forced, scale)?,
+            machine,
+        })
+    }
+
+    pub fn data(&self) -> &[f64] {
+        &self.data
+    }
+
+    pub fn seen(&self) -> &Seen {
+        &self.seen
+    }
+
+    /// Newtons per unit of each force's state.
+    pub fn units(&self) -> &[f64] {
+        &self.units
+    }
+
+    /// The state space under a model; `noise` and `spread` are relative to the channel scales and
+    /// to what the measurement shows at most.
+    pub fn space(
+        &self,
+        model: &ForceModel,
+        process: &LowPass,
+        noise: f64,
+        spread: f64,
+    ) -> Result<StateSpace, ForceError> {
+        let (states, channels, order) = (self.rate.nrows(), self.machine.out.nrows(), model.order);
+        let (n, m) = (states / 2, states + self.units.len() * order);
+        let corner = TAU * model.corner_hz * self.sampling.dt();
+        let (mut rate, mut driven) = (DMatrix::zeros(m, m), DMatrix::zeros(m, m));
+        let mut start = DMatrix::zeros(m, m);
+        let mut output = DMatrix::zeros(m, channels);
+        rate.view_mut((0, 0), (states, states)).copy_from(&self.rate);
+        output.view_mut((0, 0), (states, channels)).copy_from(&self.machine.out.transpose());
+        if self.start == Start::InMotion {
+            for i in 0..states {
+                start[(i, i)] = (spread * self.spreads[i / n]).powi(2);
+            }
+        }
+        for (f, unit) in self.units.iter().enumerate() {
+            let at = states + f * order;
+            let input = self.machine.input.column(f) * *unit;
+            rate.view_mut((n, at), (n, 1)).copy_from(&input);
+            rate.view_mut((at, at), (order, order)).copy_from(&(&process.rate * corner));
+            let variance = (model.rms[f] / unit).powi(2);
+            driven[(at + order - 1, at + order - 1)] = variance * process.intensity * corner;
+            start.view_mut((at, at), (order, order)).copy_from(&(&process.covariance * variance));
+            let through = self.machine.through.column(f).transpose() * *unit;
+            output.view_mut((at, 0), (1, channels)).copy_from(&through);
+        }
+        let transition = exponential(&rate)?;
+        let driven = step_noise(&rate, &[driven])?.remove(0);
+        Ok(StateSpace {
+            states: m,
+            channels,
+            transition: transition.transpose().as_slice().to_vec(),
+            process: driven.as_slice().to_vec(),
+            output: output.as_slice().to_vec(),
+            noise_variance: noise * noise,
+            start_mean: vec![0.0; m],
+            start: start.as_slice().to_vec(),
+        })
+    }
+
+    /// The likelihood under a model, given as the logarithms of each force's signal-to-noise ratio
+    /// and of the corner in radians per sample. A noise that is not known is the one that the
+    /// innovations have: all variances go with it.
+    fn trial(&self, process: &LowPass, noise: Option<f64>, free: &[f64]) -> Option<Tuned> {
+        let (corner, ratios) = free.split_last()?;
+        let (lowest, forces) = (self.lowest(), ratios.len());
+        let outside = |ratio: &f64| !RATIO_RANGE.contains(&ratio.exp());
+        if !(lowest.ln()..=HIGHEST.ln()).contains(corner) || ratios.iter().any(outside) {
+            return None;
+        }
+        let order = process.rate.nrows();
+        let corner_hz = corner.exp() / (TAU * self.sampling.dt());
+        let mut model = ForceModel { order, corner_hz, rms: vec![1.0; forces] };
+        let unit = noise.unwrap_or(1.0);
+        for (f, ratio) in ratios.iter().enumerate() {
+            let gain = self.seen.gain(&model, process, f);
+            model.rms[f] = unit * ratio.exp() / gain;
+        }
+        if model.rms.iter().any(|rms| !(*rms > 0.0 && rms.is_finite())) {
+            return None;
+        }
+        let largest = ratios.iter().copied().fold(0.0, f64::max).exp();
+        // Ten times what was seen is no constraint, and leaves the filter its digits.
+        let spread = 10.0 * if noise.is_none() { largest } else { 1.0 };
+        let space = self.space(&model, process, unit, spread).ok()?;
+        let innovations = space.innovations(&self.data);
+        let count = self.data.len() as f64;
+        let (noise, log_likelihood) = match noise {
+            Some(noise) => (noise, innovations.log_likelihood()),
+            None => {
+                let variance = innovations.energy / count;
+                let log = count * variance.ln() + innovations.log_variance + count;
+                (variance.sqrt(), -0.5 * log)
+            }
+        };
+        if noise != unit {
+            model.rms.iter_mut().for_each(|rms| *rms *= noise);
+        }
+        let free = free.to_vec();
+        log_likelihood.is_finite().then_some(Tuned { model, noise, log_likelihood, free })
+    }
+
+    /// A model given, with the noise of the scales.
+    pub fn given(&self, model: &ForceModel) -> Result<Tuned, ForceError> {
+        let process = LowPass::new(model.order)?;
+        let space = self.space(model, &process, 1.0, 10.0)?;
+        let log_likelihood = space.innovations(&self.data).log_likelihood();
+        Ok(Tuned { model: model.clone(), noise: 1.0, log_likelihood, free: Vec::new() })
+    }
+
+    /// Lowest corner, in radians per sample: half a period in twenty records.
+    fn lowest(&self) -> f64 {
+        0.05 * PI / self.sampling.len() as f64
+    }
+
+    /// The model of greatest likelihood of all orders.
+    pub fn most_likely(&self, noise: Option<f64>) -> Result<Tuned, ForceError> {
+        let forces = self.units.len();
+        let mut best: Option<Tuned> = None;
+        let mut from: Option<(f64, Vec<f64>)> = None;
+        for order in ORDERS {
+            if order > 2 && order * forces > FORCE_STATES {
+                break;
+            }
+            let process = LowPass::new(order)?;
+            let cost = |free: &[f64]| {
+                self.trial(&process, noise, free).map_or(f64::INFINITY, |t| -t.log_likelihood)
+            };
+            let start = match &from {
+                Some((_, point)) if order > 2 => sharper(point, &cost),
+                _ => match self.coarse(forces, &cost) {
+                    Some(point) => point,
+                    None => continue,
+                },
+            };
+            // A hundredth in the log-likelihood moves no parameter by a tenth of its own uncertainty.
+            let step = if order > 2 { 0.3 } else { 1.0 };
+            let point = minimise(cost, &start, step, 0.01, 60 * (forces + 1));
+            let Some(tuned) = self.trial(&process, noise, &point) else { continue };
+            from = Some((tuned.log_likelihood, point));
+            let gain = best.as_ref().map(|best| tuned.log_likelihood - best.log_likelihood);
+            if gain.is_none_or(|gain| gain > 0.0) {
+                best = Some(tuned);
+            }
+            // Where twice the order says no more, four times says no more either.
+            if order > 4 && gain.is_some_and(|gain| gain < ENOUGH) {
+                break;
+            }
+        }
+        best.ok_or(ForceError::NoLikelihood)
+    }
+
+    /// Models as likely as the best one, with their weights; that one alone where it was given.
+    pub fn alike(&self, best: &Tuned, noise: Option<f64>) -> Result<Vec<(f64, Tuned)>, ForceError> {
+        if best.free.is_empty() {
+            return Ok(vec![(1.0, best.clone())]);
+        }
+        let process = LowPass::new(best.model.order)?;
+        let points =
+            alike(&best.free, |point| Some(self.trial(&process, noise, point)?.log_likelihood))?;
+        let tuned =
+            |(weight, point): (f64, Vec<f64>)| Some((weight, self.trial(&process, noise, &point)?));
+        Ok(points.into_iter().filter_map(tuned).collect())
+    }
+
+    /// The best point of a grid, all forces alike.
+    fn coarse(&self, forces: usize, cost: &dyn Fn(&[f64]) -> f64) -> Option<Vec<f64>> {
+        let mut best = (f64::INFINITY, None);
+        let mut corner = PI / self.sampling.len() as f64;
+        while corner < HIGHEST {
+            for ratio in RATIOS {
+                let mut point = vec![ratio.ln(); forces];
+                point.push(corner.ln());
+                let value = cost(&point);
+                if value < best.0 {
+                    best = (value, Some(point));
+                }
+            }
+            corner *= CORNER_RATIO;
+        }
+        best.1
+    }
+
+    /// The state space started from what a first pass says of the first sample, within a hundred
+    /// times what the filter knows once it has settled.
+    ///
+    /// The wide start of the first pass costs the variances of the first samples their digits;
+    /// this one does not, and moves the estimates by a ten-thousandth of their standard error.
+    pub fn started(&self, mut space: StateSpace) -> StateSpace {
+        let (m, machine) = (space.states, self.rate.nrows());
+        let first = space.filter(&self.data);
+        let settled = (3 * m).min(self.sampling.len() - 1);
+        let variances: Vec<f64> = first.variances(settled, m).take(machine).collect();
+        let (mean, _) = space.smooth(first);
+        for (i, variance) in variances.iter().enumerate() {
+            let start = &mut space.start[i * m + i];
+            if *start > 0.0 {
+                *start = start.min(1e4 * variance);
+                space.start_mean[i] = mean[i];
+            }
+        }
+        space
+    }
+}
+
+/// A start for a higher order: the corner of the one before, and the ratio that suits a sharper end.
+/// A band whose end is too gentle takes noise for force.
+fn sharper(point: &[f64], cost: &dyn Fn(&[f64]) -> f64) -> Vec<f64> {
+    let mut best = (cost(point), point.to_vec());
+    let last = point.len() - 1;
+    for ratio in RATIOS {
+        let mut trial = vec![ratio.ln(); last];
+        trial.push(point[last]);
+        let value = cost(&trial);
+        if value < best.0 {
+            best = (value, trial);
+        }
+    }
+    best.1
+}
+
+/// Upper sizes of the motion, from what was measured: velocities by differences of the samples
+/// (noise included), displacements as if all motion were one period long.
+#[derive(Default)]
+struct Sizes {
+    displacement: f64,
+    velocity: f64,
+}
+
+impl Sizes {
+    fn of(measured: &Measurement) -> Self {
+        let sampling = measured.sampling();
+        let (fast, slow) = (1.0 / sampling.dt(), 1.0 / sampling.omega0());
+        let mut largest = Self::default();
+        for (channel, column) in
+            measured.channels().iter().zip(measured.record().data().column_iter())
+        {
+            let size = column.amax();
+            let step =
+                column.as_slice().windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+            let [x, v] = match channel.quantity {
+                ResponseQuantity::Displacement => [size, step * fast],
+                ResponseQuantity::Velocity => [size * slow, size],
+                ResponseQuantity::Acceleration => [size * slow * slow, size * slow],
+            };
+            largest.displacement = largest.displacement.max(x);
+            largest.velocity = largest.velocity.max(v);
+        }
+        largest
+    }
+}
