@@ -5,7 +5,7 @@ use std::fmt::Display;
 use mechid_analysis::bearing::Coefficients;
 use mechid_analysis::frf::{Estimator, Weight};
 use mechid_analysis::identify::{
-    Between, Derivatives, Fit, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
+    Band, Between, Derivatives, Fit, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
     ValidationWindow,
 };
 use mechid_analysis::reconstruct::Method as ForceMethod;
@@ -137,6 +137,7 @@ fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
             method: method(d),
             noise: pooling(d),
             extent: if d.one_in(3) { Some(d.extent()) } else { None },
+            force_noise: if d.one_in(4) { Some(d.numbers(3)) } else { None },
         },
     };
     let mut how = Identify { fit, ..Identify::default() };
@@ -245,6 +246,7 @@ fn force(d: &mut Draw, record: &Measurement) -> Result<(), String> {
         ]),
         forced: if d.one_in(3) { d.indices(2) } else { Vec::new() },
         lines: None,
+        band_hz: d.one_in(4).then(|| Band { low_hz: d.number(), high_hz: d.number() }),
         at_rest: d.one_in(2),
         noise: if d.one_in(3) { d.numbers(4) } else { Vec::new() },
         rule: match d.below(5) {

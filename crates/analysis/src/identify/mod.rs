@@ -409,6 +409,11 @@ impl Identified {
         &self.fitted
     }
 
+    /// Returns whether the records are the hits of a hammer test.
+    pub(crate) fn is_hammer_test(&self) -> bool {
+        !self.summary.hits.is_empty()
+    }
+
     /// Returns the names of the channels of the first record, without units.
     pub fn names(&self) -> &Channels {
         &self.records[0].held.names
@@ -430,6 +435,12 @@ impl Identified {
     /// Returns the spectra that were fitted; `None` for a fit in the time domain.
     pub fn spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
         self.fitted.frequency.as_ref().map(|(_, data)| data)
+    }
+
+    /// Returns the spectra to draw: those fitted, of open records the responses to the forces alone; `None` for
+    /// a fit in the time domain.
+    pub fn drawn_spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
+        self.fitted.open.as_ref().or_else(|| self.spectra())
     }
 }
 

@@ -95,10 +95,11 @@ pub(super) fn fit(
     let (data, lines): (Vec<FrequencyData>, Vec<Lines>) = spectra.into_iter().unzip();
     let all = joined(&data)?;
     let fit = output_error_pooling(&all, unknowns, noise.response)?;
-    fit.estimate.system()?;
-    let closed = match &fit.ends {
-        Some(ends) => ends.taken_off(&data)?,
-        None => data,
+    let (closed, alone) = match &fit.ends {
+        Some(ends) => {
+            (ends.taken_off(&data)?, ends.taken_off_responses(&data, &fit.estimate.system()?)?)
+        }
+        None => (data.clone(), data),
     };
     let mut after = Vec::new();
     for ((Windowed { held, .. }, data), lines) in records.iter().zip(&closed).zip(&lines) {
@@ -142,7 +143,7 @@ pub(super) fn fit(
         remarks: of_motion.chain(remarks).collect(),
         noise: fit.noise,
         force_noise: of_force,
-        open: true,
+        open: Some(joined(&alone)?),
         nonlinear: None,
         estimate: fit.estimate,
     };

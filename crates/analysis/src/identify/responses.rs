@@ -108,7 +108,7 @@ pub fn fit(
         misfit,
         noise: Vec::new(),
         force_noise: Vec::new(),
-        open: false,
+        open: None,
         remarks,
         estimate,
         nonlinear: None,

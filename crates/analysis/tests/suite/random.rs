@@ -49,7 +49,7 @@ fn warns(identified: &Identified) -> bool {
 }
 
 fn is_open(identified: &Identified) -> bool {
-    identified.fitted().open
+    identified.fitted().open.is_some()
 }
 
 /// Of 100 intervals of 95 % fewer than 88 % hold with a probability of 0.003; a warning on right data is to be

@@ -134,7 +134,7 @@ impl Display for Sentence<'_> {
                     mode + 1,
                     three_digits(*lines)
                 )?;
-                match (self.verdict(), settled) {
+                match (self.finding.verdict(), settled) {
                     (Verdict::Good, _) => Ok(()),
                     (_, true) => write!(
                         f,

@@ -1,6 +1,6 @@
 //! Forces and displacements at chosen frequencies: what every estimator of this module takes.
 
-use mechid_model::ResponseQuantity;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -260,6 +260,26 @@ impl FrequencyData {
         }
         closed.ends = DMatrix::zeros(self.len(), 0);
         closed
+    }
+
+    /// The rows that belong to periods, those of open records with the response of `system` to the load of their
+    /// ends, the force less the `closed` one, taken off the displacement.
+    pub(crate) fn with_response_of_load_taken_off(
+        &self,
+        closed: &DMatrix<Complex<f64>>,
+        system: &SecondOrderSystem,
+    ) -> Self {
+        let mut alone = self.clone();
+        for (row, omega) in self.omega.iter().enumerate() {
+            // At an undamped resonance the motion is that of rounding: it stays as it is.
+            if let Ok(receptance) = system.receptance(*omega) {
+                let load = (closed.row(row) - self.force.row(row)).transpose();
+                let displacement = self.displacement.row(row) - (receptance * load).transpose();
+                alone.displacement.row_mut(row).copy_from(&displacement);
+            }
+        }
+        alone.ends = DMatrix::zeros(self.len(), 0);
+        alone
     }
 
     /// Second differences of neighbouring lines of the same spacing, in which the ends of a record count little:

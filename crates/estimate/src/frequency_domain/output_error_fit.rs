@@ -1,5 +1,6 @@
 //! The result of maximum likelihood, made of the minimum that its search found.
 
+use mechid_model::SecondOrderSystem;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -87,6 +88,24 @@ impl EndLoads {
             record.with_load_of_ends(tau)
         });
         Ok(closed.collect())
+    }
+
+    /// The records that were fitted, each as the response to its force alone: what the loads of its ends make
+    /// of `system` is taken off the displacement (m), where its receptance exists.
+    ///
+    /// # Errors
+    /// As [`EndLoads::taken_off`], and [`EstimateError::Size`] for another number of degrees of freedom.
+    pub fn taken_off_responses(
+        &self,
+        records: &[FrequencyData],
+        system: &SecondOrderSystem,
+    ) -> Result<Vec<FrequencyData>, EstimateError> {
+        let closed = self.taken_off(records)?;
+        let each = records.iter().zip(&closed).map(|(record, closed)| {
+            crate::least_squares::size("degrees of freedom", record.dof(), system.dof())?;
+            Ok(record.with_response_of_load_taken_off(closed.force(), system))
+        });
+        each.collect()
     }
 
     fn of(data: &FrequencyData, tau: &[f64], covariance: DMatrix<f64>) -> Option<Self> {

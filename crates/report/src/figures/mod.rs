@@ -82,7 +82,7 @@ impl ToFigure for Identified {
         if let Some(fitted) = &self.fitted().nonlinear {
             return restoring::figure(&title, fitted);
         }
-        match self.spectra() {
+        match self.drawn_spectra() {
             Some(data) => {
                 let channels = self.names();
                 let drawn = {
