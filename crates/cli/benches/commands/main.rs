@@ -105,25 +105,24 @@ fn figure(what: impl Into<String>, value: String, goal: &'static str) -> Figure 
     Figure { what: what.into(), value, goal }
 }
 
-/// A record of two masses with one force, of four columns.
+/// A record of one mass: time, force, displacement and velocity.
 fn write_record(path: &Path, periods: usize) -> Result<()> {
     let description = format!(
         r#"{{
-        "system": {{ "mass": [[1, 0], [0, 1.5]], "damping": [[6, -2], [-2, 5]],
-                     "stiffness": [[40000, -15000], [-15000, 60000]] }},
+        "system": {{ "mass": 1, "damping": 6, "stiffness": 40000 }},
         "sampling": {{ "samples": 4096, "rate_hz": 2048 }},
         "excitation": [{{ "dof": 1, "lines": "1:400", "amplitude": 1, "phases": "random", "seed": 1 }}],
         "periods": {periods},
         "noise": {{ "displacement": {{ "fraction_of_rms": 0.01 }}, "seed": 3 }}
     }}"#
     );
-    let experiment = mechid::io::Experiment::parse("two masses", &description)?;
+    let experiment = mechid::io::Experiment::parse("one mass", &description)?;
     let measured = mechid::simulate(&experiment)?;
-    let (force, x) = (&measured.measured_force, measured.measured_response.displacement());
+    let (force, response) = (&measured.measured_force, &measured.measured_response);
     let columns: [(String, &[f64]); 3] = [
         ("force".into(), force.channel(0)),
-        ("x".into(), x.channel(0)),
-        ("y".into(), x.channel(1)),
+        ("x".into(), response.displacement().channel(0)),
+        ("v".into(), response.velocity().channel(0)),
     ];
     fs::write(path, csv_text(force.sampling(), &columns))?;
     fs::write(path.with_extension("json"), description)?;
@@ -137,11 +136,11 @@ fn reading(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
     write_record(&record, periods)?;
     let megabytes = fs::metadata(&record)?.len() as f64 * 1e-6;
     println!("a text of {} × 4, {megabytes:.0} MB", 4096 * periods);
-    let force = ["force", "record.csv", "--system", "record.json", "--displacement", "x,y"];
-    let force = [&force[..], &["--method", "discretised"]].concat();
+    let force = ["force", "record.csv", "--system", "record.json", "--displacement", "x"];
+    let force = [&force[..], &["--velocity", "v", "--method", "discretised"]].concat();
     let with_output = [&force[..], &["--output", "force.csv"]].concat();
-    let identify = ["identify", "record.csv", "--force", "force,0", "--displacement", "x,y"];
-    let frf = ["frf", "record.csv", "--force", "force", "--displacement", "x,y"];
+    let identify = ["identify", "record.csv", "--force", "force", "--displacement", "x"];
+    let frf = ["frf", "record.csv", "--force", "force", "--displacement", "x"];
     let period = ["--period", "4096"];
     let commands: [(&str, Vec<&str>); 5] = [
         ("info", vec!["info", "record.csv"]),
