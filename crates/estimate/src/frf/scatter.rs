@@ -40,7 +40,11 @@ impl Scatter {
         let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
         let own = frf.averages - inputs as f64;
         let lines = unexplained.len();
-        let widest = lines.saturating_sub(1) / 2;
+        // The lines of periods are each measured by themselves, however far apart they are.
+        let widest = match segments {
+            Segments::Periods(_) => 0,
+            Segments::Windowed { .. } => lines.saturating_sub(1) / 2,
+        };
         let freedom = |half: usize| own * independent(2 * half + 1, &frf.line_correlation);
         let half = (0..=widest).find(|half| freedom(*half) >= DEVIATIONS).unwrap_or(widest);
         let pooled = (0..lines).map(|line| {
