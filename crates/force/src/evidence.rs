@@ -47,6 +47,9 @@ const NEGLIGIBLE: f64 = 6.0;
 const ENDLESS: f64 = 0.25;
 /// Reaches on either side of the best that are averaged over.
 const BESIDE: usize = 16;
+/// Share of driven components below which a force is one of single lines: of those the silent components say
+/// where they are, and the reach says nothing more.
+const BAND_SHARE: f64 = 0.5;
 
 impl Posterior {
     /// Averages over reach, colour and, at the most likely of them, share and variances; the noise
@@ -158,6 +161,9 @@ impl Evidence {
         }
         let stride = (self.reach / BESIDE).max(1);
         near.push((stride as f64, self));
+        if self.share < BAND_SHARE {
+            return;
+        }
         if self.reach < most {
             let all = Self::at_reach(components, most, 0, noise);
             near.push((ENDLESS * most as f64, all));
