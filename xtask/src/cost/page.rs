@@ -7,9 +7,9 @@ use super::measure::Growth;
 
 const BEGIN: &str = "# What it costs
 
-How time grows with degrees of freedom and with samples, on the machine that `cargo run --release -p xtask -- \
-measure-cost` ran on last.
-That command writes this page and its figure; other machines have other times and nearly the same slopes.
+How time grows with degrees of freedom and with samples, on the machine that `measure-cost`, \
+a task of `cargo xtask`, ran on last.
+It writes this page and its figure; other machines have other times and nearly the same slopes.
 Each point is the shortest of several runs; what else the machine did can only have added to it.
 
 ![Time over degrees of freedom and over samples](cost.svg)

@@ -79,7 +79,7 @@ fn modes_are_those_of_the_machine_and_nothing_else_is_given() {
         for absent in ["m11", "k23", "kg", "N/m"] {
             assert!(!text.contains(absent), "{absent} in {text}");
         }
-        assert!(text.contains("2 degree of freedom 3"), "{text}");
+        assert!(text.contains("2 displacement 3"), "{text}");
         let note = "note: no force acts on degrees of freedom 2 and 3, and their masses are not known: the modes do \
                     not depend on that, but rows 1, 2 and 3 of M, C and K have no scale then, and they are not \
                     given; state masses (`mass`), or apply a force on each of them";

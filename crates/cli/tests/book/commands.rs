@@ -265,7 +265,7 @@ fn what_is_not_there_is_found() {
         ("cargo test -p mechid-cli --test boook", "no test boook"),
         ("cargo test -p mechid-cli --test book no_such_test", "no test no_such_test"),
         ("MECHID_BLUNDER=1 cargo test -p mechid-cli --test book", "does not know MECHID_B"),
-        ("cargo bench -p mechid-cli", "nothing runs"),
+        ("cargo bench -p mechid-plot", "nothing runs"),
         ("cargo install --path crates/mechid", "no program mechid"),
         ("cargo test --workspace --no-run", "no such line"),
         ("pip install mechid-of-another", "`.ci/python` has no such line"),
