@@ -240,7 +240,7 @@ impl Frf {
         self.scatter.as_ref().map_or(own, |scatter| scatter.freedom)
     }
 
-    /// What the responses say of a machine: the sum over lines and motions of γ²/(1 − γ²), the power that the
+    /// Information of the responses on a machine: the sum over lines and motions of γ²/(1 − γ²), the power that the
     /// forces explain over that they leave, without the bias of a sampled coherence, times the averages beyond
     /// those that forces and weights take up (pure number). Longer segments have more lines and less leakage, but
     /// fewer averages.

@@ -68,6 +68,9 @@ impl IdentifiedForce {
     ///
     /// # Errors
     /// [`ForceError::NoBand`] if the lower end is not below the upper one or one is not finite.
+    ///
+    /// # Source
+    /// Brillinger, *Time Series: Data Analysis and Theory* (1981), chapter 4 (white noise on lines).
     pub fn white_in_band(self, band_hz: [f64; 2], extent: Extent) -> Result<Self, ForceError> {
         let record = within_band(&self.record, band_hz, extent)?;
         let sampling = record.sampling();

@@ -1,4 +1,4 @@
-//! What the measured channels show of a force at each frequency.
+//! Sensitivity of the measured channels to a force at each frequency.
 
 use std::f64::consts::{PI, TAU};
 

@@ -37,7 +37,7 @@ const HANN: f64 = 0.375;
 /// use mechid_signal::{NoiseLevel, Record, Sampling, noise, noise_above_band};
 ///
 /// let sampling = Sampling::new(0.001, 4096)?;
-/// let force: Vec<f64> = sampling.times().map(|t| (300.0 * t + 900.0 * t * t).sin()).collect();
+/// let force: Vec<f64> = sampling.times().map(|t| (300.0 * t + 100.0 * t * t).sin()).collect();
 /// let exact = Record::from_channel(sampling, force)?;
 /// let noisy = noise::add_white(&exact, NoiseLevel::StandardDeviation(0.02), 1)?;
 /// let level = noise_above_band(&noisy)?[0].expect("a band without force");

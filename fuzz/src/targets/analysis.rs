@@ -137,7 +137,12 @@ fn settings(d: &mut Draw) -> Result<Option<Identify>, String> {
             method: method(d),
             noise: pooling(d),
             extent: if d.one_in(3) { Some(d.extent()) } else { None },
-            force_noise: if d.one_in(4) { Some(d.numbers(3)) } else { None },
+            // JSON, which settings are saved in, has finite numbers only.
+            force_noise: d.one_in(4).then(|| {
+                let mut levels = d.numbers(3);
+                levels.retain(|level| level.is_finite());
+                levels
+            }),
         },
     };
     let mut how = Identify { fit, ..Identify::default() };

@@ -55,7 +55,7 @@ pub struct Fitted {
     pub noise: Vec<NoiseModel>,
     /// Noise of the forces of each record, where it is not in those spectra and was allowed for.
     pub force_noise: Vec<ForceNoise>,
-    /// Of windows that are no periods, whose ends were fitted, too: the responses to the forces alone.
+    /// Responses to the forces alone, of windows that are no periods, whose ends were fitted, too.
     pub open: Option<FrequencyData>,
     /// Remarks on how the fit was done.
     pub remarks: Vec<String>,

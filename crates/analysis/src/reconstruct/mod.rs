@@ -35,7 +35,7 @@ use self::kinematics::KinematicConsistency;
 use self::method::{Found, How, Request};
 use self::motion::Recorded;
 pub use self::options::{Method, ParameterRule, Reconstruct};
-use self::summary::{Chosen, ForceSummary};
+use self::summary::{Chosen, ForceRow, ForceSummary};
 use self::tally::{Take, Tally};
 pub use self::unexplained::Measured;
 use crate::AnalysisError;
@@ -243,6 +243,8 @@ impl Task {
         let channels = Measured::all(recorded, unexplained);
         let (dofs, uncertain) = (machine.system().dof(), !machine.is_exact());
         remarks.extend(unexplained::remark(&channels, unexplained, request, dofs));
+        let forces = tally.forces(&request.forced);
+        remarks.extend(forces.iter().filter_map(ForceRow::doubt));
         if uncertain && !how.counts_noise {
             remarks.push(
                 "the standard error counts the uncertainty of the machine, not the noise of the \
@@ -272,7 +274,7 @@ impl Task {
                 .collect(),
             channels,
             band_hz: how.band_hz,
-            forces: tally.forces(&request.forced),
+            forces,
             remarks,
             analysis: settings.clone(),
         }

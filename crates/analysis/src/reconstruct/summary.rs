@@ -75,6 +75,25 @@ pub struct ForceRow {
     pub strongest_amplitude: f64,
 }
 
+/// Standard error over the force, RMS values, from which the record hardly determines the force.
+const UNSURE: f64 = 0.5;
+
+impl ForceRow {
+    /// Returns a remark on a force whose standard error is nearly as large as itself.
+    pub(super) fn doubt(&self) -> Option<String> {
+        let share = self.standard_error? / self.rms;
+        (self.sought && share > UNSURE).then(|| {
+            format!(
+                "the record hardly determines the force on degree of freedom {}: its standard error is {} % of its \
+                 RMS value. Possible causes: noise, sensors that hardly show the force, or a machine that is not \
+                 this one",
+                self.dof,
+                significant(100.0 * share, 2)
+            )
+        })
+    }
+}
+
 impl ForceSummary {
     fn counts_machine_alone(&self) -> bool {
         self.machine_uncertainty && !self.noise_uncertainty

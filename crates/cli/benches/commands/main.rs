@@ -274,7 +274,7 @@ fn identification(folder: &Path, figures: &mut Vec<Figure>) -> Result<()> {
         (20, 2048, 4, "maximum-likelihood", "20 s at most"),
     ];
     for (n, samples, periods, method, goal) in cases {
-        let n = if is_tried_only() { n / 10 } else { n };
+        let n = if is_tried_only() { n / 5 } else { n };
         fs::write(folder.join("machine.json"), driven_chain(n, samples, 500, periods))?;
         run(folder, &["simulate", "machine.json", "--output", "machine.csv", "--quiet"])?;
         let (force, displacement) = (channels("force", n), channels("displacement", n));

@@ -277,7 +277,7 @@ fn a_whole_period_closes() {
         assert_eq!(found["fit"]["equations"], equations);
         assert!(error(&found) < 1e-8, "{found}");
         let drawn = fs::read_to_string(folder.join(format!("{extent}.svg"))).unwrap();
-        for part in ["<title>p.csv: 3.183 Hz", "measured", "predicted", "Residual (m)"] {
+        for part in ["<title>p.csv: 3.183 Hz", "measured", "predicted", "Residual of x (m)"] {
             assert!(drawn.contains(part), "no {part}");
         }
     }
@@ -333,7 +333,7 @@ fn several_records_are_one_fit() {
     assert_eq!(found["fit"]["equations"], 512);
     let (_, text, _) = run(folder, &format!("identify a.csv b.csv {columns}"));
     assert!(text.contains("b.csv: samples 1 to 256, 100 Hz\n"), "{text}");
-    assert!(text.contains("excitation: force 1 is persistently exciting of order 2"), "{text}");
+    assert!(text.contains("excitation: f is persistently exciting of order 2"), "{text}");
     refused(folder, &format!("identify a.csv d.csv {columns}"), &["cannot read d.csv"]);
 }
 

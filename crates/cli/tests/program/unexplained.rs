@@ -154,7 +154,13 @@ fn what_the_machine_is_known_to_is_expected() {
             // Periods show their noise; an open record does not, apart from the fit.
             let noise = if way.contains("period") { "" } else { "--noise 4e-8,4e-8" };
             let found = report(folder.path(), &format!("{way} {noise}"));
-            assert_eq!(remarks(&found).contains("unexplained"), doubted, "{way}, {found}");
+            let told = remarks(&found);
+            if doubted && way.contains("kalman") {
+                // A band without end follows both channels of a wrong machine, by a force that is not known.
+                assert!(told.contains("hardly determines the force"), "{way}, {found}");
+                continue;
+            }
+            assert_eq!(told.contains("unexplained"), doubted, "{way}, {found}");
         }
     }
 }

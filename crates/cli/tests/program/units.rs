@@ -41,10 +41,9 @@ fn json(folder: &Path, arguments: &str) -> Value {
 fn alike(path: &str, a: &Value, b: &Value) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
-            for (key, value) in a
-                .iter()
-                .filter(|(key, _)| !["file", "remarks", "covariance"].contains(&key.as_str()))
-            {
+            for (key, value) in a.iter().filter(|(key, _)| {
+                !["file", "remarks", "covariance", "channels"].contains(&key.as_str())
+            }) {
                 alike(&format!("{path}.{key}"), value, &b[key]);
             }
         }

@@ -150,7 +150,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
         let (re, im) = line(&motion, n);
         found += 0.5 * stiffness * stiffness * (re * re + im * im);
     }
-    let cells = row(&document, "Force found and force measured", "1");
+    let cells = row(&document, "Force found and force measured", "F");
     // The strike is 2 N in the mean period, and not in what is held.
     near(&cells[1], measured.sqrt(), 4);
     near(&cells[2], found.sqrt(), 4);
@@ -168,7 +168,7 @@ fn numbers_and_pictures_are_those_of_all_samples() {
     assert!(end.0 - top.0 < 0.2, "{top:?} is not at the end, {end:?}");
     assert!(points.iter().filter(|point| point.1 < 0.5 * (top.1 + end.1)).count() < 4);
 
-    let of_held = row(&document, "What is left of the motion, samples 1 to 262000", "displacement");
+    let of_held = row(&document, "What is left of the motion, samples 1 to 262000", "x");
     near(&of_held[2], rms(without_mean(&all[1][..262_000]).into_iter()), 4);
     assert_eq!(row(&document, "The record", "Samples used")[1], "1 to 270000");
 }
@@ -203,7 +203,7 @@ fn an_open_record_says_which_samples_it_shows() {
         assert!(caption.contains(part), "{caption}");
     }
     assert!(captions.iter().any(|c| c.contains("segments of 32768 samples")), "{captions:?}");
-    let excited = row(&document, "Quality of the excitation, samples 1 to 262144", "1");
+    let excited = row(&document, "Quality of the excitation, samples 1 to 262144", "F");
     // Without the strike: the peak over the RMS of what is held.
     let held = &all[0][..262_144];
     let peak = held.iter().fold(0.0, |peak: f64, x| peak.max(x.abs()));

@@ -185,11 +185,11 @@ fn the_page_says_what_is_in_the_record() {
     let channel = row(&document, "Channels over the window", "F");
     // 77 lines of 5 N: RMS 5 √(77/2).
     assert_eq!((channel[4].as_str(), channel[7].as_str()), ("31.02", "0 %"));
-    let excitation = row(&document, "Quality of the excitation", "1");
+    let excitation = row(&document, "Quality of the excitation", "F");
     assert_eq!(excitation[3..], ["77", "1 to 20", "1.00", "154"]);
-    assert_eq!(row(&document, "What is left of the motion", "displacement")[3..], ["0", "0 %"]);
+    assert_eq!(row(&document, "What is left of the motion", "x")[3..], ["0", "0 %"]);
     assert!(checks(&document).contains("residual 1: rounding"), "{}", checks(&document));
-    let force = row(&document, "Force found and force measured", "1");
+    let force = row(&document, "Force found and force measured", "F");
     assert_eq!((&force[1], &force[2]), (&"31.02".to_owned(), &"31.02".to_owned()));
     let [(heading, _)] = &remarks(&document)[..] else { panic!("nothing speaks against it") };
     assert_eq!(heading, "What speaks for the numbers");
@@ -308,7 +308,7 @@ fn an_open_record_has_its_page_too() {
         figures.iter().find(|figure| figure.attribute("id") == Some("figure-receptance"));
     assert!(text(*receptance.unwrap()).contains("by H1 from segments of 64 samples"));
     assert_eq!(figures.len(), 7);
-    let force = row(&document, "Force found and force measured", "1");
+    let force = row(&document, "Force found and force measured", "F");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
     // Noise of a hundredth on motion of which the inertia is the greater part.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
@@ -335,7 +335,7 @@ fn several_records_and_one_that_was_not_fitted_are_on_the_page() {
         assert!(ids.contains(&format!("figure-{name}-2").as_str()), "{name}");
     }
     assert_eq!(ids.iter().filter(|id| **id == "figure-validation").count(), 1);
-    let fit = &row(&document, "What is predicted", "displacement")[1];
+    let fit = &row(&document, "What is predicted", "x")[1];
     let fit: f64 = fit.strip_suffix(" %").unwrap().parse().unwrap();
     // A uniform number of this width has the standard deviation of its √12th part.
     let motion: f64 = row(&document, "Channels over the window", "x")[4].parse().unwrap();
@@ -387,9 +387,9 @@ fn a_record_in_segments_has_its_page_too() {
     assert_eq!(row(&document, "The record", "Segments")[1], "of 512 samples");
     assert_eq!(row(&document, "The record", "Line spacing")[1], "0.125 Hz");
     let percent = |cell: &str| cell.strip_suffix(" %").unwrap().parse::<f64>().unwrap();
-    let left = row(&document, "What is left of the motion", "displacement");
+    let left = row(&document, "What is left of the motion", "x");
     assert!(percent(&left[4]) < 5.0, "{left:?}");
-    let force = row(&document, "Force found and force measured", "1");
+    let force = row(&document, "Force found and force measured", "F");
     assert!(percent(&force[4]) < 20.0, "{force:?}");
     assert_eq!(tagged(&document, "figure").len(), 6);
 }

@@ -102,7 +102,7 @@ pub enum Finding {
         lines: f64,
         /// Number of samples of a segment that would have as many lines in it as are needed.
         samples_needed: usize,
-        /// Whether what the window blunts could be told from the resonance.
+        /// True if what the window blunts could be told from the resonance.
         settled: bool,
     },
     /// A channel was cut off by an amplifier or a converter.

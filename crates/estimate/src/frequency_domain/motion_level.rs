@@ -61,16 +61,16 @@ mod tests {
         assert!((level - mean.sqrt()).abs() < 1e-6 * level, "{level}");
     }
 
-    /// A resonance a hundred times as high as the noise does not hide its level: of 400 lines 3.5 % of scatter in
-    /// the root, and 40 experiments have a ninth of it in their mean.
+    /// A resonance a hundred times as high as the noise does not hide its level: some 350 lines beside it know the
+    /// root to 2.7 %, and the mean of 40 experiments a sixth of that.
     #[test]
     fn the_level_is_found_beside_a_resonance() {
         let known: Vec<f64> =
-            (0..400).map(|l| 1e4 / (1.0 + (0.2 * (f64::from(l) - 200.0)).powi(2))).collect();
+            (0..400).map(|l| 1e4 / (1.0 + (4.0 * (f64::from(l) - 200.0)).powi(2))).collect();
         let levels: Vec<f64> =
             (0..40).map(|seed| motion_level(powers(1.0, &known, seed).into_iter())).collect();
         let mean = levels.iter().sum::<f64>() / 40.0;
-        assert!((mean - 1.0).abs() < 0.1, "{mean}");
+        assert!((mean - 1.0).abs() < 0.02, "{mean}");
     }
 
     #[test]

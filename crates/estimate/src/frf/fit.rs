@@ -24,9 +24,9 @@ pub struct ResponseEstimate {
     pub fit: OutputErrorFit,
     /// The responses of each record as they were fitted: less what their window blunts.
     pub responses: Vec<Frf>,
-    /// Largest change of a parameter by that, in its standard errors; zero where nothing is blunted.
+    /// Largest change of a parameter by that, in its standard errors (pure number); zero where nothing is blunted.
     pub blunted: f64,
-    /// Whether the rounds in which the blunting and the parameters are found came to an end.
+    /// True if the rounds in which the blunting and the parameters are found came to an end.
     pub settled: bool,
 }
 
