@@ -83,7 +83,8 @@ pub fn output_error_of_responses(
             let system = match unknowns.assemble(entries(&theta).as_slice()) {
                 [m, c, k] => mechid_model::SecondOrderSystem::new(m, c, k)?,
             };
-            let sharp = records.iter().map(|(frf, dofs)| frf.sharpened(&system, dofs)).collect();
+            let sharp: Vec<Frf> =
+                records.iter().map(|(frf, dofs)| frf.sharpened(&system, dofs)).collect();
             let Some(next) = Errors::of(records, &sharp, unknowns, &entries(&theta), &noise) else {
                 break;
             };
@@ -147,7 +148,7 @@ struct Errors {
 impl Errors {
     fn of(
         records: &[(Frf, Vec<usize>)],
-        responses: &Vec<Frf>,
+        responses: &[Frf],
         unknowns: &Unknowns,
         entries: &DVector<f64>,
         noise: &NoiseSpectrum,
