@@ -50,6 +50,8 @@ const BESIDE: usize = 16;
 /// Share of driven components below which a force is one of single lines: of those the silent components say
 /// where they are, and the reach says nothing more.
 const BAND_SHARE: f64 = 0.5;
+/// Driven components below which a force is one of single lines, whatever its share.
+const FEW: f64 = 6.0;
 
 impl Posterior {
     /// Averages over reach, colour and, at the most likely of them, share and variances; the noise
@@ -161,7 +163,7 @@ impl Evidence {
         }
         let stride = (self.reach / BESIDE).max(1);
         near.push((stride as f64, self));
-        if self.share < BAND_SHARE {
+        if self.share < BAND_SHARE || self.share * self.reach as f64 < FEW {
             return;
         }
         if self.reach < most {

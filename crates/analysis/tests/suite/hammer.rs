@@ -91,14 +91,16 @@ fn a_roving_hammer_finds_the_machine() {
     }
 }
 
-/// What is drawn of hits is the motion over the one force that acts, on every line: as accelerance within 1 % of its
-/// largest value (noise of 0.05 m/s², 0.005 m/s² on a line, and 1 N and more of force there).
+/// What is drawn of hits is the response to the one force that acts, on every line: the acceleration is that of the
+/// machine but for six times the noise (0.05 m/s² on a sample, 2/√N of it on a line).
 #[test]
 fn the_receptance_of_hits_is_that_of_the_machine() {
     let truth = rig(ACCELERATION).system().unwrap();
     let found = roving(ACCELERATION, 1);
     let data = found.drawn_spectra().unwrap();
     assert_eq!(data.len(), found.spectra().unwrap().len());
+    let samples = found.summary().records.iter().map(|hit| hit.window.period_samples).min().unwrap();
+    let noise = 0.05 * 2.0 / (samples as f64).sqrt();
     let (mut seen, mut largest, mut worst) = ([0; 2], 0.0_f64, 0.0_f64);
     for (row, omega) in data.omega().iter().enumerate() {
         let struck = usize::from(data.force()[(row, 0)] == Complex::ZERO);
@@ -106,14 +108,15 @@ fn the_receptance_of_hits_is_that_of_the_machine() {
         seen[struck] += 1;
         let h = truth.receptance(*omega).unwrap();
         for motion in 0..2 {
-            let measured = data.displacement()[(row, motion)] / data.force()[(row, struck)];
+            let measured = data.displacement()[(row, motion)];
+            let exact = h[(motion, struck)] * data.force()[(row, struck)];
             let square = omega * omega;
-            largest = largest.max(square * h[(motion, struck)].norm());
-            worst = worst.max(square * (measured - h[(motion, struck)]).norm());
+            largest = largest.max(square * exact.norm());
+            worst = worst.max(square * (measured - exact).norm());
         }
     }
     assert!(seen.iter().all(|lines| *lines > 200), "{seen:?}");
-    assert!(worst < 0.01 * largest, "{worst} of {largest}");
+    assert!(worst < 6.0 * noise && worst < 0.01 * largest, "{worst} of {largest}, noise {noise}");
 }
 
 #[test]
