@@ -163,7 +163,7 @@ impl Evidence {
         }
         let stride = (self.reach / BESIDE).max(1);
         near.push((stride as f64, self));
-        if self.share < BAND_SHARE || self.share * self.reach as f64 < FEW {
+        if self.share < BAND_SHARE || FEW > self.share * self.reach as f64 {
             return;
         }
         if self.reach < most {

@@ -99,7 +99,8 @@ fn the_receptance_of_hits_is_that_of_the_machine() {
     let found = roving(ACCELERATION, 1);
     let data = found.drawn_spectra().unwrap();
     assert_eq!(data.len(), found.spectra().unwrap().len());
-    let samples = found.summary().records.iter().map(|hit| hit.window.period_samples).min().unwrap();
+    let samples =
+        found.summary().records.iter().map(|hit| hit.window.period_samples).min().unwrap();
     let noise = 0.05 * 2.0 / (samples as f64).sqrt();
     let (mut seen, mut largest, mut worst) = ([0; 2], 0.0_f64, 0.0_f64);
     for (row, omega) in data.omega().iter().enumerate() {

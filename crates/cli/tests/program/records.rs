@@ -113,10 +113,12 @@ fn identify_finds_the_same_machine_in_every_format() {
     let report = |file: &str| {
         let (force, motion) = columns_of(file);
         let arguments = format!("--force {force} --displacement {motion} --period 256 --json");
-        let told =
-            mechid(folder.path(), &format!("identify {file} {arguments}")).replace(file, "rec");
+        let told = mechid(folder.path(), &format!("identify {file} {arguments}"));
+        let mut told: serde_json::Value = serde_json::from_str(&told.replace(file, "rec")).unwrap();
         // The names of the columns are those of the file.
-        told.replace(&format!("\"{force}\""), "\"f\"").replace(&format!("\"{motion}\""), "\"x\"")
+        assert_eq!(told["channels"]["force"][0], force);
+        told.as_object_mut().unwrap().remove("channels");
+        told
     };
     let first = report(files[0]);
     for file in files {

@@ -42,7 +42,8 @@ fn alike(path: &str, a: &Value, b: &Value) {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
             for (key, value) in a.iter().filter(|(key, _)| {
-                !["file", "remarks", "covariance", "channels"].contains(&key.as_str())
+                !["file", "remarks", "covariance", "channels", "response_names", "force_names"]
+                    .contains(&key.as_str())
             }) {
                 alike(&format!("{path}.{key}"), value, &b[key]);
             }

@@ -308,7 +308,7 @@ fn an_open_record_has_its_page_too() {
         figures.iter().find(|figure| figure.attribute("id") == Some("figure-receptance"));
     assert!(text(*receptance.unwrap()).contains("by H1 from segments of 64 samples"));
     assert_eq!(figures.len(), 7);
-    let force = row(&document, "Force found and force measured", "F");
+    let force = row(&document, "Force found and force measured", "force");
     let difference: f64 = force[4].strip_suffix(" %").unwrap().parse().unwrap();
     // Noise of a hundredth on motion of which the inertia is the greater part.
     assert!(difference > 0.5 && difference < 5.0, "{difference}");
