@@ -33,8 +33,8 @@ pub(crate) struct Posterior {
 
 /// Colours tried: white, random walk, integrated random walk.
 const COLOURS: [i32; 3] = [0, 1, 2];
-/// Fewest components that tell a colour: a few amplitudes lie near some slope by chance.
-const COLOURED_FROM: usize = 16;
+/// Fewest driven components that tell a colour: a few amplitudes lie near some slope by chance.
+const COLOURED_FROM: f64 = 16.0;
 /// Reaches tried first: all components, then each 0.8 of the one before.
 const REACH_RATIO: f64 = 0.8;
 /// EM rounds at most; from the starts below it needs a few dozen.
@@ -58,11 +58,11 @@ impl Posterior {
     /// is 1 where it is known.
     pub fn of(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
-        let tried = if components.transmitted() < COLOURED_FROM { 1 } else { COLOURS.len() };
-        let bests: Vec<Evidence> = COLOURS[..tried]
-            .iter()
-            .map(|colour| Evidence::of(components, *colour, noise))
-            .collect();
+        let mut bests = vec![Evidence::of(components, COLOURS[0], noise)];
+        if bests[0].share * bests[0].reach as f64 >= COLOURED_FROM {
+            let coloured = COLOURS[1..].iter();
+            bests.extend(coloured.map(|colour| Evidence::of(components, *colour, noise)));
+        }
         let best = bests[1..].iter().fold(bests[0], |best, other| best.better(*other));
         let greatest = best.likelihood;
         let mut near = Vec::new();
