@@ -54,7 +54,7 @@ pub struct RegularisedForce {
 /// The standard error is such that 1.96 of it to either side hold the force with a probability of
 /// 95 % given the measurement: noise let through, force held back, and all that the measurement does
 /// not tell of the sizes of force and noise. A noise level that is stated or measured apart
-/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. Of a given λ ([`Rule::Given`])
+/// ([`Noise::PerChannel`], [`Noise::OutsideLines`]) counts as known. Of a given λ ([`Rule::Given`](crate::Rule::Given))
 /// it is that of a force of variance (noise/λ)² in every component, and of truncation that of the
 /// noise: there nothing else is asked of the measurement.
 ///
