@@ -987,8 +987,8 @@ def _levels(force_noise: float | Sequence[float] | None) -> tuple[float, ...] | 
     """Return the noise levels of the forces as they are saved."""
     if force_noise is None:
         return None
-    several = isinstance(force_noise, Iterable)
-    return tuple(float(level) for level in (force_noise if several else [force_noise]))
+    levels = force_noise if isinstance(force_noise, Iterable) else [force_noise]
+    return tuple(float(level) for level in levels)
 
 
 def _fit(
