@@ -114,7 +114,7 @@ fn identify_finds_the_same_machine_in_every_format() {
         let (force, motion) = columns_of(file);
         let arguments = format!("--force {force} --displacement {motion} --period 256 --json");
         let told = mechid(folder.path(), &format!("identify {file} {arguments}"));
-        let told = told.replace(&format!("with {force}:"), "with f:");
+        let told = told.replace(&format!("residual 1 with {force}:"), "residual 1 with f:");
         let mut told: serde_json::Value = serde_json::from_str(&told.replace(file, "rec")).unwrap();
         // The names of the columns are those of the file.
         assert_eq!(told["channels"]["force"][0], force);
