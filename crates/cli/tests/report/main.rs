@@ -100,7 +100,9 @@ fn row(document: &Document<'_>, caption: &str, first: &str) -> Vec<String> {
     let tables = tagged(document, "table");
     let has = |table: &&Node<'_, '_>| text(table.first_element_child().unwrap()) == caption;
     let table = tables.iter().find(has).unwrap_or_else(|| panic!("no table \"{caption}\""));
-    let rows = table.descendants().filter(|node| node.has_tag_name("tr"));
+    // The head has no values.
+    let has_values = |row: &Node<'_, '_>| row.children().any(|cell| cell.has_tag_name("td"));
+    let rows = table.descendants().filter(|node| node.has_tag_name("tr") && has_values(node));
     let mut cells = rows.map(|row| row.children().map(text).collect::<Vec<_>>());
     cells.find(|cells| cells[0] == first).unwrap_or_else(|| panic!("no row \"{first}\""))
 }
