@@ -128,7 +128,7 @@ struct Outcome {
     /// The estimator in words.
     name: &'static str,
     estimate: Estimate,
-    /// What it leaves against the coherence.
+    /// Residual against the coherence.
     misfit: Option<Misfit>,
     remark: Option<String>,
     /// Whether what the window blunts was told from the machine.

@@ -266,7 +266,7 @@ fn lines(
     })
 }
 
-/// What shows the noise where it is not stated: lines that carry no force, if there are enough of
+/// Evidence of the noise where it is not stated: lines that carry no force, if there are enough of
 /// them. Lines outside a band may carry one that is not asked for.
 fn outside(request: &Request, motion: &Measurement) -> Noise {
     let given = request.lines.as_ref().filter(|_| request.periodic);

@@ -91,7 +91,7 @@ fn a_roving_hammer_finds_the_machine() {
     }
 }
 
-/// What is drawn of hits is the response to the one force that acts, on every line: the acceleration is that of the
+/// The spectra drawn of hits are the response to the one force that acts, on every line: the acceleration is that of the
 /// machine but for six times the noise (0.05 m/s² on a sample, 2/√N of it on a line).
 #[test]
 fn the_receptance_of_hits_is_that_of_the_machine() {
