@@ -128,7 +128,7 @@ impl Identified {
     fn receptances<'py>(&self, py: Python<'py>) -> PyResult<Spectra<'py>> {
         let identified = Arc::clone(&self.0);
         let compare = move || -> Result<_, AnalysisError> {
-            let data = match identified.spectra() {
+            let data = match identified.drawn_spectra() {
                 Some(data) => data.clone(),
                 None => match Review::of(&identified, false)?.receptance {
                     Ok(shown) => shown.data,

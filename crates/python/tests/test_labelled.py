@@ -50,10 +50,7 @@ def test_receptances_are_measured_where_one_force_acts() -> None:
 def test_receptances_of_open_records_are_those_of_segments(
     columns: dict[str, np.ndarray], options: Any, segment: int
 ) -> None:
-    """Judge: H1 by SciPy from the same segments; an eighth of the record each, unless said.
-
-    Those that are fitted are less what the window blunts: by some hundredths of the largest.
-    """
+    """Judge: H1 by SciPy from the same segments; an eighth of the record each, unless said."""
     signal = pytest.importorskip("scipy.signal")
     table = mechid.identify(FILE, **COLUMNS, **options).frf
     force, x = columns["force"], columns["displacement"]
@@ -62,9 +59,7 @@ def test_receptances_of_open_records_are_those_of_segments(
     judge = dict(zip(hz, cross / signal.welch(force, **how)[1], strict=True))
     assert len(table.frequency_hz) > 5
     for frequency, measured in zip(table.frequency_hz, table.measured[:, 0, 0], strict=True):
-        exact = pytest.approx(judge[round(frequency, 9)], rel=1e-9)
-        blunted = pytest.approx(judge[round(frequency, 9)], abs=0.05 * max(map(abs, judge.values())))
-        assert measured == (blunted if "from_frf" in options else exact)
+        assert measured == pytest.approx(judge[round(frequency, 9)], rel=1e-9)
 
 
 def test_a_residual_is_measured_minus_predicted(columns: dict[str, np.ndarray]) -> None:

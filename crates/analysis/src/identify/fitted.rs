@@ -55,8 +55,9 @@ pub struct Fitted {
     pub noise: Vec<NoiseModel>,
     /// Noise of the forces of each record, where it is not in those spectra and was allowed for.
     pub force_noise: Vec<ForceNoise>,
-    /// Responses to the forces alone, of windows that are no periods, whose ends were fitted, too.
-    pub open: Option<FrequencyData>,
+    /// Measured responses to draw, where others were fitted: of windows that are no periods those to the forces
+    /// alone, of segments those from which nothing is taken off.
+    pub drawn: Option<FrequencyData>,
     /// Remarks on how the fit was done.
     pub remarks: Vec<String>,
 }

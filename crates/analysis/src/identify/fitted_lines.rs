@@ -20,7 +20,8 @@ pub struct FittedLine {
     pub frequency_hz: f64,
     /// Force on each degree of freedom, in N.
     pub force: Vec<[f64; 2]>,
-    /// Measured response of each degree of freedom, in the SI unit of its quantity.
+    /// Measured response of each degree of freedom as it was fitted, in the SI unit of its quantity; of segments less
+    /// what their window blunts.
     pub measured: Vec<[f64; 2]>,
     /// Standard error of real and imaginary part alike of each measured response, √(E|ΔX|²/2), in its unit;
     /// `None` where the noise is not known.

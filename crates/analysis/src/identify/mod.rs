@@ -437,10 +437,10 @@ impl Identified {
         self.fitted.frequency.as_ref().map(|(_, data)| data)
     }
 
-    /// Returns the spectra to draw: those fitted, of open records the responses to the forces alone; `None` for
-    /// a fit in the time domain.
+    /// Returns the spectra to draw: of open records the responses to the forces alone, of segments their averages as
+    /// measured, otherwise those fitted; `None` for a fit in the time domain.
     pub fn drawn_spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
-        self.fitted.open.as_ref().or_else(|| self.spectra())
+        self.fitted.drawn.as_ref().or_else(|| self.spectra())
     }
 }
 

@@ -223,7 +223,7 @@ pub(super) fn fit(
         misfit: None,
         noise: Vec::new(),
         force_noise: Vec::new(),
-        open: None,
+        drawn: None,
         remarks,
         estimate: estimated.linear().clone(),
         nonlinear: Some(WithTerms {

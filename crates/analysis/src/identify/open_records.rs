@@ -143,7 +143,7 @@ pub(super) fn fit(
         remarks: of_motion.chain(remarks).collect(),
         noise: fit.noise,
         force_noise: of_force,
-        open: Some(joined(&alone)?),
+        drawn: Some(joined(&alone)?),
         nonlinear: None,
         estimate: fit.estimate,
     };

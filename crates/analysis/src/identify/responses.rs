@@ -45,6 +45,7 @@ pub fn fit(
     let estimate =
         |recorded| Responses::of(std::slice::from_ref(recorded), segments, *estimator, lines);
     let mut responses: Vec<Responses> = records.iter().map(estimate).collect::<Result<_, _>>()?;
+    let measured = joined(&responses)?;
     let Outcome { name, estimate, misfit, remark, settled } =
         estimated(&mut responses, unknowns, *method)?;
     let data = joined(&responses)?;
@@ -108,7 +109,7 @@ pub fn fit(
         misfit,
         noise: Vec::new(),
         force_noise: Vec::new(),
-        open: None,
+        drawn: Some(measured),
         remarks,
         estimate,
         nonlinear: None,

@@ -76,7 +76,7 @@ pub(super) fn fit(
         misfit,
         noise: models,
         force_noise: Vec::new(),
-        open: None,
+        drawn: None,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
         estimate,

@@ -49,13 +49,15 @@ impl Receptance {
     pub fn of(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
         // One window without averages shows little of a random response.
         let fitted = identified.fitted();
-        if let Some(data) = fitted.open.as_ref().filter(|_| identified.is_hammer_test()) {
+        if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
             let origin =
                 "measured on the lines of each hit, without what the ends of its window add";
             return Ok(Self { data: data.clone(), origin: origin.into() });
         }
-        if let Some((_, data)) = fitted.frequency.as_ref().filter(|_| fitted.open.is_none()) {
-            let origin = match identified.fitted().prediction {
+        let of_responses = fitted.coherence.is_some();
+        let of_lines = identified.drawn_spectra();
+        if let Some(data) = of_lines.filter(|_| of_responses || fitted.drawn.is_none()) {
+            let origin = match fitted.prediction {
                 Prediction::Steady => "measured on the lines used",
                 Prediction::Sampled { .. } => "averaged over segments, on the lines used",
             };

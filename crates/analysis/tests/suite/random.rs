@@ -49,7 +49,8 @@ fn warns(identified: &Identified) -> bool {
 }
 
 fn is_open(identified: &Identified) -> bool {
-    identified.fitted().open.is_some()
+    let fitted = identified.fitted();
+    fitted.drawn.is_some() && fitted.coherence.is_none()
 }
 
 /// Of 100 intervals of 95 % fewer than 88 % hold with a probability of 0.003; a warning on right data is to be

@@ -312,10 +312,7 @@ fn every_command_is_run() {
         }
     }
     let programs = Programs::of(&root(), &runs);
-    for run in &runs {
-        let failed = run.go(&root(), &programs).err();
-        wrong.extend(failed.map(|why| format!("{run:?}: {why}")));
-    }
+    wrong.extend(runs::go_all(&runs, &root(), &programs));
     assert!(runs.len() > 6, "{runs:?}");
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }

@@ -5,7 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use std::time::Duration;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use mdbook_driver::MDBook;
 use serde_json::Value;
@@ -81,6 +82,29 @@ impl Programs {
         let path = self.0.get(&(kind.to_owned(), name.to_owned()));
         path.map(PathBuf::as_path).ok_or(format!("no {kind} {name} was built"))
     }
+}
+
+/// Goes through all of them, several at a time; what went wrong, in their order.
+pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<String> {
+    let (waiting, failed) = (Mutex::new(runs.iter()), Mutex::new(BTreeMap::new()));
+    let work = || {
+        loop {
+            let Some(run) = waiting.lock().unwrap().next() else { break };
+            let started = Instant::now();
+            if let Err(why) = run.go(root, programs) {
+                failed.lock().unwrap().insert(run, why);
+            }
+            println!("{:6.1} s: {run:?}", started.elapsed().as_secs_f64());
+        }
+    };
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(work);
+        }
+    });
+    let failed = failed.into_inner().unwrap().into_iter();
+    failed.map(|(run, why)| format!("{run:?}: {why}")).collect()
 }
 
 /// A command of the pages that takes longer than this is stopped and named.
