@@ -201,7 +201,7 @@ fn run<'a>(
     let dof = system.dof();
     initial.check_dof(dof)?;
     let sampling = table.sampling();
-    let mut run = Run::new(scheme.prepare(system, sampling.dt())?, system, sampling.dt());
+    let mut run = Run::new(scheme, system, sampling.dt())?;
     let first = run.stepper().first();
     let mut motions = vec![vec![0.0; 3 * dof]; first + 1];
     run.start(initial, &table.early(first), &mut motions)?;

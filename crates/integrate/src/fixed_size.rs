@@ -6,7 +6,7 @@ use crate::Stepper;
 use crate::transition::Transition;
 
 /// Number of degrees of freedom up to which a step is one small matrix product of fixed size.
-const MOST_DOF: usize = 2;
+pub(crate) const MOST_DOF: usize = 2;
 
 /// The transition of a system of few degrees of freedom.
 #[derive(Debug)]
@@ -106,7 +106,7 @@ impl FixedSize {
 /// The entries of D are rounded, each once and for all, and of the order of (ωΔt)²: beyond that
 /// limit a motion without damping would grow or decay by up to ε in every step. The stepper rounds
 /// anew each time and keeps the energy.
-fn resolves(transition: &Transition, dt: f64, n: usize, factor: f64) -> bool {
+pub(crate) fn resolves(transition: &Transition, dt: f64, n: usize, factor: f64) -> bool {
     let change = |i: usize| (factor * factor * dt * transition.change[(n + i, i)]).abs();
     (0..n).all(|i| change(i) <= 1.0)
 }

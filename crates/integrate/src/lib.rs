@@ -43,6 +43,7 @@
 mod accuracy;
 mod bathe;
 mod central_difference;
+mod collocations;
 mod connection;
 mod driver;
 mod effective;

@@ -8,7 +8,7 @@ use crate::{IntegrateError, NonlinearForce, Tangents};
 
 /// Newton's method ends when the accelerations miss their equation by no more than this part of the
 /// largest.
-const TOLERANCE: f64 = 1e-12;
+pub(crate) const TOLERANCE: f64 = 1e-12;
 
 /// Tolerance where no step leads nearer, as a small extension between large displacements is rounded.
 const ROUNDING: f64 = 1e-9;

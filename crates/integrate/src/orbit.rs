@@ -102,7 +102,7 @@ pub fn periodic_orbit<'a>(
     let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
     guess.check_dof(system.dof())?;
     let dt = table.sampling().dt();
-    let run = Run::new(scheme.prepare(system, dt)?, system, dt);
+    let run = Run::new(scheme, system, dt)?;
     let mut shooting = Shooting { run, table, dof: system.dof(), scales: DVector::zeros(0) };
     let mut state = shooting.settle(guess, settling)?;
     let mut monodromy = None;

@@ -40,9 +40,8 @@ pub fn integrate_periodic<'a>(
     }
     let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
     let (samples, dof) = (table.sampling().len(), system.dof());
-    let mut stepper = scheme.prepare(system, table.sampling().dt())?;
-    let period = Period::of(&Transition::of(stepper.as_mut()), dof, table.sampling())?;
-    let mut run = Run::new(stepper, system, table.sampling().dt());
+    let mut run = Run::new(scheme, system, table.sampling().dt())?;
+    let period = Period::of(&Transition::of(run.stepper()), dof, table.sampling())?;
     let mut motion = Motion::zeros(samples, dof);
     run.step(&table, samples - 1)?;
     run.restart(&period.at_rest(&run.state));

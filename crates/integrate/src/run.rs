@@ -5,9 +5,10 @@ use mechid_model::{InitialState, Response};
 use mechid_signal::{Record, SignalError};
 use nalgebra::DMatrix;
 
+use crate::collocations::Collocations;
 use crate::fixed_size::FixedSize;
 use crate::force::ForceTable;
-use crate::{IntegrateError, Loads, Stepper, System};
+use crate::{IntegrateError, Loads, Scheme, Stepper, System};
 
 /// Displacement, velocity and acceleration, or displacement alone: samples × observed degrees of
 /// freedom.
@@ -108,7 +109,7 @@ impl<'a> Motion<'a> {
 pub(crate) struct Run {
     stepper: Box<dyn Stepper>,
     dt: f64,
-    fixed: Option<FixedSize>,
+    small: Option<Small>,
     pub(crate) state: Vec<f64>,
     change: Vec<f64>,
     /// Rounding errors kept from `state` so far.
@@ -117,17 +118,34 @@ pub(crate) struct Run {
     rows: [Vec<f64>; 4],
 }
 
+/// The step of a small system as products of fixed size.
+enum Small {
+    Linear(FixedSize),
+    Nonlinear(Collocations),
+}
+
+/// Steps that the stepper takes where a step of fixed size is not solved.
+const STEPS_ASIDE: usize = 16;
+
 /// Numbers of the state that are computed between two messages about the progress.
 const NUMBERS_PER_MESSAGE: usize = 1 << 20;
 
 impl Run {
-    pub(crate) fn new(mut stepper: Box<dyn Stepper>, system: &dyn System, dt: f64) -> Self {
+    /// Prepares a scheme for a system and a step of `dt` seconds.
+    pub(crate) fn new(
+        scheme: &dyn Scheme,
+        system: &dyn System,
+        dt: f64,
+    ) -> Result<Self, IntegrateError> {
+        let mut stepper = scheme.prepare(system, dt)?;
         let (n, len) = (stepper.dof(), stepper.state_len());
-        let linear = system.nonlinear_forces().is_empty();
-        let fixed = linear.then(|| FixedSize::of(stepper.as_mut(), dt)).flatten();
+        let small = match system.nonlinear_forces().is_empty() {
+            true => FixedSize::of(stepper.as_mut(), dt).map(Small::Linear),
+            false => Collocations::of(scheme, system, dt).map(Small::Nonlinear),
+        };
         let rows = [(); 4].map(|()| vec![0.0; n]);
         let [state, change, owed] = [(); 3].map(|()| vec![0.0; len]);
-        Self { stepper, dt, fixed, state, change, owed, rows }
+        Ok(Self { stepper, dt, small, state, change, owed, rows })
     }
 
     /// Starts the stepper and keeps the state it starts in.
@@ -159,15 +177,23 @@ impl Run {
         to: usize,
         motion: &mut Motion<'_>,
     ) -> Result<(), IntegrateError> {
-        let (done, finite) = self.advance_fixed(table, from, to, motion);
+        let (mut done, finite) = self.advance_small(table, from, to, motion);
         let steps_per_message = (NUMBERS_PER_MESSAGE / self.state.len()).max(1);
-        for k in done..to {
-            if k % steps_per_message == 0 {
-                log::trace!("step {k} of {to}");
+        let mut aside = 0;
+        while done < to {
+            if done % steps_per_message == 0 {
+                log::trace!("step {done} of {to}");
             }
-            self.step(table, k)?;
-            if k + 1 < motion.parts[0].nrows() {
-                motion.set(k + 1, &self.state);
+            self.step(table, done)?;
+            done += 1;
+            if done < motion.parts[0].nrows() {
+                motion.set(done, &self.state);
+            }
+            aside += 1;
+            if aside == STEPS_ASIDE && matches!(self.small, Some(Small::Nonlinear(_))) {
+                aside = 0;
+                self.owed.fill(0.0);
+                done = self.advance_small(table, done, to, motion).0;
             }
         }
         // A sum is not finite if one of its terms is not: what has overflowed stays so to the end.
@@ -200,7 +226,7 @@ impl Run {
 
     /// Takes as many steps as it can at fixed size; returns the step to go on with, and whether the
     /// motion is finite so far.
-    fn advance_fixed(
+    fn advance_small(
         &mut self,
         table: &ForceTable<'_>,
         from: usize,
@@ -208,13 +234,17 @@ impl Run {
         motion: &mut Motion<'_>,
     ) -> (usize, bool) {
         let none = (from, true);
-        let Some(fixed) = &self.fixed else { return none };
+        let transition = match &self.small {
+            None => return none,
+            Some(Small::Linear(fixed)) => fixed.transition(),
+            Some(Small::Nonlinear(collocations)) => collocations.transition(),
+        };
         if !table.is_complete() || motion.observed.is_some() {
             return none;
         }
         let n = table.dof();
         let mut streams = Vec::with_capacity(6);
-        for (instant, _) in &fixed.transition().loads {
+        for (instant, _) in &transition.loads {
             streams.extend((0..n).map(|c| table.stream(*instant, from, c)));
         }
         let steps = streams.iter().map(|s| s.len()).min().unwrap_or(0).min(to - from);
@@ -223,9 +253,18 @@ impl Run {
             return none;
         }
         let mut columns = motion.columns(from + 1, steps);
-        match fixed.advance(&mut self.state, &streams, &mut columns, steps) {
-            Some(finite) => (from + steps, finite),
+        match &self.small {
             None => none,
+            Some(Small::Linear(fixed)) => {
+                match fixed.advance(&mut self.state, &streams, &mut columns, steps) {
+                    Some(finite) => (from + steps, finite),
+                    None => none,
+                }
+            }
+            Some(Small::Nonlinear(collocations)) => {
+                let steps = [from, steps];
+                (from + collocations.advance(&mut self.state, &streams, &mut columns, steps), true)
+            }
         }
     }
 }

@@ -172,6 +172,13 @@ pub struct Loads<'a> {
     pub beyond: &'a [f64],
 }
 
+impl<'a> Loads<'a> {
+    /// No force, with `zeros` for it, at t = 0.
+    pub(crate) fn none(zeros: &'a [f64]) -> Self {
+        Self { time: 0.0, now: zeros, middle: zeros, next: zeros, beyond: zeros }
+    }
+}
+
 /// A scheme prepared for one system and one step: the map from one state to the next, which is
 /// linear if the system is.
 ///

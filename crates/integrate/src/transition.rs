@@ -20,12 +20,18 @@ impl Transition {
     /// The map `stepper` performs, prepared for a linear system. State `j` of 1 and all else 0 gives column j of D, a force of
     /// 1 N a column of B.
     pub fn of(stepper: &mut dyn Stepper) -> Self {
+        Self::read(stepper, || ())
+    }
+
+    /// The same; `after` is called after each unit state and then after each unit load, in their order.
+    pub(crate) fn read(stepper: &mut dyn Stepper, mut after: impl FnMut()) -> Self {
         let (n, len) = (stepper.dof(), stepper.state_len());
         let (instants, zeros) = (stepper.instants(), vec![0.0; n]);
-        let still = Loads { time: 0.0, now: &zeros, middle: &zeros, next: &zeros, beyond: &zeros };
+        let still = Loads::none(&zeros);
         // Of a linear system no step fails.
         let mut change_of = |state: &[f64], loads: &Loads<'_>, change: &mut [f64]| {
             let _ = stepper.change(state, loads, change);
+            after();
         };
         let mut state = vec![0.0; len];
         let mut change = DMatrix::zeros(len, len);
@@ -54,6 +60,17 @@ impl Transition {
             loads.push((instant, matrix));
         }
         Self { change, loads }
+    }
+
+    /// Entry of D or, from column `state` on, of the matrices of the loads side by side.
+    pub(crate) fn entry(&self, row: usize, column: usize) -> f64 {
+        match column.checked_sub(self.change.ncols()) {
+            None => self.change[(row, column)],
+            Some(load) => {
+                let (_, first) = &self.loads[0];
+                self.loads[load / first.ncols()].1[(row, load % first.ncols())]
+            }
+        }
     }
 
     /// Scales `matrix`, a D or an A, to comparable rows and columns by powers of two; the scales s

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use mdbook_driver::MDBook;
 use serde_json::Value;
@@ -90,11 +90,9 @@ pub fn go_all(runs: &BTreeSet<Run>, root: &Path, programs: &Programs) -> Vec<Str
     let work = || {
         loop {
             let Some(run) = waiting.lock().unwrap().next() else { break };
-            let started = Instant::now();
             if let Err(why) = run.go(root, programs) {
                 failed.lock().unwrap().insert(run, why);
             }
-            println!("{:6.1} s: {run:?}", started.elapsed().as_secs_f64());
         }
     };
     let threads = std::thread::available_parallelism().map_or(1, usize::from);

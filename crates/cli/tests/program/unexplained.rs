@@ -156,8 +156,18 @@ fn what_the_machine_is_known_to_is_expected() {
             let found = report(folder.path(), &format!("{way} {noise}"));
             let told = remarks(&found);
             if doubted && way.contains("kalman") {
-                // A band without end follows both channels of a wrong machine, by a force that is not known.
+                // A force of any band follows both channels of a wrong machine by what it does between samples: it is
+                // told that the machine may be another, and the standard error holds the force that acted.
                 assert!(told.contains("hardly determines the force"), "{way}, {found}");
+                assert!(told.contains("a machine that is not this one"), "{way}, {found}");
+                let force = &found["forces"][0];
+                let [rms, error] =
+                    ["rms", "standard_error"].map(|name| force[name].as_f64().unwrap());
+                let acted = 13.0 * (56.0_f64 / 2.0).sqrt();
+                assert!(
+                    (rms - acted).abs() < 1.5 * error,
+                    "{way}: {rms} N ± {error} N for {acted} N"
+                );
                 continue;
             }
             assert_eq!(told.contains("unexplained"), doubted, "{way}, {found}");

@@ -227,6 +227,61 @@ fn reduction_and_tangents_do_not_change_the_response() {
     }
 }
 
+/// One or two degrees of freedom have steps of fixed size; a choice of responses goes through the scheme itself.
+#[test]
+fn steps_of_fixed_size_are_those_of_the_scheme() {
+    let one = oscillator(1.0, 0.4, 400.0);
+    let two = SecondOrderSystem::new(
+        DMatrix::from_row_slice(2, 2, &[1.0, 0.1, 0.0, 2.0]),
+        DMatrix::from_row_slice(2, 2, &[0.5, -0.1, 0.2, 0.4]),
+        DMatrix::from_row_slice(2, 2, &[900.0, -300.0, -200.0, 700.0]),
+    )
+    .unwrap();
+    let on = Connection::to_ground(0);
+    let follows = |t: f64, x: f64, v: f64| 3e6 * (x - 0.01 * (5.0 * t).sin()).powi(3) + v * v.abs();
+    let systems = [
+        ("cubic", SystemWithForces::new(&one).with(on.spring(&[0.0, 0.0, 4e5]).unwrap()).unwrap()),
+        ("stop", SystemWithForces::new(&one).with(on.gap(0.002, 2e3).unwrap()).unwrap()),
+        (
+            "friction and a spring",
+            SystemWithForces::new(&two)
+                .with(on.friction(0.3, 0.05).unwrap())
+                .unwrap()
+                .with(on.spring(&[0.0, 2e4, 4e5]).unwrap())
+                .unwrap(),
+        ),
+        (
+            "a function of time",
+            SystemWithForces::new(&two)
+                .with(ForceFunction::new(vec![1], move |t, x, v, g| g[0] = follows(t, x[0], v[0])))
+                .unwrap(),
+        ),
+    ];
+    for scheme in nonlinear_schemes() {
+        for (name, system) in &systems {
+            let (scheme, n) = (scheme.as_ref(), system.dof());
+            let force = force(Sampling::new(0.01, 400).unwrap(), n);
+            let rest = InitialState::rest(n);
+            let all: Vec<usize> = (0..n).collect();
+            let dofs = SelectedDofs { forced: &all, observed: &all };
+            let fixed = integrate(scheme, system, &force, &rest).unwrap();
+            let own = integrate_selected(scheme, system, dofs, &force, &rest).unwrap();
+            let linear = integrate(scheme, &system.matrices(), &force, &rest).unwrap();
+            for ((fixed, own), linear) in
+                parts(&fixed).into_iter().zip(parts(&own)).zip(parts(&linear))
+            {
+                let (size, what) = (own.amax(), format!("{}, {name}", scheme.name()));
+                assert!(
+                    (fixed - own).amax() < 1e-9 * size,
+                    "{what}: {:e}",
+                    (fixed - own).amax() / size
+                );
+                assert!((linear - own).amax() > 1e-2 * size, "{what}: the force matters");
+            }
+        }
+    }
+}
+
 /// A linear spring as a nonlinear force is part of K.
 #[test]
 fn a_linear_spring_is_a_part_of_the_stiffness() {

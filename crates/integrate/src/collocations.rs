@@ -1,0 +1,316 @@
+//! Steps of one or two degrees of freedom with nonlinear forces on one of them, at fixed size.
+//!
+//! ```text
+//! z(t+Δt) = z + D z + B F + Σ E_s g_s,   g_s = g(x_s, ẋ_s, t_s)
+//! [x_s ẋ_s] = X_s [z F] + Σ P_sr g_r,    r ≤ s
+//! ```
+//!
+//! at the collocations s of a step. The maps are read off the stepping code by unit states, loads and forces, so that
+//! one equation in one unknown is left at each collocation, or none where the scheme is explicit.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::fixed_size::{MOST_DOF, resolves};
+use crate::newton::TOLERANCE;
+use crate::transition::Transition;
+use crate::{Loads, NonlinearForce, Scheme, System, SystemWithForces, Tangents};
+
+/// Largest number of collocations of a step.
+const MOST: usize = 4;
+
+/// Largest number of corrections before a step is left to Newton's method with its safeguards.
+const CORRECTIONS: usize = 12;
+
+/// A residual of more than this many tolerances is no rounding, and tells the slope.
+const TELLING: f64 = 1e3;
+
+/// The maps of a step, and the forces.
+#[derive(Debug)]
+pub(crate) struct Collocations {
+    transition: Transition,
+    each: Vec<Collocation>,
+    forces: Vec<Arc<dyn NonlinearForce>>,
+    /// Degree of freedom that they act on.
+    dof: usize,
+    dt: f64,
+}
+
+/// One collocation.
+#[derive(Debug)]
+struct Collocation {
+    /// Instant, from the beginning of the step, in s.
+    after: f64,
+    /// Displacement and velocity there, for each number of the state and each load.
+    seen: [Vec<f64>; 2],
+    /// The same for the forces of this collocation and those before it.
+    by_force: [[f64; MOST]; 2],
+    /// E: what a force of 1 N adds to the state.
+    change: Vec<f64>,
+    /// Force, in N, that weighs as much as an acceleration of 1 m/s².
+    per_acceleration: f64,
+}
+
+/// What the steps before tell of the force at a collocation.
+#[derive(Debug, Clone, Copy)]
+struct Before {
+    /// The forces, latest first, in N.
+    forces: [f64; 3],
+    /// Ratio by which a correction exceeds what the force misses its equation by.
+    correction: f64,
+}
+
+impl Collocations {
+    /// The maps of `scheme` for a step of `dt` seconds: if the system is small enough, all nonlinear forces act on the
+    /// same degree of freedom, and the step is short.
+    pub(crate) fn of(scheme: &dyn Scheme, system: &dyn System, dt: f64) -> Option<Self> {
+        let forces = system.nonlinear_forces();
+        let &[dof] = forces.first()?.dofs() else { return None };
+        let n = system.dof();
+        if n > MOST_DOF || forces.iter().any(|force| force.dofs() != [dof]) {
+            return None;
+        }
+        let probe = Probe { dof: [dof], state: Arc::default() };
+        let linear = system.matrices();
+        let probed = SystemWithForces::new(&linear).with(probe.clone()).ok()?;
+        let mut stepper = scheme.prepare_unchecked(&probed, dt).ok()?;
+        let mut columns = Vec::new();
+        let transition = Transition::read(stepper.as_mut(), || columns.push(probe.asked()));
+        let count = columns.iter().map(Vec::len).max()?;
+        if !(1..=MOST).contains(&count)
+            || columns.iter().any(|asked| asked.len() != count)
+            || !resolves(&transition, dt, n, 1.0)
+        {
+            return None;
+        }
+        let mut each: Vec<Collocation> = (0..count)
+            .map(|s| Collocation {
+                after: columns[0][s].time,
+                seen: [0, 1]
+                    .map(|part| columns.iter().map(|asked| asked[s].motion[part]).collect()),
+                by_force: [[0.0; MOST]; 2],
+                change: vec![0.0; stepper.state_len()],
+                per_acceleration: 0.0,
+            })
+            .collect();
+        let (rest, zeros) = (vec![0.0; stepper.state_len()], vec![0.0; n]);
+        for r in 0..count {
+            probe.give(r);
+            stepper.change(&rest, &Loads::none(&zeros), &mut each[r].change).ok()?;
+            let asked = probe.asked();
+            for (s, Asked { motion, .. }) in asked.iter().enumerate() {
+                each[s].by_force[0][r] = motion[0];
+                each[s].by_force[1][r] = motion[1];
+            }
+            let [x, v] = asked[r].motion.map(f64::abs);
+            each[r].per_acceleration = 0.25 * dt * dt / (x + dt * v);
+        }
+        Some(Self { transition, each, forces: forces.to_vec(), dof, dt })
+    }
+
+    /// The transition of one step without the nonlinear forces.
+    pub(crate) fn transition(&self) -> &Transition {
+        &self.transition
+    }
+
+    /// Takes steps from `state` under the loads of `streams`, writing the first numbers of each state into `columns`;
+    /// returns how many of `steps`, the first of them being number `from`. It stops short of a step whose equation it
+    /// does not solve.
+    pub(crate) fn advance(
+        &self,
+        state: &mut [f64],
+        streams: &[&[f64]],
+        columns: &mut [&mut [f64]],
+        [from, steps]: [usize; 2],
+    ) -> usize {
+        match (state.len(), streams.len()) {
+            (3, 1) => self.steps::<3, 1>(state, streams, columns, [from, steps]),
+            (3, 2) => self.steps::<3, 2>(state, streams, columns, [from, steps]),
+            (3, 3) => self.steps::<3, 3>(state, streams, columns, [from, steps]),
+            (4, 1) => self.steps::<4, 1>(state, streams, columns, [from, steps]),
+            (4, 2) => self.steps::<4, 2>(state, streams, columns, [from, steps]),
+            (6, 2) => self.steps::<6, 2>(state, streams, columns, [from, steps]),
+            (6, 4) => self.steps::<6, 4>(state, streams, columns, [from, steps]),
+            (6, 6) => self.steps::<6, 6>(state, streams, columns, [from, steps]),
+            (8, 2) => self.steps::<8, 2>(state, streams, columns, [from, steps]),
+            (8, 4) => self.steps::<8, 4>(state, streams, columns, [from, steps]),
+            _ => 0,
+        }
+    }
+
+    /// Steps of a state of `S` numbers under `W` loads.
+    fn steps<const S: usize, const W: usize>(
+        &self,
+        state: &mut [f64],
+        streams: &[&[f64]],
+        columns: &mut [&mut [f64]],
+        [from, steps]: [usize; 2],
+    ) -> usize {
+        let mut z: [f64; S] = std::array::from_fn(|i| state[i]);
+        let streams: [&[f64]; W] = std::array::from_fn(|j| &streams[j][..steps]);
+        let linear = Rows::<S, W, S>::of(|i, j| self.transition.entry(i, j));
+        let seen: Vec<Rows<S, W, 2>> =
+            self.each.iter().map(|one| Rows::of(|part, j| one.seen[part][j])).collect();
+        let acceleration = 2 * self.transition.loads[0].1.ncols() + self.dof;
+        let mut before = [Before { forces: [0.0; 3], correction: 1.0 }; MOST];
+        let mut done = 0;
+        'steps: while done < steps {
+            let (time, size) = ((from + done) as f64 * self.dt, z[acceleration].abs());
+            let w: [f64; W] = std::array::from_fn(|j| streams[j][done]);
+            let (mut g, mut next) = ([0.0; MOST], linear.times(&z, &w));
+            (0..S).for_each(|i| next[i] += z[i]);
+            for (s, (one, seen)) in self.each.iter().zip(&seen).enumerate() {
+                let [mut x, mut v] = seen.times(&z, &w);
+                for (r, g) in g[..s].iter().enumerate() {
+                    x += one.by_force[0][r] * g;
+                    v += one.by_force[1][r] * g;
+                }
+                let own = [one.by_force[0][s], one.by_force[1][s]];
+                let force = |g: f64| self.force(time + one.after, x + own[0] * g, v + own[1] * g);
+                let enough = TOLERANCE * size * one.per_acceleration;
+                g[s] = match own == [0.0; 2] {
+                    true => force(0.0),
+                    false => match before[s].solved(force, enough) {
+                        Some(force) => force,
+                        None => break 'steps,
+                    },
+                };
+                (0..S).for_each(|i| next[i] += one.change[i] * g[s]);
+            }
+            z = next;
+            columns.iter_mut().zip(&z).for_each(|(column, value)| column[done] = *value);
+            done += 1;
+        }
+        state.copy_from_slice(&z);
+        done
+    }
+
+    /// The sum of the forces, in N.
+    fn force(&self, time: f64, x: f64, v: f64) -> f64 {
+        let mut sum = 0.0;
+        for force in &self.forces {
+            let mut g = [0.0];
+            force.force(time, &[x], &[v], &mut g);
+            sum += g[0];
+        }
+        sum
+    }
+}
+
+impl Before {
+    /// The g that equals `force(g)` within `enough` or, if that is more, [`TOLERANCE`] of itself; `None` if it is not
+    /// found.
+    ///
+    /// # Source
+    /// The secant method: Ostrowski, *Solution of Equations and Systems of Equations* (1960), chapter 3.
+    fn solved(&mut self, force: impl Fn(f64) -> f64, enough: f64) -> Option<f64> {
+        // A parabola through the last three.
+        let [last, second, third] = self.forces;
+        let mut g = 3.0 * (last - second) + third;
+        let mut missed = force(g) - g;
+        for _ in 0..CORRECTIONS {
+            let enough = enough.max(TOLERANCE * g.abs());
+            if missed.abs() <= enough {
+                self.forces = [g, last, second];
+                return Some(g);
+            }
+            let next = g + missed * self.correction;
+            let left = force(next) - next;
+            let correction = (next - g) / (missed - left);
+            if missed.abs() > TELLING * enough && correction.is_finite() {
+                self.correction = correction;
+            }
+            (g, missed) = (next, left);
+        }
+        None
+    }
+}
+
+/// R rows of a map of S numbers of the state and W loads, by columns.
+struct Rows<const S: usize, const W: usize, const R: usize> {
+    state: [[f64; R]; S],
+    loads: [[f64; R]; W],
+}
+
+impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
+    /// The loads are columns S and those after it.
+    fn of(entry: impl Fn(usize, usize) -> f64) -> Self {
+        Self {
+            state: std::array::from_fn(|j| std::array::from_fn(|i| entry(i, j))),
+            loads: std::array::from_fn(|j| std::array::from_fn(|i| entry(i, S + j))),
+        }
+    }
+
+    fn times(&self, z: &[f64; S], w: &[f64; W]) -> [f64; R] {
+        let mut sum = [0.0; R];
+        for (column, w) in self.loads.iter().zip(w) {
+            (0..R).for_each(|i| sum[i] += column[i] * w);
+        }
+        for (column, z) in self.state.iter().zip(z) {
+            (0..R).for_each(|i| sum[i] += column[i] * z);
+        }
+        sum
+    }
+}
+
+/// A force of given values that keeps what the stepping code asks it.
+#[derive(Debug, Clone)]
+struct Probe {
+    dof: [usize; 1],
+    state: Arc<Mutex<ProbeState>>,
+}
+
+#[derive(Debug, Default)]
+struct ProbeState {
+    /// The collocation at which the force is 1 N; 0 at all others.
+    unit: Option<usize>,
+    asked: Vec<Asked>,
+    /// Whether Newton's method goes on at the collocation before.
+    goes_on: bool,
+}
+
+/// Instant in s, displacement and velocity at which a force was asked for last at a collocation.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    time: f64,
+    motion: [f64; 2],
+}
+
+impl Probe {
+    fn state(&self) -> MutexGuard<'_, ProbeState> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Makes the force 1 N at one collocation.
+    fn give(&self, unit: usize) {
+        self.state().unit = Some(unit);
+    }
+
+    /// What was asked, collocation by collocation, since the last call.
+    fn asked(&self) -> Vec<Asked> {
+        std::mem::take(&mut self.state().asked)
+    }
+}
+
+impl NonlinearForce for Probe {
+    fn dofs(&self) -> &[usize] {
+        &self.dof
+    }
+
+    fn force(&self, time: f64, x: &[f64], v: &[f64], g: &mut [f64]) {
+        let mut state = self.state();
+        // Of a constant force Newton's method asks once more after the tangent, and no more.
+        if std::mem::take(&mut state.goes_on) {
+            state.asked.pop();
+        }
+        let at = state.asked.len();
+        state.asked.push(Asked { time, motion: [x[0], v[0]] });
+        g[0] = if state.unit == Some(at) { 1.0 } else { 0.0 };
+    }
+
+    fn tangents(&self, _: f64, _: &[f64], _: &[f64], tangents: &mut Tangents) -> bool {
+        self.state().goes_on = true;
+        tangents.stiffness.fill(0.0);
+        tangents.damping.fill(0.0);
+        true
+    }
+}
