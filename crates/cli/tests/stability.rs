@@ -39,6 +39,32 @@ fn anchors_and_limits_are_in_the_json() {
     }
 }
 
+/// ρ∞ is what its schemes are chosen by: the spectral radius at very large steps.
+#[test]
+fn schemes_of_a_radius_have_it() {
+    let of = |rho: &str| {
+        let report = json(&["--step", "0.05,1e7", "--rho-infinity", rho]);
+        let schemes = report["schemes"].as_array().unwrap().clone();
+        let with_rho = schemes.into_iter().filter(|scheme| {
+            let name = scheme["name"].as_str().unwrap();
+            name.contains("ρ∞ =") && !name.contains("ρ∞ = 0,")
+        });
+        with_rho.collect::<Vec<_>>()
+    };
+    for (rho, count) in [("0.8", 4), ("0.5", 4), ("0.3", 3)] {
+        let schemes = of(rho);
+        assert_eq!(schemes.len(), count, "{rho}: {schemes:?}");
+        for scheme in schemes {
+            let radius = |k: usize| scheme["chart"][k]["spectral_radius"].as_f64().unwrap();
+            let expected: f64 = rho.parse().unwrap();
+            // A double eigenvalue keeps half of the digits.
+            assert!((radius(1) - expected).abs() < 1e-4, "{}: {}", scheme["name"], radius(1));
+            assert!(radius(0) > 0.99, "{}: {}", scheme["name"], radius(0));
+            assert_eq!(scheme["stability_limit"], Value::Null, "{}", scheme["name"]);
+        }
+    }
+}
+
 #[test]
 fn a_machine_gets_its_largest_steps() {
     let folder = tempfile::tempdir().unwrap();

@@ -52,7 +52,8 @@ pub struct StabilityArgs {
     /// θ of Wilson's scheme
     #[arg(long, default_value_t = 1.4, allow_negative_numbers = true, help_heading = "Schemes")]
     theta: f64,
-    /// ρ∞ of the generalised-α scheme, its spectral radius at very large steps
+    /// ρ∞ of the generalised-α schemes and of ρ∞-Bathe, the spectral radius at very large steps; HHT-α is shown from
+    /// 0.5 on
     #[arg(
         long = "rho-infinity",
         value_name = "RADIUS",
@@ -97,23 +98,32 @@ impl StabilityArgs {
     fn schemes(&self) -> Result<Vec<NamedScheme>, CliError> {
         let newmark = Newmark::new(self.beta, self.gamma)?;
         let wilson = WilsonTheta::new(self.theta)?;
-        let alpha = GeneralisedAlpha::new(self.rho_infinity)?;
+        let rho = self.rho_infinity;
+        let (alpha, wbz) =
+            (GeneralisedAlpha::new(rho)?, GeneralisedAlpha::wood_bossak_zienkiewicz(rho)?);
         let of_newmark = match newmark == Newmark::AVERAGE_ACCELERATION {
             true => "Newmark".into(),
             false => format!("Newmark {} {}", compact(self.beta, 4), compact(self.gamma, 4)),
         };
         let of_wilson = format!("Wilson θ = {}", compact(self.theta, 6));
-        let of_alpha = format!("generalised-α {}", compact(self.rho_infinity, 6));
-        let schemes: [(String, Box<dyn Scheme>); 8] = [
+        let with_radius = |name: &str| format!("{name} {}", compact(rho, 6));
+        let hht = GeneralisedAlpha::hilber_hughes_taylor(rho);
+        let hht = hht.map(|hht| (with_radius("HHT-α"), Box::new(hht) as Box<dyn Scheme>));
+        let schemes: Vec<(String, Box<dyn Scheme>)> = vec![
             (of_newmark, Box::new(newmark)),
             ("linear acceleration".into(), Box::new(Newmark::LINEAR_ACCELERATION)),
             ("central difference".into(), Box::new(CentralDifference::default())),
             ("Houbolt".into(), Box::new(Houbolt::default())),
             (of_wilson, Box::new(wilson)),
-            (of_alpha, Box::new(alpha)),
+            (with_radius("generalised-α"), Box::new(alpha)),
             ("Bathe".into(), Box::new(Bathe::HALVES)),
             ("Runge–Kutta 4".into(), Box::new(RungeKutta4::LINEAR)),
         ];
-        Ok(schemes.into_iter().map(|(label, scheme)| NamedScheme { label, scheme }).collect())
+        let variants: [(String, Box<dyn Scheme>); 2] = [
+            (with_radius("WBZ-α"), Box::new(wbz)),
+            (with_radius("ρ∞-Bathe"), Box::new(Bathe::new(rho)?)),
+        ];
+        let schemes = schemes.into_iter().chain(hht).chain(variants);
+        Ok(schemes.map(|(label, scheme)| NamedScheme { label, scheme }).collect())
     }
 }
