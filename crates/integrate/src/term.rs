@@ -30,10 +30,7 @@ impl TermForces {
     /// # Errors
     /// [`ModelError::Coefficients`] unless there is one finite coefficient for each.
     pub fn new(terms: &Terms, coefficients: &[f64]) -> Result<Self, ModelError> {
-        if coefficients.len() != terms.len() || coefficients.iter().any(|c| !c.is_finite()) {
-            let (got, terms) = (coefficients.len(), terms.len());
-            return Err(ModelError::Coefficients { got, terms });
-        }
+        terms.check_coefficients(coefficients)?;
         let mut dofs: Vec<usize> = terms.iter().flat_map(|term| ends(term.coordinate())).collect();
         dofs.sort_unstable();
         dofs.dedup();

@@ -74,7 +74,7 @@ struct Described {
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in Matrix Market files: of more than {DENSE_DOF} only \
-         the linear response from a start can be simulated, and some of the modes found"
+         the response from a start can be simulated, and some of the modes found"
     );
     IoError::Description { file: file.into(), what }
 }

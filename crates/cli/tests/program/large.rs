@@ -47,27 +47,40 @@ fn column(folder: &Path, file: &str, name: &str) -> Vec<f64> {
 #[test]
 fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
     let home = tempfile::tempdir().unwrap();
-    chain(home.path(), 5000, r#", "outputs": [2, 1]"#);
-    let told = mechid(home.path(), "simulate chain/chain.json --output large.csv");
-    assert!(told.contains("5000 degrees of freedom in Matrix Market files"), "{told}");
-    let text = fs::read_to_string(home.path().join("large.csv")).unwrap();
-    let header = "time,force_2,displacement_2,displacement_1,velocity_2,velocity_1,\
-                  acceleration_2,acceleration_1\n";
-    assert!(text.starts_with(header), "{}", text.lines().next().unwrap());
+    let hard = r#", "nonlinear": {"terms": "k3: (x1-x2)^3", "coefficients": [1e9]}"#;
+    let moved = ["", hard].map(|nonlinear| {
+        let rest = format!(r#", "outputs": [2, 1]{nonlinear}"#);
+        chain(home.path(), 5000, &rest);
+        let told = mechid(home.path(), "simulate chain/chain.json --output large.csv");
+        assert!(told.contains("5000 degrees of freedom in Matrix Market files"), "{told}");
+        assert_eq!(told.contains("nonlinear term k3"), !nonlinear.is_empty(), "{told}");
+        let text = fs::read_to_string(home.path().join("large.csv")).unwrap();
+        let header = "time,force_2,displacement_2,displacement_1,velocity_2,velocity_1,\
+                      acceleration_2,acceleration_1\n";
+        assert!(text.starts_with(header), "{}", text.lines().next().unwrap());
 
-    // 64 degrees of freedom are dense; a wave of 30 masses per second goes 60 of them in 2 s.
-    chain(home.path(), 64, r#", "outputs": [2, 1]"#);
-    mechid(home.path(), "simulate chain/chain.json --output small.csv --plot small.svg");
-    for name in ["force_2", "displacement_1", "displacement_2", "velocity_1", "acceleration_2"] {
-        let [large, small] = ["large.csv", "small.csv"].map(|file| column(home.path(), file, name));
-        let size = small.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        assert!(size > 0.0);
-        for (k, (a, b)) in large.iter().zip(&small).enumerate() {
-            assert!((a - b).abs() < 1e-9 * size, "{name}, sample {k}: {a} and {b}");
+        // 64 degrees of freedom are dense; a wave of 30 masses per second goes 60 of them in 2 s.
+        chain(home.path(), 64, &rest);
+        mechid(home.path(), "simulate chain/chain.json --output small.csv --plot small.svg");
+        for name in ["force_2", "displacement_1", "displacement_2", "velocity_1", "acceleration_2"]
+        {
+            let [large, small] =
+                ["large.csv", "small.csv"].map(|file| column(home.path(), file, name));
+            let size = small.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+            assert!(size > 0.0);
+            for (k, (a, b)) in large.iter().zip(&small).enumerate() {
+                assert!((a - b).abs() < 1e-9 * size, "{name}, sample {k}: {a} and {b}");
+            }
         }
-    }
-    // Of a dense machine every force is recorded.
-    assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
+        // Of a dense machine every force is recorded.
+        assert_eq!(column(home.path(), "small.csv", "force_64"), vec![0.0; 200]);
+        column(home.path(), "large.csv", "displacement_1")
+    });
+    let [linear, hard] = moved;
+    let largest =
+        |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, |m: f64, v| m.max(v.abs()));
+    let apart = largest(&mut linear.iter().zip(&hard).map(|(a, b)| a - b));
+    assert!(apart > 0.05 * largest(&mut linear.into_iter()), "the spring matters: {apart}");
 }
 
 /// Judge: ω = 2 √(k/m) sin(r π / 2(n + 1)); the damping is that part of K.
@@ -113,9 +126,10 @@ fn what_a_large_machine_does_not_have_is_refused() {
         (r#", "outputs": [101]"#, "outputs names degree of freedom 101, the system has 100"),
         (r#", "outputs": [3, 3]"#, "outputs names degree of freedom 3 twice"),
         (
-            r#", "nonlinear": {"terms": "k3: x1^3", "coefficients": [1]}"#,
-            "only the linear response",
+            r#", "nonlinear": {"terms": "k3: x101^3", "coefficients": [1]}"#,
+            "the system has 100 degrees of freedom",
         ),
+        (r#", "nonlinear": {"terms": "k3: x1^3", "coefficients": []}"#, "coefficient"),
     ] {
         let refused = refusal(rest);
         assert!(refused.contains(expected), "{rest}: {refused}");

@@ -9,7 +9,7 @@ mod study;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use mechid_model::{InitialState, NonlinearSystem, SecondOrderSystem, SparseSystem};
+use mechid_model::{InitialState, SecondOrderSystem, SparseSystem};
 use mechid_signal::{Record, Sampling, message};
 use nalgebra::{DMatrix, DVector};
 use serde::Deserialize;
@@ -213,16 +213,17 @@ impl Experiment {
         Ok(outputs.iter().map(|output| output - 1).collect())
     }
 
-    /// The system with its nonlinear terms, if it has any.
+    /// The nonlinear terms beside the system, if it has any, with their coefficients.
     ///
     /// # Errors
-    /// Those of [`Experiment::system`], and [`IoError::Model`] if the terms do not belong to the system.
-    pub fn nonlinear_system(&self) -> Result<Option<NonlinearSystem>, IoError> {
-        let Some(NonlinearDescription { terms, coefficients, .. }) = &self.nonlinear else {
-            return Ok(None);
-        };
-        let system = NonlinearSystem::new(self.system()?, terms.clone(), coefficients.clone());
-        system.map(Some).map_err(|source| IoError::Model { file: self.file.clone(), source })
+    /// Those of [`Experiment::dof`], and [`IoError::Model`] if the terms do not belong to the system.
+    pub fn nonlinear(&self) -> Result<Option<&NonlinearDescription>, IoError> {
+        let Some(described) = &self.nonlinear else { return Ok(None) };
+        let NonlinearDescription { terms, coefficients, .. } = described;
+        let fits =
+            terms.check_dof(self.dof()?).and_then(|()| terms.check_coefficients(coefficients));
+        fits.map_err(|source| IoError::Model { file: self.file.clone(), source })?;
+        Ok(Some(described))
     }
 
     /// One period of the force: samples × [forced](Experiment::forced) degrees of freedom, in N.

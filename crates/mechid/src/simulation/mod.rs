@@ -14,10 +14,9 @@ use mechid_integrate::{
     SystemWithForces, TermForces, integrate, integrate_periodic, integrate_selected,
     periodic_orbit,
 };
-use mechid_io::{Experiment, IoError, Level, ResponseKind};
+use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
-    InitialState, Instability, ModelError, NonlinearSystem, Response, SecondOrderSystem,
-    SparseSystem,
+    InitialState, Instability, ModelError, Response, SecondOrderSystem, SparseSystem,
 };
 use mechid_signal::{Record, SignalError, Spectrum, noise};
 use nalgebra::{Complex, DMatrix};
@@ -35,8 +34,8 @@ pub use self::summary::{
 pub struct Simulation {
     /// The machine; of a nonlinear one, the linear part.
     pub system: SimulatedSystem,
-    /// The machine with its nonlinear terms; `None` of a linear one.
-    pub nonlinear: Option<NonlinearSystem>,
+    /// The nonlinear terms of the machine; `None` of a linear one.
+    pub nonlinear: Option<SimulatedTerms>,
     /// Kind of the response: the steady state, or one with a beginning.
     pub response_kind: ResponseKind,
     /// Number of periods of the force.
@@ -219,12 +218,15 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
 /// The machine of an experiment.
 struct Described {
     linear: SimulatedSystem,
-    nonlinear: Option<NonlinearSystem>,
+    nonlinear: Option<SimulatedTerms>,
 }
 
 impl Described {
     fn of(experiment: &Experiment) -> Result<Self, SimulateError> {
-        let nonlinear = experiment.nonlinear_system()?.filter(|system| !system.terms().is_empty());
+        let terms = experiment.nonlinear()?.filter(|described| !described.terms.is_empty());
+        let nonlinear = terms.map(|NonlinearDescription { terms, coefficients, .. }| {
+            SimulatedTerms { terms: terms.clone(), coefficients: coefficients.clone() }
+        });
         let linear = match experiment.sparse_system() {
             Some(sparse) => SimulatedSystem::Sparse(sparse.clone()),
             None => SimulatedSystem::Dense(experiment.system()?),
@@ -261,8 +263,8 @@ impl Described {
         };
         match &self.nonlinear {
             None => Ok(system),
-            Some(nonlinear) => {
-                let forces = TermForces::new(nonlinear.terms(), nonlinear.coefficients())?;
+            Some(SimulatedTerms { terms, coefficients }) => {
+                let forces = TermForces::new(terms, coefficients)?;
                 Ok(system.with(forces)?)
             }
         }
@@ -289,8 +291,9 @@ fn stepped(
         }
         ResponseKind::Periodic => match &machine.nonlinear {
             None => Ok(integrate_periodic(scheme, machine.dense()?, force)?),
-            Some(nonlinear) => {
-                let (system, rest) = (machine.with_forces()?, InitialState::rest(nonlinear.dof()));
+            Some(_) => {
+                let rest = InitialState::rest(machine.dense()?.dof());
+                let system = machine.with_forces()?;
                 let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)?;
                 Ok(orbit.response().clone())
             }
@@ -301,10 +304,10 @@ fn stepped(
                 SimulatedSystem::Dense(_) => {
                     Ok(integrate(scheme, &machine.with_forces()?, force, &initial)?)
                 }
-                SimulatedSystem::Sparse(system) => {
+                SimulatedSystem::Sparse(_) => {
                     let (forced, observed) = (experiment.forced()?, experiment.outputs()?);
                     let dofs = SelectedDofs { forced: &forced, observed: &observed };
-                    Ok(integrate_selected(scheme, system, dofs, force, &initial)?)
+                    Ok(integrate_selected(scheme, &machine.with_forces()?, dofs, force, &initial)?)
                 }
             }
         }
@@ -527,7 +530,7 @@ mod tests {
             let fourth = r#"{ "name": "runge-kutta-4", "load": "exact" }"#;
             let fourth = simulated(fourth, response).unwrap();
             assert!(error(&fourth) < 1e-7, "{response}: {:e}", error(&fourth));
-            assert_eq!(fourth.nonlinear.unwrap().coefficients(), [1.0]);
+            assert_eq!(fourth.nonlinear.unwrap().coefficients, [1.0]);
         }
         let exact = simulated(r#"{ "name": "exact" }"#, r#""periodic""#);
         assert!(matches!(exact, Err(SimulateError::ExactNonlinear)));

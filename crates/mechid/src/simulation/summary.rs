@@ -5,7 +5,7 @@ use std::fmt;
 
 use mechid_analysis::text::{compact, significant, text_table};
 use mechid_io::{ResponseKind, SystemMatrices};
-use mechid_model::{Instability, ModelError, NonlinearSystem, Term, Terms};
+use mechid_model::{Instability, ModelError, Term, Terms};
 use mechid_signal::{Record, message};
 use serde::Serialize;
 
@@ -150,7 +150,7 @@ impl Simulation {
             channels: self.groups().iter().flat_map(SimulatedChannel::of).collect(),
             instability: self.instability.as_ref().map(FreeGrowth::of),
             system: self.system.dense().map(SystemMatrices::from),
-            nonlinear: self.nonlinear.as_ref().map(SimulatedTerms::of),
+            nonlinear: self.nonlinear.clone(),
         })
     }
 
@@ -221,10 +221,6 @@ impl FreeGrowth {
 }
 
 impl SimulatedTerms {
-    fn of(system: &NonlinearSystem) -> Self {
-        Self { terms: system.terms().clone(), coefficients: system.coefficients().to_vec() }
-    }
-
     fn each(&self) -> impl Iterator<Item = (&Term, &f64)> {
         self.terms.iter().zip(&self.coefficients)
     }

@@ -60,10 +60,7 @@ impl NonlinearSystem {
         coefficients: Vec<f64>,
     ) -> Result<Self, ModelError> {
         terms.check_dof(linear.dof())?;
-        if coefficients.len() != terms.len() || coefficients.iter().any(|c| !c.is_finite()) {
-            let (got, terms) = (coefficients.len(), terms.len());
-            return Err(ModelError::Coefficients { got, terms });
-        }
+        terms.check_coefficients(&coefficients)?;
         Ok(Self { linear, terms, coefficients })
     }
 

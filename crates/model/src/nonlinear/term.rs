@@ -256,6 +256,17 @@ impl Terms {
         }
         Ok(())
     }
+
+    /// Checks that there is one finite coefficient for each term, in its unit.
+    ///
+    /// # Errors
+    /// [`ModelError::Coefficients`].
+    pub fn check_coefficients(&self, coefficients: &[f64]) -> Result<(), ModelError> {
+        if coefficients.len() == self.len() && coefficients.iter().all(|c| c.is_finite()) {
+            return Ok(());
+        }
+        Err(ModelError::Coefficients { got: coefficients.len(), terms: self.len() })
+    }
 }
 
 impl<'a> IntoIterator for &'a Terms {
