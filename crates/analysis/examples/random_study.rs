@@ -9,6 +9,7 @@
 //! without them, all are made.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
+use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use mechid_analysis::frf::Estimator;
@@ -130,8 +131,13 @@ fn study(row: &str, system: &SecondOrderSystem, runs: u64, how: &Identify, noise
     let mean = |of: &dyn Fn(&Run) -> f64| all.iter().map(of).sum::<f64>() / count;
     let (holding, bias) = (100.0 * mean(&|run| run.holding), 100.0 * mean(&|run| run.damping));
     let scatter = (1e4 * mean(&|run| run.damping.powi(2)) - bias * bias).max(0.0).sqrt();
-    let warned = 100.0 * mean(&|run| f64::from(u8::from(run.warned)));
+    let warned = 100.0 * mean(&|run| f64::from(u8::from(!run.warnings.is_empty())));
     println!("| {row} | {holding:.1} | {bias:.3}, {scatter:.3} | {warned:.1} |");
+    let subjects: BTreeSet<&String> = all.iter().flat_map(|run| &run.warnings).collect();
+    for subject in subjects {
+        let runs = all.iter().filter(|run| run.warnings.contains(subject)).count();
+        eprintln!("{row}: {runs} of {count} warn of {subject}");
+    }
     if all.len() as u64 != runs {
         println!("{} of {runs} fits failed", runs - all.len() as u64);
     }
@@ -142,7 +148,8 @@ struct Run {
     holding: f64,
     /// Relative error of the damping ratio of the first mode.
     damping: f64,
-    warned: bool,
+    /// What checks warn of.
+    warnings: BTreeSet<String>,
 }
 
 fn measure(system: &SecondOrderSystem, seed: u64, level: Noise) -> Option<[Record; 2]> {
@@ -167,9 +174,10 @@ fn one(system: &SecondOrderSystem, seed: u64, how: &Identify, noise: Noise) -> O
     });
     let ratio = |identified: &Identified| identified.summary().modes[0].row.damping_ratio.value;
     let truth = system.modes().ok()?[0].damping_ratio();
+    let warnings = identified.summary().checks.iter().filter(|check| check.is_conspicuous());
     Some(Run {
         holding: holds.count() as f64 / count,
         damping: ratio(&identified) / truth - 1.0,
-        warned: identified.summary().checks.iter().any(|check| check.is_conspicuous()),
+        warnings: warnings.map(|check| check.subject.to_string()).collect(),
     })
 }

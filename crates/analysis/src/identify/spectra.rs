@@ -10,16 +10,27 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 
-use super::fitted::{Fitted, Misfit, Residual};
+use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
 use super::options::Method;
 use super::prediction::Prediction;
 use crate::AnalysisError;
 use crate::measurement::{Block, Windowed};
+use crate::text::significant;
 
 /// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
 /// degrees of freedom, which take seconds.
 const LIKELIHOOD_PARAMETERS: usize = 1200;
+
+/// Part of the motion that rounding leaves at most.
+const ROUNDING: f64 = 1e-9;
+
+/// Power that least squares leaves beyond maximum likelihood, per parameter and in units of the noise, from which it is
+/// biased.
+const EXCESS: f64 = 10.0;
+
+/// Ratio of what both leave, from which least squares is biased whatever else is left.
+const MUCH: f64 = 2.0;
 
 /// The periods of a record on the lines found in its force.
 type Spectra = (RepeatedPeriods, Lines);
@@ -140,10 +151,17 @@ fn found(
         Some(Method::MaximumLikelihood) => Ok(likelihood(&together(spectra, &with_noise)?)?),
         None => {
             let noisy = together(spectra, &with_noise)?;
-            if noisy.noise().is_none() {
-                return least_squares(None);
-            }
             let parameters = unknowns.independent();
+            if noisy.noise().is_none() {
+                let plain = least_squares(None)?;
+                if parameters > LIKELIHOOD_PARAMETERS {
+                    return Ok(plain);
+                }
+                return Ok(match likelihood(&noisy) {
+                    Ok(likely) => less_left(data, plain, likely)?,
+                    Err(_) => plain,
+                });
+            }
             if parameters > LIKELIHOOD_PARAMETERS {
                 return least_squares(Some(format!(
                     "least squares was used, for {parameters} parameters: noise on the response biases it. \
@@ -158,6 +176,41 @@ fn found(
             }
         }
     }
+}
+
+/// Least squares where it explains the motion as well as maximum likelihood does, or where that leaves more than noise;
+/// otherwise noise has biased it, and maximum likelihood is returned with its reason.
+fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found, AnalysisError> {
+    let left = |found: &Found| match found.estimate.system() {
+        Ok(system) => unexplained_motion(data, &system),
+        Err(_) => Ok(None),
+    };
+    let (Some(of_plain), Some(of_likely)) = (left(&plain)?, left(&likely)?) else {
+        return Ok(plain);
+    };
+    let unknown = likely.estimate.unknowns().independent() as f64;
+    let equations = 2.0 * (data.dof() * data.len()) as f64;
+    // Per parameter, in units of the noise that maximum likelihood leaves.
+    let excess = ((of_plain / of_likely).powi(2) - 1.0) * equations / unknown;
+    if of_plain <= ROUNDING || excess.is_nan() || excess <= EXCESS {
+        return Ok(plain);
+    }
+    // Where the model is wrong, neither of both is right.
+    let left = after_spectral_fit(std::slice::from_ref(data), &likely.estimate)?.records;
+    let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
+    if of_plain < MUCH * of_likely
+        && !left.iter().flat_map(|left| left.findings()).all(|f| is_noise(&f))
+    {
+        return Ok(plain);
+    }
+    let reason = format!(
+        "maximum likelihood was used: least squares, which noise biases, leaves {} % of the motion unexplained, \
+         and not {} %",
+        significant(100.0 * of_plain, 3),
+        significant(100.0 * of_likely, 3)
+    );
+    let remark = likely.remark.map(|remark| format!("{reason}; {remark}"));
+    Ok(Found { remark, ..likely })
 }
 
 /// The rows of all records.

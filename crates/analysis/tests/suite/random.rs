@@ -99,6 +99,31 @@ fn a_period_stays_one() {
     assert!(!is_open(&identify(&[periods], &Identify::default()).unwrap()));
 }
 
+/// Noise biases least squares: where it shows, one period is fitted by maximum likelihood, too. 48 intervals of 95 %.
+#[test]
+fn noise_on_one_period_biases_nothing() {
+    let each: Vec<(usize, bool)> = (0..16)
+        .into_par_iter()
+        .map(|seed| {
+            let [force, response] = rig().period(seed).unwrap();
+            let noisy =
+                noise::add_white(&response, NoiseLevel::FractionOfRms(0.05), seed + 100_000);
+            let measured = Measurement::from_records(&force, &[(KIND, &noisy.unwrap())]).unwrap();
+            let period = force.len();
+            let by = |how: &Identify| identify(&[measured.clone().period(period).unwrap()], how);
+            let found = by(&Identify::default()).unwrap();
+            let held = ["m", "c", "k"].iter().filter(|name| holds(&found, name)).count();
+            let remarks = found.summary().remarks.join("\n");
+            assert!(remarks.contains("maximum likelihood was used"), "{remarks}");
+            assert!(!holds(&by(&Identify::spectra(Method::LeastSquares)).unwrap(), "m"));
+            (held, warns(&found))
+        })
+        .collect();
+    let held: usize = each.iter().map(|(held, _)| held).sum();
+    let warned = each.iter().filter(|(_, warned)| *warned).count();
+    assert!(held >= 42 && warned <= 1, "{held} of 48, {warned} warn");
+}
+
 #[test]
 fn settings_that_contradict_open_records_are_refused() {
     let open = |method| Identify {
