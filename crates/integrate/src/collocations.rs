@@ -43,10 +43,10 @@ struct Collocation {
     /// Displacement and velocity there, for each number of the state and each load.
     seen: [Vec<f64>; 2],
     /// The same for the forces of this collocation and those before it.
-    by_force: [[f64; MOST]; 2],
+    by_force: [[f64; 2]; MOST],
     /// E: what a force of 1 N adds to the state.
     change: Vec<f64>,
-    /// Force, in N, that weighs as much as an acceleration of 1 m/s².
+    /// Force, in N, that weighs as much as an acceleration of 1 m/s²; infinite where the scheme is explicit.
     per_acceleration: f64,
 }
 
@@ -87,7 +87,7 @@ impl Collocations {
                 after: columns[0][s].time,
                 seen: [0, 1]
                     .map(|part| columns.iter().map(|asked| asked[s].motion[part]).collect()),
-                by_force: [[0.0; MOST]; 2],
+                by_force: [[0.0; 2]; MOST],
                 change: vec![0.0; stepper.state_len()],
                 per_acceleration: 0.0,
             })
@@ -98,8 +98,7 @@ impl Collocations {
             stepper.change(&rest, &Loads::none(&zeros), &mut each[r].change).ok()?;
             let asked = probe.asked();
             for (s, Asked { motion, .. }) in asked.iter().enumerate() {
-                each[s].by_force[0][r] = motion[0];
-                each[s].by_force[1][r] = motion[1];
+                each[s].by_force[r] = *motion;
             }
             let [x, v] = asked[r].motion.map(f64::abs);
             each[r].per_acceleration = 0.25 * dt * dt / (x + dt * v);
@@ -122,23 +121,39 @@ impl Collocations {
         columns: &mut [&mut [f64]],
         [from, steps]: [usize; 2],
     ) -> usize {
-        match (state.len(), streams.len()) {
-            (3, 1) => self.steps::<3, 1>(state, streams, columns, [from, steps]),
-            (3, 2) => self.steps::<3, 2>(state, streams, columns, [from, steps]),
-            (3, 3) => self.steps::<3, 3>(state, streams, columns, [from, steps]),
-            (4, 1) => self.steps::<4, 1>(state, streams, columns, [from, steps]),
-            (4, 2) => self.steps::<4, 2>(state, streams, columns, [from, steps]),
-            (6, 2) => self.steps::<6, 2>(state, streams, columns, [from, steps]),
-            (6, 4) => self.steps::<6, 4>(state, streams, columns, [from, steps]),
-            (6, 6) => self.steps::<6, 6>(state, streams, columns, [from, steps]),
-            (8, 2) => self.steps::<8, 2>(state, streams, columns, [from, steps]),
-            (8, 4) => self.steps::<8, 4>(state, streams, columns, [from, steps]),
+        match self.each.len() {
+            1 => self.collocated::<1>(state, streams, columns, [from, steps]),
+            2 => self.collocated::<2>(state, streams, columns, [from, steps]),
+            4 => self.collocated::<4>(state, streams, columns, [from, steps]),
             _ => 0,
         }
     }
 
-    /// Steps of a state of `S` numbers under `W` loads.
-    fn steps<const S: usize, const W: usize>(
+    /// Steps of `Q` collocations.
+    fn collocated<const Q: usize>(
+        &self,
+        state: &mut [f64],
+        streams: &[&[f64]],
+        columns: &mut [&mut [f64]],
+        steps: [usize; 2],
+    ) -> usize {
+        match (state.len(), streams.len()) {
+            (3, 1) => self.steps::<3, 1, Q>(state, streams, columns, steps),
+            (3, 2) => self.steps::<3, 2, Q>(state, streams, columns, steps),
+            (3, 3) => self.steps::<3, 3, Q>(state, streams, columns, steps),
+            (4, 1) => self.steps::<4, 1, Q>(state, streams, columns, steps),
+            (4, 2) => self.steps::<4, 2, Q>(state, streams, columns, steps),
+            (6, 2) => self.steps::<6, 2, Q>(state, streams, columns, steps),
+            (6, 4) => self.steps::<6, 4, Q>(state, streams, columns, steps),
+            (6, 6) => self.steps::<6, 6, Q>(state, streams, columns, steps),
+            (8, 2) => self.steps::<8, 2, Q>(state, streams, columns, steps),
+            (8, 4) => self.steps::<8, 4, Q>(state, streams, columns, steps),
+            _ => 0,
+        }
+    }
+
+    /// Steps of a state of `S` numbers under `W` loads, with `Q` collocations.
+    fn steps<const S: usize, const W: usize, const Q: usize>(
         &self,
         state: &mut [f64],
         streams: &[&[f64]],
@@ -146,30 +161,30 @@ impl Collocations {
         [from, steps]: [usize; 2],
     ) -> usize {
         let mut z: [f64; S] = std::array::from_fn(|i| state[i]);
-        let streams: [&[f64]; W] = std::array::from_fn(|j| &streams[j][..steps]);
+        let mut streams: [_; W] = std::array::from_fn(|j| streams[j][..steps].iter());
         let linear = Rows::<S, W, S>::of(|i, j| self.transition.entry(i, j));
-        let seen: Vec<Rows<S, W, 2>> =
-            self.each.iter().map(|one| Rows::of(|part, j| one.seen[part][j])).collect();
+        let mut each: [FixedCollocation<S, W>; Q] =
+            std::array::from_fn(|s| FixedCollocation::of(&self.each[s]));
         let acceleration = 2 * self.transition.loads[0].1.ncols() + self.dof;
-        let mut before = [Before { forces: [0.0; 3], correction: 1.0 }; MOST];
         let mut done = 0;
         'steps: while done < steps {
             let (time, size) = ((from + done) as f64 * self.dt, z[acceleration].abs());
-            let w: [f64; W] = std::array::from_fn(|j| streams[j][done]);
-            let (mut g, mut next) = ([0.0; MOST], linear.times(&z, &w));
+            let w = streams.each_mut().map(|stream| stream.next().copied().unwrap_or(f64::NAN));
+            let (mut g, mut next) = ([0.0; Q], linear.times(&z, &w));
             (0..S).for_each(|i| next[i] += z[i]);
-            for (s, (one, seen)) in self.each.iter().zip(&seen).enumerate() {
-                let [mut x, mut v] = seen.times(&z, &w);
-                for (r, g) in g[..s].iter().enumerate() {
-                    x += one.by_force[0][r] * g;
-                    v += one.by_force[1][r] * g;
+            let seen: [[f64; 2]; Q] = std::array::from_fn(|s| each[s].seen.times(&z, &w));
+            for s in 0..Q {
+                let (one, [mut x, mut v]) = (&mut each[s], seen[s]);
+                for (g, by) in g.iter().zip(&one.by_force).take(s) {
+                    x += by[0] * g;
+                    v += by[1] * g;
                 }
-                let own = [one.by_force[0][s], one.by_force[1][s]];
-                let force = |g: f64| self.force(time + one.after, x + own[0] * g, v + own[1] * g);
-                let enough = TOLERANCE * size * one.per_acceleration;
-                g[s] = match own == [0.0; 2] {
+                let own = one.by_force[s];
+                let after = one.after;
+                let force = |g: f64| self.force(time + after, x + own[0] * g, v + own[1] * g);
+                g[s] = match one.is_explicit {
                     true => force(0.0),
-                    false => match before[s].solved(force, enough) {
+                    false => match one.before.solved(force, size * one.tolerance) {
                         Some(force) => force,
                         None => break 'steps,
                     },
@@ -225,6 +240,32 @@ impl Before {
     }
 }
 
+/// A collocation in the sizes of a loop, with what it has found so far.
+struct FixedCollocation<const S: usize, const W: usize> {
+    after: f64,
+    seen: Rows<S, W, 2>,
+    by_force: [[f64; 2]; MOST],
+    change: [f64; S],
+    is_explicit: bool,
+    /// Part of an acceleration that is left of the equation, as a force.
+    tolerance: f64,
+    before: Before,
+}
+
+impl<const S: usize, const W: usize> FixedCollocation<S, W> {
+    fn of(one: &Collocation) -> Self {
+        Self {
+            after: one.after,
+            seen: Rows::of(|part, j| one.seen[part][j]),
+            by_force: one.by_force,
+            change: std::array::from_fn(|i| one.change[i]),
+            is_explicit: !one.per_acceleration.is_finite(),
+            tolerance: TOLERANCE * one.per_acceleration,
+            before: Before { forces: [0.0; 3], correction: 1.0 },
+        }
+    }
+}
+
 /// R rows of a map of S numbers of the state and W loads, by columns.
 struct Rows<const S: usize, const W: usize, const R: usize> {
     state: [[f64; R]; S],
@@ -240,15 +281,19 @@ impl<const S: usize, const W: usize, const R: usize> Rows<S, W, R> {
         }
     }
 
+    /// Two sums at a time, which wait half as long for one another.
     fn times(&self, z: &[f64; S], w: &[f64; W]) -> [f64; R] {
-        let mut sum = [0.0; R];
+        let [mut even, mut odd] = [[0.0; R]; 2];
+        for j in (0..S).step_by(2) {
+            (0..R).for_each(|i| even[i] += self.state[j][i] * z[j]);
+        }
+        for j in (1..S).step_by(2) {
+            (0..R).for_each(|i| odd[i] += self.state[j][i] * z[j]);
+        }
         for (column, w) in self.loads.iter().zip(w) {
-            (0..R).for_each(|i| sum[i] += column[i] * w);
+            (0..R).for_each(|i| odd[i] += column[i] * w);
         }
-        for (column, z) in self.state.iter().zip(z) {
-            (0..R).for_each(|i| sum[i] += column[i] * z);
-        }
-        sum
+        std::array::from_fn(|i| even[i] + odd[i])
     }
 }
 

@@ -96,6 +96,7 @@ struct Reaction {
 }
 
 impl Law {
+    #[inline]
     fn reaction(&self, extension: f64, rate: f64) -> Reaction {
         match self {
             Self::Spring(coefficients) => {
@@ -121,6 +122,7 @@ impl Law {
 }
 
 /// Σ cᵢ eⁱ from i = 1, and its derivative.
+#[inline]
 fn polynomial(coefficients: &[f64], e: f64) -> (f64, f64) {
     let (mut value, mut slope) = (0.0, 0.0);
     for coefficient in coefficients.iter().rev() {
@@ -131,6 +133,7 @@ fn polynomial(coefficients: &[f64], e: f64) -> (f64, f64) {
 }
 
 impl NonlinearElement {
+    #[inline]
     fn reaction(&self, x: &[f64], v: &[f64]) -> Reaction {
         match self.dofs.len() {
             1 => self.law.reaction(x[0], v[0]),
