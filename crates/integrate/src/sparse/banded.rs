@@ -3,10 +3,11 @@
 use nalgebra_sparse::csr::CsrMatrix;
 
 use super::ordering::Ordering;
+use super::tridiagonal::Tridiagonal;
 
 /// Part of the largest entry of its column that a diagonal entry must have to be the pivot: rows are
 /// exchanged only where that keeps rounding small, since every exchange widens the band.
-const KEPT_DIAGONAL: f64 = 0.1;
+pub(super) const KEPT_DIAGONAL: f64 = 0.1;
 
 /// P A = L U with L of unit diagonal, stored along the columns of the band.
 ///
@@ -25,6 +26,8 @@ pub(crate) struct BandedLu {
     above: Vec<f64>,
     /// 1 / the diagonal of U.
     reciprocals: Vec<f64>,
+    /// The factors to solve with of a matrix that has one diagonal on either side.
+    tridiagonal: Option<Box<Tridiagonal>>,
 }
 
 /// A band with room for the entries that exchanges of rows bring above it, column by column.
@@ -135,7 +138,10 @@ impl BandedLu {
         if !exchanged {
             exchanges.clear();
         }
-        Ok(Self::packed(&band, widest, exchanges))
+        let is_tridiagonal = (band.lower, widest) == (1, 1);
+        let tridiagonal =
+            if is_tridiagonal { Tridiagonal::of(matrix, ordering).map(Box::new) } else { None };
+        Ok(Self { tridiagonal, ..Self::packed(&band, widest, exchanges) })
     }
 
     /// Returns whether elimination without exchanges meets positive pivots only.
@@ -164,13 +170,13 @@ impl BandedLu {
             above[(j + 1) * upper - height..(j + 1) * upper]
                 .copy_from_slice(&band.entries[top - height..top]);
         }
-        Self { lower, upper, multipliers, exchanges, above, reciprocals }
+        Self { lower, upper, multipliers, exchanges, above, reciprocals, tridiagonal: None }
     }
 
     /// Solves A x = `b`, both in the order of the factors, in place.
     pub(crate) fn solve(&self, b: &mut [f64]) {
-        if (self.lower, self.upper) == (1, 1) && self.exchanges.is_empty() {
-            return self.solve_tridiagonal(b);
+        if let Some(tridiagonal) = &self.tridiagonal {
+            return tridiagonal.solve(b);
         }
         let n = self.reciprocals.len();
         for j in 0..n {
@@ -188,23 +194,6 @@ impl BandedLu {
             let column = &self.above[(j + 1) * self.upper - height..(j + 1) * self.upper];
             let rows = &mut head[j - height..];
             rows.iter_mut().zip(column).for_each(|(b, u)| *b -= tail[0] * u);
-        }
-    }
-
-    /// The same with one diagonal on either side, the neighbour being kept at hand.
-    fn solve_tridiagonal(&self, b: &mut [f64]) {
-        let mut before = 0.0;
-        let mut multiplier = 0.0;
-        for (b, next) in b.iter_mut().zip(&self.multipliers) {
-            *b -= before * multiplier;
-            (before, multiplier) = (*b, *next);
-        }
-        let mut after = 0.0;
-        let mut above = 0.0;
-        let rows = b.iter_mut().zip(&self.reciprocals).zip(&self.above);
-        for ((b, reciprocal), next) in rows.rev() {
-            *b = (*b - after * above) * reciprocal;
-            (after, above) = (*b, *next);
         }
     }
 }
@@ -236,7 +225,7 @@ mod tests {
 
     #[test]
     fn banded_solutions_are_the_dense_ones() {
-        for n in [1, 2, 5, 40] {
+        for n in [1, 2, 4, 5, 40, 41] {
             for (lower, upper) in [(0, 0), (1, 1), (2, 1), (0, 3), (3, 3), (7, 5), (39, 39)] {
                 for weak in [false, true] {
                     let matrix = random(n, lower, upper, weak);

@@ -7,6 +7,7 @@ mod general;
 mod ordering;
 mod product;
 mod symmetric;
+mod tridiagonal;
 
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;

@@ -1,0 +1,102 @@
+//! Factors of a tridiagonal matrix that is eliminated from both ends at once.
+
+use nalgebra_sparse::csr::CsrMatrix;
+
+use super::banded::KEPT_DIAGONAL;
+use super::ordering::Ordering;
+
+/// Elimination from both ends to the middle: a row waits for the one before it, so that two ends wait half as long.
+///
+/// # Source
+/// Babuška (1972), SIAM Journal on Numerical Analysis 9, 53–77; van der Vorst (1987), Parallel Computing 5, 45–54.
+#[derive(Debug)]
+pub(super) struct Tridiagonal {
+    /// Parts of the row before, towards an end, that are subtracted from each row.
+    multipliers: Vec<f64>,
+    /// Entry towards the middle over the pivot, row by row.
+    inward: Vec<f64>,
+    /// 1 / the pivots.
+    reciprocals: Vec<f64>,
+}
+
+impl Tridiagonal {
+    /// Factors `matrix`, which is tridiagonal in the given order; `None` where rows would have to be exchanged, and of
+    /// fewer than four rows.
+    pub(super) fn of(matrix: &CsrMatrix<f64>, ordering: &Ordering) -> Option<Self> {
+        let n = matrix.nrows();
+        if n < 4 {
+            return None;
+        }
+        let places = ordering.places(n);
+        let [mut below, mut pivots, mut above] = [(); 3].map(|()| vec![0.0; n]);
+        for (i, j, value) in matrix.triplet_iter() {
+            let (i, j) = (places[i], places[j]);
+            match j.checked_sub(i) {
+                Some(0) => pivots[i] = *value,
+                Some(_) => above[i] = *value,
+                None => below[i] = *value,
+            }
+        }
+        let half = n / 2;
+        let mut multipliers = vec![0.0; n];
+        let kept =
+            |pivot: f64, entry: f64| pivot.abs() >= KEPT_DIAGONAL * entry.abs() && pivot != 0.0;
+        for i in 1..half {
+            kept(pivots[i - 1], below[i]).then_some(())?;
+            multipliers[i] = below[i] / pivots[i - 1];
+            pivots[i] -= multipliers[i] * above[i - 1];
+        }
+        for i in (half..n - 1).rev() {
+            kept(pivots[i + 1], above[i]).then_some(())?;
+            multipliers[i] = above[i] / pivots[i + 1];
+            pivots[i] -= multipliers[i] * below[i + 1];
+        }
+        // The upper half is eliminated from the first row of the lower, last of all.
+        kept(pivots[half - 1], below[half]).then_some(())?;
+        let last = pivots[half];
+        pivots[half] -= below[half] / pivots[half - 1] * above[half - 1];
+        kept(pivots[half], last).then_some(())?;
+        let inward: Vec<f64> = (0..n)
+            .map(|i| match i {
+                // Its row is the last, and has nothing but the pivot.
+                i if i == half => below[half] / pivots[half - 1],
+                i if i < half => above[i] / pivots[i],
+                i => below[i] / pivots[i],
+            })
+            .collect();
+        let reciprocals: Vec<f64> = pivots.iter().map(|pivot| pivot.recip()).collect();
+        let finite = inward.iter().chain(&reciprocals).all(|value| value.is_finite());
+        finite.then_some(Self { multipliers, inward, reciprocals })
+    }
+
+    /// Solves A x = `b`, both in the order of the factors, in place.
+    pub(super) fn solve(&self, b: &mut [f64]) {
+        let n = self.multipliers.len();
+        let half = n / 2;
+        let (m, u, p) = (&self.multipliers[..n], &self.inward[..n], &self.reciprocals[..n]);
+        let b = &mut b[..n];
+        let (mut first, mut second) = (0.0, 0.0);
+        for top in 0..half {
+            let bottom = n - 1 - top;
+            first = b[top] - m[top] * first;
+            second = b[bottom] - m[bottom] * second;
+            (b[top], b[bottom]) = (first, second);
+        }
+        // Of an odd number of rows the one at the middle is left.
+        if n - half > half {
+            b[half] -= m[half] * second;
+        }
+        second = (b[half] - u[half] * first) * p[half];
+        first = first * p[half - 1] - u[half - 1] * second;
+        (b[half - 1], b[half]) = (first, second);
+        for step in 1..half {
+            let (top, bottom) = (half - 1 - step, half + step);
+            first = b[top] * p[top] - u[top] * first;
+            second = b[bottom] * p[bottom] - u[bottom] * second;
+            (b[top], b[bottom]) = (first, second);
+        }
+        if n - half > half {
+            b[n - 1] = b[n - 1] * p[n - 1] - u[n - 1] * second;
+        }
+    }
+}
