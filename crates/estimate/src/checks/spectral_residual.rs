@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use mechid_model::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix, DVector};
+use rayon::prelude::*;
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
 use super::concentration::{Part, concentration};
@@ -422,19 +423,21 @@ impl SpectralResidual {
             let (p_value, source) = (PValue::of(p_value), NoiseSource::Force);
             findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
         }
-        for residual in 0..self.data.dof() {
-            if let Some(correlation) = self.line_to_line(residual) {
-                let test = correlation.test(self.rounding);
-                let residual = Residual::Lines { residual };
-                findings.push(Finding::Whiteness { residual, test, span: None });
-            }
-            for force in 0..self.data.dof() {
-                if let Some(correlation) = self.with_force(residual, force) {
-                    let test = correlation.test(self.rounding);
-                    findings.push(Finding::CrossCorrelation { residual, force, test });
-                }
-            }
-        }
+        let dof = self.data.dof();
+        let of_channel = |residual: usize| {
+            let whiteness = self.line_to_line(residual).map(|correlation| Finding::Whiteness {
+                residual: Residual::Lines { residual },
+                test: correlation.test(self.rounding),
+                span: None,
+            });
+            let with_forces = (0..dof).filter_map(move |force| {
+                let test = self.with_force(residual, force)?.test(self.rounding);
+                Some(Finding::CrossCorrelation { residual, force, test })
+            });
+            whiteness.into_iter().chain(with_forces).collect::<Vec<_>>()
+        };
+        let correlations: Vec<Vec<Finding>> = (0..dof).into_par_iter().map(of_channel).collect();
+        findings.extend(correlations.into_iter().flatten());
         findings
     }
 
@@ -580,12 +583,14 @@ impl SpectralResidual {
         let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
         let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
         for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
+            // From lag to lag by the same angle.
+            let turn = Complex::cis(omega * lag);
+            let mut weight = f.conj() * Complex::cis(-omega * lag * lags as f64);
             for at in 0..weights.nrows() {
-                let shift = (at as f64 - lags as f64) * lag;
-                let weight = f.conj() * Complex::cis(omega * shift);
                 // Re(w r) = Re w Re r − Im w Im r.
                 weights[(at, 2 * line)] = weight.re;
                 weights[(at, 2 * line + 1)] = -weight.im;
+                weight *= turn;
             }
         }
         let places: Vec<usize> = rows.iter().flat_map(|row| [*row, row + 1]).collect();
