@@ -14,7 +14,7 @@ use mechid_estimate::{
     Unknowns, Window, checks, fit_percent, fitted_start, logarithm, predict, predict_periodic,
 };
 use mechid_model::{Discretisation, Matrix, Response, Terms};
-use mechid_signal::{Interpolation, Record, Sampling};
+use mechid_signal::{Extent, Interpolation, Record, Sampling};
 use nalgebra::{Complex, DMatrix};
 
 use super::draw::{Draw, finite, passed};
@@ -139,7 +139,7 @@ fn spectra(d: &mut Draw) -> Result<(), String> {
     let estimate = equation_error(&data, &unknowns);
     let estimate = found(d, estimate)?;
     if let Some(estimate) = estimate {
-        passed(checks::after_spectral_fit(std::slice::from_ref(&data), &estimate))?;
+        passed(checks::after_spectral_fit(std::slice::from_ref(&data), &estimate, Extent::Open))?;
         passed(checks::fitted_band(&estimate, &lines))?;
     }
     let _ = checks::delay_of_lines(&data, force.sampling().dt(), &unknowns);
@@ -175,7 +175,7 @@ fn spectra(d: &mut Draw) -> Result<(), String> {
     if let Some(data) = noise {
         let estimate = output_error(&data, &unknowns).map(|fit| fit.estimate);
         if let Some(estimate) = found(d, estimate)? {
-            passed(checks::after_spectral_fit(&[data], &estimate))?;
+            passed(checks::after_spectral_fit(&[data], &estimate, Extent::WholePeriod))?;
         }
     }
     Ok(())

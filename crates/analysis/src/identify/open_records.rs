@@ -110,7 +110,8 @@ pub(super) fn fit(
         }
         after.push(checks);
     }
-    let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&closed, &fit.estimate)?;
+    let AfterSpectralFit { records: residuals, bias } =
+        after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
     let windows = match excitation {
         Excitation::Lasting => "the windows are no periods",
         Excitation::Hits(_) => "hits are no periods",

@@ -9,6 +9,7 @@ use mechid_estimate::frequency_domain::{
     instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_signal::Extent;
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
@@ -70,7 +71,8 @@ pub(super) fn fit(
         after.push(band.into_iter().chain(late).collect());
         weighted.push(data);
     }
-    let AfterSpectralFit { records: residuals, bias } = after_spectral_fit(&weighted, &estimate)?;
+    let AfterSpectralFit { records: residuals, bias } =
+        after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
     Ok(Fitted {
         domain: "frequency",
         estimator,
@@ -196,10 +198,11 @@ fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found,
         return Ok(plain);
     }
     // Where the model is wrong, neither of both is right.
-    let left = after_spectral_fit(std::slice::from_ref(data), &likely.estimate)?.records;
+    let left =
+        after_spectral_fit(std::slice::from_ref(data), &likely.estimate, Extent::WholePeriod)?;
     let is_noise = |finding: &Finding| finding.verdict() == Verdict::Good;
     if of_plain < MUCH * of_likely
-        && !left.iter().flat_map(|left| left.findings()).all(|f| is_noise(&f))
+        && !left.records.iter().flat_map(|left| left.findings()).all(|f| is_noise(&f))
     {
         return Ok(plain);
     }

@@ -282,6 +282,20 @@ impl FrequencyData {
         alone
     }
 
+    /// A jump between the ends of a record in what channel `channel` reads, without a force: its lines fall as 1/s.
+    pub(crate) fn of_jump(&self, channel: usize) -> Self {
+        let jump = |row: usize, column: usize| {
+            let omega = self.omega[row];
+            let read = Complex::new(0.0, omega) * self.measured.per_displacement(omega);
+            if column == channel { read.inv() } else { Complex::ZERO }
+        };
+        Self {
+            force: DMatrix::zeros(self.len(), self.dof()),
+            displacement: DMatrix::from_fn(self.len(), self.dof(), jump),
+            ..self.clone()
+        }
+    }
+
     /// Second differences of neighbouring lines of the same spacing, in which the ends of a record count little:
     /// the spectra under a Hann window. Rows at the ends of a band stay as they are.
     ///

@@ -9,7 +9,9 @@ use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns, Window};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::resample::refine;
-use mechid_signal::{Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_signal::{
+    Extent, Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise,
+};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
@@ -174,7 +176,7 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
             let all = RepeatedPeriods::new(&lines, &force, &noisy, kind).unwrap();
             let data = all.mean_with_noise(pooling).unwrap();
             let estimate = output_error(&data, unknowns).unwrap().estimate;
-            let after = after_spectral_fit(&[data], &estimate).unwrap();
+            let after = after_spectral_fit(&[data], &estimate, Extent::WholePeriod).unwrap();
             let findings = after.records[0].findings();
             [Subject::Misfit, Subject::Whiteness, Subject::CrossCorrelation].map(|subject| {
                 let found = findings.iter().find(|finding| finding.subject() == subject).unwrap();
