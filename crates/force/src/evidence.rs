@@ -33,8 +33,11 @@ pub(crate) struct Posterior {
 
 /// Colours tried: white, random walk, integrated random walk.
 const COLOURS: [i32; 3] = [0, 1, 2];
-/// Fewest driven components that tell a colour: a few amplitudes lie near some slope by chance.
+/// Fewest driven components of a white force that tell a colour by themselves: a few amplitudes lie near some slope by
+/// chance.
 const COLOURED_FROM: f64 = 16.0;
+/// Logarithm of the likelihood that a colour gains of fewer of them where that is no chance.
+const CLEARLY: f64 = 6.0;
 /// Reaches tried first: all components, then each 0.8 of the one before.
 const REACH_RATIO: f64 = 0.8;
 /// EM rounds at most; from the starts below it needs a few dozen.
@@ -58,10 +61,14 @@ impl Posterior {
     /// is 1 where it is known.
     pub fn of(components: &Components, noise_known: bool) -> Result<Self, ForceError> {
         let noise = noise_known.then_some(1.0);
-        let mut bests = vec![Evidence::of(components, COLOURS[0], noise)];
-        if bests[0].share * bests[0].reach as f64 >= COLOURED_FROM {
+        let white = Evidence::of(components, COLOURS[0], noise);
+        let few = white.share * (white.reach as f64) < COLOURED_FROM;
+        let least = if few { white.likelihood + CLEARLY } else { f64::NEG_INFINITY };
+        let mut bests = vec![white];
+        if components.transmitted() as f64 >= COLOURED_FROM {
             let coloured = COLOURS[1..].iter();
-            bests.extend(coloured.map(|colour| Evidence::of(components, *colour, noise)));
+            let coloured = coloured.map(|colour| Evidence::of(components, *colour, noise));
+            bests.extend(coloured.filter(|coloured| coloured.likelihood > least));
         }
         let best = bests[1..].iter().fold(bests[0], |best, other| best.better(*other));
         let greatest = best.likelihood;
