@@ -136,7 +136,7 @@ fn study(row: &str, system: &SecondOrderSystem, runs: u64, how: &Identify, noise
     let subjects: BTreeSet<&String> = all.iter().flat_map(|run| &run.warnings).collect();
     for subject in subjects {
         let runs = all.iter().filter(|run| run.warnings.contains(subject)).count();
-        eprintln!("{row}: {runs} of {count} warn of {subject}");
+        println!("{row}: {runs} of {count} warn of {subject}");
     }
     if all.len() as u64 != runs {
         println!("{} of {runs} fits failed", runs - all.len() as u64);

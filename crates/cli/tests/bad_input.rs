@@ -89,6 +89,21 @@ fn tables_of_frequency_responses() {
 }
 
 #[test]
+fn noise_of_the_force_belongs_to_open_records() {
+    for (arguments, parts) in [
+        ("--force-noise -1", ["--force-noise: ", "zero or positive, got -1"]),
+        ("--force-noise nan", ["--force-noise: ", "zero or positive, got NaN"]),
+        ("--force-noise 1,2", ["--force-noise: ", "one for each of 1 forces, not 2"]),
+        ("--force-noise 1 --period 20", ["--force-noise", "--period"]),
+        ("--force-noise 1 --from-frf h1", ["--force-noise ", "without --from-frf"]),
+        ("--force-noise 1 --method least-squares", ["--force-noise: ", "maximum-likelihood alone"]),
+        ("--force-noise 1 --extent period", ["--force-noise: ", "it is for open records"]),
+    ] {
+        identify(&good(), arguments, &parts);
+    }
+}
+
+#[test]
 fn bearing_tests_need_two_directions() {
     let common = "bearing a.csv --force force --stator-mass";
     refused(&good(), &format!("{common} 2 --displacement x"), &["needs two columns, in x and y"]);

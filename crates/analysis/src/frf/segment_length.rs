@@ -22,12 +22,12 @@ impl Segmentation {
     /// Returns these segments with a length, and a remark on how it was chosen; `None` where it is given, and
     /// where no segments would have averages enough.
     ///
-    /// Of the powers of two that leave averages enough it is the shortest whose responses say at least nine tenths
-    /// of what the best say, by their coherence, averages and number of lines
+    /// The length is the shortest of the powers of two, as far as they leave averages enough, whose responses say at
+    /// least nine tenths of what the best say, by their coherence, averages and number of lines
     /// ([`Frf::information`](mechid_estimate::Frf::information)). The samples held in memory are looked at.
     ///
     /// # Errors
-    /// As those of an average over segments.
+    /// The errors of an average over segments.
     pub(crate) fn chosen(
         &self,
         recorded: &Windowed,

@@ -213,6 +213,9 @@ impl Identify {
                     Some(Extent::Open) if period_given => {
                         wrong("extent", "an open record has no `period`: leave one of them out")
                     }
+                    Some(Extent::Open) if !likelihood && force_noise.is_some() => {
+                        wrong("force_noise", "`method` maximum-likelihood alone allows for it")
+                    }
                     Some(Extent::Open) if !likelihood => {
                         wrong("extent", "the ends of open records take `method` maximum-likelihood")
                     }

@@ -56,7 +56,7 @@ pub struct Identify {
 pub enum Fit {
     /// Spectral lines of whole periods.
     Spectra {
-        /// Estimator; `None`: maximum likelihood where two periods or more show the noise, otherwise
+        /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least squares, otherwise
         /// least squares.
         #[serde(default)]
         method: Option<Method>,

@@ -183,8 +183,7 @@ fn with_force_noise(levels: Option<Vec<f64>>) -> Identify {
     Identify { fit, ..Identify::default() }
 }
 
-/// Of 180 intervals of 95 %, three of a record that go together, fewer than 88 % hold with a probability below
-/// 0.01. Taken for exact, noise of 1 % makes a third of them miss.
+/// Fewer than 88 % of 180 intervals of 95 %, three of a record that go together, hold with a probability below 0.01. Taken for exact, noise of 1 % makes a third of them miss.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
     let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 60);

@@ -45,7 +45,7 @@ pub struct FitArgs {
     #[command(flatten)]
     lines: LineArgs,
     /// Estimator of the parameters from the spectra [default: maximum-likelihood where two periods or
-    /// more show the noise or with --from-frf, otherwise least-squares]
+    /// more show the noise, where it biases least squares, or with --from-frf; otherwise least-squares]
     #[arg(long, value_name = "METHOD", value_enum)]
     method: Option<MethodChoice>,
     /// Noise spectrum by which maximum likelihood weighs the lines: white, smooth, neighbours:N (means over
@@ -55,7 +55,13 @@ pub struct FitArgs {
     /// Standard deviation of the noise on the samples of the force, in N, one for all forces or one per
     /// degree of freedom; for open records, which are fitted as such then [default: that above the band
     /// that the force drives, or between hits]
-    #[arg(long, value_name = "N,…", value_delimiter = ',', conflicts_with = "period")]
+    #[arg(
+        long,
+        value_name = "N,…",
+        value_delimiter = ',',
+        conflicts_with = "period",
+        allow_negative_numbers = true
+    )]
     force_noise: Vec<f64>,
     /// Extent of the window: of open records the unknown loads of their ends are fitted with the machine
     /// [default: period with --period; otherwise period unless the ends show, and in the time domain open

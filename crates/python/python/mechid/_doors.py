@@ -120,8 +120,8 @@ def identify(
         mappings, SEP 5 channels), or `Measurement` objects. Or the force and the displacement as
         arrays of shape (samples,) or (samples, degrees of freedom), in N and m.
     method : {"least-squares", "instrumental", "maximum-likelihood"}, optional
-        Estimator of the parameters; without, maximum likelihood where the periods show the noise or
-        `from_frf` is given, otherwise least squares.
+        Estimator of the parameters; without, maximum likelihood where the periods show the noise,
+        where it biases least squares, or where `from_frf` is given; otherwise least squares.
     noise : str, optional
         Noise spectrum by which maximum likelihood weighs the lines of whole periods: ``"white"``,
         ``"smooth"``, ``"neighbours:N"`` (means over N lines to either side), ``"per-line"`` or
