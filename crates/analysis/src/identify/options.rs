@@ -56,8 +56,8 @@ pub struct Identify {
 pub enum Fit {
     /// Spectral lines of whole periods.
     Spectra {
-        /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least squares, otherwise
-        /// least squares.
+        /// Estimator; `None`: maximum likelihood where two periods or more show the noise or it biases least
+        /// squares, otherwise least squares.
         #[serde(default)]
         method: Option<Method>,
         /// Spectrum of the noise that weighs maximum likelihood and by which the residual is tested: from
