@@ -148,7 +148,7 @@ struct Run {
     holding: f64,
     /// Relative error of the damping ratio of the first mode.
     damping: f64,
-    /// What checks warn of.
+    /// Subjects of the checks that warn.
     warnings: BTreeSet<String>,
 }
 

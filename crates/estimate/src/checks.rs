@@ -24,6 +24,7 @@ mod sentences;
 mod spectral;
 mod spectral_residual;
 pub mod thresholds;
+mod weighted_fit;
 
 pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
@@ -44,7 +45,8 @@ pub use range::{clipped_channels, constant_channels, quantised_channels, spiked_
 pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
 pub use spectral::{before_spectral_fit, coherence, fitted_band, fitted_step, steady_periods};
-pub use spectral_residual::{AfterSpectralFit, SpectralResidual, after_spectral_fit};
+pub use spectral_residual::SpectralResidual;
+pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.
 const MAX_SAMPLES: usize = 1 << 15;

@@ -50,7 +50,7 @@ struct Collocation {
     per_acceleration: f64,
 }
 
-/// What the steps before tell of the force at a collocation.
+/// Forces at a collocation in the steps before, and how a correction went there.
 #[derive(Debug, Clone, Copy)]
 struct Before {
     /// The forces, latest first, in N.
@@ -76,7 +76,7 @@ impl Collocations {
         let mut columns = Vec::new();
         let transition = Transition::read(stepper.as_mut(), || columns.push(probe.asked()));
         let count = columns.iter().map(Vec::len).max()?;
-        if !(1..=MOST).contains(&count)
+        if ![1, 2, MOST].contains(&count)
             || columns.iter().any(|asked| asked.len() != count)
             || !resolves(&transition, dt, n, 1.0)
         {
@@ -330,7 +330,7 @@ impl Probe {
         self.state().unit = Some(unit);
     }
 
-    /// What was asked, collocation by collocation, since the last call.
+    /// Takes the instants and motions asked for since the last call, collocation by collocation.
     fn asked(&self) -> Vec<Asked> {
         std::mem::take(&mut self.state().asked)
     }

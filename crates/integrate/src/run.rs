@@ -192,8 +192,11 @@ impl Run {
             aside += 1;
             if aside == STEPS_ASIDE && matches!(self.small, Some(Small::Nonlinear(_))) {
                 aside = 0;
-                self.owed.fill(0.0);
-                done = self.advance_small(table, done, to, motion).0;
+                let (ahead, _) = self.advance_small(table, done, to, motion);
+                if ahead > done {
+                    self.owed.fill(0.0);
+                }
+                done = ahead;
             }
         }
         // A sum is not finite if one of its terms is not: what has overflowed stays so to the end.

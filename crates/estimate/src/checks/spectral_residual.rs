@@ -1,25 +1,15 @@
-//! Residuals of spectra, weighted by their covariance, against noise.
+//! Tests of the weighted residual of spectra against noise.
 
 use std::f64::consts::PI;
 
-use mechid_model::linear_algebra::svd;
-use mechid_signal::Extent;
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
-use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
-use super::concentration::{Part, concentration};
+use super::concentration::Part;
 use super::correlation::{Correlation, share_above_of};
-use super::finding::{Concentration, Finding, NoiseSource, PValue, Reference, Residual};
-use super::thresholds::{LAGS, ROUNDING};
-use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened, motion_level};
-use crate::relations::Relations;
-use crate::triangular::TriangularFactor;
-use crate::{Estimate, EstimateError};
-
-/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
-/// combination of parameters has no effect.
-const RANK: f64 = 1e-12;
+use super::finding::{Concentration, Finding, NoiseSource, PValue, Residual};
+use super::thresholds::LAGS;
+use crate::frequency_domain::{FrequencyData, NoiseSpectrum};
 
 /// Maximum distance of lines, counted in lines of the fit, at which residuals are correlated.
 const DISTANCES: usize = 12;
@@ -29,124 +19,7 @@ const DISTANCES: usize = 12;
 const LINES_PER_CORRELATION: usize = 8;
 
 /// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
-const FREE_RESIDUALS: f64 = 8.0;
-
-/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
-const DECIDES: f64 = 10.0;
-
-/// Loads of the ends of a record that a channel is fitted with.
-const LOADS: f64 = 6.0;
-
-/// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
-const STEPS: usize = 8;
-
-/// Residual power that another such step removes, over the variance of a residual, below which there is
-/// none.
-const SETTLED: f64 = 0.01;
-
-/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
-/// the estimate leaves it.
-const SENSITIVITIES: usize = 1 << 24;
-
-/// Likewise, maximum number of products, sensitivities times parameters: some seconds.
-const PRODUCTS: usize = 1 << 32;
-
-/// Result of the tests after a fit of spectra.
-#[derive(Debug, Clone)]
-pub struct AfterSpectralFit {
-    /// Residual of each record.
-    pub records: Vec<SpectralResidual>,
-    /// Test for a bias of the estimate ([`Finding::Bias`]); `None` where a record states no noise or the
-    /// standard errors of the estimate are not known.
-    pub bias: Option<Finding>,
-}
-
-/// Weights the residuals of a fit of spectra by their own covariance, and tests the estimate for a bias.
-///
-/// The covariance follows from the noise of force and response that the data state. Of the weighted
-/// residual, the part that other parameters explain is removed by a few Gauss–Newton steps of maximum
-/// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
-/// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
-/// parameters together and the one that changes most alone.
-/// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
-/// response, beside that of the forces if the data know it.
-///
-/// Of an open record, its own ends taken off, the noise begins and ends at values that differ: that jump, which ties
-/// low lines together, is left out of the tests.
-///
-/// # Errors
-/// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
-///
-/// # Source
-/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on maximum
-/// likelihood and on model validation; Hausman (1978), Econometrica 46, 1251–1271, for the bias, here
-/// with the covariance of the estimate, which is an upper bound of that of the difference.
-pub fn after_spectral_fit(
-    records: &[FrequencyData],
-    estimate: &Estimate,
-    extent: Extent,
-) -> Result<AfterSpectralFit, EstimateError> {
-    for data in records {
-        let what = "degrees of freedom of the data";
-        crate::least_squares::size(what, data.dof(), estimate.dof())?;
-    }
-    let Some(fit) = WeightedFit::of(records, estimate, extent) else {
-        return Ok(AfterSpectralFit { records: Vec::new(), bias: None });
-    };
-    let noise_stated = fit.records.iter().all(|record| record.noise_stated);
-    let bias = if noise_stated { fit.bias(estimate) } else { None };
-    Ok(AfterSpectralFit { records: fit.records, bias })
-}
-
-/// Residuals of all records of a fit.
-struct WeightedFit {
-    records: Vec<SpectralResidual>,
-    /// Change of the parameters from the estimate to the most likely ones.
-    step: Option<DVector<f64>>,
-}
-
-/// Weighted residuals of all records, and their sensitivities in an orthonormal basis.
-struct Linearised {
-    weighted: Vec<Whitened>,
-    /// Combinations of parameters, one per column, that change the residuals by orthonormal columns.
-    basis: DMatrix<f64>,
-    /// Orthonormal columns that the parameters explain.
-    explained: Vec<DMatrix<f64>>,
-    /// Scalar products of the residuals with those columns.
-    coefficients: DVector<f64>,
-}
-
-impl Linearised {
-    fn of(weighted: Vec<Whitened>) -> Option<Self> {
-        let basis = orthonormal_basis(&weighted)?;
-        let explained: Vec<DMatrix<f64>> =
-            weighted.iter().map(|record| &record.sensitivity * &basis).collect();
-        let products = explained.iter().zip(&weighted).map(|(q, w)| q.tr_mul(&w.residual));
-        let coefficients =
-            products.fold(DVector::zeros(basis.ncols()), |sum, product| sum + product);
-        Some(Self { weighted, basis, explained, coefficients })
-    }
-
-    /// Residuals of which the parameters are taken to explain nothing.
-    fn without_sensitivity(weighted: Vec<Whitened>, parameters: usize) -> Self {
-        let nothing = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
-        Self {
-            explained: weighted.iter().map(nothing).collect(),
-            weighted,
-            basis: DMatrix::zeros(parameters, 0),
-            coefficients: DVector::zeros(0),
-        }
-    }
-
-    fn power(&self) -> f64 {
-        self.weighted.iter().map(|record| record.residual.norm_squared()).sum()
-    }
-
-    /// Gauss–Newton step of the parameters.
-    fn step(&self) -> DVector<f64> {
-        &self.basis * &self.coefficients
-    }
-}
+pub(super) const FREE_RESIDUALS: f64 = 8.0;
 
 /// Residual of one record of a fit of spectra, in units of its noise.
 #[derive(Debug, Clone)]
@@ -170,257 +43,47 @@ pub struct SpectralResidual {
     concentration: Option<Concentration>,
 }
 
-impl WeightedFit {
-    fn of(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
-        let noise: Option<Vec<&NoiseSpectrum>> =
-            records.iter().map(FrequencyData::noise_above_rounding).collect();
-        let levels = levels(records, estimate)?;
-        let relations = Relations::of(estimate.unknowns());
-        let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
-        let start = match &relations {
-            None => DVector::from_column_slice(&entries),
-            Some(relations) => relations.unknowns(&entries),
-        };
-        let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
-        let sensitivities = rows * start.len();
-        let small = sensitivities <= SENSITIVITIES && sensitivities * start.len() <= PRODUCTS;
-        let covariance = |at: usize, row: usize| match &noise {
-            Some(noise) => noise[at].covariance(row).clone(),
-            None => white_covariance(&records[at], row, &levels),
-        };
-        let linearised = |values: &DVector<f64>| -> Option<Linearised> {
-            let entries = relations.as_ref().map(|relations| relations.entries(values.as_slice()));
-            let (entries, unknowns) = (entries.as_ref().unwrap_or(values), estimate.unknowns());
-            let one = |(at, data): (usize, &FrequencyData)| {
-                let covariance = |row: usize| covariance(at, row);
-                match small {
-                    true => Whitened::of(data, unknowns, entries, covariance),
-                    false => Whitened::residual_of(data, unknowns, entries, covariance),
-                }
-            };
-            let weighted = records.iter().enumerate().map(one).collect::<Option<_>>()?;
-            match small {
-                true => Linearised::of(weighted),
-                false => Some(Linearised::without_sensitivity(weighted, values.len())),
-            }
-        };
-        let mut values = start.clone();
-        let mut linear = linearised(&values)?;
-        for _ in 0..STEPS {
-            let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
-            if linear.coefficients.norm_squared() <= SETTLED * unit {
-                break;
-            }
-            // Half a step where a whole one goes too far.
-            let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
-                let values = &values + linear.step() * *length;
-                let next = linearised(&values)?;
-                (next.power() < linear.power()).then_some((values, next))
-            });
-            let Some(next) = next else { break };
-            (values, linear) = next;
-        }
-        let end = &values + linear.step();
-        let entries_of = |values: &DVector<f64>| match &relations {
-            None => values.clone(),
-            Some(relations) => relations.entries(values.as_slice()),
-        };
-        let jumps = |at: usize| -> Vec<DVector<f64>> {
-            let jump = |channel| {
-                let (data, unknowns) = (records[at].of_jump(channel), estimate.unknowns());
-                let covariance = |row| covariance(at, row);
-                Whitened::residual_of(&data, unknowns, &entries_of(&values), covariance)
-            };
-            let channels = if extent == Extent::Open { records[at].dof() } else { 0 };
-            (0..channels).filter_map(jump).map(|jump| jump.residual).collect()
-        };
-        let step = match &relations {
-            None => end - start,
-            Some(relations) => relations.entries(end.as_slice()) - DVector::from_vec(entries),
-        };
-        let Linearised { weighted, explained, coefficients, .. } = linear;
-        let residuals = records.iter().enumerate().zip(weighted).zip(explained);
-        let residuals = residuals.map(|(((at, data), weighted), explained)| {
-            let values = weighted.residual - &explained * &coefficients;
-            let (values, explained) = without(&jumps(at), values, explained);
-            let deviations = deviations(&values, &explained);
-            let mut spread = explained.clone();
-            for mut column in spread.column_iter_mut() {
-                column.component_mul_assign(&deviations);
-            }
-            SpectralResidual {
-                data: data.clone(),
-                noise_stated: noise.is_some(),
-                explained_spread: spread.transpose() * &spread,
-                deviations,
-                values,
-                explained,
-                rounding: is_rounding(data, &levels),
-                force_decides: if noise.is_none() { force_decides(data, estimate) } else { None },
-                concentration: None,
-            }
-        });
-        let mut records: Vec<SpectralResidual> = residuals.collect();
-        let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
-        if parts.len() == records.len() {
-            let lines = concentration(&parts);
-            records.iter_mut().for_each(|record| record.concentration = lines.clone());
-        }
-        Some(Self { records, step: small.then_some(step) })
-    }
-
-    fn bias(&self, estimate: &Estimate) -> Option<Finding> {
-        let errors: Vec<f64> = estimate.parameters().map(|p| p.standard_error).collect();
-        if errors.is_empty() || errors.iter().any(|error| !(*error > 0.0 && error.is_finite())) {
-            return None;
-        }
-        let (scale, change) = (DVector::from_vec(errors), self.step.as_ref()?);
-        let step = change.component_div(&scale);
-        let mut correlation = estimate.covariance();
-        for (mut column, size) in correlation.column_iter_mut().zip(&scale) {
-            column.iter_mut().zip(&scale).for_each(|(entry, other)| *entry /= other * size);
-        }
-        let count = scale.len() as f64;
-        let together = match estimate.unknowns().is_related() {
-            false => {
-                let statistic = step.dot(&correlation.cholesky()?.solve(&step));
-                ChiSquared::new(count).expect("at least one parameter").sf(statistic)
-            }
-            // Entries that follow from others have no inverse of their covariance.
-            true => 1.0,
-        };
-        let largest = step.iamax();
-        let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
-        let parameter = estimate.parameters().nth(largest)?;
-        Some(Finding::Bias {
-            p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
-            parameter: parameter.parameter,
-            estimate: parameter.value,
-            unbiased: parameter.value + change[largest],
-            standard_error: parameter.standard_error,
-            reference: Reference::MaximumLikelihood,
-        })
-    }
-}
-
-/// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
-/// stated noise of the forces, the most likely one.
-fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
-    let each = residuals(records, estimate)?;
-    Some(each.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
-}
-
-/// Power of the residual of each channel in the quantity measured, with the variance that the noise of the forces
-/// makes of it, over all records.
-fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
-    let system = estimate.system().ok()?;
-    let mut residuals = vec![Vec::new(); system.dof()];
-    for data in records {
-        for (row, omega) in data.omega().iter().enumerate() {
-            let receptance = system.receptance(*omega).ok()?;
-            let scale = data.measured().per_displacement(*omega).norm_sqr();
-            let modelled = &receptance * data.force().row(row).transpose();
-            let residual = data.displacement().row(row).transpose() - modelled;
-            let variance = data.force_variance().row(row).transpose();
-            let by_force = receptance.map(|g| g.norm_sqr()) * variance;
-            for (channel, pairs) in residuals.iter_mut().enumerate() {
-                pairs.push((scale * residual[channel].norm_sqr(), scale * by_force[channel]));
-            }
-        }
-    }
-    Some(residuals)
-}
-
-/// Power of the residual over that of the noise, on the lines on which that of the forces decides, with the
-/// probability of so little times the number of channels; of the channel where it is least probable. `None` where
-/// no noise of the forces is stated, or where it decides on too few lines.
-fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
-    if data.force_variance().iter().all(|variance| *variance == 0.0) {
-        return None;
-    }
-    let residuals = residuals(std::slice::from_ref(data), estimate)?;
-    let channels = residuals.len() as f64;
-    let fitted = estimate.parameters().len() as f64 / channels + LOADS;
-    let of_channel = |pairs: Vec<(f64, f64)>| {
-        let own = motion_level(pairs.iter().copied()).powi(2);
-        let decided = pairs.iter().filter(|(_, known)| *known > DECIDES * own);
-        let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
-            (count + 1.0, over + power / (own + known))
-        });
-        // A sum of squares of complex numbers has two degrees of freedom each.
-        let free = 2.0 * count - fitted;
-        if free < FREE_RESIDUALS {
-            return None;
-        }
-        let below = ChiSquared::new(free).ok()?.cdf(2.0 * over);
-        Some((2.0 * over / free, (channels * below).min(1.0)))
-    };
-    residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
-}
-
-/// Returns whether the residual of every channel is rounding.
-fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
-    let rms = |channel: usize| {
-        let lines = data.displacement().column(channel);
-        let power = lines
-            .iter()
-            .zip(data.omega())
-            .map(|(x, omega)| (x * data.measured().per_displacement(*omega)).norm_sqr());
-        (power.sum::<f64>() / data.len() as f64).sqrt()
-    };
-    levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
-}
-
-/// Covariance of displacement and force for white noise of these levels on the quantity measured, and what noise of
-/// the forces is stated.
-fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
-    let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
-    let scale = data.measured().per_displacement(data.omega()[row]).norm();
-    // A channel without any residual must not take all the weight.
-    let least = levels.iter().copied().fold(0.0, f64::max) * 1e-6;
-    for (channel, level) in levels.iter().enumerate().take(n) {
-        let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
-        covariance[(channel, channel)] = Complex::from(level * level);
-        let of_force = data.force_variance()[(row, channel)];
-        covariance[(n + channel, n + channel)] = Complex::from(of_force);
-    }
-    covariance
-}
-
-/// B for which J B of the stacked sensitivities J has orthonormal columns that span those of J.
-fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
-    let parameters = records.first()?.sensitivity.ncols();
-    let mut factor = TriangularFactor::new(parameters);
-    for record in records {
-        factor.push(&[record.sensitivity.as_view()]).then_some(())?;
-    }
-    let mut r = factor.r().clone();
-    let mut scale = DVector::from_element(parameters, 1.0);
-    for (mut column, scale) in r.column_iter_mut().zip(scale.iter_mut()) {
-        let length = column.norm();
-        if length > 0.0 {
-            *scale = length;
-            column /= length;
-        }
-    }
-    // Without dependent parameters the triangle alone tells, in a fraction of the time.
-    if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
-        && r.norm() * inverse.norm() * RANK < 1.0
-    {
-        let mut basis = inverse;
-        basis.column_iter_mut().for_each(|mut column| column.component_div_assign(&scale));
-        return Some(basis);
-    }
-    let svd = svd(r).ok()?;
-    let (singular, v_t) = (&svd.singular_values, svd.v_t.as_ref()?);
-    let kept: Vec<usize> =
-        (0..parameters).filter(|at| singular[*at] > RANK * singular.max()).collect();
-    Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
-        v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
-    }))
-}
-
 impl SpectralResidual {
+    /// The weighted values of data that state their noise or not, with covariance I − QQᵀ of the `explained` Q.
+    pub(super) fn new(
+        data: FrequencyData,
+        noise_stated: bool,
+        values: DVector<f64>,
+        explained: DMatrix<f64>,
+    ) -> Self {
+        let deviations = deviations(&values, &explained);
+        let mut spread = explained.clone();
+        for mut column in spread.column_iter_mut() {
+            column.component_mul_assign(&deviations);
+        }
+        Self {
+            data,
+            noise_stated,
+            explained_spread: spread.transpose() * &spread,
+            deviations,
+            values,
+            explained,
+            rounding: false,
+            force_decides: None,
+            concentration: None,
+        }
+    }
+
+    /// The same, of rounding or not.
+    pub(super) fn of_rounding(self, rounding: bool) -> Self {
+        Self { rounding, ..self }
+    }
+
+    /// The same with a power where the noise of the forces decides.
+    pub(super) fn with_force_decides(self, force_decides: Option<(f64, f64)>) -> Self {
+        Self { force_decides, ..self }
+    }
+
+    /// Keeps the lines that hold the misfit of all records.
+    pub(super) fn hold_misfit(&mut self, lines: Option<Concentration>) {
+        self.concentration = lines;
+    }
+
     /// Tests the power of the residual against the noise, if it is stated ([`Finding::Misfit`]), and its
     /// correlation from line to line ([`Finding::Whiteness`]) and with the forces
     /// ([`Finding::CrossCorrelation`]). Residuals of rounding pass. Empty if the parameters leave too
@@ -462,7 +125,7 @@ impl SpectralResidual {
     }
 
     /// Returns the input of the search for disturbed lines; `None` if no noise is stated.
-    fn part(&self) -> Option<Part<'_>> {
+    pub(super) fn part(&self) -> Option<Part<'_>> {
         let noise = self.data.noise().filter(|_| self.noise_stated && !self.rounding)?;
         let (n, nu) = (self.data.dof() as f64, noise.degrees_of_freedom());
         Some(Part {
@@ -663,29 +326,6 @@ fn deviations(values: &DVector<f64>, explained: &DMatrix<f64>) -> DVector<f64> {
         deviations[row + 1] = deviations[row];
     }
     deviations
-}
-
-/// Leaves some `parts` out of the values, and adds them to the orthonormal columns that are explained.
-fn without(
-    parts: &[DVector<f64>],
-    mut values: DVector<f64>,
-    mut explained: DMatrix<f64>,
-) -> (DVector<f64>, DMatrix<f64>) {
-    for part in parts {
-        let mut column = part.unscale(part.norm());
-        for _ in 0..2 {
-            column -= &explained * explained.tr_mul(&column);
-        }
-        let left = column.norm();
-        if left > RANK.sqrt() {
-            column.unscale_mut(left);
-            values.axpy(-column.dot(&values), &column, 1.0);
-            let at = explained.ncols();
-            explained = explained.insert_column(at, 0.0);
-            explained.set_column(at, &column);
-        }
-    }
-    (values, explained)
 }
 
 /// Covariance of |p(a)|² and |p(b)|², where p(d) = Σ r̄(l) r(l + d) and the r have random phases and the
