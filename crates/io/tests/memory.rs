@@ -69,7 +69,7 @@ fn peak(path: &Path, rows: usize) -> usize {
     assert!(!file.is_whole());
     let survey = file.survey(&TimeAxis::Column("time"), &COLUMNS).unwrap();
     assert_eq!(survey.sampling.len(), rows);
-    let inventory = file.inventory(&[1, 2, 3, 4], Some(0)).unwrap();
+    let inventory = file.inventory(&[1, 2, 3, 4], Some(0), &mut |_, _, _| {}).unwrap();
     assert_eq!(inventory.samples, rows);
     let stretch = survey.sampling.with_len(PERIOD).unwrap();
     let lines = Lines::new(stretch, 1..=20).unwrap();

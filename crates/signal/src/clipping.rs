@@ -68,6 +68,9 @@ pub fn clipping(samples: &[f64]) -> Option<Clipping> {
 
 /// Value and length of every run of equal samples that begins or ends with a jump.
 fn steep_runs(samples: &[f64]) -> Vec<(f64, usize)> {
+    if !samples.chunk_by(|a, b| a == b).any(|run| run.len() >= RUN) {
+        return Vec::new();
+    }
     // No two levels of a converter are nearer than its step.
     let mut levels = samples.to_vec();
     levels.sort_unstable_by(f64::total_cmp);

@@ -15,10 +15,9 @@
 //! # Ok::<(), mechid_signal::SignalError>(())
 //! ```
 
-use nalgebra::{Complex, DMatrix};
-
 use crate::error::{has_channel, not_negative, within};
-use crate::{Record, Sampling, SignalError, Spectrum};
+use crate::transform::forward;
+use crate::{Record, SignalError, Spectrum};
 
 /// Root mean square, in the unit of the samples; 0 for no samples.
 ///
@@ -97,33 +96,34 @@ pub fn circular_autocorrelation(x: &[f64]) -> Vec<f64> {
 /// Dissertation eq. (4.3.1), the sum ending with the sequence.
 pub fn aperiodic_autocorrelation(x: &[f64]) -> Vec<f64> {
     // Zeros behind the sequence keep its end from meeting its beginning.
-    correlate(x, 2 * x.len())
+    correlate(x, fast_length(2 * x.len()))
 }
 
 /// The first N lags of the correlation of a sequence padded to `period`, over N.
 fn correlate(x: &[f64], period: usize) -> Vec<f64> {
-    let Ok(sampling) = Sampling::new(1.0, period) else {
+    if x.is_empty() {
         return Vec::new();
-    };
+    }
     // Squares of large or small samples leave the range of numbers; scaling is exact.
     let unit = power_of_two(peak(x));
-    let mut padded = DMatrix::zeros(period, 1);
-    padded.iter_mut().zip(x).for_each(|(padded, x)| *padded = x / unit);
-    let Ok(record) = Record::new(sampling, padded) else {
-        // Samples that are not finite have no finite correlation.
-        return vec![f64::NAN; x.len()];
-    };
-    // With one-sided amplitudes X_n the correlation has the lines |X_n|²/2, but |X_n|² where a
-    // line is its own mirror image.
-    let mut lines = Spectrum::of(&record).lines().clone();
-    for (n, line) in lines.iter_mut().enumerate() {
-        let half = if n == 0 || 2 * n == period { 1.0 } else { 0.5 };
-        *line = Complex::from(half * line.norm_sqr());
+    let plan = forward(period);
+    let (mut samples, mut lines) = (plan.make_input_vec(), plan.make_output_vec());
+    let mut scratch = plan.make_scratch_vec();
+    samples.iter_mut().zip(x).for_each(|(padded, x)| *padded = x / unit);
+    plan.process_with_scratch(&mut samples, &mut lines, &mut scratch).expect("buffers of the plan");
+    // The power of all lines is real and even: its transform is that of the way back, too.
+    for (n, power) in samples.iter_mut().enumerate() {
+        *power = lines[n.min(period - n)].norm_sqr();
     }
-    let correlation = Spectrum::from_lines(sampling, lines).map(|spectrum| spectrum.samples());
-    let correlation = correlation.expect("squares of scaled samples are finite");
-    let scale = period as f64 / x.len() as f64;
-    correlation.as_slice()[..x.len()].iter().map(|a| scale * a * unit * unit).collect()
+    plan.process_with_scratch(&mut samples, &mut lines, &mut scratch).expect("buffers of the plan");
+    let scale = 1.0 / (period as f64 * x.len() as f64);
+    (0..x.len()).map(|lag| scale * lines[lag.min(period - lag)].re * unit * unit).collect()
+}
+
+/// Smallest 2ⁿ, 3·2ⁿ or 9·2ⁿ that is even and not below `least`: transforms of such lengths are fast.
+fn fast_length(least: usize) -> usize {
+    let lengths = [1, 3, 9].map(|odd| odd * least.div_ceil(odd).max(2).next_power_of_two());
+    lengths.into_iter().fold(usize::MAX, usize::min)
 }
 
 /// Largest power of two that is not above a positive level, in the unit of the level; at least the smallest

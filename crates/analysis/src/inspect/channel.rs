@@ -84,7 +84,6 @@ pub struct Gathered {
     levels: RunningStatistics,
     /// The first samples, which are looked at together; none where nothing is looked for.
     held: Vec<f64>,
-    mean_of_held: f64,
     /// Extreme values over time; `None` if no picture is drawn.
     extremes: Option<Extremes>,
 }
@@ -106,16 +105,14 @@ impl Gathered {
         Self { extremes: drawn.then(|| Extremes::of(window)), ..Self::default() }
     }
 
-    /// Takes the next samples; whole blocks are held until there are `hold` of them.
+    /// Takes the next samples; the first `hold` of all are held.
     pub(crate) fn push(&mut self, values: &[f64], hold: usize) -> Result<(), SignalError> {
         self.levels.push(values)?;
         if let Some(extremes) = &mut self.extremes {
             extremes.push(values);
         }
-        if self.held.len() < hold {
-            self.held.extend_from_slice(values);
-            self.mean_of_held = self.levels.mean();
-        }
+        let more = hold.saturating_sub(self.held.len()).min(values.len());
+        self.held.extend_from_slice(&values[..more]);
         Ok(())
     }
 }
@@ -130,10 +127,11 @@ impl Measured {
         dt: Option<f64>,
         given: Option<usize>,
     ) -> Result<Self, SignalError> {
-        let Gathered { levels, held, mean_of_held, extremes } = gathered;
+        let Gathered { levels, held, extremes } = gathered;
         let (spectral, repeats, cut) = (!held.is_empty(), repetition(&held), clipping(&held));
         let period = repeats.map(|r| r.period).or(given.filter(|period| *period <= held.len()));
-        let lines = AmplitudeSpectrum::of(held, mean_of_held, period)?;
+        let mean = held.iter().sum::<f64>() / held.len() as f64;
+        let lines = AmplitudeSpectrum::of(held, mean, period)?;
         let channel = Channel {
             column,
             name,

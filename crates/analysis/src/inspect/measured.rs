@@ -1,6 +1,8 @@
 //! The columns of a window, gone through once.
 
 use mechid_io::{RecordFile, Unit};
+use mechid_signal::SignalError;
+use rayon::prelude::*;
 
 use super::channel::{AmplitudeSpectrum, Channel, Gathered, Measured};
 use crate::AnalysisError;
@@ -10,6 +12,8 @@ use crate::measurement::IN_MEMORY_SAMPLES;
 /// A column to show, and what is taken away from it.
 #[derive(Debug, Clone, Copy)]
 pub struct Shown {
+    /// Place among the columns asked for, counted from 0.
+    pub place: usize,
     pub column: usize,
     pub offset: f64,
     /// Whether lines and period are looked for, which bare instants do not have.
@@ -67,28 +71,69 @@ impl Span {
     }
 }
 
+/// What was gathered of the columns asked for, one each, on the way to the end of a text.
+#[derive(Debug)]
+pub struct OnTheWay {
+    /// First sample of the window, counted from 0.
+    start: usize,
+    /// Most samples to hold of each column.
+    hold: Vec<usize>,
+    gathered: Vec<Result<Gathered, SignalError>>,
+}
+
+impl OnTheWay {
+    /// Begins without a sample, with the samples to hold of each column.
+    pub fn new(start: usize, hold: Vec<usize>) -> Self {
+        let gathered = hold.iter().map(|_| Ok(Gathered::default())).collect();
+        Self { start, hold, gathered }
+    }
+
+    /// Takes the samples of a column from `first` on, those before the window too.
+    pub fn push(&mut self, column: usize, first: usize, values: &[f64]) {
+        let values = &values[self.start.saturating_sub(first).min(values.len())..];
+        let gathered = &mut self.gathered[column];
+        if let Ok(Err(error)) = gathered.as_mut().map(|g| g.push(values, self.hold[column])) {
+            *gathered = Err(error);
+        }
+    }
+
+    /// The columns shown, by their places among those asked for.
+    fn of(self, places: impl Iterator<Item = usize>) -> Result<Vec<Gathered>, SignalError> {
+        let mut all: Vec<_> = self.gathered.into_iter().map(Some).collect();
+        places.filter_map(|place| all[place].take()).collect()
+    }
+}
+
 /// Measures the window of some columns, with the step and the period if they are known; of those to
 /// be drawn what a picture shows, too.
 pub fn measured(
     file: &RecordFile,
     shown: &[Shown],
+    on_the_way: Option<OnTheWay>,
     window: Span,
     dt: Option<f64>,
     period: Option<usize>,
 ) -> Result<(Vec<Channel>, Vec<Drawn>), AnalysisError> {
-    // A text is read once for all columns; of what is held, one copy at a time is enough.
-    let at_once = if file.is_whole() { 1 } else { shown.len() };
+    // A text is read once for all columns; of what is held, a copy for each thread is enough.
+    let at_once = if file.is_whole() { rayon::current_num_threads() } else { shown.len() };
     let table = file.head();
     let (mut channels, mut drawn) = (Vec::new(), Vec::new());
+    let mut on_the_way = on_the_way;
     for together in shown.chunks(at_once) {
-        let gathered = gathered(file, together, window)?;
-        for (column, gathered) in together.iter().map(|s| s.column).zip(gathered) {
+        let gathered = match on_the_way.take() {
+            Some(on_the_way) => on_the_way.of(together.iter().map(|shown| shown.place))?,
+            None => gathered(file, together, window)?,
+        };
+        let of_columns = together.par_iter().zip(gathered).map(|(shown, gathered)| {
+            let column = shown.column;
             let (name, about) = (table.names()[column].clone(), table.about(column).into());
-            let Measured { channel, lines, extremes } =
-                Measured::of(column + 1, name, about, gathered, dt, period)?;
+            Measured::of(column + 1, name, about, gathered, dt, period)
+        });
+        let of_columns: Vec<_> = of_columns.collect::<Result<_, _>>()?;
+        for (shown, Measured { channel, lines, extremes }) in together.iter().zip(of_columns) {
             drawn.extend(extremes.map(|extremes| Drawn {
                 name: channel.title(),
-                unit: table.unit(column),
+                unit: table.unit(shown.column),
                 start: window.start,
                 extremes,
                 lines,

@@ -12,7 +12,7 @@ use mechid_signal::{self as signal, message};
 use serde::{Deserialize, Serialize, Serializer};
 
 pub use self::measured::Drawn;
-use self::measured::{Shown, Span, measured};
+use self::measured::{OnTheWay, Shown, Span, measured};
 pub use self::summary::RecordSummary;
 use crate::AnalysisError;
 use crate::measurement::units::doubtful_time;
@@ -119,7 +119,12 @@ impl Inspection<'_> {
             _ => None,
         };
         let asked = self.asked(table)?;
-        let mut inventory = file.inventory(&asked, instants)?;
+        let mut on_the_way = self.on_the_way(&file, &asked, instants);
+        let mut inventory = file.inventory(&asked, instants, &mut |column, first, values| {
+            if let Some(gathered) = &mut on_the_way {
+                gathered.push(column, first, values);
+            }
+        })?;
         let (samples, open_line) = (inventory.samples, inventory.open_line);
         let sampling = inventory.sampling.take();
         let of_file = std::mem::take(&mut inventory.remarks);
@@ -141,7 +146,7 @@ impl Inspection<'_> {
             summary.remarks.extend(window.looked_at(table.file()));
             summary.remarks.extend(self.choose_drawn(table, &mut shown));
             let period = self.window.period;
-            (summary.channels, drawn) = measured(&file, &shown, window, dt, period)?;
+            (summary.channels, drawn) = measured(&file, &shown, on_the_way, window, dt, period)?;
         }
         summary.remarks.extend(open_line.map(|line| {
             format!(
@@ -150,6 +155,30 @@ impl Inspection<'_> {
             )
         }));
         Ok(Inspected { summary, drawn, held: window.and_then(Span::held), dt })
+    }
+
+    /// Gathers the columns of a text while its samples are counted, so that it is read only once: where the
+    /// window ends with the record, and neither its length nor a mean is needed beforehand.
+    fn on_the_way(
+        &self,
+        file: &RecordFile,
+        asked: &[usize],
+        instants: Option<usize>,
+    ) -> Option<OnTheWay> {
+        let to_the_end = self.window.period.is_none() && self.window.periods.is_none();
+        let at_once = to_the_end && self.reading.detrend == Detrend::None && !self.how.curves;
+        (at_once && !file.is_whole()).then(|| {
+            let hold = |column: &usize| match self.is_signal(*column, instants) {
+                true => IN_MEMORY_SAMPLES,
+                false => 0,
+            };
+            OnTheWay::new(self.window.start.saturating_sub(1), asked.iter().map(hold).collect())
+        })
+    }
+
+    /// Whether period and lines of a column are looked for: instants are no signal.
+    fn is_signal(&self, column: usize, instants: Option<usize>) -> bool {
+        !self.columns.is_empty() || Some(column) != instants
     }
 
     /// Chooses the columns that are drawn, and returns a remark on the others.
@@ -190,14 +219,12 @@ impl Inspection<'_> {
             Detrend::None => 0.0,
         };
         let (mut shown, mut len, mut left_out) = (Vec::new(), inventory.samples, Vec::new());
-        for (&column, tally) in asked.iter().zip(inventory.columns) {
+        for (place, (&column, tally)) in asked.iter().zip(inventory.columns).enumerate() {
             match tally {
                 Ok(tally) if !self.columns.is_empty() || tally.samples == inventory.samples => {
                     len = tally.samples;
-                    // Instants are no signal.
-                    let spectral = !self.columns.is_empty() || Some(column) != instants;
-                    let offset = offset(tally.mean);
-                    shown.push(Shown { column, offset, spectral, drawn: false });
+                    let (offset, spectral) = (offset(tally.mean), self.is_signal(column, instants));
+                    shown.push(Shown { place, column, offset, spectral, drawn: false });
                 }
                 Ok(tally) => left_out.push(format!(
                     "column {} has {}, most have {}",

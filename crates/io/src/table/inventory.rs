@@ -35,7 +35,9 @@ pub struct Tally {
 
 impl RecordFile {
     /// Reads columns to the end, by their indices, counted from 0, and the time axis from the column
-    /// `instants`, in its stated unit.
+    /// `instants`, in its stated unit. On the way `take` gets every sample of each column that is usable so
+    /// far, in order: the place of the column in `columns`, the number of the first sample, counted from 0,
+    /// and this and further samples, in the unit of the column.
     ///
     /// # Errors
     /// Errors of a column or of the time axis are part of the result, as by
@@ -48,12 +50,14 @@ impl RecordFile {
         &self,
         columns: &[usize],
         instants: Option<usize>,
+        take: &mut dyn FnMut(usize, usize, &[f64]),
     ) -> Result<Inventory, IoError> {
         if !self.is_whole() {
-            return self.inventory_of_text(columns, instants);
+            return self.inventory_of_text(columns, instants, take);
         }
-        let tally = |column: &usize| {
+        let mut tally = |(at, column): (usize, &usize)| {
             let values = self.head.values(*column)?;
+            take(at, 0, values);
             Ok(Tally { samples: values.len(), mean: mean(values.iter().sum(), values.len()) })
         };
         let sampling = |column: usize| {
@@ -66,7 +70,7 @@ impl RecordFile {
         };
         Ok(Inventory {
             samples: self.head.len(),
-            columns: columns.iter().map(tally).collect(),
+            columns: columns.iter().enumerate().map(&mut tally).collect(),
             sampling: instants.map(sampling),
             open_line: self.head.contents.open_line,
             remarks: Vec::new(),
@@ -77,15 +81,18 @@ impl RecordFile {
         &self,
         columns: &[usize],
         instants: Option<usize>,
+        take: &mut dyn FnMut(usize, usize, &[f64]),
     ) -> Result<Inventory, IoError> {
         // The sum of no numbers, as of a column in memory.
         let mut sums = vec![-0.0; columns.len()];
         let mut steps = Steps::default();
         let read: Vec<usize> = columns.iter().copied().chain(instants).collect();
         let reader = self.rows(&read, &mut |first, rows| {
-            for (sum, column) in sums.iter_mut().zip(columns) {
-                let values = rows.column(*column).values.iter().flatten();
-                *sum = values.fold(*sum, |sum, value| sum + value);
+            for (at, (sum, column)) in sums.iter_mut().zip(columns).enumerate() {
+                if let Ok(values) = &rows.column(*column).values {
+                    *sum = values.iter().fold(*sum, |sum, value| sum + value);
+                    take(at, first, values);
+                }
             }
             for times in instants.iter().flat_map(|column| &rows.column(*column).values) {
                 for (k, time) in (first..).zip(times) {

@@ -69,7 +69,12 @@ fn surveys_and_tables_agree() {
         let rate = file.survey(&TimeAxis::RateHz(8.0), &["f"]).unwrap();
         assert_eq!((rate.sampling.dt(), rate.sampling.len()), (0.125, 9001));
         // The same column twice, and one that cannot be used.
-        let inventory = file.inventory(&[1, 3, 1, 2], Some(0)).unwrap();
+        let mut taken = vec![Vec::new(); 4];
+        let inventory = file.inventory(&[1, 3, 1, 2], Some(0), &mut |at, first, values| {
+            assert_eq!(taken[at].len(), first);
+            taken[at].extend_from_slice(values);
+        });
+        let inventory = inventory.unwrap();
         assert_eq!(inventory.samples, 9001);
         assert_eq!(inventory.sampling.unwrap().unwrap(), record.sampling());
         for (&(at, column), mean) in [(0, 1), (1, 3), (2, 1), (3, 2)].iter().zip([0, 1, 0, 0]) {
@@ -78,6 +83,7 @@ fn surveys_and_tables_agree() {
                     assert_eq!(tally.samples, 9001);
                     assert!((tally.mean - survey.means[mean]).abs() < 1e-15);
                     assert_eq!(values.len(), 9001);
+                    assert_eq!(taken[at], values);
                 }
                 (Err(told), Err(why)) => assert_eq!(told.to_string(), why.to_string()),
                 (told, why) => panic!("column {column}: {told:?}, held {why:?}"),
