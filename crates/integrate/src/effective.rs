@@ -127,8 +127,8 @@ impl Linear {
                 rhs.gemv(-1.0, system.stiffness(), &DVectorView::from_slice(x_hat, n), 1.0);
             }
             Self::Sparse(system) => {
-                system.products[0].subtract(v_hat, load);
-                system.products[1].subtract(x_hat, load);
+                let [damping, stiffness] = &system.products;
+                Product::subtract(&[(damping, v_hat), (stiffness, x_hat)], load);
             }
         }
     }

@@ -3,7 +3,7 @@
 use mechid_model::InitialState;
 
 use crate::effective::{Effective, Equations};
-use crate::scheme::{check_parameter, check_step};
+use crate::scheme::{add, check_parameter, check_step};
 use crate::{Convention, Instant, IntegrateError, Loads, Scheme, StableSteps, Stepper, System};
 
 /// Newmark's scheme: equilibrium at t + Δt with
@@ -131,6 +131,34 @@ impl NewmarkStepper {
     }
 }
 
+impl Newmark {
+    /// The known parts of the changes of displacement and velocity, before what the new acceleration adds.
+    #[inline(always)]
+    fn known(self, dt: f64, v: f64, a: f64) -> [f64; 2] {
+        [dt * (v + dt * (0.5 - self.beta) * a), dt * (1.0 - self.gamma) * a]
+    }
+}
+
+impl NewmarkStepper {
+    /// Writes the acceleration at t + Δt into `next`.
+    fn accelerate(
+        &mut self,
+        x: &[f64],
+        v: &[f64],
+        a: &[f64],
+        loads: &Loads<'_>,
+        next: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        let (n, dt, scheme) = (self.dof(), self.dt, self.scheme);
+        let (x_hat, v_hat, load) = (&mut self.x_hat[..n], &mut self.v_hat[..n], &loads.next[..n]);
+        for i in 0..n {
+            let [dx, dv] = scheme.known(dt, v[i], a[i]);
+            (x_hat[i], v_hat[i], next[i]) = (x[i] + dx, v[i] + dv, load[i]);
+        }
+        self.effective.solve(loads.time + dt, &self.v_hat, &self.x_hat, next)
+    }
+}
+
 impl Stepper for NewmarkStepper {
     fn dof(&self) -> usize {
         self.x_hat.len()
@@ -153,19 +181,35 @@ impl Stepper for NewmarkStepper {
         let (n, dt, Newmark { beta, gamma }) = (self.dof(), self.dt, self.scheme);
         let (x, v, a) = motion(state, n);
         let (dx, dv, da) = motion_mut(change, n);
+        self.accelerate(x, v, a, loads, da)?;
         for i in 0..n {
-            // The known parts of the changes first, then what the new acceleration adds.
-            dx[i] = dt * (v[i] + dt * (0.5 - beta) * a[i]);
-            dv[i] = dt * (1.0 - gamma) * a[i];
-            self.x_hat[i] = x[i] + dx[i];
-            self.v_hat[i] = v[i] + dv[i];
-        }
-        da.copy_from_slice(&loads.next[..n]);
-        self.effective.solve(loads.time + dt, &self.v_hat, &self.x_hat, da)?;
-        for i in 0..n {
-            dx[i] += beta * dt * dt * da[i];
-            dv[i] += gamma * dt * da[i];
+            let [known_dx, known_dv] = self.scheme.known(dt, v[i], a[i]);
+            dx[i] = known_dx + beta * dt * dt * da[i];
+            dv[i] = known_dv + gamma * dt * da[i];
             da[i] -= a[i];
+        }
+        Ok(())
+    }
+
+    /// The changes and their sums with the state in one pass over the memory.
+    fn step(
+        &mut self,
+        state: &mut [f64],
+        owed: &mut [f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        let (n, dt, Newmark { beta, gamma }) = (self.dof(), self.dt, self.scheme);
+        let (x, v, a) = motion_mut(state, n);
+        let next = &mut change[..n];
+        self.accelerate(x, v, a, loads, next)?;
+        let (owed_x, owed_v, owed_a) = motion_mut(owed, n);
+        for i in 0..n {
+            let [dx, dv] = self.scheme.known(dt, v[i], a[i]);
+            add(&mut x[i], &mut owed_x[i], dx + beta * dt * dt * next[i]);
+            add(&mut v[i], &mut owed_v[i], dv + gamma * dt * next[i]);
+            let da = next[i] - a[i];
+            add(&mut a[i], &mut owed_a[i], da);
         }
         Ok(())
     }

@@ -206,25 +206,13 @@ impl Run {
     }
 
     /// One step through the stepper itself, from sample `k`.
-    ///
-    /// The sum is compensated: what a small step adds to a large state keeps its digits.
-    ///
-    /// # Source
-    /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.
     pub(crate) fn step(&mut self, table: &ForceTable<'_>, k: usize) -> Result<(), IntegrateError> {
         for &instant in self.stepper.instants() {
             table.load(instant, k, &mut self.rows[instant as usize]);
         }
         let [now, middle, next, beyond] = &self.rows;
         let loads = Loads { time: k as f64 * self.dt, now, middle, next, beyond };
-        self.stepper.change(&self.state, &loads, &mut self.change)?;
-        for ((z, dz), owed) in self.state.iter_mut().zip(&self.change).zip(&mut self.owed) {
-            let add = dz + *owed;
-            let sum = *z + add;
-            *owed = add - (sum - *z);
-            *z = sum;
-        }
-        Ok(())
+        self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
     }
 
     /// Takes as many steps as it can at fixed size; returns the step to go on with, and whether the

@@ -215,6 +215,32 @@ pub trait Stepper: Send {
         change: &mut [f64],
     ) -> Result<(), IntegrateError>;
 
+    /// Takes the step: adds to `state` what [`change`](Self::change) writes into `change`, and to each sum the
+    /// rounding error of the sum before, which `owed` keeps. What a small step adds to a large state keeps its
+    /// digits.
+    ///
+    /// # Errors
+    /// Those of [`change`](Self::change).
+    ///
+    /// # Panics
+    /// As [`change`](Self::change).
+    ///
+    /// # Source
+    /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.
+    fn step(
+        &mut self,
+        state: &mut [f64],
+        owed: &mut [f64],
+        loads: &Loads<'_>,
+        change: &mut [f64],
+    ) -> Result<(), IntegrateError> {
+        self.change(state, loads, change)?;
+        for ((z, owed), dz) in state.iter_mut().zip(owed).zip(change) {
+            add(z, owed, *dz);
+        }
+        Ok(())
+    }
+
     /// The sample at which the scheme's own recurrence takes over from its starting procedure.
     fn first(&self) -> usize {
         0
@@ -234,6 +260,15 @@ pub trait Stepper: Send {
         motions: &mut [Vec<f64>],
         state: &mut [f64],
     ) -> Result<(), IntegrateError>;
+}
+
+/// Adds `dz` and what is `owed` to `z`, and owes the rounding error of the sum.
+#[inline(always)]
+pub(crate) fn add(z: &mut f64, owed: &mut f64, dz: f64) {
+    let more = dz + *owed;
+    let sum = *z + more;
+    *owed = more - (sum - *z);
+    *z = sum;
 }
 
 /// `dt`, if it is positive and finite.

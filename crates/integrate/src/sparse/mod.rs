@@ -5,6 +5,7 @@ mod banded;
 mod fill;
 mod general;
 mod ordering;
+mod panels;
 mod product;
 mod symmetric;
 mod tridiagonal;
@@ -114,7 +115,7 @@ impl std::fmt::Debug for SparseLu {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Banded { factors, .. } => factors.fmt(f),
-            Self::Symmetric(_) => f.write_str("CholeskyFactors"),
+            Self::Symmetric(factors) => factors.fmt(f),
             Self::General(_) => f.write_str("GeneralLu"),
         }
     }

@@ -1,5 +1,7 @@
 //! Products of a sparse matrix with a vector.
 
+use std::ops::Range;
+
 use nalgebra_sparse::csr::CsrMatrix;
 
 /// A matrix in the form that multiplies fastest: by diagonals, or by rows.
@@ -59,19 +61,25 @@ impl Product {
         }
     }
 
-    /// y ← y − A x.
-    pub(crate) fn subtract(&self, x: &[f64], y: &mut [f64]) {
+    /// y ← y − Σ A x, a block of rows at a time.
+    pub(crate) fn subtract(terms: &[(&Self, &[f64])], y: &mut [f64]) {
+        for (block, y) in y.chunks_mut(BLOCK).enumerate() {
+            for (product, x) in terms {
+                product.subtract_rows(x, block * BLOCK, y);
+            }
+        }
+    }
+
+    /// Subtracts A x from the rows `first ..` of y.
+    fn subtract_rows(&self, x: &[f64], first: usize, y: &mut [f64]) {
         match self {
             Self::Diagonals(diagonals) => {
-                for (block, y) in y.chunks_mut(BLOCK).enumerate() {
-                    let first = block * BLOCK;
-                    for diagonal in diagonals {
-                        diagonal.subtract(x, first, y);
-                    }
-                }
+                let (three, rest) = diagonals.as_chunks();
+                three.iter().for_each(|diagonals| subtract_three(diagonals, x, first, y));
+                rest.iter().for_each(|diagonal| diagonal.subtract(x, first, y));
             }
             Self::Rows { starts, columns, values } => {
-                for (y, ends) in y.iter_mut().zip(starts.windows(2)) {
+                for (y, ends) in y.iter_mut().zip(starts[first..].windows(2)) {
                     let row = ends[0] as usize..ends[1] as usize;
                     let entries = values[row.clone()].iter().zip(&columns[row]);
                     let sum: f64 = entries.map(|(value, j)| value * x[*j as usize]).sum();
@@ -82,17 +90,47 @@ impl Product {
     }
 }
 
+/// Subtracts three diagonals times `x` from the rows `first ..` of y, in their order: y is read and written once.
+fn subtract_three(diagonals: &[Diagonal; 3], x: &[f64], first: usize, y: &mut [f64]) {
+    let all = first..first + y.len();
+    let rows = diagonals.iter().map(|diagonal| diagonal.rows(&all));
+    let common = rows.reduce(|a, b| a.start.max(b.start)..a.end.min(b.end)).unwrap_or(0..0);
+    if common.is_empty() {
+        return diagonals.iter().for_each(|diagonal| diagonal.subtract(x, first, y));
+    }
+    let (above, rest) = y.split_at_mut(common.start - first);
+    let (y, below) = rest.split_at_mut(common.len());
+    for diagonal in diagonals {
+        diagonal.subtract(x, first, above);
+        diagonal.subtract(x, common.end, below);
+    }
+    let [a, b, c] = diagonals.each_ref().map(|diagonal| diagonal.of_rows(&common, x));
+    for (i, y) in y.iter_mut().enumerate() {
+        *y = *y - a.0[i] * a.1[i] - b.0[i] * b.1[i] - c.0[i] * c.1[i];
+    }
+}
+
 impl Diagonal {
+    /// The rows of these in which it has an entry.
+    fn rows(&self, of: &Range<usize>) -> Range<usize> {
+        of.start.max(self.row)..of.end.min(self.row + self.values.len())
+    }
+
+    /// The entries of some of its rows, and what of `x` they are multiplied by.
+    fn of_rows<'a>(&'a self, rows: &Range<usize>, x: &'a [f64]) -> (&'a [f64], &'a [f64]) {
+        let values = rows.start - self.row..rows.end - self.row;
+        let of_x = values.start + self.column..values.end + self.column;
+        (&self.values[values], &x[of_x])
+    }
+
     /// Subtracts the diagonal times `x` from the rows `first ..` of y.
     fn subtract(&self, x: &[f64], first: usize, y: &mut [f64]) {
-        let begin = first.max(self.row);
-        let end = (first + y.len()).min(self.row + self.values.len());
-        if begin >= end {
+        let rows = self.rows(&(first..first + y.len()));
+        if rows.is_empty() {
             return;
         }
-        let values = &self.values[begin - self.row..end - self.row];
-        let x = &x[begin - self.row + self.column..];
-        for ((y, value), x) in y[begin - first..].iter_mut().zip(values).zip(x) {
+        let (values, x) = self.of_rows(&rows, x);
+        for ((y, value), x) in y[rows.start - first..].iter_mut().zip(values).zip(x) {
             *y -= value * x;
         }
     }
@@ -116,7 +154,7 @@ mod tests {
         let x = DVector::from_fn(n, |i, _| (i as f64).sin());
         for matrix in [banded, scattered] {
             let mut y = vec![1.0; n];
-            Product::of(&matrix).subtract(x.as_slice(), &mut y);
+            Product::subtract(&[(&Product::of(&matrix), x.as_slice())], &mut y);
             let expected = DVector::from_element(n, 1.0) - DMatrix::from(&matrix) * &x;
             let gap = (DVector::from_vec(y) - &expected).amax();
             assert!(gap <= 1e-15 * expected.amax(), "{gap:e}");

@@ -4,23 +4,25 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
-    LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::{Conj, MatMut, Par, Side};
+use faer::{Par, Side};
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
 
 use super::NotFactored;
 use super::general::{pattern, reciprocal_condition};
+use super::panels::{Columns, Panels};
 
 /// Factors of a matrix in the order of minimum degree, its rows and columns scaled by the sizes of their
 /// terms. They have a fraction of the entries of a band, and of LU factors with exchanges of rows.
+#[derive(Debug)]
 pub(crate) struct CholeskyFactors {
-    symbolic: SymbolicCholesky<usize>,
-    values: Vec<f64>,
-    /// 1 / the root of the size of each row's terms.
-    scales: Vec<f64>,
-    scratch: MemBuffer,
+    panels: Panels,
+    /// Of each row of the factors the row of the matrix, and 1 / the root of the size of its terms.
+    order: Vec<(u32, f64)>,
+    /// The right-hand side in that order.
+    scratch: Vec<f64>,
 }
 
 /// The order of a symmetric matrix, before it is factored.
@@ -80,10 +82,16 @@ impl Plan {
         if factored.is_err() {
             return Ok(None);
         }
-        let scratch = symbolic.solve_in_place_scratch::<f64>(1, Par::Seq);
-        let Ok(scratch) = MemBuffer::try_new(scratch) else { return Ok(None) };
-        let mut factors = CholeskyFactors { symbolic, values, scales, scratch };
-        match reciprocal_condition(factors.scales.len(), |vector| factors.solve_scaled(vector)) {
+        drop((matrix, workspace));
+        let panels = Panels::of(&Columns::of(&symbolic, &values));
+        let order: Vec<u32> = match symbolic.perm() {
+            Some(order) => order.arrays().0.iter().map(|row| *row as u32).collect(),
+            None => (0..scales.len() as u32).collect(),
+        };
+        let order: Vec<_> = order.into_iter().map(|row| (row, scales[row as usize])).collect();
+        let scratch = vec![0.0; order.len()];
+        let factors = CholeskyFactors { panels, order, scratch };
+        match reciprocal_condition(scales.len(), |vector| factors.panels.solve(vector)) {
             reciprocal if reciprocal > f64::EPSILON => Ok(Some(factors)),
             reciprocal => Err(NotFactored::Singular(reciprocal)),
         }
@@ -93,24 +101,19 @@ impl Plan {
 impl CholeskyFactors {
     /// Solves for `b`, in place.
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
-        b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= scale);
-        self.solve_scaled(b);
-        b.iter_mut().zip(&self.scales).for_each(|(b, scale)| *b *= scale);
-    }
-
-    fn solve_scaled(&mut self, b: &mut [f64]) {
-        let n = b.len();
-        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(b, n, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
+        for (scaled, (row, scale)) in self.scratch.iter_mut().zip(&self.order) {
+            *scaled = b[*row as usize] * scale;
+        }
+        self.panels.solve(&mut self.scratch);
+        for (solved, (row, scale)) in self.scratch.iter().zip(&self.order) {
+            b[*row as usize] = solved * scale;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use faer::sparse::linalg::cholesky::SymbolicCholeskyRaw;
     use mechid_model::triplets;
     use nalgebra::{DMatrix, DVector};
 
@@ -140,15 +143,18 @@ mod tests {
         matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
     }
 
+    /// Of flat grids the columns are factored one by one, of cubes together.
     #[test]
-    fn solutions_of_grids_are_the_dense_ones() {
-        for (side, layers) in [(24, 1), (8, 8)] {
+    fn grids_are_solved() {
+        for (side, layers, joint) in [(24, 1, false), (20, 20, true)] {
             let matrix = grid(side, layers, 6.5);
             let n = matrix.nrows();
+            let plan = Plan::of(&matrix, &sizes(&matrix)).unwrap();
+            assert_eq!(matches!(plan.symbolic.raw(), SymbolicCholeskyRaw::Supernodal(_)), joint);
             let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
             assert!(matches!(factors, SparseLu::Symmetric(_)), "{side}");
             let x = DVector::from_fn(n, |i, _| (i as f64).sin());
-            let mut found = &DMatrix::from(&matrix) * &x;
+            let mut found = &matrix * &x;
             factors.solve(found.as_mut_slice());
             assert!((found - x).amax() < 1e-13);
         }

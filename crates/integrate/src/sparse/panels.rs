@@ -1,0 +1,247 @@
+//! Triangular factors in panels of neighbouring columns, for many solves.
+
+use faer::sparse::linalg::cholesky::simplicial::SymbolicSimplicialCholesky;
+use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
+use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
+
+/// Widths of panels, the widest first.
+const WIDTHS: [usize; 4] = [8, 4, 2, 1];
+
+/// A lower triangular factor L of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is looked up
+/// for a row serves all columns of the panel, whose entries stand side by side.
+///
+/// # Source
+/// Ng and Peyton (1993), SIAM Journal on Scientific Computing 14, 1034–1056; Ashcraft and Grimes (1989), ACM
+/// Transactions on Mathematical Software 15, 291–309, for the zeros that make rows the same.
+#[derive(Debug)]
+pub(super) struct Panels {
+    panels: Vec<Panel>,
+    /// Rows below each panel, panel by panel.
+    rows: Vec<u32>,
+    /// Of each panel the triangle, row by row with 1 / the diagonal, and the rows below it.
+    values: Vec<f64>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Panel {
+    first: u32,
+    width: u32,
+    /// Number of its rows below the triangle.
+    below: u32,
+}
+
+/// The columns of a factor, each from the diagonal down.
+pub(super) enum Columns<'a> {
+    /// One by one.
+    Single { symbolic: &'a SymbolicSimplicialCholesky<usize>, values: &'a [f64] },
+    /// Neighbours with the same rows together; of each column the number of them.
+    Joint { factor: SupernodalLltRef<'a, usize, f64>, of_column: Vec<usize> },
+}
+
+impl<'a> Columns<'a> {
+    pub(super) fn of(symbolic: &'a SymbolicCholesky<usize>, values: &'a [f64]) -> Self {
+        match symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(symbolic) => Self::Single { symbolic, values },
+            SymbolicCholeskyRaw::Supernodal(symbolic) => {
+                let ends = symbolic.supernode_end().iter().zip(symbolic.supernode_begin());
+                let of_column = ends
+                    .enumerate()
+                    .flat_map(|(s, (end, begin))| std::iter::repeat_n(s, end - begin));
+                let of_column = of_column.collect();
+                Self::Joint { factor: SupernodalLltRef::new(symbolic, values), of_column }
+            }
+        }
+    }
+
+    fn len(&self) -> usize {
+        match self {
+            Self::Single { symbolic, .. } => symbolic.ncols(),
+            Self::Joint { of_column, .. } => of_column.len(),
+        }
+    }
+
+    /// Rows and entries of a column, from the diagonal down.
+    fn column(&self, j: usize) -> (Rows<'_>, &[f64]) {
+        match self {
+            Self::Single { symbolic, values } => {
+                let range = symbolic.col_ptr()[j]..symbolic.col_ptr()[j + 1];
+                (Rows { joint: 0..0, single: &symbolic.row_idx()[range.clone()] }, &values[range])
+            }
+            Self::Joint { factor, of_column } => {
+                let node = factor.supernode(of_column[j]);
+                let (start, width) = (node.start(), node.val().ncols());
+                let column = node.val().col(j - start);
+                let values =
+                    column.try_as_col_major().expect("columns lie in one piece").as_slice();
+                let rows = Rows { joint: j..start + width, single: node.pattern() };
+                (rows, &values[j - start..])
+            }
+        }
+    }
+}
+
+/// Rising numbers of rows.
+#[derive(Debug, Clone)]
+struct Rows<'a> {
+    joint: std::ops::Range<usize>,
+    single: &'a [usize],
+}
+
+impl Rows<'_> {
+    fn len(&self) -> usize {
+        self.joint.len() + self.single.len()
+    }
+
+    fn iter(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.joint.clone().chain(self.single.iter().copied())
+    }
+}
+
+impl Panels {
+    pub(super) fn of(columns: &Columns<'_>) -> Self {
+        let n = columns.len();
+        let mut panels = Vec::new();
+        let mut first = 0;
+        while first < n {
+            let width = width(columns, first, n);
+            let below = columns.column(first + width - 1).0.len() - 1;
+            let [start, width_, below] = [first, width, below].map(|count| count as u32);
+            panels.push(Panel { first: start, width: width_, below });
+            first += width;
+        }
+        let mut rows = Vec::with_capacity(panels.iter().map(|panel| panel.below as usize).sum());
+        let mut values = vec![0.0; panels.iter().map(|panel| panel.entries()).sum()];
+        // Where in its panel a row stands.
+        let mut place = vec![0; n];
+        let mut rest = values.as_mut_slice();
+        for panel in &panels {
+            let [first, width] = [panel.first, panel.width].map(|count| count as usize);
+            let own = first..first + width;
+            let (last, _) = columns.column(own.end - 1);
+            let below = last.iter().skip(1);
+            rows.extend(below.clone().map(|row| row as u32));
+            own.clone().chain(below).zip(0..).for_each(|(row, at)| place[row] = at);
+            let of_panel;
+            (of_panel, rest) = rest.split_at_mut(panel.entries());
+            for (c, j) in own.enumerate() {
+                let (rows, values) = columns.column(j);
+                for (row, value) in rows.iter().zip(values) {
+                    of_panel[place[row] * width + c] = *value;
+                }
+                of_panel[c * width + c] = values[0].recip();
+            }
+        }
+        Self { panels, rows, values }
+    }
+
+    /// Solves L Lᵀ x = `b`, in place.
+    pub(super) fn solve(&self, b: &mut [f64]) {
+        let (mut rows, mut values) = (self.rows.as_slice(), self.values.as_slice());
+        for panel in &self.panels {
+            let (below, of_panel);
+            (below, rows) = rows.split_at(panel.below as usize);
+            (of_panel, values) = values.split_at(panel.entries());
+            let down = match panel.width {
+                8 => down::<8>,
+                4 => down::<4>,
+                2 => down::<2>,
+                _ => down::<1>,
+            };
+            down(panel.first as usize, below, of_panel, b);
+        }
+        let (mut rows, mut values) = (self.rows.as_slice(), self.values.as_slice());
+        for panel in self.panels.iter().rev() {
+            let (below, of_panel);
+            (rows, below) = rows.split_at(rows.len() - panel.below as usize);
+            (values, of_panel) = values.split_at(values.len() - panel.entries());
+            let up = match panel.width {
+                8 => up::<8>,
+                4 => up::<4>,
+                2 => up::<2>,
+                _ => up::<1>,
+            };
+            up(panel.first as usize, below, of_panel, b);
+        }
+    }
+}
+
+impl Panel {
+    /// Number of entries of the triangle, which is kept as a square, and the rows below it.
+    fn entries(self) -> usize {
+        self.width as usize * (self.width + self.below) as usize
+    }
+}
+
+/// Width of the panel from column `first` on for which a column costs least.
+fn width(columns: &Columns<'_>, first: usize, n: usize) -> usize {
+    // The rows of a column but its diagonal are among those of the column that its second row names: where that is
+    // the next one, the last column of a panel has the rows of all.
+    let follows = |j: &usize| columns.column(*j).0.iter().nth(1) == Some(j + 1);
+    let chain = 1 + (first..n - 1).take(WIDTHS[0] - 1).take_while(follows).count();
+    // An entry costs one, a row and a panel some of them.
+    let cost = |width: usize| {
+        let rows = columns.column(first + width - 1).0.len() + width;
+        (rows * (width + PER_ROW) + PER_PANEL) as f64 / width as f64
+    };
+    let possible = WIDTHS.into_iter().filter(|width| *width <= chain);
+    possible.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1)
+}
+
+/// Cost of what is done once for each row of a panel, in entries.
+const PER_ROW: usize = 3;
+
+/// Cost of what is done once for each panel, in entries.
+const PER_PANEL: usize = 12;
+
+/// One panel of L x = b.
+fn down<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64]) {
+    let (triangle, below) = values.as_chunks::<W>().0.split_at(W);
+    let mut x = [0.0; W];
+    x.copy_from_slice(&b[first..first + W]);
+    for (r, row) in triangle.iter().enumerate() {
+        for c in 0..r {
+            x[r] -= row[c] * x[c];
+        }
+        x[r] *= row[r];
+    }
+    b[first..first + W].copy_from_slice(&x);
+    for (row, entries) in rows.iter().zip(below) {
+        let mut products = [0.0; W];
+        for c in 0..W {
+            products[c] = entries[c] * x[c];
+        }
+        b[*row as usize] -= sum(products);
+    }
+}
+
+/// One panel of Lᵀ x = b.
+fn up<const W: usize>(first: usize, rows: &[u32], values: &[f64], b: &mut [f64]) {
+    let (triangle, below) = values.as_chunks::<W>().0.split_at(W);
+    let mut x = [0.0; W];
+    x.copy_from_slice(&b[first..first + W]);
+    for (row, entries) in rows.iter().zip(below) {
+        let known = b[*row as usize];
+        for c in 0..W {
+            x[c] -= entries[c] * known;
+        }
+    }
+    for (r, row) in triangle.iter().enumerate().rev() {
+        x[r] *= row[r];
+        for c in 0..r {
+            x[c] -= row[c] * x[r];
+        }
+    }
+    b[first..first + W].copy_from_slice(&x);
+}
+
+/// Sum of a few numbers by halves, which depend less on one another than in a row.
+fn sum<const W: usize>(mut values: [f64; W]) -> f64 {
+    let mut half = W / 2;
+    while half > 0 {
+        for c in 0..half {
+            values[c] += values[c + half];
+        }
+        half /= 2;
+    }
+    values[0]
+}
