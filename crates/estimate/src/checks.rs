@@ -23,6 +23,7 @@ mod response_residual;
 mod sentences;
 mod spectral;
 mod spectral_residual;
+mod symmetry;
 pub mod thresholds;
 mod weighted_fit;
 
@@ -46,6 +47,7 @@ pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
 pub use spectral::{before_spectral_fit, coherence, fitted_band, fitted_step, steady_periods};
 pub use spectral_residual::SpectralResidual;
+pub use symmetry::mass_symmetry;
 pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.
@@ -92,6 +94,8 @@ pub enum Subject {
     Bias,
     /// Free responses of the identified system that grow.
     Instability,
+    /// Symmetry of the mass matrix.
+    Symmetry,
     /// Residual power against the noise.
     Misfit,
     /// Residual against powers of the displacement.

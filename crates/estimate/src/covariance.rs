@@ -36,11 +36,19 @@ impl Covariance {
     /// The variance of one parameter.
     pub(crate) fn of(&self, at: usize) -> f64 {
         match self {
-            Self::Full(all) => all[(at, at)],
             Self::Product(product) if product.open[at] => f64::INFINITY,
+            _ => self.between(at, at),
+        }
+    }
+
+    /// The covariance of two parameters; NaN if the data leave one open.
+    pub(crate) fn between(&self, p: usize, q: usize) -> f64 {
+        match self {
+            Self::Full(all) => all[(p, q)],
+            Self::Product(product) if product.open[p] || product.open[q] => f64::NAN,
             Self::Product(Product { residual, rows, places, .. }) => {
-                let (i, h) = places[at];
-                residual[(i, i)] * rows.row(h).dot(&rows.row(h))
+                let ((i, h), (j, k)) = (places[p], places[q]);
+                residual[(i, j)] * rows.row(h).dot(&rows.row(k))
             }
         }
     }
@@ -152,8 +160,8 @@ mod tests {
         });
         let full = product.full();
         assert!((&full - full.transpose()).amax() < 1e-15);
-        for at in 0..6 {
-            assert_eq!(product.of(at), full[(at, at)]);
+        for (p, q) in (0..6).flat_map(|p| (0..6).map(move |q| (p, q))) {
+            assert!((product.between(p, q) - full[(p, q)]).abs() < 1e-15);
         }
         let gradient = DVector::from_fn(6, |at, _| number(at, 2));
         let expected = gradient.dot(&(&full * &gradient));

@@ -18,6 +18,7 @@
 
 mod error;
 pub mod exact;
+mod fault;
 mod hammer_test;
 pub mod machines;
 mod named;
@@ -31,6 +32,7 @@ pub use exact::{
     exact_foh, exact_foh_periodic, exact_harmonic, exact_harmonic_periodic, exact_zoh,
     exact_zoh_periodic,
 };
+pub use fault::Fault;
 pub use hammer_test::{HammerRecord, HammerTest, MadeFault};
 pub use named::{dissertation_bearing, dissertation_sdof, steffen_rade};
 pub use random::random_stable;

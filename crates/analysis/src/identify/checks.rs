@@ -2,7 +2,8 @@
 
 use mechid_estimate::checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
-    constant_channels, instability, kinematics, power, quantised_channels, spiked_channels,
+    constant_channels, instability, kinematics, mass_symmetry, power, quantised_channels,
+    spiked_channels,
 };
 use mechid_model::ResponseQuantity;
 use serde::Serialize;
@@ -57,6 +58,7 @@ pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>,
     }
     add(When::After, None, &fitted.after_all);
     add(When::After, None, instability(&fitted.estimate.modes()?).as_slice());
+    add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
     for (at, residual) in fitted.residuals.iter().enumerate() {
         let checks = match residual {
             Residual::Samples(residual) => of_samples(residual)?,

@@ -204,6 +204,24 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
     },
+    /// Difference of two masses that the kinetic energy makes equal.
+    MassSymmetry {
+        /// Degree of freedom of the row of the one, and of the column of the other.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        row: usize,
+        /// Degree of freedom of the column of the one, and of the row of the other.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        column: usize,
+        /// Entry (`row`, `column`) of M, in kg.
+        above: f64,
+        /// Entry (`column`, `row`) of M, in kg.
+        below: f64,
+        /// Standard error of their difference, in kg.
+        standard_error: f64,
+        /// Probability that noise alone makes any two such entries differ as much.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+    },
     /// Residual power against the power of the noise.
     Misfit {
         /// Residual power over its expectation for noise alone (pure number).
@@ -494,6 +512,7 @@ impl Finding {
             Finding::Delay { .. } => Subject::Delay,
             Finding::Bias { .. } => Subject::Bias,
             Finding::Instability { .. } => Subject::Instability,
+            Finding::MassSymmetry { .. } => Subject::Symmetry,
             Finding::Misfit { .. } => Subject::Misfit,
             Finding::Linearity { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
@@ -577,6 +596,7 @@ impl Finding {
             Finding::Delay { samples, .. } => samples,
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::MassSymmetry { p_value, .. }
             | Finding::Linearity { p_value, .. } => p_value.adjusted,
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 test.p_value.adjusted
@@ -589,6 +609,7 @@ impl Finding {
         match self {
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. } => Some(*p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
@@ -603,6 +624,7 @@ impl Finding {
         match self {
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. } => Some(p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {

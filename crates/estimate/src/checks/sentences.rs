@@ -235,6 +235,26 @@ impl Display for Sentence<'_> {
                     )
                 }
             }
+            Finding::MassSymmetry { row, column, above, below, standard_error, p_value } => {
+                let (i, j) = (row + 1, column + 1);
+                let errors = three_digits((above - below).abs() / standard_error);
+                let [above, below] = [*above, *below].map(three_digits);
+                if self.finding.verdict() == Verdict::Good {
+                    write!(
+                        f,
+                        "M is symmetric as far as the noise shows: m{i}{j} and m{j}{i} differ by {errors} \
+                         standard errors ({p_value})"
+                    )
+                } else {
+                    write!(
+                        f,
+                        "M is not symmetric, which the kinetic energy of a machine makes it: m{i}{j} is {above} kg \
+                         and m{j}{i} {below} kg, {errors} standard errors apart ({p_value}). Possible causes: \
+                         crosstalk between forces or between responses, a gain that is wrong, a sensor that is not \
+                         at the point and in the direction of its force"
+                    )
+                }
+            }
             Finding::Misfit { ratio, p_value, source, concentration } => misfit(
                 f,
                 *ratio,
@@ -593,6 +613,7 @@ impl Display for Subject {
             Subject::Delay => "delay",
             Subject::Bias => "bias",
             Subject::Instability => "instability",
+            Subject::Symmetry => "symmetry",
             Subject::Misfit => "misfit",
             Subject::Linearity => "linearity",
             Subject::Whiteness => "whiteness",

@@ -89,3 +89,7 @@ pub const LAGS: usize = 25;
 
 /// Minimum number of samples per lag.
 pub const SAMPLES_PER_LAG: usize = 4;
+
+/// Difference of two masses that are equal in a symmetric M, over the geometric mean of those on the diagonal, below
+/// which it is rounding.
+pub const ASYMMETRY: f64 = 1e-6;

@@ -1,0 +1,70 @@
+//! Symmetry of the mass matrix.
+
+use mechid_model::Matrix;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::finding::{Finding, PValue};
+use super::thresholds::ASYMMETRY;
+use crate::Estimate;
+
+/// Tells how far the estimated mass matrix is from a symmetric one; `None` where no two masses could differ.
+///
+/// The kinetic energy ½ ẋᵀMẋ has a symmetric M, whatever bearings, gyroscopic forces and controls make of C and K: an M
+/// that is not symmetric says that forces and displacements are not those of the same points and directions.
+///
+/// The p-value is the probability that one pair m_ij, m_ji of a symmetric M differs by as many standard errors:
+/// two-sided, Student's t times the number of pairs.
+///
+/// # Source
+/// Meirovitch, *Fundamentals of Vibrations* (2001), section 4.4 (the kinetic energy); the test is ours.
+pub fn mass_symmetry(estimate: &Estimate) -> Option<Finding> {
+    let (n, unknowns) = (estimate.dof(), estimate.unknowns());
+    let freedom = estimate.degrees_of_freedom();
+    if unknowns.is_symmetric(Matrix::Mass) || freedom == 0 {
+        return None;
+    }
+    let mut places = vec![None; n * n];
+    for (at, p) in unknowns.free().iter().enumerate().filter(|(_, p)| p.matrix() == Matrix::Mass) {
+        places[p.row() * n + p.column()] = Some(at);
+    }
+    let (mass, spread) = (estimate.mass(), estimate.spread());
+    let student = StudentsT::new(0.0, 1.0, freedom as f64).expect("positive degrees of freedom");
+    let mut pairs = 0;
+    let mut worst: Option<(f64, Finding)> = None;
+    for (i, j) in (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))) {
+        let free = [places[i * n + j], places[j * n + i]];
+        let variance = match free {
+            [None, None] => continue,
+            [Some(one), None] | [None, Some(one)] => spread.of(one),
+            [Some(p), Some(q)] => spread.of(p) + spread.of(q) - 2.0 * spread.between(p, q),
+        };
+        let difference = mass[(i, j)] - mass[(j, i)];
+        let standard_error = variance.max(0.0).sqrt();
+        if !(difference.is_finite() && standard_error.is_finite()) {
+            continue;
+        }
+        pairs += 1;
+        let scale = (mass[(i, i)] * mass[(j, j)]).abs().sqrt();
+        let alone = match difference.abs() / standard_error {
+            _ if difference.abs() <= ASYMMETRY * scale => 1.0,
+            ratio if ratio.is_finite() => 2.0 * student.sf(ratio),
+            _ => 0.0,
+        };
+        if worst.as_ref().is_none_or(|(least, _)| alone < *least) {
+            let finding = Finding::MassSymmetry {
+                row: i,
+                column: j,
+                above: mass[(i, j)],
+                below: mass[(j, i)],
+                standard_error,
+                p_value: PValue::of(alone),
+            };
+            worst = Some((alone, finding));
+        }
+    }
+    let (alone, mut finding) = worst?;
+    if let Some(p_value) = finding.p_value_mut() {
+        *p_value = PValue::of((alone * f64::from(pairs)).min(1.0));
+    }
+    Some(finding)
+}

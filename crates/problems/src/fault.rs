@@ -1,0 +1,200 @@
+//! Faults of measuring chains, put on records that were computed without any.
+
+use std::f64::consts::TAU;
+
+use mechid_signal::noise::Colour;
+use mechid_signal::{NoiseLevel, Record, Spectrum, noise};
+use nalgebra::{Complex, DMatrix};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use crate::ProblemError;
+
+/// A fault of the sensors of one kind, with all of their channels.
+///
+/// A level is a part of the RMS value of a channel unless it says otherwise, so that one fault suits a force and a
+/// displacement.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fault {
+    /// Every channel shows this part of each other one.
+    Crosstalk {
+        /// Part, a ratio.
+        part: f64,
+    },
+    /// The surface that the probes look at is not round: sines of the rotation and its multiples, with phases drawn
+    /// from the seed.
+    RunOut {
+        /// Speed of rotation, in Hz.
+        rotation_hz: f64,
+        /// Amplitudes, one for the rotation and each of its multiples.
+        amplitudes: Vec<f64>,
+    },
+    /// Gaussian noise.
+    Noise {
+        /// RMS value of the noise.
+        level: f64,
+        /// Its spectrum.
+        colour: Colour,
+    },
+    /// The zero moves along a straight line.
+    Drift {
+        /// What it has moved by from the first sample to the last.
+        end: f64,
+    },
+    /// The channels are late against those without the fault.
+    ///
+    /// The record is taken as one period or several whole ones.
+    Delay {
+        /// Delay in samples, which need not be a whole number.
+        samples: f64,
+    },
+    /// What goes beyond a limit is cut off.
+    Clipping {
+        /// Limit as part of the largest magnitude of each channel.
+        part: f64,
+    },
+    /// Samples are missing and nothing stands for them: those behind them come too early, and the last are made up
+    /// for by what follows, as of a record of whole periods.
+    Lost {
+        /// Number of samples that are missing, all at one place drawn from the seed.
+        samples: usize,
+    },
+    /// A converter that has nothing new repeats its last value.
+    Held {
+        /// Number of gaps, at places drawn from the seed.
+        gaps: usize,
+        /// Samples of a gap.
+        samples: usize,
+    },
+}
+
+impl Fault {
+    /// The record as a measuring chain with the fault shows it; draws from `seed`.
+    ///
+    /// # Errors
+    /// [`ProblemError::Signal`] if a level or a colour is out of range.
+    ///
+    /// # Source
+    /// Ours.
+    pub fn of(&self, record: &Record, seed: u64) -> Result<Record, ProblemError> {
+        let (sampling, len) = (record.sampling(), record.len());
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let rms = |channel: usize| mechid_signal::measures::rms(record.channel(channel));
+        let mut data = record.data().clone();
+        match self {
+            Self::Crosstalk { part } => {
+                let sums = DMatrix::from_fn(len, 1, |k, _| data.row(k).sum());
+                for mut column in data.column_iter_mut() {
+                    column.zip_apply(&sums, |value, sum| *value += part * (sum - *value));
+                }
+            }
+            Self::RunOut { rotation_hz, amplitudes } => {
+                for (channel, mut column) in data.column_iter_mut().enumerate() {
+                    for (multiple, amplitude) in (1..).zip(amplitudes) {
+                        let omega = TAU * f64::from(multiple) * rotation_hz * sampling.dt();
+                        let phase = rng.random_range(0.0..TAU);
+                        for (k, value) in column.iter_mut().enumerate() {
+                            *value += amplitude * rms(channel) * (omega * k as f64 + phase).cos();
+                        }
+                    }
+                }
+            }
+            Self::Noise { level, colour } => {
+                return Ok(noise::add(record, NoiseLevel::FractionOfRms(*level), *colour, seed)?);
+            }
+            Self::Drift { end } => {
+                for (channel, mut column) in data.column_iter_mut().enumerate() {
+                    for (k, value) in column.iter_mut().enumerate() {
+                        *value += end * rms(channel) * k as f64 / (len - 1) as f64;
+                    }
+                }
+            }
+            Self::Delay { samples } => {
+                let mut lines = Spectrum::of(record).lines().clone();
+                for (n, mut line) in lines.row_iter_mut().enumerate() {
+                    line *= Complex::from_polar(1.0, -TAU * n as f64 * samples / len as f64);
+                }
+                return Ok(Spectrum::from_lines(sampling, lines)?.to_record()?);
+            }
+            Self::Clipping { part } => {
+                for mut column in data.column_iter_mut() {
+                    let limit = part * column.amax();
+                    column.apply(|value| *value = value.clamp(-limit, limit));
+                }
+            }
+            Self::Lost { samples } => {
+                let first = rng.random_range(0..len);
+                let come_early = |k: usize| if k < first { k } else { (k + samples) % len };
+                data = DMatrix::from_fn(len, data.ncols(), |k, c| data[(come_early(k), c)]);
+            }
+            Self::Held { gaps, samples } => {
+                for _ in 0..*gaps {
+                    let first = rng.random_range(1..len);
+                    for k in first..(first + samples).min(len) {
+                        let last = data.row(first - 1).into_owned();
+                        data.set_row(k, &last);
+                    }
+                }
+            }
+        }
+        Ok(Record::new(sampling, data)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::{Multisine, Phases, Sampling};
+
+    use super::*;
+
+    fn two_sines() -> Record {
+        let sampling = Sampling::new(0.001, 1000).unwrap();
+        let sine = |line: usize| {
+            Multisine::flat([line], 2.0, Phases::Schroeder).unwrap().sample(sampling).unwrap()
+        };
+        let (a, b) = (sine(5), sine(8));
+        Record::from_channels(sampling, &[a.channel(0), b.channel(0)]).unwrap()
+    }
+
+    /// Judge: what each fault is, line by line of the spectrum or sample by sample.
+    #[test]
+    fn faults_are_what_they_say() {
+        let clean = two_sines();
+        let line = |record: &Record, n: usize, c: usize| Spectrum::of(record).line(n, c);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+
+        let crossed = Fault::Crosstalk { part: 0.1 }.of(&clean, 1).unwrap();
+        assert!(near(line(&crossed, 8, 0).norm(), 0.2) && near(line(&crossed, 5, 0).norm(), 2.0));
+
+        let run_out = Fault::RunOut { rotation_hz: 20.0, amplitudes: vec![0.1, 0.05] };
+        let seen = run_out.of(&clean, 1).unwrap();
+        let rms = 2.0_f64.sqrt();
+        assert!(near(line(&seen, 20, 1).norm(), 0.1 * rms));
+        assert!(near(line(&seen, 40, 0).norm(), 0.05 * rms));
+        assert_ne!(run_out.of(&clean, 2).unwrap(), seen);
+        assert_eq!(run_out.of(&clean, 1).unwrap(), seen);
+
+        let drifted = Fault::Drift { end: 0.5 }.of(&clean, 1).unwrap();
+        let moved = drifted.data() - clean.data();
+        assert!(near(moved[(0, 0)], 0.0) && near(moved[(999, 1)], 0.5 * rms));
+
+        let late = Fault::Delay { samples: 2.5 }.of(&clean, 1).unwrap();
+        let turned = line(&late, 8, 1) / line(&clean, 8, 1);
+        assert!(near(turned.arg(), -TAU * 8.0 * 2.5 / 1000.0) && near(turned.norm(), 1.0));
+
+        let cut = Fault::Clipping { part: 0.9 }.of(&clean, 1).unwrap();
+        assert!(near(cut.data().amax(), 0.9 * clean.data().amax()));
+
+        let lost = Fault::Lost { samples: 3 }.of(&clean, 1).unwrap();
+        let first = (0..1000).find(|k| lost.data().row(*k) != clean.data().row(*k)).unwrap();
+        assert!((first..997).all(|k| lost.data().row(k) == clean.data().row(k + 3)));
+
+        let held = Fault::Held { gaps: 1, samples: 4 }.of(&clean, 1).unwrap();
+        let other = (0..1000).filter(|k| held.data().row(*k) != clean.data().row(*k)).count();
+        assert_eq!(other, 4);
+
+        let noise = Fault::Noise { level: 0.1, colour: Colour::White }.of(&clean, 1).unwrap();
+        let added = (noise.data() - clean.data()).column(0).norm() / 1000.0_f64.sqrt();
+        assert!((added / (0.1 * rms) - 1.0).abs() < 0.1, "{added}");
+    }
+}
