@@ -90,11 +90,12 @@ impl Fault {
             }
             Self::RunOut { rotation_hz, amplitudes } => {
                 for (channel, mut column) in data.column_iter_mut().enumerate() {
+                    let unit = rms(channel);
                     for (multiple, amplitude) in (1..).zip(amplitudes) {
                         let omega = TAU * f64::from(multiple) * rotation_hz * sampling.dt();
                         let phase = rng.random_range(0.0..TAU);
                         for (k, value) in column.iter_mut().enumerate() {
-                            *value += amplitude * rms(channel) * (omega * k as f64 + phase).cos();
+                            *value += amplitude * unit * (omega * k as f64 + phase).cos();
                         }
                     }
                 }
@@ -104,8 +105,9 @@ impl Fault {
             }
             Self::Drift { end } => {
                 for (channel, mut column) in data.column_iter_mut().enumerate() {
+                    let all = end * rms(channel);
                     for (k, value) in column.iter_mut().enumerate() {
-                        *value += end * rms(channel) * k as f64 / (len - 1) as f64;
+                        *value += all * k as f64 / (len - 1) as f64;
                     }
                 }
             }

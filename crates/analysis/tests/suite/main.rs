@@ -6,6 +6,7 @@ mod bearing;
 mod decay;
 mod doors;
 mod error_rate;
+mod faults;
 #[cfg(feature = "parquet")]
 mod fleet;
 mod hammer;

@@ -1,0 +1,80 @@
+//! Faults of measuring chains, made by a generator: each is told, and nothing else is.
+
+use mechid_analysis::{Identify, Measurement, ResponseQuantity, identify};
+use mechid_model::SecondOrderSystem;
+use mechid_problems::{Fault, exact_harmonic_periodic};
+use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use nalgebra::dmatrix;
+use rayon::prelude::*;
+
+const PERIOD: usize = 512;
+const PERIODS: usize = 4;
+
+fn machine() -> SecondOrderSystem {
+    let mass = dmatrix![10.0, 0.5; 0.5, 8.0];
+    let damping = dmatrix![30.0, -8.0; -12.0, 25.0];
+    let stiffness = dmatrix![2.5e5, -0.9e5; -1.1e5, 3.0e5];
+    SecondOrderSystem::new(mass, damping, stiffness).unwrap()
+}
+
+/// Subjects warned of where a fault is put on the forces, on the responses, or on both.
+fn warnings(fault: Option<&Fault>, on: [bool; 2], seed: u64) -> Vec<String> {
+    let sampling = Sampling::new(0.002, PERIOD).unwrap();
+    let of = |channel: u64| {
+        let phases = Phases::Random { seed: 2 * seed + channel };
+        Multisine::flat(1..=100, 10.0, phases).unwrap().sample(sampling).unwrap()
+    };
+    let (first, second) = (of(0), of(1));
+    let force = Record::from_channels(sampling, &[first.channel(0), second.channel(0)]).unwrap();
+    let exact = exact_harmonic_periodic(&machine(), &force).unwrap();
+    let mut force = force.repeated(PERIODS).unwrap();
+    let exact = exact.displacement().repeated(PERIODS).unwrap();
+    let level = NoiseLevel::FractionOfRms(0.005);
+    let mut response = noise::add_white(&exact, level, 1000 + seed).unwrap();
+    if let Some(fault) = fault {
+        for record in [&mut force, &mut response].into_iter().zip(on).filter(|of| of.1) {
+            *record.0 = fault.of(record.0, seed).unwrap();
+        }
+    }
+    let responses = [(ResponseQuantity::Displacement, &response)];
+    let record = Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap();
+    let found = identify(&[record], &Identify::default()).unwrap();
+    let warned = found.checks().iter().filter(|check| check.is_conspicuous());
+    warned.map(|check| check.subject.to_string()).collect()
+}
+
+/// Judge: the generator, which knows what is wrong.
+#[test]
+fn every_fault_is_told_by_a_check_that_is_meant_for_it() {
+    let (force, response, both) = ([true, false], [false, true], [true, true]);
+    let crosstalk = Fault::Crosstalk { part: 0.02 };
+    let run_out = Fault::RunOut { rotation_hz: 40.0 * 500.0 / 512.0, amplitudes: vec![0.05, 0.02] };
+    let lost = Fault::Lost { samples: 3 };
+    for (fault, on, subject) in [
+        (&crosstalk, force, "symmetry"),
+        (&crosstalk, response, "symmetry"),
+        (&run_out, response, "misfit"),
+        (&Fault::Drift { end: 0.5 }, response, "periodicity"),
+        (&Fault::Delay { samples: 0.2 }, response, "delay"),
+        (&Fault::Clipping { part: 0.7 }, response, "range"),
+        (&Fault::Clipping { part: 0.5 }, force, "range"),
+        (&lost, both, "periodicity"),
+        (&Fault::Held { gaps: 5, samples: 6 }, response, "periodicity"),
+    ] {
+        let told = |seed: &u64| {
+            let warned = warnings(Some(fault), on, *seed);
+            warned.iter().any(|warned| warned == subject)
+        };
+        let told = (0..8_u64).into_par_iter().filter(told).count();
+        assert_eq!(told, 8, "{fault:?} on {on:?}: {subject}");
+    }
+}
+
+/// Judge: the error rate of 1 % of each of two families of tests; of 150 records more than 8 warn with a probability
+/// below 0.01.
+#[test]
+fn records_without_a_fault_seldom_warn() {
+    let warned = |seed: &u64| !warnings(None, [true, true], *seed).is_empty();
+    let warned = (100..250_u64).into_par_iter().filter(warned).count();
+    assert!(warned <= 8, "{warned} of 150");
+}
