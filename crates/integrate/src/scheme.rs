@@ -216,8 +216,8 @@ pub trait Stepper: Send {
     ) -> Result<(), IntegrateError>;
 
     /// Takes the step: adds to `state` what [`change`](Self::change) writes into `change`, and to each sum the
-    /// rounding error of the sum before, which `owed` keeps. What a small step adds to a large state keeps its
-    /// digits.
+    /// rounding error of the sum before, which `owed` keeps, in the units of the state. What a small step adds to a
+    /// large state keeps its digits.
     ///
     /// # Errors
     /// Those of [`change`](Self::change).

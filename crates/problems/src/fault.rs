@@ -26,29 +26,29 @@ pub enum Fault {
     RunOut {
         /// Speed of rotation, in Hz.
         rotation_hz: f64,
-        /// Amplitudes, one for the rotation and each of its multiples.
+        /// Amplitudes over the RMS value of the channel (pure numbers), one for the rotation and each of its multiples.
         amplitudes: Vec<f64>,
     },
     /// Gaussian noise.
     Noise {
-        /// RMS value of the noise.
+        /// RMS value of the noise over that of the channel (pure number).
         level: f64,
-        /// Its spectrum.
+        /// Colour of the noise.
         colour: Colour,
     },
     /// The zero moves along a straight line.
     Drift {
-        /// What it has moved by from the first sample to the last.
+        /// Distance that it moves from the first sample to the last, over the RMS value of the channel (pure number).
         end: f64,
     },
     /// The channels are late against those without the fault.
     ///
     /// The record is taken as one period or several whole ones.
     Delay {
-        /// Delay in samples, which need not be a whole number.
+        /// Delay, in samples (pure number), which need not be a whole one.
         samples: f64,
     },
-    /// What goes beyond a limit is cut off.
+    /// An amplifier cuts off whatever goes beyond a limit.
     Clipping {
         /// Limit as part of the largest magnitude of each channel.
         part: f64,

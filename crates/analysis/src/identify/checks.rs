@@ -42,8 +42,13 @@ pub enum When {
     After,
 }
 
-/// All findings before and after a fit, with one error rate for the statistical tests among them.
-pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>, AnalysisError> {
+/// All findings before and after a fit, with one error rate for the statistical tests among them; `scaled` is
+/// false where some equations of motion are known up to factors only.
+pub(crate) fn rows(
+    fitted: &Fitted,
+    records: &[&Block],
+    scaled: bool,
+) -> Result<Vec<CheckRow>, AnalysisError> {
     let mut all: Vec<(When, Option<usize>, Finding)> = Vec::new();
     let mut add = |when, at: Option<usize>, findings: &[Finding]| {
         all.extend(findings.iter().map(|finding| (when, at, finding.clone())));
@@ -58,7 +63,9 @@ pub(crate) fn rows(fitted: &Fitted, records: &[&Block]) -> Result<Vec<CheckRow>,
     }
     add(When::After, None, &fitted.after_all);
     add(When::After, None, instability(&fitted.estimate.modes()?).as_slice());
-    add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
+    if scaled {
+        add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
+    }
     for (at, residual) in fitted.residuals.iter().enumerate() {
         let checks = match residual {
             Residual::Samples(residual) => of_samples(residual)?,

@@ -172,7 +172,7 @@ impl IdentificationSummary {
             channels: Channels::clone(&records[0].names),
             records: records.iter().map(row).collect(),
             hits,
-            checks: checks::rows(fitted, &records)?,
+            checks: checks::rows(fitted, &records, unscaled.is_none())?,
             fitted_lines: None,
             validation: None,
             remarks: Vec::new(),
