@@ -139,15 +139,15 @@ impl Header {
         let words: Vec<String> =
             lines.words().map(|word| String::from_utf8_lossy(word).to_lowercase()).collect();
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
-        let [banner, "matrix", format, field, symmetry] = words[..] else {
+        let ["%%matrixmarket", "matrix", format, field, symmetry] = words[..] else {
             return Err(lines.malformed(
                 "a Matrix Market file begins with a line such as \
                  %%MatrixMarket matrix coordinate real general",
             ));
         };
-        let is_coordinate = match (banner, format) {
-            ("%%matrixmarket", "coordinate") => true,
-            ("%%matrixmarket", "array") => false,
+        let is_coordinate = match format {
+            "coordinate" => true,
+            "array" => false,
             _ => return Err(lines.malformed("coordinate and array are the formats that are read")),
         };
         if !matches!(field, "real" | "double" | "integer") {
@@ -325,6 +325,7 @@ mod tests {
         for (text, expected) in [
             ("".into(), "line 1: it is empty"),
             ("1 2 3\n".into(), "line 1: a Matrix Market file begins"),
+            (banner[1..].into(), "line 1: a Matrix Market file begins"),
             ("%%MatrixMarket matrix coordinate complex general\n".into(), "real or integer"),
             ("%%MatrixMarket matrix coordinate pattern general\n".into(), "real or integer"),
             ("%%MatrixMarket matrix coordinate real hermitian\n".into(), "symmetries"),
