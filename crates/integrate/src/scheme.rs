@@ -223,7 +223,7 @@ pub trait Stepper: Send {
     /// Those of [`change`](Self::change).
     ///
     /// # Panics
-    /// As [`change`](Self::change).
+    /// If `owed` is shorter than [`state_len`](Self::state_len), and where [`change`](Self::change) does.
     ///
     /// # Source
     /// Higham, *Accuracy and Stability of Numerical Algorithms* (2002), section 4.3.

@@ -71,7 +71,7 @@ impl Span {
     }
 }
 
-/// What was gathered of the columns asked for, one each, on the way to the end of a text.
+/// Statistics of the columns asked for, gathered while a text is read to its end.
 #[derive(Debug)]
 pub struct OnTheWay {
     /// First sample of the window, counted from 0.

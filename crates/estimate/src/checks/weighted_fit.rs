@@ -55,8 +55,8 @@ pub struct AfterSpectralFit {
 /// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
 /// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
 /// parameters together and the one that changes most alone.
-/// Where a record states no noise, or only rounding, all residuals are weighted as white noise on the
-/// response, beside that of the forces if the data know it.
+/// All residuals are weighted as white noise on the response, beside that of the forces if the data know it, where a
+/// record states no noise, or only rounding.
 ///
 /// The noise of an open record begins and ends at values that differ: that jump, which ties low lines together, is left
 /// out of the tests. The data are those whose own ends are taken off.

@@ -18,7 +18,7 @@ pub(super) struct Panels {
     panels: Vec<Panel>,
     /// Rows below each panel, panel by panel.
     rows: Vec<u32>,
-    /// Of each panel the triangle, row by row with 1 / the diagonal, and the rows below it.
+    /// Entries of each panel: the triangle, row by row with 1 / the diagonal, and the rows below it.
     values: Vec<f64>,
 }
 

@@ -19,7 +19,7 @@ use super::panels::{Columns, Panels};
 #[derive(Debug)]
 pub(crate) struct CholeskyFactors {
     panels: Panels,
-    /// Of each row of the factors the row of the matrix, and 1 / the root of the size of its terms.
+    /// Row of the matrix for each row of the factors, and 1 / the root of the size of its terms.
     order: Vec<(u32, f64)>,
     /// The right-hand side in that order.
     scratch: Vec<f64>,
@@ -143,7 +143,7 @@ mod tests {
         matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
     }
 
-    /// Of flat grids the columns are factored one by one, of cubes together.
+    /// The columns of flat grids are factored one by one, those of cubes together.
     #[test]
     fn grids_are_solved() {
         for (side, layers, joint) in [(24, 1, false), (20, 20, true)] {
