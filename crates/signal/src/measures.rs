@@ -28,9 +28,10 @@ pub fn rms(samples: &[f64]) -> f64 {
     if peak == 0.0 {
         return 0.0;
     }
-    // Relative to the peak: squares of large or small values leave the range of numbers.
-    let sum: f64 = samples.iter().map(|x| (x / peak).powi(2)).sum();
-    peak * (sum / samples.len() as f64).sqrt()
+    // Squares of large or small samples leave the range of numbers; scaling is exact.
+    let unit = power_of_two(peak);
+    let sum: f64 = samples.iter().map(|x| (x / unit).powi(2)).sum();
+    unit * (sum / samples.len() as f64).sqrt()
 }
 
 /// Largest absolute value, in the unit of the samples; 0 for no samples.

@@ -183,7 +183,8 @@ fn with_force_noise(levels: Option<Vec<f64>>) -> Identify {
     Identify { fit, ..Identify::default() }
 }
 
-/// Fewer than 88 % of 180 intervals of 95 %, three of a record that go together, hold with a probability below 0.01. Taken for exact, noise of 1 % makes a third of them miss.
+/// Fewer than 88 % of 180 intervals of 95 %, three of a record that go together, hold with a probability below 0.01.
+/// Taken for exact, noise of 1 % makes a third of them miss.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
     let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 60);
