@@ -14,6 +14,7 @@ use nalgebra::DMatrix;
 use super::force_noise::ForceNoise;
 use super::nonlinear::SelectionSummary;
 use super::prediction::{Model, Prediction};
+use super::sinusoids::SinusoidRow;
 use crate::AnalysisError;
 use crate::machine::NonlinearPart;
 
@@ -55,6 +56,8 @@ pub struct Fitted {
     pub noise: Vec<NoiseModel>,
     /// Noise of the forces of each record, where it is not in those spectra and was allowed for.
     pub force_noise: Vec<ForceNoise>,
+    /// Sinusoids of open records that were taken off.
+    pub sinusoids: Vec<SinusoidRow>,
     /// Measured responses to draw, where others were fitted: of windows that are no periods those to the forces
     /// alone, of segments those from which nothing is taken off.
     pub drawn: Option<FrequencyData>,

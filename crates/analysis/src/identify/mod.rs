@@ -15,6 +15,7 @@
 //! | `mass`, `structure` | what is known of M, C and K |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
 //! | `force_noise` | noise of the forces, stated or as the record shows it |
+//! | `sinusoids` | sinusoids beside the response to the forces, in open records |
 //! | `fitted_lines` | the lines of a fit one by one, with standard errors and residual |
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
@@ -34,6 +35,7 @@ pub mod prediction;
 mod responses;
 pub mod rows;
 mod samples;
+mod sinusoids;
 pub(crate) mod spectra;
 pub mod structure;
 pub mod summary;
@@ -64,6 +66,7 @@ pub use self::options::{
     Between, Derivatives, Fit, Identify, Method, Nonlinear, Refinement, ResponseFit, SampleFit,
 };
 use self::prediction::{Compared, Model, Prediction};
+pub use self::sinusoids::SinusoidRow;
 pub use self::structure::{Form, Structure};
 use self::summary::IdentificationSummary;
 pub use self::tables::{IdentifiedResponses, IdentifyResponses, identify_responses};

@@ -223,6 +223,7 @@ pub(super) fn fit(
         misfit: None,
         noise: Vec::new(),
         force_noise: Vec::new(),
+        sinusoids: Vec::new(),
         drawn: None,
         remarks,
         estimate: estimated.linear().clone(),

@@ -5,7 +5,7 @@ use mechid_estimate::checks::{
     AfterSpectralFit, after_spectral_fit, before_spectral_fit, delay_of_lines, fitted_band,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, FrequencyData, Lines, Pooling, output_error_pooling,
+    EndLoads, FrequencyData, Lines, Pooling, Sinusoid, output_error_pooling,
 };
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
@@ -16,6 +16,7 @@ use super::left_out::LineRule;
 use super::lines::LineChoice;
 use super::prediction::Prediction;
 use super::responses::of_linearity;
+use super::sinusoids::SinusoidRow;
 use super::spectra::{of_noise, one_motion_of};
 use crate::AnalysisError;
 use crate::hits::HitNoise;
@@ -87,7 +88,8 @@ pub(super) fn fit(
             Excitation::Hits(noise) => noise.get(at),
         };
         let force_noise = ForceNoise::of(held, noise.force, hit)?;
-        let data = FrequencyData::read(&lines, &held.force, motion, kind)?.of_open_record();
+        let data = FrequencyData::read(&lines, &held.force, motion, kind)?
+            .of_open_record(held.force.sampling());
         let data = force_noise.known_to(data, held.force.len())?;
         of_force.push(force_noise);
         spectra.push((data, lines));
@@ -95,6 +97,14 @@ pub(super) fn fit(
     let (data, lines): (Vec<FrequencyData>, Vec<Lines>) = spectra.into_iter().unzip();
     let all = joined(&data)?;
     let fit = output_error_pooling(&all, unknowns, noise.response)?;
+    let data: Vec<FrequencyData> = match fit.sinusoids.is_empty() {
+        true => data,
+        false => data
+            .iter()
+            .zip(&fit.sinusoids)
+            .map(|(data, sinusoids)| data.without_sinusoids(std::slice::from_ref(sinusoids)))
+            .collect(),
+    };
     let (closed, alone) = match &fit.ends {
         Some(ends) => {
             (ends.taken_off(&data)?, ends.taken_off_responses(&data, &fit.estimate.system()?)?)
@@ -123,6 +133,11 @@ pub(super) fn fit(
     let known: Vec<(&Block, &ForceNoise)> =
         records.iter().map(|record| &record.held).zip(&of_force).collect();
     let remarks = [remark, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)];
+    let of_record = |(record, sinusoids): (&'_ Windowed, &'_ Vec<Sinusoid>)| -> Vec<SinusoidRow> {
+        SinusoidRow::all(&record.held, sinusoids).collect()
+    };
+    let sinusoids: Vec<SinusoidRow> =
+        records.iter().zip(&fit.sinusoids).flat_map(of_record).collect();
     let all = joined(&closed)?;
     let fitted = Fitted {
         domain: "frequency",
@@ -141,9 +156,10 @@ pub(super) fn fit(
             extent: Extent::Open,
         },
         misfit: None,
-        remarks: of_motion.chain(remarks).collect(),
+        remarks: of_motion.chain(remarks).chain(SinusoidRow::remark(&sinusoids)).collect(),
         noise: fit.noise,
         force_noise: of_force,
+        sinusoids,
         drawn: Some(joined(&alone)?),
         nonlinear: None,
         estimate: fit.estimate,

@@ -109,6 +109,7 @@ pub fn fit(
         misfit,
         noise: Vec::new(),
         force_noise: Vec::new(),
+        sinusoids: Vec::new(),
         drawn: Some(measured),
         remarks,
         estimate,

@@ -89,6 +89,7 @@ pub(super) fn fit(
         misfit,
         noise: models,
         force_noise: Vec::new(),
+        sinusoids: Vec::new(),
         drawn: None,
         nonlinear: None,
         remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),

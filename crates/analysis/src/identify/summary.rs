@@ -22,6 +22,7 @@ use super::rows::{
     self, CONFIDENCE, LinesUsed, ParameterRow, ProportionalDamping, WindowRow, mode_table,
     parameter_table, parameters,
 };
+use super::sinusoids::SinusoidRow;
 use super::unscaled::Unscaled;
 use super::validation::Validation;
 use crate::AnalysisError;
@@ -118,6 +119,9 @@ pub struct FitRow {
     pub noise: Vec<NoiseModel>,
     /// Noise of the forces of each record where these spectra are of the response alone, as of open records.
     pub force_noise: Vec<ForceNoise>,
+    /// Sinusoids of open records beside the response to the forces, which were taken off.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub sinusoids: Vec<SinusoidRow>,
     /// Condition number of the column-scaled regressor, a ratio.
     pub condition_number: f64,
     /// Number of real equations per degree of freedom.
@@ -162,6 +166,7 @@ impl IdentificationSummary {
                 misfit_ratio: fitted.misfit.map(|misfit| misfit.ratio),
                 noise: fitted.noise.clone(),
                 force_noise: fitted.force_noise.clone(),
+                sinusoids: fitted.sinusoids.clone(),
                 condition_number: estimate.condition(),
                 equations: fitted.equations,
                 unknowns: match &fitted.nonlinear {

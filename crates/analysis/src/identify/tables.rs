@@ -121,6 +121,7 @@ pub fn identify_responses(
             misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
             noise: fit.noise.clone(),
             force_noise: Vec::new(),
+            sinusoids: Vec::new(),
             condition_number: estimate.condition(),
             equations: 2 * data.len(),
             unknowns: estimate.unknowns().independent(),

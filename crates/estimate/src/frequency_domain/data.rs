@@ -1,10 +1,11 @@
 //! Forces and displacements at chosen frequencies: what every estimator of this module takes.
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
-use mechid_signal::{Record, Spectrum};
+use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use super::ends::Ends;
+use super::sinusoids::OpenRecord;
 use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
 use crate::noise_spectrum::variance_on_lines;
@@ -28,6 +29,8 @@ pub struct FrequencyData {
     /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
     /// on the rows of others.
     ends: DMatrix<Complex<f64>>,
+    /// Time axis of each open record.
+    open: Vec<Sampling>,
 }
 
 impl FrequencyData {
@@ -103,7 +106,8 @@ impl FrequencyData {
         let ends = DMatrix::zeros(omega.len(), 0);
         let force_variance = DMatrix::zeros(omega.len(), force.ncols());
         let displacement = motion;
-        Ok(Self { omega, force, displacement, measured, noise: None, force_variance, ends })
+        let open = Vec::new();
+        Ok(Self { omega, force, displacement, measured, noise: None, force_variance, ends, open })
     }
 
     /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
@@ -214,7 +218,8 @@ impl FrequencyData {
         &self.force_variance
     }
 
-    /// The same data as those of a record that is no period: begins and ends in motion that differs.
+    /// The same data as those of a record with this time axis that is no period: begins and ends in motion that
+    /// differs.
     ///
     /// The difference acts on the lines like a force. For displacements it is M(iω Δx + Δv) + C Δx over the
     /// duration, and the samples fold what it has above half their rate back into the band, which the higher
@@ -233,7 +238,8 @@ impl FrequencyData {
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on arbitrary
     /// excitations (transient terms of a plant) and on continuous-time models of band-limited signals.
     #[must_use]
-    pub fn of_open_record(mut self) -> Self {
+    pub fn of_open_record(mut self, sampling: Sampling) -> Self {
+        self.open = vec![sampling];
         self.ends = DMatrix::from_fn(self.len(), 2, |row, column| {
             let omega = self.omega[row];
             let unit = self.measured.per_displacement(omega).inv();
@@ -248,6 +254,25 @@ impl FrequencyData {
         &self.ends
     }
 
+    fn no_longer_open(&mut self) {
+        self.ends = DMatrix::zeros(self.len(), 0);
+        self.open.clear();
+    }
+
+    /// An open record, counted from 0, if there is one.
+    pub(super) fn open_record(&self, record: usize) -> Option<OpenRecord> {
+        let sampling = *self.open.get(record)?;
+        let of_record = |row: &usize| self.ends[(*row, 2 * record)] != Complex::ZERO;
+        let first = (0..self.len()).find(of_record)?;
+        let last = (0..self.len()).rfind(of_record)?;
+        Some(OpenRecord { sampling, rows: first..last + 1 })
+    }
+
+    /// The same data with other displacements (m), rows × n.
+    pub(super) fn with_displacement(&self, displacement: DMatrix<Complex<f64>>) -> Self {
+        Self { displacement, ..self.clone() }
+    }
+
     /// The rows that belong to periods: those of open records with the unknown load of their ends, by `tau`
     /// in the order of [`Ends`], taken off the force.
     pub(crate) fn with_load_of_ends(&self, tau: &[f64]) -> Self {
@@ -258,7 +283,7 @@ impl FrequencyData {
             ends.take_off(row, force.as_mut_slice());
             closed.force.row_mut(row).copy_from(&force.transpose());
         }
-        closed.ends = DMatrix::zeros(self.len(), 0);
+        closed.no_longer_open();
         closed
     }
 
@@ -278,7 +303,7 @@ impl FrequencyData {
                 alone.displacement.row_mut(row).copy_from(&displacement);
             }
         }
-        alone.ends = DMatrix::zeros(self.len(), 0);
+        alone.no_longer_open();
         alone
     }
 
@@ -320,6 +345,7 @@ impl FrequencyData {
             force: windowed(&self.force, &|_| Complex::from(1.0)),
             displacement: windowed(&self.displacement, &|w| self.measured.per_displacement(w)),
             ends: DMatrix::zeros(self.len(), 0),
+            open: Vec::new(),
             ..self.clone()
         }
     }
@@ -354,6 +380,7 @@ impl FrequencyData {
             measured: self.measured,
             noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
             ends: self.ends_of_both(other),
+            open: [&self.open[..], &other.open].concat(),
         })
     }
 

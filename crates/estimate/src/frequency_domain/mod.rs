@@ -58,6 +58,7 @@ mod output_error_fit;
 mod periods;
 mod residual_noise;
 mod search;
+mod sinusoids;
 mod starts;
 mod weight_uncertainty;
 mod whitened;
@@ -74,6 +75,7 @@ pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{output_error, output_error_near, output_error_pooling};
 pub use output_error_fit::{EndLoads, OutputErrorFit};
 pub use periods::RepeatedPeriods;
+pub use sinusoids::Sinusoid;
 pub(crate) use whitened::Whitened;
 
 pub use crate::noise_spectrum::NoiseSpectrum;

@@ -9,7 +9,7 @@ use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, Plausible};
 use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
-use super::{FrequencyData, NoiseModel, NoiseSpectrum};
+use super::{FrequencyData, NoiseModel, NoiseSpectrum, Sinusoid};
 use crate::estimate::Findings;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -45,6 +45,9 @@ pub struct OutputErrorFit {
     pub noise: Vec<NoiseModel>,
     /// Loads of the ends of open records, `None` where all rows belong to periods.
     pub ends: Option<EndLoads>,
+    /// Sinusoids of each open record that were found beside the response to the forces and taken off it; none where
+    /// the noise is stated.
+    pub sinusoids: Vec<Vec<Sinusoid>>,
 }
 
 /// Loads of the ends of open records, as [`FrequencyData::of_open_record`] describes them.
@@ -199,6 +202,7 @@ pub(super) fn finish(
         agreeing: best.agreeing,
         noise: scale.noise,
         ends,
+        sinusoids: Vec::new(),
     })
 }
 

@@ -1,5 +1,7 @@
 //! Maximum likelihood where the noise is known from the residual alone.
 
+use std::borrow::Cow;
+
 use mechid_model::SecondOrderSystem;
 use nalgebra::{Complex, DMatrix};
 
@@ -11,6 +13,7 @@ use super::output_error_fit::{
     uncertain_weights,
 };
 use super::search::SumOfSquares;
+use super::sinusoids::{self, Sinusoid};
 use super::starts::Starts;
 use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, Whitened};
 use crate::{EstimateError, Unknowns};
@@ -25,6 +28,10 @@ const MAX_ROUNDS: usize = 10;
 const COLOURED_ROUNDS: usize = 3;
 /// Maximum number of sensitivities, residuals times parameters, of which leverages are computed.
 const SENSITIVITIES: usize = 1 << 20;
+/// Rounds of sinusoids found in the residual of a fit to what is left without those found before, and the change
+/// of what is left, over the residual, below which another one is useless.
+const SINUSOID_ROUNDS: usize = 8;
+const SINUSOID_TOLERANCE: f64 = 1e-3;
 /// Least power of a residual, relative to that of the noise before.
 const LEAST: f64 = 1e-12;
 /// Least part of its noise that a residual is taken to keep.
@@ -47,7 +54,13 @@ pub(super) fn with_residual_noise(
     if pooling == Pooling::PerLine {
         return Err(EstimateError::TooFewAverages { got: 1, needed: 2 });
     }
-    let (white, is_rounding) = with_white_noise(data, unknowns, nominal)?;
+    let (white, is_rounding) = with_white_noise(data, unknowns, nominal, None)?;
+    let mut beside = BesideSinusoids { data: Cow::Borrowed(data), sinusoids: Vec::new(), white };
+    if !is_rounding {
+        beside.find(data, unknowns, nominal)?;
+    }
+    let BesideSinusoids { data, sinusoids, white } = beside;
+    let data = data.as_ref();
     let coloured = match pooling {
         Pooling::AllLines => None,
         _ if is_rounding => None,
@@ -58,7 +71,8 @@ pub(super) fn with_residual_noise(
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
     misfit.try_at(&fit.minimum.theta).ok_or(EstimateError::Overflow)?;
     misfit.accept();
-    let free = spare(data, unknowns);
+    let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
+    let free = spare(data, unknowns).saturating_sub(of_sinusoids);
     let level = fit.minimum.cost / free.max(1) as f64;
     let inflation = match is_white {
         true => 1.0,
@@ -73,19 +87,61 @@ pub(super) fn with_residual_noise(
         deviance: None,
         noise: if is_white { vec![NoiseModel::White] } else { noise.models().to_vec() },
     };
-    finish(data, unknowns, &mut misfit, &fit, scale)
+    Ok(OutputErrorFit { sinusoids, ..finish(data, unknowns, &mut misfit, &fit, scale)? })
 }
 
-/// White noise of unknown level per channel, and whether the residual is only rounding.
+/// A fit in white noise to what is left of open records without the sinusoids that stand out of its residual.
+struct BesideSinusoids<'a> {
+    data: Cow<'a, FrequencyData>,
+    sinusoids: Vec<Vec<Sinusoid>>,
+    white: Weighted,
+}
+
+impl<'a> BesideSinusoids<'a> {
+    /// Finds sinusoids in the open records of `data`, and fits what is left without them, in turn.
+    fn find(
+        &mut self,
+        data: &'a FrequencyData,
+        unknowns: &Unknowns,
+        nominal: Option<&SecondOrderSystem>,
+    ) -> Result<(), EstimateError> {
+        for round in 0..SINUSOID_ROUNDS {
+            let residual = {
+                let mut misfit = Misfit::new(data, unknowns, &self.white.noise)?;
+                misfit.try_at(&self.white.fit.minimum.theta).ok_or(EstimateError::Overflow)?;
+                misfit.accept();
+                misfit.errors()
+            };
+            let found = sinusoids::find(data, &residual, &self.sinusoids);
+            if found.iter().all(Vec::is_empty) && self.sinusoids.is_empty() {
+                break;
+            }
+            let less = data.without_sinusoids(&found);
+            let change = (less.displacement() - self.data.displacement()).norm();
+            // The first of them can have led the search astray.
+            let from = (round > 0).then(|| self.white.fit.clone());
+            self.white = with_white_noise(&less, unknowns, nominal, from)?.0;
+            (self.data, self.sinusoids) = (Cow::Owned(less), found);
+            if change <= SINUSOID_TOLERANCE * residual.norm() {
+                break;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// White noise of unknown level per channel, and whether the residual is only rounding; searched near a minimum
+/// `from` of nearly the same data, or from all starts.
 fn with_white_noise(
     data: &FrequencyData,
     unknowns: &Unknowns,
     nominal: Option<&SecondOrderSystem>,
+    from: Option<GlobalMinimum>,
 ) -> Result<(Weighted, bool), EstimateError> {
     let measured = measured_size(data, data.displacement());
     let known_force = data.force_variance().iter().all(|variance| *variance == 0.0);
     let mut levels = measured.clone();
-    let mut last: Option<GlobalMinimum> = None;
+    let mut last = from;
     for _ in 0..MAX_ROUNDS {
         let noise = white_noise(data, &levels)?;
         let mut misfit = Misfit::new(data, unknowns, &noise)?;

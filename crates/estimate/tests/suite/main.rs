@@ -27,6 +27,7 @@ mod related;
 mod response_checks;
 mod search_start;
 mod silverbox;
+mod sinusoids;
 mod time_domain;
 mod time_domain_invariance;
 mod time_domain_study;

@@ -1,0 +1,80 @@
+//! Sinusoids beside the response to the forces, found in open records and taken off.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::frequency_domain::Sinusoid;
+use mechid_signal::message;
+use serde::Serialize;
+
+use crate::measurement::Block;
+use crate::text::significant;
+
+/// Frequencies that a remark names.
+const NAMED: usize = 4;
+/// Relative difference of frequencies in several records below which they are one.
+const SAME: f64 = 1e-3;
+
+/// A sinusoid in the responses of one record that the forces do not account for.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SinusoidRow {
+    /// The record.
+    pub record: String,
+    /// Frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Amplitude in the response of each degree of freedom, in the unit of the response that was fitted.
+    pub amplitudes: Vec<f64>,
+    /// Largest of the amplitudes over √2 times the standard deviation of their responses, a ratio.
+    pub share: f64,
+}
+
+impl SinusoidRow {
+    /// Lists the sinusoids of a record.
+    pub(super) fn all<'a>(
+        held: &'a Block,
+        sinusoids: &'a [Sinusoid],
+    ) -> impl Iterator<Item = SinusoidRow> + use<'a> {
+        let deviations: Vec<f64> =
+            held.response().0.data().column_iter().map(|x| x.variance().sqrt()).collect();
+        sinusoids.iter().map(move |sinusoid| {
+            let amplitudes: Vec<f64> = sinusoid.amplitude().iter().map(|z| z.norm()).collect();
+            let shares = amplitudes.iter().zip(&deviations);
+            let shares = shares.filter(|(_, deviation)| **deviation > 0.0);
+            SinusoidRow {
+                record: held.file.clone(),
+                frequency_hz: sinusoid.omega() / TAU,
+                share: shares.map(|(a, s)| a.abs() / s).fold(0.0, f64::max) / 2_f64.sqrt(),
+                amplitudes,
+            }
+        })
+    }
+
+    /// Returns the remark on those of all records, the strongest first, if there are any.
+    pub(super) fn remark(all: &[Self]) -> Option<String> {
+        let mut by_size: Vec<&Self> = all.iter().collect();
+        by_size.sort_by(|a, b| b.share.total_cmp(&a.share));
+        let mut named: Vec<&Self> = Vec::new();
+        for one in by_size {
+            // Records of one test have the same.
+            let known = |other: &&Self| {
+                other.record != one.record
+                    && (other.frequency_hz / one.frequency_hz - 1.0).abs() < SAME
+            };
+            if !named.iter().any(known) {
+                named.push(one);
+            }
+        }
+        let name = |one: &&Self| {
+            let percent = significant(100.0 * one.share, 2);
+            format!("{} Hz ({percent} % of the motion)", significant(one.frequency_hz, 6))
+        };
+        let list = message::list(named.iter().map(name), ", ", NAMED);
+        (!named.is_empty()).then(|| {
+            format!(
+                "{} that the forces do not account for {} fitted beside the machine and taken off the responses: \
+                 {list}: run-out, an unbalance or mains?",
+                message::count(named.len(), "sinusoid"),
+                if named.len() == 1 { "was" } else { "were" },
+            )
+        })
+    }
+}

@@ -1,0 +1,364 @@
+//! Sinusoids of unknown frequency in the responses of open records: what run-out, an unbalance or mains leave there.
+//!
+//! Between two lines a sinusoid leaks to all of them, with one phase: neither the spectrum of a noise nor leaving
+//! lines out describes that. It is fitted where it stands out, to the lines around it under Hann's window, and taken
+//! off all of them.
+
+use std::f64::consts::LN_2;
+use std::ops::Range;
+
+use mechid_signal::Sampling;
+use nalgebra::{Complex, DMatrix};
+
+use super::FrequencyData;
+
+/// Power of a line under Hann's window over the level around it from which it is looked at: noise passes it on one
+/// of 10⁷ lines, with a level of 20 independent lines.
+const CONSPICUOUS: f64 = 30.0;
+/// Lines to either side whose median is the level around a line, and those next to it that do not count.
+const AROUND: usize = 24;
+const NEXT: usize = 3;
+/// Fewest lines that make a level.
+const FEWEST: usize = 16;
+/// Lines to either side that a sinusoid is fitted to; under Hann's window it has next to nothing beyond.
+const FITTED: usize = 4;
+/// Lines to either side of which a sinusoid has to explain the power above the level, and the part it may leave: a
+/// band of noise, or a frequency that changes, leaves more.
+const EXPLAINED: usize = 8;
+const LEFT: f64 = 0.25;
+/// Part of the power of the strongest new one that others found with it have at least: what a fit beside a strong one
+/// leaves near a resonance may look like a weak one.
+const BESIDE: f64 = 0.1;
+/// Sinusoids of a record at most, and lines that are looked at.
+const MOST: usize = 16;
+const LOOKED_AT: usize = 48;
+/// Rounds in which each sinusoid is fitted again beside all others.
+const ROUNDS: usize = 2;
+/// Frequencies tried between the line before and the line after, and the halvings that follow.
+const FREQUENCIES: usize = 20;
+const SECTIONS: usize = 40;
+
+/// A sinusoid beside the response to the forces: Re(c e^{iωt}) in each channel, from the first sample on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sinusoid {
+    /// Line that it stands at, or next to.
+    line: usize,
+    omega: f64,
+    amplitude: Vec<Complex<f64>>,
+}
+
+impl Sinusoid {
+    /// Angular frequency ω, in rad/s.
+    pub fn omega(&self) -> f64 {
+        self.omega
+    }
+
+    /// Complex amplitudes c of each channel, in the unit of the quantity measured.
+    pub fn amplitude(&self) -> &[Complex<f64>] {
+        &self.amplitude
+    }
+
+    /// Number of real unknowns.
+    pub(super) fn unknowns(&self) -> usize {
+        2 * self.amplitude.len() + 1
+    }
+
+    /// What channel `channel` reads of it at a line, in the unit of the quantity measured.
+    fn read(&self, sampling: Sampling, line: usize, channel: usize) -> Complex<f64> {
+        let [before, after] = sides(sampling, self.omega, line);
+        self.amplitude[channel] * before + self.amplitude[channel].conj() * after
+    }
+}
+
+/// What e^{iωt} and e^{−iωt}, each halved as in a cosine of amplitude 1, read at a line.
+fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
+    let samples = sampling.len() as f64;
+    // Sum of a geometric series over its number of terms.
+    let mean = |turn: f64| {
+        let half = 0.5 * turn;
+        match half.sin() {
+            0.0 => Complex::ONE,
+            sine => {
+                Complex::cis((samples - 1.0) * half) * ((samples * half).sin() / (samples * sine))
+            }
+        }
+    };
+    let of_line = line as f64 * sampling.omega0() * sampling.dt();
+    [omega, -omega].map(|omega| mean(omega * sampling.dt() - of_line))
+}
+
+impl FrequencyData {
+    /// The rows of open records with the sinusoids of each, as [`output_error`](super::output_error()) found them,
+    /// taken off the displacement.
+    #[must_use]
+    pub fn without_sinusoids(&self, sinusoids: &[Vec<Sinusoid>]) -> Self {
+        let mut displacement = self.displacement().clone();
+        for (record, sinusoids) in sinusoids.iter().enumerate() {
+            let Some(OpenRecord { sampling, rows }) = self.open_record(record) else { break };
+            for row in rows {
+                let (omega, line) = (self.omega()[row], self.line(row, sampling));
+                let unit = self.measured().per_displacement(omega).inv();
+                for (channel, x) in displacement.row_mut(row).iter_mut().enumerate() {
+                    let read =
+                        sinusoids.iter().map(|sinusoid| sinusoid.read(sampling, line, channel));
+                    *x -= read.sum::<Complex<f64>>() * unit;
+                }
+            }
+        }
+        self.with_displacement(displacement)
+    }
+
+    fn line(&self, row: usize, sampling: Sampling) -> usize {
+        (self.omega()[row] / sampling.omega0()).round() as usize
+    }
+}
+
+/// An open record among the rows of data.
+pub(super) struct OpenRecord {
+    pub(super) sampling: Sampling,
+    pub(super) rows: Range<usize>,
+}
+
+/// Finds the sinusoids that stand out of a residual (rows × n, in m), for each open record of the data; those `known`
+/// from a residual before are looked for first.
+///
+/// Where a force has a line of its own there is none: the residual may be that of the machine.
+///
+/// # Source
+/// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a sinusoid in
+/// noise); Harris (1978), Proceedings of the IEEE 66, 51–83 (Hann's window); the limits are ours.
+pub(super) fn find(
+    data: &FrequencyData,
+    residual: &DMatrix<Complex<f64>>,
+    known: &[Vec<Sinusoid>],
+) -> Vec<Vec<Sinusoid>> {
+    let records = (0..).map_while(|record| data.open_record(record));
+    let each = records.enumerate().map(|(at, record)| {
+        let known = known.get(at).map_or(&[][..], Vec::as_slice);
+        Search::new(data, residual, record).sinusoids(known)
+    });
+    each.collect()
+}
+
+/// The lines of one record, from the first to the last.
+struct Search {
+    sampling: Sampling,
+    first: usize,
+    /// Flag for each line that its neighbours are there, too.
+    whole: Vec<bool>,
+    /// Residual in the quantity measured, lines × channels.
+    residual: DMatrix<Complex<f64>>,
+    /// Power around each line under Hann's window; infinite where there is none to tell.
+    level: DMatrix<f64>,
+    /// Lines at which nothing more is looked for.
+    done: Vec<bool>,
+}
+
+impl Search {
+    fn new(data: &FrequencyData, residual: &DMatrix<Complex<f64>>, record: OpenRecord) -> Self {
+        let OpenRecord { sampling, rows } = record;
+        let lines: Vec<usize> = rows.clone().map(|row| data.line(row, sampling)).collect();
+        let ends = (lines.iter().min().copied(), lines.iter().max().copied());
+        let (first, last) = (ends.0.unwrap_or(0), ends.1.unwrap_or(0));
+        let (count, n) = (last - first + 1, data.dof());
+        let mut there = vec![false; count];
+        let (mut own, mut force) = (DMatrix::zeros(count, n), DMatrix::zeros(count, n));
+        for (row, line) in rows.zip(&lines) {
+            there[line - first] = true;
+            let unit = data.measured().per_displacement(data.omega()[row]);
+            own.row_mut(line - first).copy_from(&(residual.row(row) * unit));
+            force.row_mut(line - first).copy_from(&data.force().row(row));
+        }
+        let whole = (0..count)
+            .map(|at| at > 0 && at + 1 < count && there[at - 1] && there[at] && there[at + 1]);
+        let whole: Vec<bool> = whole.collect();
+        let level = levels(&hann(&own), &whole);
+        let force = hann(&force);
+        let of_force = levels(&force, &whole);
+        let stands_out =
+            |at: usize| (0..n).any(|c| force[(at, c)].norm_sqr() > CONSPICUOUS * of_force[(at, c)]);
+        let mut done = vec![false; count];
+        for at in (0..count).filter(|at| stands_out(*at)) {
+            done[around(at, NEXT, count)].fill(true);
+        }
+        Self { sampling, first, whole, residual: own, level, done }
+    }
+
+    fn sinusoids(mut self, known: &[Sinusoid]) -> Vec<Sinusoid> {
+        let mut found = known.to_vec();
+        found.iter().for_each(|sinusoid| self.put(sinusoid, -1.0));
+        self.refine(&mut found);
+        found.retain(|sinusoid| {
+            self.put(sinusoid, 1.0);
+            let at = sinusoid.line - self.first;
+            let stands_out = self.stands_out(&hann(&self.residual), at) > CONSPICUOUS;
+            if stands_out {
+                self.put(sinusoid, -1.0);
+            }
+            stands_out
+        });
+        let mut windowed = hann(&self.residual);
+        let mut least = CONSPICUOUS;
+        for _ in 0..LOOKED_AT {
+            let Some((ratio, at)) = self.most_conspicuous(&windowed) else { break };
+            if ratio <= least || found.len() >= MOST {
+                break;
+            }
+            let sinusoid = self.fit(&windowed, at);
+            self.put(&sinusoid, -1.0);
+            let less = hann(&self.residual);
+            let [before, after] = [&windowed, &less].map(|of| self.excess(of, at));
+            if after <= LEFT * before {
+                least = least.max(BESIDE * ratio);
+                found.push(sinusoid);
+                windowed = less;
+            } else {
+                self.put(&sinusoid, 1.0);
+                let count = self.done.len();
+                self.done[around(at, EXPLAINED, count)].fill(true);
+            }
+        }
+        self.refine(&mut found);
+        found
+    }
+
+    /// Fits each sinusoid again, beside all others.
+    fn refine(&mut self, found: &mut [Sinusoid]) {
+        for _ in 0..ROUNDS {
+            for sinusoid in &mut *found {
+                self.put(sinusoid, 1.0);
+                *sinusoid = self.fit(&hann(&self.residual), sinusoid.line - self.first);
+                self.put(sinusoid, -1.0);
+            }
+        }
+    }
+
+    /// Power of a line over the level around it, of the channel where that is most.
+    fn stands_out(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
+        let of = |c: usize| windowed[(at, c)].norm_sqr() / self.level[(at, c)];
+        (0..windowed.ncols()).map(of).fold(0.0, f64::max)
+    }
+
+    /// The line that stands out most, and by how much.
+    fn most_conspicuous(&self, windowed: &DMatrix<Complex<f64>>) -> Option<(f64, usize)> {
+        let open = (0..self.done.len()).filter(|at| !self.done[*at]);
+        let ratios = open.map(|at| (self.stands_out(windowed, at), at));
+        ratios.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// Power above the level around a line, over the level.
+    fn excess(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> f64 {
+        let rows = around(at, EXPLAINED, self.done.len()).filter(|row| self.whole[*row]);
+        let of = |row: usize| -> f64 {
+            let channels = (0..windowed.ncols()).filter(|c| self.level[(row, *c)].is_finite());
+            channels.map(|c| windowed[(row, c)].norm_sqr() / self.level[(row, c)] - 1.0).sum()
+        };
+        rows.map(of).sum()
+    }
+
+    /// The sinusoid between the neighbours of a line that leaves least around it.
+    fn fit(&self, windowed: &DMatrix<Complex<f64>>, at: usize) -> Sinusoid {
+        let rows = around(at, FITTED, self.done.len()).filter(|row| self.whole[*row]);
+        let rows: Vec<usize> = rows.collect();
+        let channels = windowed.ncols();
+        let parts = DMatrix::from_fn(2 * rows.len(), channels, |part, c| {
+            let z = windowed[(rows[part / 2], c)];
+            if part % 2 == 0 { z.re } else { z.im }
+        });
+        let solved = |place: f64| {
+            let omega = place * self.sampling.omega0();
+            let waves = self.waves(omega, &rows);
+            let qr = waves.clone().qr();
+            let along = qr.q().tr_mul(&parts);
+            let left = &parts - qr.q() * &along;
+            let cost: f64 =
+                (0..channels).map(|c| left.column(c).norm_squared() / self.level[(at, c)]).sum();
+            (cost, omega, qr.r().solve_upper_triangular(&along))
+        };
+        let cost = |place: f64| solved(place).0;
+        let middle = (self.first + at) as f64;
+        let step = 2.0 / FREQUENCIES as f64;
+        let tried = (0..=FREQUENCIES).map(|k| middle - 1.0 + step * k as f64);
+        let best = tried.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(middle);
+        let (mut low, mut high) = (best - step, best + step);
+        const GOLDEN: f64 = 0.618_033_988_749_895;
+        for _ in 0..SECTIONS {
+            let inner = GOLDEN * (high - low);
+            if cost(high - inner) < cost(low + inner) {
+                high = low + inner;
+            } else {
+                low = high - inner;
+            }
+        }
+        let (_, omega, amplitude) = solved(0.5 * (low + high));
+        let of = |c: usize| match &amplitude {
+            Some(both) => Complex::new(both[(0, c)], both[(1, c)]),
+            None => Complex::ZERO,
+        };
+        let line = self.first + at;
+        Sinusoid { line, omega, amplitude: (0..channels).map(of).collect() }
+    }
+
+    /// Cosine and negative sine of amplitude 1 at lines under Hann's window, real and imaginary parts in turn.
+    fn waves(&self, omega: f64, rows: &[usize]) -> DMatrix<f64> {
+        let mut waves = DMatrix::zeros(2 * rows.len(), 2);
+        for (at, row) in rows.iter().enumerate() {
+            let line = self.first + row;
+            let [[b, a], [before, after], [d, e]] =
+                [line - 1, line, line + 1].map(|line| sides(self.sampling, omega, line));
+            let (one, other) =
+                (before.scale(0.5) - (b + d).scale(0.25), after.scale(0.5) - (a + e).scale(0.25));
+            let cosine: Complex<f64> = one + other;
+            let sine: Complex<f64> = (one - other) * Complex::i();
+            waves
+                .view_mut((2 * at, 0), (2, 2))
+                .copy_from_slice(&[cosine.re, cosine.im, sine.re, sine.im]);
+        }
+        waves
+    }
+
+    /// Adds a sinusoid to the residual, or takes it off.
+    fn put(&mut self, sinusoid: &Sinusoid, sign: f64) {
+        for row in 0..self.done.len() {
+            for channel in 0..sinusoid.amplitude.len() {
+                let read = sinusoid.read(self.sampling, self.first + row, channel);
+                self.residual[(row, channel)] += read.scale(sign);
+            }
+        }
+    }
+}
+
+fn around(at: usize, reach: usize, count: usize) -> Range<usize> {
+    at.saturating_sub(reach)..(at + reach + 1).min(count)
+}
+
+/// Lines under Hann's window; those at the ends stay as they are.
+fn hann(lines: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+    let mut windowed = lines.clone();
+    for row in 1..lines.nrows().saturating_sub(1) {
+        let sides = lines.row(row - 1) + lines.row(row + 1);
+        windowed.row_mut(row).copy_from(&(lines.row(row).scale(0.5) - sides.scale(0.25)));
+    }
+    windowed
+}
+
+/// The power around each line of each channel.
+fn levels(windowed: &DMatrix<Complex<f64>>, whole: &[bool]) -> DMatrix<f64> {
+    let mut powers = Vec::with_capacity(2 * AROUND);
+    DMatrix::from_fn(windowed.nrows(), windowed.ncols(), |at, channel| {
+        if !whole[at] {
+            return f64::INFINITY;
+        }
+        let others = around(at, AROUND, whole.len());
+        let others = others.filter(|row| whole[*row] && row.abs_diff(at) > NEXT);
+        powers.clear();
+        powers.extend(others.map(|row| windowed[(row, channel)].norm_sqr()));
+        if powers.len() < FEWEST {
+            return f64::INFINITY;
+        }
+        let middle = powers.len() / 2;
+        let (_, median, _) = powers.select_nth_unstable_by(middle, f64::total_cmp);
+        // Median of an exponential distribution.
+        if *median > 0.0 { *median / LN_2 } else { f64::INFINITY }
+    })
+}
