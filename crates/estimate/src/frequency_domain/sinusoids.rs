@@ -34,7 +34,7 @@ const MOST: usize = 16;
 const LOOKED_AT: usize = 48;
 /// Rounds in which each sinusoid is fitted again beside all others.
 const ROUNDS: usize = 2;
-/// Frequencies tried between the line before and the line after, and the halvings that follow.
+/// Frequencies tried between the line before and the line after, and the golden sections that follow.
 const FREQUENCIES: usize = 20;
 const SECTIONS: usize = 40;
 
