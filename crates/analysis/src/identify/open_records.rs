@@ -5,7 +5,7 @@ use mechid_estimate::checks::{
     AfterSpectralFit, after_spectral_fit, before_spectral_fit, delay_of_lines, fitted_band,
 };
 use mechid_estimate::frequency_domain::{
-    EndLoads, FrequencyData, Lines, Pooling, Sinusoid, output_error_pooling,
+    EndLoads, FrequencyData, Lines, Pooling, output_error_pooling,
 };
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
@@ -133,11 +133,9 @@ pub(super) fn fit(
     let known: Vec<(&Block, &ForceNoise)> =
         records.iter().map(|record| &record.held).zip(&of_force).collect();
     let remarks = [remark, of_noise(1, false, &fit.noise), ForceNoise::remark(&known)];
-    let of_record = |(record, sinusoids): (&'_ Windowed, &'_ Vec<Sinusoid>)| -> Vec<SinusoidRow> {
-        SinusoidRow::all(&record.held, sinusoids).collect()
-    };
+    let each = records.iter().zip(&fit.sinusoids).enumerate();
     let sinusoids: Vec<SinusoidRow> =
-        records.iter().zip(&fit.sinusoids).flat_map(of_record).collect();
+        each.flat_map(|(at, (record, found))| SinusoidRow::all(at, &record.held, found)).collect();
     let all = joined(&closed)?;
     let fitted = Fitted {
         domain: "frequency",

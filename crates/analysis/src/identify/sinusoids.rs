@@ -25,27 +25,29 @@ pub struct SinusoidRow {
     pub amplitudes: Vec<f64>,
     /// Largest of the amplitudes over √2 times the standard deviation of their responses, a ratio.
     pub share: f64,
+    /// Place of the record among all: names may be the same.
+    #[serde(skip)]
+    place: usize,
 }
 
 impl SinusoidRow {
-    /// Lists the sinusoids of a record.
-    pub(super) fn all<'a>(
-        held: &'a Block,
-        sinusoids: &'a [Sinusoid],
-    ) -> impl Iterator<Item = SinusoidRow> + use<'a> {
+    /// Lists the sinusoids of the record at a place among all.
+    pub(super) fn all(place: usize, held: &Block, sinusoids: &[Sinusoid]) -> Vec<Self> {
         let deviations: Vec<f64> =
             held.response().0.data().column_iter().map(|x| x.variance().sqrt()).collect();
-        sinusoids.iter().map(move |sinusoid| {
+        let row = |sinusoid: &Sinusoid| {
             let amplitudes: Vec<f64> = sinusoid.amplitude().iter().map(|z| z.norm()).collect();
             let shares = amplitudes.iter().zip(&deviations);
             let shares = shares.filter(|(_, deviation)| **deviation > 0.0);
-            SinusoidRow {
+            Self {
                 record: held.file.clone(),
                 frequency_hz: sinusoid.omega() / TAU,
                 share: shares.map(|(a, s)| a.abs() / s).fold(0.0, f64::max) / 2_f64.sqrt(),
                 amplitudes,
+                place,
             }
-        })
+        };
+        sinusoids.iter().map(row).collect()
     }
 
     /// Returns the remark on those of all records, the strongest first, if there are any.
@@ -56,7 +58,7 @@ impl SinusoidRow {
         for one in by_size {
             // Records of one test have the same.
             let known = |other: &&Self| {
-                other.record != one.record
+                other.place != one.place
                     && (other.frequency_hz / one.frequency_hz - 1.0).abs() < SAME
             };
             if !named.iter().any(known) {

@@ -9,7 +9,7 @@ use mechid_analysis::{
 use mechid_estimate::checks::Subject;
 use mechid_estimate::frequency_domain::Pooling;
 use mechid_model::Sdof;
-use mechid_problems::RandomTest;
+use mechid_problems::{Fault, RandomTest};
 use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
 use rayon::prelude::*;
 
@@ -83,6 +83,30 @@ fn several_records_have_ends_of_their_own() {
     // Three times the data.
     let gain = error(&one) / error(&all);
     assert!((1.2..2.4).contains(&gain), "{gain}");
+}
+
+/// Judge: the generator. An amplitude of a tenth of the RMS value is a share of 0.1/√2.
+#[test]
+fn run_out_is_taken_off_and_told_once() {
+    let tests: Vec<Measurement> = (0..2)
+        .map(|seed| {
+            let [force, response] = rig().measure(seed).unwrap();
+            let run_out = Fault::RunOut { rotation_hz: 31.37, amplitudes: vec![0.1] };
+            measured([force, run_out.of(&response, seed).unwrap()], seed)
+        })
+        .collect();
+    let found = identify(&tests, &Identify::default()).unwrap();
+    let summary = found.summary();
+    assert_eq!(summary.fit.sinusoids.len(), 2);
+    for row in &summary.fit.sinusoids {
+        assert!((row.frequency_hz - 31.37).abs() < 1e-2, "{row:?}");
+        assert!((row.share * 2_f64.sqrt() - 0.1).abs() < 2e-3, "{row:?}");
+    }
+    let told: Vec<&String> =
+        summary.remarks.iter().filter(|remark| remark.contains("run-out")).collect();
+    assert!(told.len() == 1 && told[0].starts_with("1 sinusoid that"), "{told:?}");
+    let right = identify(&[random_test(1)], &Identify::default()).unwrap();
+    assert!(right.summary().fit.sinusoids.is_empty());
 }
 
 #[test]

@@ -63,14 +63,14 @@ impl Sinusoid {
         2 * self.amplitude.len() + 1
     }
 
-    /// What channel `channel` reads of it at a line, in the unit of the quantity measured.
+    /// Amplitude that channel `channel` reads at a line, in the unit of the quantity measured.
     fn read(&self, sampling: Sampling, line: usize, channel: usize) -> Complex<f64> {
         let [before, after] = sides(sampling, self.omega, line);
         self.amplitude[channel] * before + self.amplitude[channel].conj() * after
     }
 }
 
-/// What e^{iωt} and e^{−iωt}, each halved as in a cosine of amplitude 1, read at a line.
+/// Amplitudes at a line of e^{iωt} and e^{−iωt}, each halved as in a cosine of amplitude 1.
 fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
     let samples = sampling.len() as f64;
     // Sum of a geometric series over its number of terms.
@@ -122,7 +122,7 @@ pub(super) struct OpenRecord {
 /// Finds the sinusoids that stand out of a residual (rows × n, in m), for each open record of the data; those `known`
 /// from a residual before are looked for first.
 ///
-/// Where a force has a line of its own there is none: the residual may be that of the machine.
+/// None is looked for where a force has a line of its own: the residual may be that of the machine.
 ///
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a sinusoid in
@@ -267,8 +267,7 @@ impl Search {
         });
         let solved = |place: f64| {
             let omega = place * self.sampling.omega0();
-            let waves = self.waves(omega, &rows);
-            let qr = waves.clone().qr();
+            let qr = self.waves(omega, &rows).qr();
             let along = qr.q().tr_mul(&parts);
             let left = &parts - qr.q() * &along;
             let cost: f64 =
