@@ -42,9 +42,9 @@ struct Collocation {
     after: f64,
     /// Displacement and velocity there, for each number of the state and each load.
     seen: [Vec<f64>; 2],
-    /// The same for the forces of this collocation and those before it.
-    by_force: [[f64; 2]; MOST],
-    /// E: what a force of 1 N adds to the state.
+    /// What a force of 1 N here adds to displacement and velocity at every collocation.
+    moves: [[f64; MOST]; 2],
+    /// E: what it adds to the state.
     change: Vec<f64>,
     /// Force, in N, that weighs as much as an acceleration of 1 m/s²; infinite where the scheme is explicit.
     per_acceleration: f64,
@@ -87,7 +87,7 @@ impl Collocations {
                 after: columns[0][s].time,
                 seen: [0, 1]
                     .map(|part| columns.iter().map(|asked| asked[s].motion[part]).collect()),
-                by_force: [[0.0; 2]; MOST],
+                moves: [[0.0; MOST]; 2],
                 change: vec![0.0; stepper.state_len()],
                 per_acceleration: 0.0,
             })
@@ -96,11 +96,10 @@ impl Collocations {
         for r in 0..count {
             probe.give(r);
             stepper.change(&rest, &Loads::none(&zeros), &mut each[r].change).ok()?;
-            let asked = probe.asked();
-            for (s, Asked { motion, .. }) in asked.iter().enumerate() {
-                each[s].by_force[r] = *motion;
+            for (s, Asked { motion, .. }) in probe.asked().iter().enumerate() {
+                (0..2).for_each(|part| each[r].moves[part][s] = motion[part]);
             }
-            let [x, v] = asked[r].motion.map(f64::abs);
+            let [x, v] = each[r].moves.map(|moved| moved[r].abs());
             each[r].per_acceleration = 0.25 * dt * dt / (x + dt * v);
         }
         Some(Self { transition, each, forces: forces.to_vec(), dof, dt })
@@ -163,33 +162,32 @@ impl Collocations {
         let mut z: [f64; S] = std::array::from_fn(|i| state[i]);
         let mut streams: [_; W] = std::array::from_fn(|j| streams[j][..steps].iter());
         let linear = Rows::<S, W, S>::of(|i, j| self.transition.entry(i, j));
-        let mut each: [FixedCollocation<S, W>; Q] =
-            std::array::from_fn(|s| FixedCollocation::of(&self.each[s]));
+        let [seen_x, seen_v] =
+            [0, 1].map(|part| Rows::<S, W, Q>::of(|s, j| self.each[s].seen[part][j]));
+        let mut each: [FixedCollocation<S, Q>; Q] =
+            std::array::from_fn(|s| FixedCollocation::of(s, &self.each[s]));
         let acceleration = 2 * self.transition.loads[0].1.ncols() + self.dof;
         let mut done = 0;
         'steps: while done < steps {
             let (time, size) = ((from + done) as f64 * self.dt, z[acceleration].abs());
             let w = streams.each_mut().map(|stream| stream.next().copied().unwrap_or(f64::NAN));
-            let (mut g, mut next) = ([0.0; Q], linear.times(&z, &w));
+            let (mut x, mut v) = (seen_x.times(&z, &w), seen_v.times(&z, &w));
+            let mut next = linear.times(&z, &w);
             (0..S).for_each(|i| next[i] += z[i]);
-            let seen: [[f64; 2]; Q] = std::array::from_fn(|s| each[s].seen.times(&z, &w));
             for s in 0..Q {
-                let (one, [mut x, mut v]) = (&mut each[s], seen[s]);
-                for (g, by) in g.iter().zip(&one.by_force).take(s) {
-                    x += by[0] * g;
-                    v += by[1] * g;
-                }
-                let own = one.by_force[s];
-                let after = one.after;
-                let force = |g: f64| self.force(time + after, x + own[0] * g, v + own[1] * g);
-                g[s] = match one.is_explicit {
+                let one = &mut each[s];
+                let (time, [by_x, by_v]) = (time + one.after, one.own);
+                let force = |g: f64| self.force(time, x[s] + by_x * g, v[s] + by_v * g);
+                let g = match one.is_explicit {
                     true => force(0.0),
                     false => match one.before.solved(force, size * one.tolerance) {
                         Some(force) => force,
                         None => break 'steps,
                     },
                 };
-                (0..S).for_each(|i| next[i] += one.change[i] * g[s]);
+                (0..Q).for_each(|r| x[r] += one.moves[0][r] * g);
+                (0..Q).for_each(|r| v[r] += one.moves[1][r] * g);
+                (0..S).for_each(|i| next[i] += one.change[i] * g);
             }
             z = next;
             columns.iter_mut().zip(&z).for_each(|(column, value)| column[done] = *value);
@@ -230,9 +228,9 @@ impl Before {
             }
             let next = g + missed * self.correction;
             let left = force(next) - next;
-            let correction = (next - g) / (missed - left);
-            if missed.abs() > TELLING * enough && correction.is_finite() {
-                self.correction = correction;
+            if missed.abs() > TELLING * enough {
+                let correction = (next - g) / (missed - left);
+                self.correction = if correction.is_finite() { correction } else { self.correction };
             }
             (g, missed) = (next, left);
         }
@@ -241,10 +239,12 @@ impl Before {
 }
 
 /// A collocation in the sizes of a loop, with what it has found so far.
-struct FixedCollocation<const S: usize, const W: usize> {
+struct FixedCollocation<const S: usize, const Q: usize> {
     after: f64,
-    seen: Rows<S, W, 2>,
-    by_force: [[f64; 2]; MOST],
+    /// What a force of 1 N adds to displacement and velocity here.
+    own: [f64; 2],
+    /// The same at every collocation.
+    moves: [[f64; Q]; 2],
     change: [f64; S],
     is_explicit: bool,
     /// Part of an acceleration that is left of the equation, as a force.
@@ -252,12 +252,12 @@ struct FixedCollocation<const S: usize, const W: usize> {
     before: Before,
 }
 
-impl<const S: usize, const W: usize> FixedCollocation<S, W> {
-    fn of(one: &Collocation) -> Self {
+impl<const S: usize, const Q: usize> FixedCollocation<S, Q> {
+    fn of(s: usize, one: &Collocation) -> Self {
         Self {
             after: one.after,
-            seen: Rows::of(|part, j| one.seen[part][j]),
-            by_force: one.by_force,
+            own: one.moves.map(|moved| moved[s]),
+            moves: one.moves.map(|moved| std::array::from_fn(|r| moved[r])),
             change: std::array::from_fn(|i| one.change[i]),
             is_explicit: !one.per_acceleration.is_finite(),
             tolerance: TOLERANCE * one.per_acceleration,

@@ -96,7 +96,7 @@ struct Reaction {
 }
 
 impl Law {
-    #[inline]
+    #[inline(always)]
     fn reaction(&self, extension: f64, rate: f64) -> Reaction {
         match self {
             Self::Spring(coefficients) => {
@@ -122,10 +122,11 @@ impl Law {
 }
 
 /// Σ cᵢ eⁱ from i = 1, and its derivative.
-#[inline]
+#[inline(always)]
 fn polynomial(coefficients: &[f64], e: f64) -> (f64, f64) {
-    let (mut value, mut slope) = (0.0, 0.0);
-    for coefficient in coefficients.iter().rev() {
+    let Some((last, rest)) = coefficients.split_last() else { return (0.0, 0.0) };
+    let (mut value, mut slope) = (*last, 0.0);
+    for coefficient in rest.iter().rev() {
         slope = slope * e + value;
         value = value * e + coefficient;
     }
@@ -133,7 +134,7 @@ fn polynomial(coefficients: &[f64], e: f64) -> (f64, f64) {
 }
 
 impl NonlinearElement {
-    #[inline]
+    #[inline(always)]
     fn reaction(&self, x: &[f64], v: &[f64]) -> Reaction {
         match self.dofs.len() {
             1 => self.law.reaction(x[0], v[0]),
