@@ -52,7 +52,7 @@ pub struct IdentifiedMode {
     /// Index of the other mode of a pair of real eigenvalues; `None` for a mode that oscillates, and where
     /// no shape tells which real eigenvalues belong together.
     pub partner: Option<usize>,
-    /// `true` for a motion without restoring force: the 95 % interval of `squared_frequency` contains
+    /// `true` for a motion without restoring force: the 99 % interval of `squared_frequency` contains
     /// zero, or the eigenvalue is zero to rounding.
     pub is_rigid_body: bool,
     /// Standard errors of the real and the imaginary part of every entry of the shape; those
@@ -155,7 +155,7 @@ fn modes(
 const SAME_SHAPE: f64 = 0.9;
 
 /// Level of the interval by which a mode is one of a rigid body.
-const RIGID_BODY_LEVEL: f64 = 0.95;
+const RIGID_BODY_LEVEL: f64 = 0.99;
 
 /// Pairs the real eigenvalues of overdamped modes: the only two there are, otherwise those whose shapes
 /// agree best, as proportional damping makes them do exactly.
@@ -234,8 +234,14 @@ impl Spread<'_> {
             },
             false => self.uncertain(size / tau, &(growth / tau)),
         };
+        let mut growth_rate = self.uncertain(lambda.re, &own.map(|d| d.re));
+        if is_rigid_body && !mode.oscillates() {
+            // Near a double zero the eigenvalues are as roots of their product, and no derivative says how far.
+            let of_root = squared_frequency.standard_error.sqrt();
+            growth_rate.standard_error = growth_rate.standard_error.max(of_root);
+        }
         IdentifiedMode {
-            growth_rate: self.uncertain(lambda.re, &own.map(|d| d.re)),
+            growth_rate,
             damped_frequency_hz: self
                 .uncertain(mode.damped_frequency_hz(), &own.map(|d| d.im / tau)),
             natural_frequency_hz,

@@ -84,10 +84,18 @@ pub(super) fn unknowns_of_an_equation(unknowns: &Unknowns) -> usize {
     (0..unknowns.dof()).map(of).max().unwrap_or(0)
 }
 
-/// Natural frequency (Hz) of the highest mode, and samples per period of it.
+/// Natural frequency (Hz) of the highest mode that oscillates, and samples per period of it; where none does, the
+/// geometric mean of all: a fast decay needs no samples of its own.
 pub(super) fn highest_mode(system: &SecondOrderSystem, dt: f64) -> Result<[f64; 2], EstimateError> {
     let modes = system.modes()?;
-    let highest = modes.iter().map(|mode| mode.natural_frequency()).fold(0.0, f64::max);
+    let oscillating = modes.iter().filter(|mode| mode.oscillates());
+    let highest = match oscillating.map(|mode| mode.natural_frequency()).reduce(f64::max) {
+        Some(highest) => highest,
+        None => {
+            let logarithms = modes.iter().map(|mode| mode.natural_frequency().ln());
+            (logarithms.sum::<f64>() / modes.len().max(1) as f64).exp()
+        }
+    };
     Ok([highest / TAU, TAU / (highest * dt)])
 }
 
