@@ -6,7 +6,7 @@ use mechid::Identify;
 use mechid::analysis::AnalysisError;
 use mechid::analysis::identify::ValidationWindow;
 use mechid::analysis::review::Review;
-use mechid::analysis::review::receptance::acts_alone;
+use mechid::analysis::review::receptance::ActingAlone;
 use mechid::report::{PageSettings, page};
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
@@ -143,8 +143,9 @@ impl Identified {
                 None => &[],
             };
             let none = Complex::new(f64::NAN, f64::NAN);
+            let acting = ActingAlone::of(&data);
             let measured = DMatrix::from_fn(data.len(), n * n, |row, at| match at % n {
-                force if acts_alone(&data, row, force) => {
+                force if acting.on(row, force) => {
                     data.displacement()[(row, at / n)] / data.force()[(row, force)]
                 }
                 _ => none,

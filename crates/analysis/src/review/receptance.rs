@@ -4,6 +4,7 @@ use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::{FrfEstimator, Segments, Window};
 use mechid_signal::Extent;
 use mechid_signal::lines;
+use nalgebra::{Complex, DMatrix};
 
 use super::RecordReview;
 use crate::AnalysisError;
@@ -24,6 +25,13 @@ const EXPLAINED: f64 = 0.5;
 /// A force counts as acting alone on a line if the others have less than this part of it.
 const ALONE: f64 = 1e-3;
 
+/// The same of others that have nothing to do with it: the noise of their load cells.
+const ALONE_BESIDE_NOISE: f64 = 0.1;
+
+/// Coherence with a force from which another is a part of it, and the fewest lines that tell.
+const PART_OF_IT: f64 = 0.5;
+const FEWEST_LINES: usize = 8;
+
 /// A measured receptance, and where it comes from.
 pub struct Receptance {
     /// Receptance, line by line.
@@ -32,12 +40,52 @@ pub struct Receptance {
     pub origin: String,
 }
 
-/// Returns `true` if on a row of the data, counted from 0, no force acts but the one on degree of freedom
-/// `dof`, counted from 0: motion over force is then the receptance.
-pub fn acts_alone(data: &FrequencyData, row: usize, dof: usize) -> bool {
-    let amplitude = data.force()[(row, dof)].norm();
-    let absent = |k: usize| data.force()[(row, k)].norm() <= ALONE * amplitude;
-    amplitude > 0.0 && (0..data.dof()).all(|k| k == dof || absent(k))
+/// Rows of data on which one force acts alone, so that motion over force is the receptance.
+pub struct ActingAlone<'a> {
+    data: &'a FrequencyData,
+    /// Part of force j, the column, that force k, the row, has at most where j acts alone.
+    limits: DMatrix<f64>,
+}
+
+impl<'a> ActingAlone<'a> {
+    /// Tells noise in the channel of an idle force from a part of the force that acts, by their coherence over the
+    /// lines that are driven by one force.
+    pub fn of(data: &'a FrequencyData) -> Self {
+        let n = data.dof();
+        let limits = DMatrix::from_fn(n, n, |k, j| {
+            let driven = |row: &usize| {
+                let amplitude = data.force()[(*row, j)].norm();
+                let limit = ALONE_BESIDE_NOISE * amplitude;
+                let others = (0..n).filter(|other| *other != j);
+                amplitude > 0.0
+                    && others.into_iter().all(|other| data.force()[(*row, other)].norm() <= limit)
+            };
+            let (mut lines, mut cross, mut power) = (0, Complex::from(0.0), 0.0);
+            for row in (0..data.len()).filter(driven) {
+                let [one, other] = [j, k].map(|at| data.force()[(row, at)]);
+                // Each line counts alike, whatever drives it.
+                let ratio = other / one;
+                cross += ratio;
+                power += ratio.norm_sqr();
+                lines += 1;
+            }
+            let coherence = cross.norm_sqr() / (lines as f64 * power);
+            match lines >= FEWEST_LINES && coherence < PART_OF_IT {
+                true => ALONE_BESIDE_NOISE,
+                false => ALONE,
+            }
+        });
+        Self { data, limits }
+    }
+
+    /// Returns `true` if on a row of the data no force acts but the one on degree of freedom `dof`, both counted
+    /// from 0.
+    pub fn on(&self, row: usize, dof: usize) -> bool {
+        let amplitude = self.data.force()[(row, dof)].norm();
+        let absent =
+            |k: usize| self.data.force()[(row, k)].norm() <= self.limits[(k, dof)] * amplitude;
+        amplitude > 0.0 && (0..self.data.dof()).all(|k| k == dof || absent(k))
+    }
 }
 
 impl Receptance {

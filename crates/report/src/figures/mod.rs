@@ -58,7 +58,7 @@ fn receptance_or_responses(
     match receptance::receptance(title, data, system, names, style)? {
         Some(figure) => Ok(figure),
         None => {
-            let title = format!("{title}; {}", receptance::WHY);
+            let title = format!("{}: {title}", receptance::WHY);
             receptance::responses(&title, data, system, names, style)
         }
     }

@@ -1,7 +1,7 @@
 //! Measured and fitted receptance.
 
 use mechid_analysis::identify::ResponseCoherence;
-use mechid_analysis::review::receptance::acts_alone;
+use mechid_analysis::review::receptance::ActingAlone;
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
 use mechid_model::linear_algebra::singular_values;
@@ -39,13 +39,13 @@ const SEPARABLE: f64 = 100.0;
 const SAME_LINE: f64 = 1e-9;
 
 /// Number of degrees of freedom up to which each pair of motion and force has panels of its own.
-const GRID: usize = 4;
+const GRID: usize = 8;
 
 /// Magnitude and phase of x_i / F_j, measured and fitted, for every pair of degrees of freedom that the
 /// records show: on the lines where F_j acts alone, and where as many records as degrees of freedom have
 /// independent forces. `None` where no line separates the forces.
 ///
-/// The panels are those of a matrix, a row for each motion and a column for each force; with more than four
+/// The panels are those of a matrix, a row for each motion and a column for each force; with more than eight
 /// degrees of freedom all pairs are drawn together.
 ///
 /// # Errors
@@ -106,9 +106,10 @@ pub fn receptance(
 
 /// Measured columns of H for each force, by rising frequency.
 fn columns(data: &FrequencyData) -> Vec<Vec<Column>> {
-    let separated = separated(data);
+    let acting = ActingAlone::of(data);
+    let separated = separated(data, &acting);
     let of_force = |j: usize| {
-        let alone = (0..data.len()).filter(|row| acts_alone(data, *row, j));
+        let alone = (0..data.len()).filter(|row| acting.on(*row, j));
         let alone = alone.map(|row| {
             let force = data.force()[(row, j)];
             (data.omega()[row], data.displacement().row(row).transpose() / force)
@@ -126,7 +127,7 @@ type Column = (f64, DVector<Complex<f64>>);
 
 /// H = X F⁻¹ at the frequencies at which as many rows as degrees of freedom have independent forces, of
 /// which not each acts alone.
-fn separated(data: &FrequencyData) -> Vec<(f64, DMatrix<Complex<f64>>)> {
+fn separated(data: &FrequencyData, acting: &ActingAlone<'_>) -> Vec<(f64, DMatrix<Complex<f64>>)> {
     let dof = data.dof();
     let mut rows: Vec<usize> = (0..data.len()).collect();
     rows.sort_by(|a, b| data.omega()[*a].total_cmp(&data.omega()[*b]));
@@ -136,7 +137,7 @@ fn separated(data: &FrequencyData) -> Vec<(f64, DMatrix<Complex<f64>>)> {
     };
     let mut receptances = Vec::new();
     for group in rows.chunk_by(same).filter(|group| dof > 1 && group.len() == dof) {
-        let is_alone = |row: &usize| (0..dof).any(|j| acts_alone(data, *row, j));
+        let is_alone = |row: &usize| (0..dof).any(|j| acting.on(*row, j));
         if group.iter().all(is_alone) {
             continue;
         }
