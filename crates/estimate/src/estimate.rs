@@ -4,7 +4,7 @@ use std::fmt;
 
 use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
 use mechid_signal::message;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::covariance::Covariance;
@@ -94,6 +94,36 @@ impl Estimate {
             condition: findings.condition,
             undetermined: findings.undetermined,
         })
+    }
+
+    /// Squared distance of the parameters of another estimate from these, in units of this covariance: dᵀ Cov⁻¹ d, a
+    /// pure number; of estimates that differ by noise alone about as much as there are parameters, if this one is the
+    /// best. `None` where the covariance has no inverse, as where entries follow from others, or the other has other
+    /// parameters.
+    ///
+    /// # Source
+    /// Mahalanobis (1936), Proceedings of the National Institute of Sciences of India 2, 49–55.
+    pub fn squared_distance(&self, other: &Self) -> Option<f64> {
+        if self.parameters != other.parameters || self.unknowns.is_related() {
+            return None;
+        }
+        let change = self.values.iter().zip(&other.values).map(|(own, other)| other - own);
+        self.squared_length(&DVector::from_iterator(self.values.len(), change))
+    }
+
+    /// The same of a change of the parameters.
+    pub(crate) fn squared_length(&self, change: &DVector<f64>) -> Option<f64> {
+        let errors = self.parameters().map(|p| p.standard_error);
+        let scale = DVector::from_iterator(self.values.len(), errors);
+        if !scale.iter().all(|error| *error > 0.0 && error.is_finite()) {
+            return None;
+        }
+        let change = change.component_div(&scale);
+        let mut correlation = self.covariance();
+        for (mut column, size) in correlation.column_iter_mut().zip(&scale) {
+            column.iter_mut().zip(&scale).for_each(|(entry, other)| *entry /= other * size);
+        }
+        Some(change.dot(&correlation.cholesky()?.solve(&change)))
     }
 
     /// The same fit at other values, in the order of [`Unknowns::free`], with another covariance.

@@ -35,6 +35,8 @@ pub struct SpectralResidual {
     deviations: DVector<f64>,
     /// QᵀΣQ with the squares Σ of those deviations.
     explained_spread: DMatrix<f64>,
+    /// Forces, rows × n, less what the residual tells of their noise: with that it is correlated of a right model, too.
+    force: DMatrix<Complex<f64>>,
     rounding: bool,
     /// Power of the residual over that of the noise, on the lines on which that of the forces decides, and the
     /// probability that it is as little.
@@ -57,6 +59,7 @@ impl SpectralResidual {
             column.component_mul_assign(&deviations);
         }
         Self {
+            force: data.force().clone(),
             data,
             noise_stated,
             explained_spread: spread.transpose() * &spread,
@@ -72,6 +75,11 @@ impl SpectralResidual {
     /// The same, of rounding or not.
     pub(super) fn of_rounding(self, rounding: bool) -> Self {
         Self { rounding, ..self }
+    }
+
+    /// The same with the most likely forces in place of the measured ones.
+    pub(super) fn with_likely_force(self, force: Option<DMatrix<Complex<f64>>>) -> Self {
+        Self { force: force.unwrap_or(self.force), ..self }
     }
 
     /// The same with a power where the noise of the forces decides.
@@ -261,7 +269,7 @@ impl SpectralResidual {
     /// Annals of Mathematical Statistics 25, 290–302, for their sum of squares.
     pub fn with_force(&self, channel: usize, force: usize) -> Option<Correlation> {
         let lines = self.data.len();
-        let forces = self.data.force().column(force);
+        let forces = self.force.column(force);
         let rows: Vec<usize> = (0..lines).map(|line| self.row(line, channel)).collect();
         let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
         let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);

@@ -1,5 +1,6 @@
 //! Residuals of spectra weighted by their covariance, with what other parameters explain of them.
 
+use mechid_model::SecondOrderSystem;
 use mechid_model::linear_algebra::svd;
 use mechid_signal::Extent;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -200,6 +201,8 @@ impl WeightedFit {
             (0..channels).filter_map(jump).map(|jump| jump.residual).collect()
         };
         let step = entries_of(&end) - DVector::from_vec(entries);
+        let [m, c, k] = estimate.unknowns().assemble(entries_of(&values).as_slice());
+        let system = SecondOrderSystem::new(m, c, k).ok();
         let Linearised { weighted, explained, coefficients, .. } = linear;
         let residuals = records.iter().enumerate().zip(weighted).zip(explained);
         let residuals = residuals.map(|(((at, data), weighted), explained)| {
@@ -209,6 +212,11 @@ impl WeightedFit {
             SpectralResidual::new(data.clone(), noise.is_some(), values, explained)
                 .of_rounding(is_rounding(data, &levels))
                 .with_force_decides(of_force)
+                .with_likely_force(
+                    system
+                        .as_ref()
+                        .and_then(|system| likely_force(data, system, |row| covariance(at, row))),
+                )
         });
         let mut records: Vec<SpectralResidual> = residuals.collect();
         let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
@@ -226,14 +234,10 @@ impl WeightedFit {
         }
         let (scale, change) = (DVector::from_vec(errors), self.step.as_ref()?);
         let step = change.component_div(&scale);
-        let mut correlation = estimate.covariance();
-        for (mut column, size) in correlation.column_iter_mut().zip(&scale) {
-            column.iter_mut().zip(&scale).for_each(|(entry, other)| *entry /= other * size);
-        }
         let count = scale.len() as f64;
         let together = match estimate.unknowns().is_related() {
             false => {
-                let statistic = step.dot(&correlation.cholesky()?.solve(&step));
+                let statistic = estimate.squared_length(change)?;
                 ChiSquared::new(count).expect("at least one parameter").sf(statistic)
             }
             // Entries that follow from others have no inverse of their covariance.
@@ -251,6 +255,40 @@ impl WeightedFit {
             reference: Reference::MaximumLikelihood,
         })
     }
+}
+
+/// The most likely forces, rows × n, of a machine of which displacements and forces have the noise of a covariance:
+/// F − Cov(F, e) Var(e)⁻¹ e of the residual e = X − G F. `None` where the forces have none.
+///
+/// # Source
+/// Fuller, *Measurement Error Models* (1987), section 1.2.3 (true values given the observations).
+fn likely_force(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+    covariance: impl Fn(usize) -> DMatrix<Complex<f64>>,
+) -> Option<DMatrix<Complex<f64>>> {
+    let n = data.dof();
+    let mut likely = data.force().clone();
+    let mut is_exact = true;
+    for (row, omega) in data.omega().iter().enumerate() {
+        let covariance = covariance(row);
+        let of_force = covariance.view((n, n), (n, n));
+        if of_force.iter().all(|entry| *entry == Complex::ZERO) {
+            continue;
+        }
+        is_exact = false;
+        let receptance = system.receptance(*omega).ok()?;
+        let force = data.force().row(row).transpose();
+        let residual = data.displacement().row(row).transpose() - &receptance * &force;
+        let both = covariance.view((n, 0), (n, n));
+        let with_residual = both - of_force * receptance.adjoint();
+        let variance = covariance.view((0, 0), (n, n))
+            - both.adjoint() * receptance.adjoint()
+            - &receptance * &with_residual;
+        let noise = with_residual * variance.lu().solve(&residual)?;
+        likely.row_mut(row).copy_from(&(force - noise).transpose());
+    }
+    (!is_exact).then_some(likely)
 }
 
 /// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
