@@ -94,14 +94,19 @@ fn faults() -> Vec<(String, On, Option<Fault>)> {
     all
 }
 
-/// Forces (N) and displacements (m) without noise or fault.
-fn exact(test: Test, seed: u64) -> Outcome<[Record; 2]> {
+/// Forces (N) and displacements (m) without noise; the responses later by a number of samples.
+fn exact(test: Test, late: f64, seed: u64) -> Outcome<[Record; 2]> {
+    let delay = Fault::Delay { samples: late };
     let system = machine();
     match test {
         Test::Random => {
             let sampling = Sampling::new(DT, SAMPLES)?;
             let rig = RandomTest { system, sampling, quantity: QUANTITY, force: 100.0 };
-            Ok(rig.measure(seed)?)
+            // The whole period closes, so that all of it can be late.
+            let [force, response] = rig.period(seed)?;
+            let response = delay.of(&response, seed)?;
+            let first = SAMPLES / 2 + 1;
+            Ok([force.window(first, SAMPLES)?, response.window(first, SAMPLES)?])
         }
         Test::Periods => {
             let sampling = Sampling::new(DT, PERIOD)?;
@@ -112,8 +117,9 @@ fn exact(test: Test, seed: u64) -> Outcome<[Record; 2]> {
             let (first, second) = (of(0)?, of(1)?);
             let force = Record::from_channels(sampling, &[first.channel(0), second.channel(0)])?;
             let response = exact_harmonic_periodic(&system, &force)?;
+            let response = delay.of(response.displacement(), seed)?;
             let periods = SAMPLES / PERIOD;
-            Ok([force.repeated(periods)?, response.displacement().repeated(periods)?])
+            Ok([force.repeated(periods)?, response.repeated(periods)?])
         }
     }
 }
@@ -127,9 +133,13 @@ struct Run {
 }
 
 fn run(test: Test, fault: Option<&Fault>, on: On, seed: u64) -> Outcome<Run> {
-    let [mut force, mut response] = exact(test, seed)?;
+    let late = match fault {
+        Some(Fault::Delay { samples }) => *samples,
+        _ => 0.0,
+    };
+    let [mut force, mut response] = exact(test, late, seed)?;
     response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.005), seed + 1_000_000)?;
-    if let Some(fault) = fault {
+    if let Some(fault) = fault.filter(|fault| !matches!(fault, Fault::Delay { .. })) {
         if on != On::Response {
             force = fault.of(&force, seed)?;
         }

@@ -299,7 +299,7 @@ impl SelectionSummary {
 
 /// Lines of the fit: where no force acts, too, for there the nonlinear forces and the response have to
 /// cancel.
-fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
+pub(super) fn all_lines(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     let sampling = held.force.sampling().with_len(held.period)?;
     let driven = rule.lines(&held.force, held.period)?;
     let all = match rule.choice {

@@ -2,7 +2,8 @@
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{
-    AfterSpectralFit, after_spectral_fit, before_spectral_fit, delay_of_lines, fitted_band,
+    AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
+    delay_of_open_records, fitted_band,
 };
 use mechid_estimate::frequency_domain::{
     EndLoads, FrequencyData, Lines, Pooling, output_error_pooling,
@@ -109,12 +110,11 @@ pub(super) fn fit(
         Some(ends) => {
             (ends.taken_off(&data)?, ends.taken_off_responses(&data, &fit.estimate.system()?)?)
         }
-        None => (data.clone(), data),
+        None => (data.clone(), data.clone()),
     };
     let mut after = Vec::new();
-    for ((Windowed { held, .. }, data), lines) in records.iter().zip(&closed).zip(&lines) {
+    for (Windowed { held, .. }, lines) in records.iter().zip(&lines) {
         let mut checks = Vec::from_iter(fitted_band(&fit.estimate, lines)?);
-        checks.extend(delay_of_lines(data, lines.sampling().dt(), unknowns));
         if matches!(excitation, Excitation::Lasting) {
             checks.extend(of_linearity(held, lines, &fit.estimate)?);
         }
@@ -122,6 +122,13 @@ pub(super) fn fit(
     }
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
+    // Only what a force still explains can be a delay of it.
+    let explained = |finding: &Finding| {
+        finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
+    };
+    let is_late = residuals.iter().any(|left| left.findings().iter().any(explained));
+    let dt = records[0].held.force.sampling().dt();
+    let late = is_late.then(|| delay_of_open_records(&data, dt, unknowns, &fit)).flatten();
     let windows = match excitation {
         Excitation::Lasting => "the windows are no periods",
         Excitation::Hits(_) => "hits are no periods",
@@ -147,7 +154,7 @@ pub(super) fn fit(
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
         before: vec![Vec::new(); records.len()],
         after,
-        after_all: Vec::from_iter(bias),
+        after_all: bias.into_iter().chain(late).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         prediction: Prediction::Sampled {
             discretisation: Discretisation::FirstOrderHold,

@@ -2,7 +2,7 @@
 
 use mechid_estimate::checks::{
     AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
-    delay_of_lines, fitted_band, steady_periods,
+    delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, equation_error,
@@ -13,6 +13,7 @@ use mechid_signal::Extent;
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
+use super::nonlinear::all_lines;
 use super::options::Method;
 use super::prediction::Prediction;
 use crate::AnalysisError;
@@ -22,6 +23,12 @@ use crate::text::significant;
 /// Maximum number of unknown parameters for which maximum likelihood is chosen without being asked for: 20
 /// degrees of freedom, which take seconds.
 const LIKELIHOOD_PARAMETERS: usize = 1200;
+
+/// Power of a force over that of its noise, of which the mean is 1 where there is nothing else, up to which it is none.
+const IDLE: f64 = 2.0;
+
+/// Maximum number of unknown parameters beside which nonlinear terms are looked for.
+const TERM_PARAMETERS: usize = 100;
 
 /// Part of the motion that rounding leaves at most.
 const ROUNDING: f64 = 1e-9;
@@ -73,6 +80,13 @@ pub(super) fn fit(
     }
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
+    let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
+    for ((recorded, left), checks) in records.iter().zip(&residuals).zip(&mut after) {
+        let checks: &mut Vec<Finding> = checks;
+        if left.findings().iter().any(is_told) {
+            checks.extend(nonlinear_term(&recorded.held, unknowns, lines)?);
+        }
+    }
     Ok(Fitted {
         domain: "frequency",
         estimator,
@@ -92,9 +106,49 @@ pub(super) fn fit(
         sinusoids: Vec::new(),
         drawn: None,
         nonlinear: None,
-        remarks: one_motion_of(&records[0].held).into_iter().chain(remark).collect(),
+        remarks: one_motion_of(&records[0].held)
+            .into_iter()
+            .chain(remark)
+            .chain(idle_forces(&records[0].held, &weighted))
+            .collect(),
         estimate,
     })
+}
+
+/// Returns the remark on the forces that show nothing but noise in any record, if there are any.
+fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
+    let over_noise = |channel: usize, data: &FrequencyData| {
+        let (noise, place) = (data.noise()?, data.dof() + channel);
+        let of_noise = (0..data.len()).map(|row| noise.covariance(row)[(place, place)].re);
+        Some(data.force().column(channel).norm_squared() / of_noise.sum::<f64>())
+    };
+    let is_idle = |channel: &usize| {
+        records.iter().all(|data| over_noise(*channel, data).is_some_and(|ratio| ratio < IDLE))
+    };
+    let idle = (0..held.force.channels()).filter(is_idle);
+    let names: Vec<String> = idle.map(|channel| held.names.force_name(channel)).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "{}: nothing but noise; if no force acts there, put 0 in its place (`force`), for noise is taken as a \
+             force that drives the machine",
+            names.join(", ")
+        )
+    })
+}
+
+/// Returns the nonlinear term that explains most of what a linear model leaves of a record.
+fn nonlinear_term(
+    held: &Block,
+    unknowns: &Unknowns,
+    rule: LineRule<'_>,
+) -> Result<Option<Finding>, AnalysisError> {
+    if unknowns.free().len() > TERM_PARAMETERS {
+        return Ok(None);
+    }
+    let band = Lines::new(held.force.sampling().with_len(held.period)?, all_lines(held, rule)?)?;
+    let (response, kind) = held.response();
+    // A record alone may not determine the machine, as that of one shaker of several.
+    Ok(distortion_of_periods(&band, &held.force, response, kind, unknowns).unwrap_or(None))
 }
 
 /// Returns whether a finding says that the windows are no periods of the record.
@@ -193,8 +247,10 @@ fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found,
     };
     let unknown = likely.estimate.unknowns().independent() as f64;
     let equations = 2.0 * (data.dof() * data.len()) as f64;
-    // Per parameter, in units of the noise that maximum likelihood leaves.
-    let excess = ((of_plain / of_likely).powi(2) - 1.0) * equations / unknown;
+    // Per parameter, in units of the noise that maximum likelihood leaves: of all lines alike, or as its weights have it.
+    let alike = ((of_plain / of_likely).powi(2) - 1.0) * equations;
+    let weighted = likely.estimate.squared_distance(&plain.estimate).unwrap_or(0.0);
+    let excess = alike.max(weighted) / unknown;
     if of_plain <= ROUNDING || excess.is_nan() || excess <= EXCESS {
         return Ok(plain);
     }

@@ -109,6 +109,35 @@ fn run_out_is_taken_off_and_told_once() {
     assert!(right.summary().fit.sinusoids.is_empty());
 }
 
+/// Judge: the generator, which makes all of the period late, of which the record is a window.
+#[test]
+fn a_late_response_is_told_by_its_delay() {
+    let late = |samples: f64, seed: u64| {
+        let [force, response] = rig().period(seed).unwrap();
+        let response = Fault::Delay { samples }.of(&response, seed).unwrap();
+        let [force, response] =
+            [force, response].map(|all| all.window(SAMPLES / 2 + 1, SAMPLES).unwrap());
+        measured([force, response], seed)
+    };
+    let told = |tests: &[Measurement]| {
+        let found = identify(tests, &Identify::default()).unwrap();
+        let checks = found.summary().checks.iter();
+        let delay = checks.filter(|check| check.subject == Subject::Delay);
+        delay.filter_map(|check| check.value).collect::<Vec<f64>>()
+    };
+    for samples in [-2.0, 0.1, 0.5, 3.3] {
+        for seed in 0..3 {
+            let told = told(&[late(samples, seed)]);
+            assert!(
+                matches!(told[..], [found] if (found - samples).abs() < 0.03),
+                "{samples}, seed {seed}: {told:?}"
+            );
+        }
+    }
+    let both = told(&[late(0.5, 4), late(0.5, 5)]);
+    assert!(matches!(both[..], [found] if (found - 0.5).abs() < 0.02), "{both:?}");
+}
+
 #[test]
 fn a_period_stays_one() {
     let open = |seed: u64| {

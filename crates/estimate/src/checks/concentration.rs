@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 
 use super::finding::Concentration;
-use super::thresholds::{CONCENTRATED, MOST_DISTURBED};
+use super::thresholds::{CONCENTRATED, DISTURBED_ALONE, MOST_DISTURBED};
 
 /// Lines beside each one named, of which at most one is.
 const LINES_PER_DISTURBED: usize = 8;
@@ -34,7 +34,8 @@ struct Line {
 }
 
 /// Finds the few lines without which the misfit is gone; `None` unless [`MOST_DISTURBED`] lines at most,
-/// and an eighth of all, hold [`CONCENTRATED`] of the residual power beyond the noise.
+/// and an eighth of all, hold [`CONCENTRATED`] of the residual power beyond the noise, and leave no more than
+/// [`DISTURBED_ALONE`] times that of the noise: near its resonance a model that is wrong errs most, too.
 ///
 /// The line that stands out most is left out of the linearised fit, and so on: what one of them does to
 /// the residual of all others goes with it.
@@ -57,7 +58,7 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
     // I − Q_Sᵀ Q_S and Q_Sᵀ e_S of the lines left out.
     let mut information = DMatrix::identity(parameters, parameters);
     let mut moved = DVector::zeros(parameters);
-    let (mut left, mut share) = (count, 0.0);
+    let (mut left, mut share, mut ratio) = (count, 0.0, f64::INFINITY);
     for _ in 0..MOST_DISTURBED.min(lines.len() / LINES_PER_DISTURBED) {
         let of_line = |line: &Line| -> f64 {
             let each = line.rows.iter().map(|(record, row)| {
@@ -86,14 +87,17 @@ pub(super) fn concentration(parts: &[Part<'_>]) -> Option<Concentration> {
         for (record, row) in chosen.iter().flat_map(|at| &lines[*at].rows) {
             values[*record].rows_mut(*row, 2 * parts[*record].dof).fill(0.0);
         }
-        share = 1.0 - ((power(&values) - expected(left)) / excess).max(0.0);
+        let others = power(&values);
+        share = 1.0 - ((others - expected(left)) / excess).max(0.0);
+        ratio = others / expected(left);
         if share >= 0.99 {
             break;
         }
     }
     let mut frequencies_hz: Vec<f64> = chosen.iter().map(|at| lines[*at].omega / TAU).collect();
     frequencies_hz.sort_by(f64::total_cmp);
-    (share >= CONCENTRATED).then_some(Concentration { frequencies_hz, share })
+    let alone = share >= CONCENTRATED && ratio <= DISTURBED_ALONE;
+    alone.then_some(Concentration { frequencies_hz, share })
 }
 
 /// The lines of all records by rising frequency.

@@ -5,10 +5,14 @@ use mechid_signal::{Extent, Record};
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
-use super::MAX_SAMPLES;
 use super::finding::Finding;
+use super::spectral_residual::SpectralResidual;
 use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
-use crate::frequency_domain::{FrequencyData, LateForce, output_error};
+use super::weighted_fit::after_spectral_fit;
+use super::{MAX_SAMPLES, Subject, Verdict};
+use crate::frequency_domain::{
+    FrequencyData, LateForce, LateOpenRecord, OutputErrorFit, output_error,
+};
 use crate::time_domain::{TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -27,6 +31,19 @@ const STEPS_PER_SAMPLE: isize = 2;
 /// Reductions of the interval around the best step, each to two thirds.
 const REDUCTIONS: usize = 24;
 
+/// Samples from that delay of the equations of motion within which the one of maximum likelihood begins in the data
+/// without a delay.
+const NEAR: f64 = 0.5;
+
+/// Samples to either side of a delay through whose sums of squares a first parabola is laid.
+const REACH: f64 = 0.25;
+
+/// Parabolas at most, part of the reach of one that the next has at least, and reach, in samples, below which there
+/// is none.
+const PARABOLAS: usize = 8;
+const LEAST_PART: f64 = 0.1;
+const RESOLVED: f64 = 0.005;
+
 /// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
 const PREFERRED: f64 = 0.99;
 
@@ -41,19 +58,108 @@ const PREFERRED: f64 = 0.99;
 pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Option<Finding> {
     let driven = driven(&data.force().map(|f| f.norm()));
     let equations = LateForce::new(data, unknowns, &driven)?;
+    let undelayed = equations.residual_power(0.0)?;
+    let delay = delay_of_equations(&equations, dt, &driven)?;
+    let power = equations.residual_power(delay * dt)?;
+    finding(delay, dt, [undelayed, power], 2 * data.len(), unknowns)
+        .filter(|_| is_delayed(data, delay * dt, unknowns))
+}
+
+/// The delay, in samples, with which the equations of motion fit best.
+fn delay_of_equations(equations: &LateForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
     let power = |samples: f64| equations.residual_power(samples * dt);
     let undelayed = power(0.0)?;
     let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
-    let longest = longest(undelayed, &driven) * STEPS_PER_SAMPLE;
+    let longest = longest(undelayed, driven) * STEPS_PER_SAMPLE;
     let step = best_step(undelayed, longest, |step| power(samples(step)));
     let (mut low, mut high) = (samples(step - 1), samples(step + 1));
     for _ in 0..REDUCTIONS {
         let third = (high - low) / 3.0;
         if power(low + third)? < power(high - third)? { high -= third } else { low += third }
     }
-    let delay = 0.5 * (low + high);
-    finding(delay, dt, [undelayed, power(delay)?], 2 * data.len(), unknowns)
-        .filter(|_| is_delayed(data, delay * dt, unknowns))
+    Some(0.5 * (low + high))
+}
+
+/// Finds a delay of the responses of open records ([`Finding::Delay`]) that accounts for what their forces still
+/// explain of the residual of a `fit` by maximum likelihood: with it that residual is less, and no longer correlated
+/// with them. `dt` is the sampling interval in s; sinusoids beside the response are taken off the `records`. `None`
+/// where no delay of up to 16 samples (64 where the response hardly follows the force) does both.
+///
+/// The loads of the ends are found with each delay; without that they take up a part of it.
+///
+/// # Source
+/// Ours: equations of motion under Hann's window with the force turned by e^(−iωτ), then maximum likelihood.
+pub fn delay_of_open_records(
+    records: &[FrequencyData],
+    dt: f64,
+    unknowns: &Unknowns,
+    fit: &OutputErrorFit,
+) -> Option<Finding> {
+    let (first, others) = records.split_first()?;
+    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
+    let mut likelihood = LateOpenRecord::of(&all, unknowns, fit)?;
+    let undelayed = likelihood.cost(0.0)?;
+    let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    if near.abs() > NEAR {
+        likelihood.search(near * dt)?;
+    }
+    let (mut samples, mut delayed) = (near, likelihood.cost(near * dt)?);
+    let mut reach = REACH;
+    for _ in 0..PARABOLAS {
+        let [before, after] = [samples - reach, samples + reach];
+        let [before, after] = [likelihood.cost(before * dt)?, likelihood.cost(after * dt)?];
+        let (slope, curvature) = (after - before, after - 2.0 * delayed + before);
+        // Outside of a valley no further than there was a look.
+        let step = match curvature > 0.0 {
+            true => (-0.5 * slope / curvature).clamp(-2.0, 2.0),
+            false => -2.0 * slope.signum(),
+        };
+        samples += step * reach;
+        delayed = likelihood.cost(samples * dt)?;
+        reach *= f64::clamp(step.abs(), LEAST_PART, 1.0);
+        if reach < RESOLVED {
+            break;
+        }
+    }
+    let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
+    let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
+    let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
+    let remaining = delayed / undelayed;
+    let told = || Finding::Delay { samples, seconds: samples * dt, remaining };
+    (is_significant && explains(records, samples * dt, unknowns)?).then(told)
+}
+
+/// Returns whether no force explains anything of the residual of a fit with the delay (s).
+fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Option<bool> {
+    let late: Vec<FrequencyData> =
+        records.iter().map(|record| record.with_later_force(delay)).collect();
+    let (first, others) = late.split_first()?;
+    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
+    let fit = output_error(&all, unknowns).ok()?;
+    let closed = fit.ends.as_ref()?.taken_off(&late).ok()?;
+    let after = after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?;
+    let findings = after.records.iter().flat_map(SpectralResidual::findings);
+    let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
+    Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
+}
+
+/// The delay, in samples, of the equations of motion under Hann's window, each line weighted by the dynamic
+/// stiffness of the machine without a delay.
+fn delay_under_window(
+    data: &FrequencyData,
+    dt: f64,
+    unknowns: &Unknowns,
+    estimate: &Estimate,
+) -> Option<f64> {
+    let (system, windowed) = (estimate.system().ok()?, data.under_hann_window());
+    let weight = |omega: &f64| {
+        let unit = data.measured().per_displacement(*omega).norm();
+        unit / system.dynamic_stiffness(*omega).norm()
+    };
+    let driven = driven(&data.force().map(|f| f.norm()));
+    let weights = data.omega().iter().map(weight).collect();
+    let equations = LateForce::weighted(&windowed, weights, unknowns, &driven)?;
+    delay_of_equations(&equations, dt, &driven)
 }
 
 /// Returns whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.

@@ -247,6 +247,21 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
     },
+    /// Nonlinear term that explains most of what a linear model leaves of whole periods.
+    Distortion {
+        /// The term, in words.
+        term: String,
+        /// Part of the power that a linear model leaves, a ratio.
+        explained: f64,
+        /// Level of the response on even lines without force, where odd ones alone are driven, against that on the
+        /// driven ones, in dB; `None` where others are driven or there is no more than noise.
+        even_db: Option<f64>,
+        /// The same of odd lines without force.
+        odd_db: Option<f64>,
+        /// Probability that noise alone makes one of the terms explain as much.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+    },
     /// Autocorrelation of a residual.
     Whiteness {
         /// The residual.
@@ -514,7 +529,7 @@ impl Finding {
             Finding::Instability { .. } => Subject::Instability,
             Finding::MassSymmetry { .. } => Subject::Symmetry,
             Finding::Misfit { .. } => Subject::Misfit,
-            Finding::Linearity { .. } => Subject::Linearity,
+            Finding::Linearity { .. } | Finding::Distortion { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
             Finding::CrossCorrelation { .. } => Subject::CrossCorrelation,
         }
@@ -597,7 +612,8 @@ impl Finding {
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
-            | Finding::Linearity { p_value, .. } => p_value.adjusted,
+            | Finding::Linearity { p_value, .. }
+            | Finding::Distortion { p_value, .. } => p_value.adjusted,
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 test.p_value.adjusted
             }
@@ -611,7 +627,8 @@ impl Finding {
             | Finding::Instability { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
-            | Finding::Linearity { p_value, .. } => Some(*p_value),
+            | Finding::Linearity { p_value, .. }
+            | Finding::Distortion { p_value, .. } => Some(*p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 (!test.rounding).then_some(test.p_value)
             }
@@ -626,7 +643,8 @@ impl Finding {
             | Finding::Instability { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
-            | Finding::Linearity { p_value, .. } => Some(p_value),
+            | Finding::Linearity { p_value, .. }
+            | Finding::Distortion { p_value, .. } => Some(p_value),
             Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
                 (!test.rounding).then_some(&mut test.p_value)
             }

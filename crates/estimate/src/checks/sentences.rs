@@ -266,6 +266,22 @@ impl Display for Sentence<'_> {
                 let displacement = self.response(ResponseQuantity::Displacement, *dof);
                 linearity(f, *power, &displacement, p_value, self.finding.verdict())
             }
+            Finding::Distortion { term, explained, even_db, odd_db, p_value } => {
+                write!(
+                    f,
+                    "{term} explains {:.1} % of the power that a linear model leaves ({p_value})",
+                    100.0 * explained
+                )?;
+                for (name, level) in [("even", even_db), ("odd", odd_db)] {
+                    if let Some(level) = level {
+                        write!(f, "; {name} distortion {level:.0} dB against the response")?;
+                    }
+                }
+                f.write_str(
+                    ": the machine is nonlinear at this level of the force, to which its parameters belong; fit \
+                     the term, too (`nonlinear`), or test at a lower level",
+                )
+            }
             Finding::Whiteness { residual, test, span } => {
                 whiteness(f, residual, test, span.as_ref(), &|force| self.force(force))
             }

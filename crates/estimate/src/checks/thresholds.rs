@@ -7,6 +7,12 @@ pub const SIGNIFICANCE: f64 = 0.01;
 /// Part of the residual power beyond the noise that few lines must hold to be named.
 pub const CONCENTRATED: f64 = 0.8;
 
+/// Residual power of all other lines over that of the noise, up to which the model is right but for those.
+pub const DISTURBED_ALONE: f64 = 10.0;
+
+/// Part of what a linear model leaves that a nonlinear term has to explain to be named.
+pub const DISTORTION_EXPLAINED: f64 = 0.5;
+
 /// Maximum number of lines that a misfit names.
 pub const MOST_DISTURBED: usize = 8;
 

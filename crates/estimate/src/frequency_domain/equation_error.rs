@@ -75,17 +75,7 @@ pub(super) fn weighted_equation_errors<'a>(
     })
 }
 
-/// The rows of [`equation_error`] with the force `delay` seconds later; where noise is stated, of
-/// clear lines, weighted by it.
-pub(super) fn late_rows(
-    data: &FrequencyData,
-    delay: f64,
-) -> Result<EquationOfMotion, EstimateError> {
-    let weight = late_weight(data);
-    weighted_rows(data, delay, |row| weight[row])
-}
-
-/// The weight of each row of [`late_rows`].
+/// A weight for each row of a search for a delay: where noise is stated, that of clear lines by it.
 pub(super) fn late_weight(data: &FrequencyData) -> Vec<f64> {
     match noise_weight(data, CLEAR) {
         Some(weight) => (0..data.len()).map(weight).collect(),
@@ -110,7 +100,8 @@ fn noise_weight(data: &FrequencyData, clear: f64) -> Option<impl Fn(usize) -> f6
     })
 }
 
-fn weighted_rows(
+/// The rows of [`equation_error`] with the force `delay` seconds later and a weight on each line.
+pub(super) fn weighted_rows(
     data: &FrequencyData,
     delay: f64,
     weight: impl Fn(usize) -> f64,

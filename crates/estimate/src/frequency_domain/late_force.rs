@@ -4,7 +4,7 @@ use mechid_model::Matrix;
 use nalgebra::{Complex, DMatrix, DVectorView};
 
 use super::FrequencyData;
-use super::equation_error::{late_rows, late_weight, motions, real_rows};
+use super::equation_error::{late_weight, motions, real_rows, weighted_rows};
 use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};
 use crate::relations::Relations;
@@ -36,11 +36,20 @@ impl<'a> LateForce<'a> {
     /// `None` if the data leave an entry open, as they do with any delay. A force acts on the degrees of
     /// freedom `driven`, counted from 0.
     pub fn new(data: &'a FrequencyData, unknowns: &Unknowns, driven: &[usize]) -> Option<Self> {
-        let undelayed = late_rows(data, 0.0).ok()?.solve(unknowns).ok()?;
+        Self::weighted(data, late_weight(data), unknowns, driven)
+    }
+
+    /// The same with a weight on each line.
+    pub fn weighted(
+        data: &'a FrequencyData,
+        weight: Vec<f64>,
+        unknowns: &Unknowns,
+        driven: &[usize],
+    ) -> Option<Self> {
+        let undelayed = weighted_rows(data, 0.0, |row| weight[row]).ok()?.solve(unknowns).ok()?;
         if !undelayed.undetermined().is_empty() {
             return None;
         }
-        let weight = late_weight(data);
         let motions = motions(data, &weight);
         let groups = match Relations::linear(unknowns) {
             Some(relations) => vec![Group::together(&motions, unknowns, &relations)],
@@ -147,7 +156,8 @@ mod tests {
         for unknowns in [free, some, known] {
             let late = LateForce::new(&data, &unknowns, &[0, 1]).unwrap();
             for delay in [0.0, 0.03, -0.2] {
-                let fit = late_rows(&data, delay).unwrap().solve(&unknowns).unwrap();
+                let rows = weighted_rows(&data, delay, |_| 1.0).unwrap();
+                let fit = rows.solve(&unknowns).unwrap();
                 let power: f64 = fit.residual_nrmse().iter().map(|ratio| ratio * ratio).sum();
                 let found = late.residual_power(delay).unwrap();
                 assert!((found - power).abs() < 1e-12 * power, "{found} {power}");

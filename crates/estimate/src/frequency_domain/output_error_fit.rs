@@ -68,6 +68,11 @@ impl EndLoads {
         self.tau.len()
     }
 
+    /// The unknown loads, in the order of [`Ends`].
+    pub(super) fn loads(&self) -> &[f64] {
+        &self.tau
+    }
+
     /// Probability that periods show loads like these: the tail of the χ² distribution beyond the statistic.
     pub fn p_value(&self) -> f64 {
         let chi_squared = ChiSquared::new(self.tau.len() as f64);

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use mechid_model::SecondOrderSystem;
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 
 use super::misfit::Misfit;
 use super::motion_level::motion_level;
@@ -112,7 +112,10 @@ impl<'a> BesideSinusoids<'a> {
                 misfit.accept();
                 misfit.errors()
             };
-            let found = sinusoids::find(data, &residual, &self.sinusoids);
+            let (independent, _) = parts(data, &self.white.fit.minimum.theta);
+            let [m, c, k] = unknowns.assemble(entries(unknowns, independent).as_slice());
+            let system = SecondOrderSystem::new(m, c, k).ok();
+            let found = sinusoids::find(data, &residual, system.as_ref(), &self.sinusoids);
             if found.iter().all(Vec::is_empty) && self.sinusoids.is_empty() {
                 break;
             }
@@ -153,10 +156,7 @@ fn with_white_noise(
             }
             Some(before) => before.followed(&mut misfit)?,
         };
-        let sizes = match known_force {
-            true => measured_size(data, &misfit.errors()),
-            false => levels_beside_force(data, &misfit),
-        };
+        let sizes = levels_of(data, &misfit);
         // With an exact force only the ratios between the channels weigh; the common level is the residual's.
         let common = if known_force { sizes[0] / levels[0] } else { 1.0 };
         let settled =
@@ -268,6 +268,27 @@ fn measured_size(data: &FrequencyData, amplitudes: &DMatrix<Complex<f64>>) -> Ve
         terms.sum::<f64>()
     };
     (0..data.dof()).map(|c| (power(c) / data.len() as f64).sqrt().max(f64::MIN_POSITIVE)).collect()
+}
+
+/// White noise of the levels that the residual of a fit with the parameters `theta` shows, one for each channel.
+pub(super) fn white_noise_at(
+    data: &FrequencyData,
+    unknowns: &Unknowns,
+    theta: &DVector<f64>,
+) -> Result<NoiseSpectrum, EstimateError> {
+    let any = white_noise(data, &measured_size(data, data.displacement()))?;
+    let mut misfit = Misfit::new(data, unknowns, &any)?;
+    misfit.try_at(theta).ok_or(EstimateError::Overflow)?;
+    misfit.accept();
+    white_noise(data, &levels_of(data, &misfit))
+}
+
+/// Standard deviation of the noise of each channel, in the quantity measured.
+fn levels_of(data: &FrequencyData, misfit: &Misfit<'_>) -> Vec<f64> {
+    match data.force_variance().iter().all(|variance| *variance == 0.0) {
+        true => measured_size(data, &misfit.errors()),
+        false => levels_beside_force(data, misfit),
+    }
 }
 
 /// Standard deviation of the noise of each channel, in the quantity measured, beside which that of the forces

@@ -7,6 +7,7 @@
 use std::f64::consts::LN_2;
 use std::ops::Range;
 
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
@@ -31,7 +32,9 @@ const LEFT: f64 = 0.25;
 const BESIDE: f64 = 0.1;
 /// Sinusoids of a record at most, and lines that are looked at.
 const MOST: usize = 16;
-const LOOKED_AT: usize = 48;
+const LOOKED_AT: usize = 96;
+/// Receptances from one line to the next, of which a mean is taken.
+const GAINS_PER_LINE: usize = 16;
 /// Rounds in which each sinusoid is fitted again beside all others.
 const ROUNDS: usize = 2;
 /// Frequencies tried between the line before and the line after, and the golden sections that follow.
@@ -122,7 +125,9 @@ pub(super) struct OpenRecord {
 /// Finds the sinusoids that stand out of a residual (rows × n, in m), for each open record of the data; those `known`
 /// from a residual before are looked for first.
 ///
-/// None is looked for where a force has a line of its own: the residual may be that of the machine.
+/// None is looked for where a force has a line of its own: the residual may be that of the machine. At a resonance
+/// it has to stand out by as much more as the squared receptance of the `system`, if there is one, does: what disturbs
+/// a force looks like that.
 ///
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a sinusoid in
@@ -130,18 +135,21 @@ pub(super) struct OpenRecord {
 pub(super) fn find(
     data: &FrequencyData,
     residual: &DMatrix<Complex<f64>>,
+    system: Option<&SecondOrderSystem>,
     known: &[Vec<Sinusoid>],
 ) -> Vec<Vec<Sinusoid>> {
     let records = (0..).map_while(|record| data.open_record(record));
     let each = records.enumerate().map(|(at, record)| {
         let known = known.get(at).map_or(&[][..], Vec::as_slice);
-        Search::new(data, residual, record).sinusoids(known)
+        Search::new(data, residual, system, record).sinusoids(known)
     });
     each.collect()
 }
 
 /// The lines of one record, from the first to the last.
-struct Search {
+struct Search<'a> {
+    system: Option<&'a SecondOrderSystem>,
+    measured: ResponseQuantity,
     sampling: Sampling,
     first: usize,
     /// Flag for each line that its neighbours are there, too.
@@ -150,12 +158,19 @@ struct Search {
     residual: DMatrix<Complex<f64>>,
     /// Power around each line under Hann's window; infinite where there is none to tell.
     level: DMatrix<f64>,
+    /// Flag for each line that its level allows for the receptance there.
+    is_resonant: Vec<bool>,
     /// Lines at which nothing more is looked for.
     done: Vec<bool>,
 }
 
-impl Search {
-    fn new(data: &FrequencyData, residual: &DMatrix<Complex<f64>>, record: OpenRecord) -> Self {
+impl<'a> Search<'a> {
+    fn new(
+        data: &FrequencyData,
+        residual: &DMatrix<Complex<f64>>,
+        system: Option<&'a SecondOrderSystem>,
+        record: OpenRecord,
+    ) -> Self {
         let OpenRecord { sampling, rows } = record;
         let lines: Vec<usize> = rows.clone().map(|row| data.line(row, sampling)).collect();
         let ends = (lines.iter().min().copied(), lines.iter().max().copied());
@@ -181,7 +196,9 @@ impl Search {
         for at in (0..count).filter(|at| stands_out(*at)) {
             done[around(at, NEXT, count)].fill(true);
         }
-        Self { sampling, first, whole, residual: own, level, done }
+        let is_resonant = vec![false; count];
+        let measured = data.measured();
+        Self { system, measured, sampling, first, whole, residual: own, level, is_resonant, done }
     }
 
     fn sinusoids(mut self, known: &[Sinusoid]) -> Vec<Sinusoid> {
@@ -191,6 +208,7 @@ impl Search {
         found.retain(|sinusoid| {
             self.put(sinusoid, 1.0);
             let at = sinusoid.line - self.first;
+            self.allow_for_receptance(at);
             let stands_out = self.stands_out(&hann(&self.residual), at) > CONSPICUOUS;
             if stands_out {
                 self.put(sinusoid, -1.0);
@@ -203,6 +221,10 @@ impl Search {
             let Some((ratio, at)) = self.most_conspicuous(&windowed) else { break };
             if ratio <= least || found.len() >= MOST {
                 break;
+            }
+            if !self.is_resonant[at] {
+                self.allow_for_receptance(at);
+                continue;
             }
             let sinusoid = self.fit(&windowed, at);
             self.put(&sinusoid, -1.0);
@@ -229,6 +251,38 @@ impl Search {
                 self.put(sinusoid, 1.0);
                 *sinusoid = self.fit(&hann(&self.residual), sinusoid.line - self.first);
                 self.put(sinusoid, -1.0);
+            }
+        }
+    }
+
+    /// Raises the level around a line by as much as the mean squared receptance near it is above that of the lines
+    /// around, once.
+    fn allow_for_receptance(&mut self, at: usize) {
+        if std::mem::replace(&mut self.is_resonant[at], true) {
+            return;
+        }
+        let gain = |place: f64, channel: usize| {
+            let omega = place * self.sampling.omega0();
+            let receptance = self.system?.receptance(omega).ok()?;
+            let unit = self.measured.per_displacement(omega).norm_sqr();
+            Some(receptance.row(channel).norm_squared() * unit)
+        };
+        let line = (self.first + at) as f64;
+        let steps = 1..2 * GAINS_PER_LINE;
+        let near = steps.map(|step| line - 1.0 + step as f64 / GAINS_PER_LINE as f64);
+        let near: Vec<f64> = near.filter(|place| *place > 0.0).collect();
+        let others: Vec<f64> = around(at, AROUND, self.done.len())
+            .filter(|row| row.abs_diff(at) > NEXT)
+            .map(|row| (self.first + row) as f64)
+            .collect();
+        for channel in 0..self.level.ncols() {
+            let here = near.iter().filter_map(|place| gain(*place, channel)).sum::<f64>();
+            let mut there: Vec<f64> =
+                others.iter().filter_map(|place| gain(*place, channel)).collect();
+            there.sort_by(f64::total_cmp);
+            if let Some(median) = there.get(there.len() / 2).filter(|median| **median > 0.0) {
+                let raised = here / (near.len() as f64 * median);
+                self.level[(at, channel)] *= raised.max(1.0);
             }
         }
     }

@@ -252,6 +252,18 @@ impl Distortion {
     }
 }
 
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)?;
+        let [metre, second] = self.term.law().dimension();
+        match (second == 0 && metre == 3, self.coefficient > 0.0) {
+            (true, true) => f.write_str(" (hardening)"),
+            (true, false) => f.write_str(" (softening)"),
+            _ => Ok(()),
+        }
+    }
+}
+
 impl fmt::Display for Distortion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.kind() {
@@ -259,20 +271,11 @@ impl fmt::Display for Distortion {
                 "no square or cube of displacement or velocity explains what a linear model leaves: \
                  consistent with a linear system",
             )?,
-            Some(kind) => {
-                let [metre, second] = kind.term.law().dimension();
-                let bends = match (second == 0 && metre == 3, kind.coefficient > 0.0) {
-                    (true, true) => " (hardening)",
-                    (true, false) => " (softening)",
-                    _ => "",
-                };
-                write!(
-                    f,
-                    "nonlinear: {}{bends} explains {:.1} % of the power that a linear model leaves",
-                    kind.name,
-                    100.0 * kind.explained
-                )?;
-            }
+            Some(kind) => write!(
+                f,
+                "nonlinear: {kind} explains {:.1} % of the power that a linear model leaves",
+                100.0 * kind.explained
+            )?,
         }
         let mut write_level = |name: &str, level: Option<Level>| match level {
             Some(level) if level.db.is_finite() => {

@@ -1,0 +1,39 @@
+//! Nonlinearity in whole periods.
+
+use mechid_model::ResponseQuantity;
+use mechid_signal::Record;
+
+use super::finding::{Finding, PValue};
+use super::thresholds::DISTORTION_EXPLAINED;
+use crate::frequency_domain::Lines;
+use crate::nonlinear::{Level, distortion};
+use crate::{EstimateError, Unknowns};
+
+/// Looks for the nonlinear term that explains most of what a linear model leaves of whole periods of force (N) and
+/// response on the lines of a band ([`Finding::Distortion`]); `None` unless it explains half of that, and noise does
+/// not.
+///
+/// # Errors
+/// As [`distortion`].
+///
+/// # Source
+/// That of [`distortion`].
+pub fn distortion_of_periods(
+    band: &Lines,
+    force: &Record,
+    response: &Record,
+    measured: ResponseQuantity,
+    unknowns: &Unknowns,
+) -> Result<Option<Finding>, EstimateError> {
+    let found = distortion(band, force, response, measured, unknowns)?;
+    let [even_db, odd_db] = [found.even, found.odd]
+        .map(|level: Option<Level>| level.map(|level| level.db).filter(|db| db.is_finite()));
+    let kind = found.kind().filter(|kind| kind.explained >= DISTORTION_EXPLAINED);
+    Ok(kind.map(|kind| Finding::Distortion {
+        term: kind.to_string(),
+        explained: kind.explained,
+        even_db,
+        odd_db,
+        p_value: PValue::of(kind.p_value),
+    }))
+}

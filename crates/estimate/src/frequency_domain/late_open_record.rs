@@ -1,0 +1,71 @@
+//! Open records with the force some time later.
+
+use nalgebra::DVector;
+
+use super::misfit::Misfit;
+use super::multi_start::search;
+use super::output_error_fit::{plausible, spare};
+use super::residual_noise::white_noise_at;
+use super::search::minimise;
+use super::starts::Starts;
+use super::{FrequencyData, NoiseSpectrum, OutputErrorFit};
+use crate::Unknowns;
+use crate::relations::Relations;
+
+/// Steps of the search from one delay to the next.
+const STEPS: usize = 30;
+
+/// What maximum likelihood leaves of the lines of open records with the force some time later, the loads of their
+/// ends being found anew with each delay.
+pub(crate) struct LateOpenRecord<'a> {
+    data: &'a FrequencyData,
+    unknowns: &'a Unknowns,
+    /// Noise that the residual without a delay shows.
+    noise: NoiseSpectrum,
+    /// Parameters found last, from which the next are looked for.
+    theta: DVector<f64>,
+}
+
+impl<'a> LateOpenRecord<'a> {
+    /// Begins with the result of a `fit` to the same data.
+    pub fn of(
+        data: &'a FrequencyData,
+        unknowns: &'a Unknowns,
+        fit: &OutputErrorFit,
+    ) -> Option<Self> {
+        let entries: Vec<f64> = fit.estimate.parameters().map(|p| p.value).collect();
+        let mut theta = match Relations::of(unknowns) {
+            None => entries,
+            Some(relations) => relations.unknowns(&entries).as_slice().to_vec(),
+        };
+        theta.extend_from_slice(fit.ends.as_ref()?.loads());
+        let theta = DVector::from_vec(theta);
+        let noise = white_noise_at(data, unknowns, &theta).ok()?;
+        Some(Self { data, unknowns, noise, theta })
+    }
+
+    /// Number of real equations less that of the unknowns.
+    pub fn spare(&self) -> usize {
+        spare(self.data, self.unknowns)
+    }
+
+    /// Looks for the parameters with the force `delay` (s) later from all starts.
+    pub fn search(&mut self, delay: f64) -> Option<()> {
+        let late = self.data.with_later_force(delay);
+        let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
+        let starts = Starts::new(&late, self.unknowns, &self.noise);
+        let spare = self.spare() as f64;
+        let found = search(&mut misfit, &starts, plausible(None, spare, spare)).ok()?;
+        self.theta = found.minimum.theta;
+        Some(())
+    }
+
+    /// Sum of squares with the force `delay` (s) later, near the parameters found last.
+    pub fn cost(&mut self, delay: f64) -> Option<f64> {
+        let late = self.data.with_later_force(delay);
+        let mut misfit = Misfit::new(&late, self.unknowns, &self.noise).ok()?;
+        let found = minimise(&mut misfit, self.theta.clone(), STEPS)?;
+        self.theta = found.theta;
+        Some(found.cost)
+    }
+}
