@@ -58,7 +58,7 @@ pub fn singular_values<T: ComplexField<RealField = f64>>(
 }
 
 /// The decomposition, converged to `tolerance` relative to the largest entry.
-pub(crate) fn decomposed<T: ComplexField<RealField = f64>>(
+fn decomposed<T: ComplexField<RealField = f64>>(
     mut matrix: DMatrix<T>,
     vectors: bool,
     tolerance: f64,

@@ -174,10 +174,24 @@ fn reflect_rows(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, 
 
 /// Columns `at..at + width` of the first `rows` rows of `a` ← those times (I − 2 u uᵀ).
 fn reflect_columns(a: &mut DMatrix<f64>, u: Vector3<f64>, at: usize, width: usize, rows: usize) {
-    for row in 0..rows {
-        let part: f64 = (0..width).map(|j| u[j] * a[(row, at + j)]).sum();
-        for j in 0..width {
-            a[(row, at + j)] -= 2.0 * part * u[j];
+    // Column by column, as they lie in memory.
+    let len = a.nrows();
+    let columns = &mut a.as_mut_slice()[at * len..(at + width) * len];
+    let (first, others) = columns.split_at_mut(len);
+    let (second, third) = others.split_at_mut(len);
+    let pairs = first[..rows].iter_mut().zip(&mut second[..rows]);
+    if third.is_empty() {
+        for (p, q) in pairs {
+            let part = 2.0 * (u.x * *p + u.y * *q);
+            *p -= part * u.x;
+            *q -= part * u.y;
+        }
+    } else {
+        for ((p, q), r) in pairs.zip(&mut third[..rows]) {
+            let part = 2.0 * (u.x * *p + u.y * *q + u.z * *r);
+            *p -= part * u.x;
+            *q -= part * u.y;
+            *r -= part * u.z;
         }
     }
 }
