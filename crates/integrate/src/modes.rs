@@ -43,6 +43,9 @@ const CONVERGED: f64 = 1e-8;
 /// Eigenvalues of the inverted operator below this part of the largest count as zero.
 const NEGLIGIBLE: f64 = 1e-14;
 
+/// Largest part of a shift that is imaginary of one that is taken as real.
+const NEARLY_REAL: f64 = 1e-6;
+
 /// Difference of two such eigenvalues, relative to their modulus, that rounding makes of one.
 const TWINS: f64 = 1e-9;
 
@@ -52,6 +55,20 @@ const SPARE_MODES: usize = 8;
 
 /// Largest residual of a mode that is returned.
 const RESIDUAL: f64 = 1e-12;
+
+/// Largest number of shifts: modes that lie close together and far from the shift of one are found from
+/// another among them.
+const SHIFTS: usize = 8;
+
+/// Part of an eigenvalue by which a shift misses the one it was moved to: the matrix is not to be singular.
+const OFFSET: f64 = 1e-6;
+
+/// Difference of two converged eigenvalues, relative to their modulus, that makes one of those found from two
+/// shifts.
+const SAME: f64 = 3e-8;
+
+/// Largest residual of a mode that a shift is moved to: others need not be near any.
+const ROUGH: f64 = 1e-2;
 
 /// Returns `count` modes of a system, those searched for that come first; fewer if it has no more.
 ///
@@ -69,8 +86,10 @@ const RESIDUAL: f64 = 1e-12;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
-/// The matrix K + σC + σ²M is factored once, with σ = 0 or a small negative number where K is singular,
-/// or σ = iω; a subspace grows until the modes are exact to rounding, to 20 vectors for each and 100 at most.
+/// The matrix K + σC + σ²M is factored with σ = 0 or a small negative number where K is singular, or σ = iω;
+/// a subspace grows until the modes are exact to rounding, to 20 vectors for each and 100 at most. Where they
+/// lie too close together for that, such as above the floor that springs to ground give a spectrum, σ moves
+/// to the first of them and the search begins again, from eight shifts at most.
 /// Modes of one eigenvalue are found up to four.
 ///
 /// # Errors
@@ -91,29 +110,129 @@ pub fn sparse_modes(
         return Ok(Vec::new());
     }
     let mut inverse = Inverse::of(system, search)?;
-    let most = len.min(20 * count + 100);
-    let mut space = Space::of(len);
-    let mut target = len.min(2 * count + 20);
-    loop {
-        while space.products < target {
-            space.grow(&mut inverse);
+    let most = len.min(20 * count + 200);
+    let (mut known, mut best) = (Vec::new(), 0);
+    for shift in 0..SHIFTS {
+        let mut space = Space::of(len);
+        let mut target = len.min(2 * count + 20);
+        let (found, reach, usable) = loop {
+            while space.products < target {
+                space.grow(&mut inverse);
+            }
+            let own = space.modes(system, &inverse, count)?;
+            let reach = Reach::of(&own, inverse.shift);
+            let exhausted = shift > 0 && own.iter().all(|found| found.converged);
+            let found = joined(own, &known, search);
+            // All modes of a system that has no more.
+            let complete = space.products == len;
+            let usable = found.iter().take(count).filter(|found| found.converged).count();
+            let enough = usable == count
+                && (shift == 0 || complete || reach.covers(&found[..count], search));
+            if enough || (complete && usable == found.len()) {
+                let found = found.into_iter().take(count);
+                return Ok(found.map(|found| found.mode).collect());
+            }
+            best = best.max(usable);
+            // A space that has found next to nothing halfway is better begun again elsewhere, and so is one
+            // that has found all it looks at, too far away.
+            let stalled = most < len && 2 * target >= most && 4 * usable < count;
+            if target == most || stalled || exhausted {
+                break (found, reach, usable);
+            }
+            target = most.min(target + (target / 4).max(10));
+        };
+        let Some(next) = next_shift(&found, &reach, search, usable == count) else { break };
+        // Complex factors need twice the memory: without them the search ends here.
+        let Ok(moved) = Inverse::near(system, next) else { break };
+        inverse = moved;
+        known = found.into_iter().filter(|found| found.converged).collect();
+    }
+    Err(IntegrateError::ModesNotConverged { wanted: count, found: best, vectors: most })
+}
+
+impl ModeSearch {
+    /// What the search puts eigenvalues in order by.
+    fn distance(self, value: Complex<f64>) -> f64 {
+        match self {
+            Self::Lowest => value.norm(),
+            Self::NearOmega(omega) => (value - Complex::new(0.0, omega)).norm(),
         }
-        let found = space.modes(system, &inverse, search, count)?;
-        // All modes of a system that has no more.
-        let complete = space.products == len;
-        let usable = found.iter().take(count).filter(|found| found.converged).count();
-        if usable == count || (complete && usable == found.len()) {
-            let found = found.into_iter().take(count);
-            return Ok(found.map(|found| found.mode).collect());
+    }
+}
+
+/// How far about a shift all modes have converged.
+struct Reach {
+    shift: Complex<f64>,
+    /// Distance from the shift (rad/s).
+    radius: f64,
+}
+
+impl Reach {
+    fn of(found: &[Found], shift: Complex<f64>) -> Self {
+        let mut distances: Vec<(f64, bool)> =
+            found.iter().map(|f| ((f.value() - shift).norm(), f.converged)).collect();
+        distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let converged = distances.iter().take_while(|(_, converged)| *converged);
+        Self { shift, radius: converged.last().map_or(0.0, |(distance, _)| *distance) }
+    }
+
+    /// The first of the modes within it: those beyond were found from another shift.
+    fn first(&self, modes: &[Found]) -> Option<Complex<f64>> {
+        let within = |value: &Complex<f64>| (value - self.shift).norm() <= self.radius;
+        modes.iter().map(Found::value).find(within)
+    }
+
+    /// Returns whether the first of the modes in the order of the search can be told from the edge of what
+    /// has converged, beyond which others may come before them.
+    fn covers(&self, modes: &[Found], search: ModeSearch) -> bool {
+        let (Some(first), Some(last)) = (self.first(modes), modes.last()) else { return true };
+        let last = last.value();
+        let gap = (first - self.shift).norm();
+        match search {
+            ModeSearch::Lowest => {
+                search.distance(first) >= search.distance(self.shift) || gap <= 0.5 * self.radius
+            }
+            // On the other side of the first there may be as many as on that of the last.
+            ModeSearch::NearOmega(_) => {
+                gap + (last - first).norm() <= self.radius * (1.0 + SAME) + gap * SAME
+            }
         }
-        if target == most {
-            return Err(IntegrateError::ModesNotConverged {
-                wanted: count,
-                found: usable,
-                vectors: most,
-            });
-        }
-        target = most.min(target + (target / 4).max(10));
+    }
+}
+
+/// The modes found from this shift and, of those known from others, which it has not found again, in the order
+/// of the search.
+fn joined(own: Vec<Found>, known: &[Found], search: ModeSearch) -> Vec<Found> {
+    let same = |one: &Found, other: &Found| {
+        let gap = (one.value() - other.value()).norm();
+        gap <= SAME * other.value().norm() || (one.mode.is_rigid_body && other.mode.is_rigid_body)
+    };
+    let again = |other: &&Found| own.iter().any(|one| one.converged && same(one, other));
+    let others: Vec<Found> = known.iter().filter(|other| !again(other)).cloned().collect();
+    let mut found = own;
+    found.extend(others);
+    found.sort_by(|a, b| search.distance(a.value()).total_cmp(&search.distance(b.value())));
+    found
+}
+
+/// The next shift after one from which the modes wanted have not all converged, or `all_converged` do not
+/// reach far enough.
+fn next_shift(
+    found: &[Found],
+    reach: &Reach,
+    search: ModeSearch,
+    all_converged: bool,
+) -> Option<Complex<f64>> {
+    if !all_converged {
+        let open = || found.iter().filter(|found| !found.converged && !found.mode.is_rigid_body);
+        let rough = open().find(|found| found.mode.residual <= ROUGH);
+        return rough.or_else(|| open().next()).map(|found| found.value() * (1.0 - OFFSET));
+    }
+    let first = reach.first(found)?;
+    match search {
+        // The floor may lie well beyond it.
+        ModeSearch::Lowest => Some(first + (first - reach.shift) * 3.0),
+        ModeSearch::NearOmega(_) => Some(first * (1.0 - OFFSET)),
     }
 }
 
@@ -134,51 +253,54 @@ enum Factors {
 
 impl<'a> Inverse<'a> {
     fn of(system: &'a SparseSystem, search: ModeSearch) -> Result<Self, IntegrateError> {
-        let dof = system.dof();
-        let singular = |shift: Complex<f64>, error: NotFactored| {
-            error.or_singular(dof, |smallest| IntegrateError::SingularShift {
-                omega: shift.im,
-                smallest,
-                dof,
-            })
-        };
-        let real = |shift: f64| {
-            let (matrix, sizes) = real_part(system, shift.into());
-            let factors = SparseLu::new(&matrix, &sizes, system.factor_limit())
-                .map_err(|error| singular(shift.into(), error))?;
-            let mut inverse = Self {
-                system,
-                shift: shift.into(),
-                scale: -shift,
-                factors: Factors::Real(factors),
-            };
-            if shift == 0.0 {
-                inverse.scale = inverse.lowest();
-            }
-            Ok(inverse)
-        };
         match search {
-            ModeSearch::Lowest => real(0.0).or_else(|error: IntegrateError| {
-                if !matches!(error, IntegrateError::SingularShift { .. }) {
-                    return Err(error);
-                }
-                // A machine that is free to drift.
-                let omega = match fastest(system) {
-                    0.0 => 1.0,
-                    omega => omega,
-                };
-                real(-1e-3 * omega)
-            }),
+            ModeSearch::Lowest => {
+                Self::real(system, 0.0).or_else(|error: IntegrateError| {
+                    if !matches!(error, IntegrateError::SingularShift { .. }) {
+                        return Err(error);
+                    }
+                    // A machine that is free to drift.
+                    let omega = match fastest(system) {
+                        0.0 => 1.0,
+                        omega => omega,
+                    };
+                    Self::real(system, -1e-3 * omega)
+                })
+            }
             ModeSearch::NearOmega(omega) if omega > 0.0 && omega.is_finite() => {
-                let shift = Complex::new(0.0, omega);
-                let (matrix, sizes) = dynamic_stiffness(system, shift);
-                let factors = GeneralLu::new(matrix, &sizes, system.factor_limit())
-                    .map_err(|error| singular(shift, error))?;
-                let factors = Factors::Complex(Box::new(factors));
-                Ok(Self { system, shift, scale: omega, factors })
+                Self::complex(system, Complex::new(0.0, omega))
             }
             ModeSearch::NearOmega(omega) => Err(IntegrateError::SearchFrequency { omega }),
         }
+    }
+
+    /// With a shift anywhere.
+    fn near(system: &'a SparseSystem, shift: Complex<f64>) -> Result<Self, IntegrateError> {
+        if shift.im.abs() > NEARLY_REAL * shift.norm() {
+            Self::complex(system, shift)
+        } else {
+            Self::real(system, shift.re)
+        }
+    }
+
+    fn real(system: &'a SparseSystem, shift: f64) -> Result<Self, IntegrateError> {
+        let (matrix, sizes) = real_part(system, shift.into());
+        let factors = SparseLu::new(&matrix, &sizes, system.factor_limit())
+            .map_err(|error| singular(system, shift.into(), error))?;
+        let factors = Factors::Real(factors);
+        let mut inverse = Self { system, shift: shift.into(), scale: shift.abs(), factors };
+        if shift == 0.0 {
+            inverse.scale = inverse.lowest();
+        }
+        Ok(inverse)
+    }
+
+    fn complex(system: &'a SparseSystem, shift: Complex<f64>) -> Result<Self, IntegrateError> {
+        let (matrix, sizes) = dynamic_stiffness(system, shift);
+        let factors = GeneralLu::new(matrix, &sizes, system.factor_limit())
+            .map_err(|error| singular(system, shift, error))?;
+        let factors = Factors::Complex(Box::new(factors));
+        Ok(Self { system, shift, scale: shift.norm(), factors })
     }
 
     /// Roughly the lowest natural frequency (rad/s) without damping, by steps of x ← K⁻¹M x.
@@ -238,11 +360,20 @@ impl<'a> Inverse<'a> {
         if omega == 0.0 {
             return self.shift + theta.inv();
         }
-        // θ = λ / (λ² + ω²).
+        // θ = μ / (μ² + ω²), with λ = μ + Re σ and ω = Im σ.
         let root = (Complex::from(1.0) - theta * theta * (4.0 * omega * omega)).sqrt();
-        let pair = [1.0, -1.0].map(|sign| (root * sign + 1.0) / (theta * 2.0));
+        let pair = [1.0, -1.0].map(|sign| (root * sign + 1.0) / (theta * 2.0) + self.shift.re);
         if (pair[0] - about).norm() < (pair[1] - about).norm() { pair[0] } else { pair[1] }
     }
+}
+
+fn singular(system: &SparseSystem, shift: Complex<f64>, error: NotFactored) -> IntegrateError {
+    let dof = system.dof();
+    error.or_singular(dof, |smallest| IntegrateError::SingularShift {
+        omega: shift.im,
+        smallest,
+        dof,
+    })
 }
 
 /// y ← y − scale · A x.
@@ -359,12 +490,11 @@ impl Space {
         }
     }
 
-    /// Approximate modes in the order of the search, each with whether it has converged.
+    /// Approximate modes, each with whether it has converged.
     fn modes(
         &self,
         system: &SparseSystem,
         inverse: &Inverse<'_>,
-        search: ModeSearch,
         count: usize,
     ) -> Result<Vec<Found>, IntegrateError> {
         let (m, n) = (self.products, system.dof());
@@ -413,21 +543,20 @@ impl Space {
             let mode = SparseMode { mode, residual, is_rigid_body };
             found.push(Found { mode, converged: missed <= CONVERGED && residual <= RESIDUAL });
         }
-        let distance = |found: &Found| {
-            let value = found.mode.mode.eigenvalue();
-            match search {
-                ModeSearch::Lowest => value.norm(),
-                ModeSearch::NearOmega(omega) => (value - Complex::new(0.0, omega)).norm(),
-            }
-        };
-        found.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         Ok(found)
     }
 }
 
+#[derive(Clone)]
 struct Found {
     mode: SparseMode,
     converged: bool,
+}
+
+impl Found {
+    fn value(&self) -> Complex<f64> {
+        self.mode.mode.eigenvalue()
+    }
 }
 
 /// ‖(λ²M + λC + K) φ‖ relative to the size of its terms.

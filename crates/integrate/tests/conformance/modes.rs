@@ -182,3 +182,106 @@ fn a_cube_has_the_frequencies_of_its_closed_form() {
         assert!((found.mode.natural_frequency() / omega - 1.0).abs() < 1e-9, "{omega}: {found:?}");
     }
 }
+
+/// Masses of 1 kg with springs of 900 N/m between them and to the walls about, `ground` N/m to ground each,
+/// and damping in proportion to stiffness: width × height of them.
+fn grounded_grid(width: usize, height: usize, ground: f64, proportion: f64) -> SparseSystem {
+    let at = |x: usize, y: usize| y * width + x;
+    let walls = if height > 1 { 4.0 } else { 2.0 };
+    let mut entries = vec![];
+    for (x, y) in (0..width).flat_map(|x| (0..height).map(move |y| (x, y))) {
+        entries.push((at(x, y), at(x, y), ground + walls * 900.0));
+        let next = [(x + 1, y), (x, y + 1)];
+        for (i, j) in next.into_iter().filter(|(i, j)| *i < width && *j < height) {
+            entries.extend([(at(x, y), at(i, j), -900.0), (at(i, j), at(x, y), -900.0)]);
+        }
+    }
+    let n = width * height;
+    let damping = entries.iter().map(|(i, j, v)| (*i, *j, proportion * v));
+    let damping = triplets(n, damping.collect::<Vec<_>>()).unwrap();
+    let stiffness = triplets(n, entries).unwrap();
+    SparseSystem::new(band(n, &[(0, 1.0)]), damping, stiffness).unwrap()
+}
+
+/// ω² of such a grid, rising: k_g + 4 k sin²(r π / 2(w + 1)) + 4 k sin²(s π / 2(h + 1)).
+fn grounded_squares(width: usize, height: usize, ground: f64) -> Vec<f64> {
+    let part = |r: usize, n: usize| {
+        if n == 1 { 0.0 } else { 3600.0 * (r as f64 * PI / (2 * (n + 1)) as f64).sin().powi(2) }
+    };
+    let pairs = (1..=width).flat_map(|r| (1..=height).map(move |s| (r, s)));
+    let mut squares: Vec<f64> =
+        pairs.map(|(r, s)| ground + part(r, width) + part(s, height)).collect();
+    squares.sort_by(f64::total_cmp);
+    squares
+}
+
+/// Springs to ground give the spectrum a floor, above which the modes lie close together.
+#[test]
+fn grounded_machines_have_the_lowest_modes_of_their_closed_form() {
+    // Of the chain, and of the grid with a floor near its top, no mode is near the first shift.
+    let cases = [(60, 60, 200.0, 8, 1e-4), (10_000, 1, 200.0, 2, 1e-4), (40, 40, 1e5, 2, 0.0)];
+    for (width, height, ground, count, proportion) in cases {
+        let system = grounded_grid(width, height, ground, proportion);
+        let found = sparse_modes(&system, ModeSearch::Lowest, count);
+        let found = found.unwrap_or_else(|e| panic!("{width} × {height}, {count}: {e}"));
+        let squares = grounded_squares(width, height, ground);
+        for (k, (found, square)) in found.iter().zip(squares).enumerate() {
+            let value = found.mode.eigenvalue();
+            let re = -0.5 * proportion * square;
+            let exact = nalgebra::Complex::new(re, (square - re * re).sqrt());
+            let gap = (value - exact).norm() / exact.norm();
+            assert!(gap < 1e-9, "{width} × {height}, mode {k} of {count}: {value} {exact}");
+            assert!(found.residual < 1e-12, "{k}: {:e}", found.residual);
+        }
+    }
+}
+
+/// Modes whose damping sets them further from the axis than from one another.
+#[test]
+fn modes_near_a_frequency_are_found_beside_the_floor() {
+    let n = 10_000;
+    let system = grounded_grid(n, 1, 200.0, 1e-4);
+    let omega = 2.0 * PI * 2.2508;
+    let found = sparse_modes(&system, ModeSearch::NearOmega(omega), 10).unwrap();
+    let mut near: Vec<nalgebra::Complex<f64>> = grounded_squares(n, 1, 200.0)
+        .iter()
+        .map(|square| {
+            nalgebra::Complex::new(-0.5e-4 * square, (square - 0.25e-8 * square * square).sqrt())
+        })
+        .collect();
+    let distance =
+        |value: &nalgebra::Complex<f64>| (value - nalgebra::Complex::new(0.0, omega)).norm();
+    near.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    for (found, exact) in found.iter().zip(near) {
+        let value = found.mode.eigenvalue();
+        assert!((value - exact).norm() < 1e-9 * exact.norm(), "{value} {exact}");
+    }
+}
+
+/// A grounded chain beside a mass that is free to drift and one with little stiffness and much damping: their
+/// modes are found from one shift, those of the chain from another.
+#[test]
+fn modes_far_below_the_floor_come_first() {
+    let n = 4000;
+    let size = n + 2;
+    let mut entries: Vec<(usize, usize, f64)> = (0..n).map(|i| (i, i, 2000.0)).collect();
+    entries.extend((1..n).flat_map(|i| [(i - 1, i, -900.0), (i, i - 1, -900.0)]));
+    // s² + 5 s + 4 = (s + 1)(s + 4).
+    entries.push((n + 1, n + 1, 4.0));
+    let damping = triplets(size, [(n + 1, n + 1, 5.0)]).unwrap();
+    let stiffness = triplets(size, entries).unwrap();
+    let system = SparseSystem::new(band(size, &[(0, 1.0)]), damping, stiffness).unwrap();
+    let found = sparse_modes(&system, ModeSearch::Lowest, 8).unwrap();
+    let (low, chain): (Vec<_>, Vec<_>) =
+        found.iter().partition(|found| found.mode.natural_frequency() < 5.0);
+    assert!(low.iter().any(|found| found.is_rigid_body));
+    for exact in [-1.0, -4.0] {
+        let near = |found: &&SparseMode| (found.mode.eigenvalue() - exact).norm() < 1e-9;
+        assert_eq!(low.iter().copied().filter(near).count(), 1, "{exact}");
+    }
+    assert!(chain.len() >= 4, "{chain:?}");
+    for (found, square) in chain.iter().zip(grounded_squares(n, 1, 200.0)) {
+        let gap = found.mode.natural_frequency() / square.sqrt() - 1.0;
+        assert!(gap.abs() < 1e-9, "{gap:e}");
+    }
+}
