@@ -13,13 +13,14 @@ pub struct HitArgs {
     /// weak hits, too little room) are left out
     #[arg(long)]
     hits: bool,
-    /// Force that begins a hit, in per cent of the largest force of the record [default: 10]
+    /// Force that begins a hit, in per cent of the largest force of the record [default: 0.5]
     #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
     trigger_percent: Option<f64>,
     /// Least second peak of a double hit, in per cent of the first [default: 5]
     #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
     double_percent: Option<f64>,
-    /// Least peak of a hit, in per cent of the median of all peaks [default: 25]
+    /// Least peak of a hit, in per cent of the median of all peaks that are a tenth of the largest or more
+    /// [default: 25]
     #[arg(long, value_name = "PERCENT", requires = "hits", allow_negative_numbers = true)]
     weak_percent: Option<f64>,
     /// Time after the trigger within which a force belongs to the same hit, in s [default: 0.1]
