@@ -17,6 +17,9 @@ const ROUNDING: f64 = 1e-12;
 /// Maximum number of samples by which a neighbouring period is longer or shorter.
 const NEIGHBOURS: usize = 2;
 
+/// Mismatch, over the RMS of the force, beyond which it does not repeat even with noise on it.
+const REPEATS: f64 = 0.5;
+
 /// Reduction of the squared mismatch, in its own scatter, from which a neighbouring period is better.
 const CLEARLY: f64 = 4.0;
 
@@ -48,12 +51,13 @@ fn unit(force: &Record, channel: usize) -> Option<Vec<f64>> {
     (rms > ROUNDING * size).then(|| x.iter().map(|x| (x - mean) / rms).collect())
 }
 
-/// A period close by after which the force repeats clearly better. Mismatches are RMS differences over
-/// √2 times the RMS of the force.
+/// A period close by after which the force repeats, and clearly better. Mismatches are RMS differences over
+/// √2 times the RMS of the force. The next longer and shorter periods must be worse: if not, the true one is
+/// further away.
 fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
-    let longest = period + NEIGHBOURS;
+    let longest = period + NEIGHBOURS + 1;
     let pairs = channels[0].len().checked_sub(longest)?;
-    if period <= NEIGHBOURS || pairs < period / 2 {
+    if period <= NEIGHBOURS + 1 || pairs < period / 2 {
         return None;
     }
     let differences = |lag: usize| -> Vec<f64> {
@@ -64,13 +68,18 @@ fn neighbour(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     };
     let sum = |squares: &[f64]| squares.iter().sum::<f64>();
     let claimed = differences(period);
-    let (found, best) = (period - NEIGHBOURS..=longest)
+    let (found, best) = (period - NEIGHBOURS - 1..=longest)
         .map(|lag| (lag, differences(lag)))
         .min_by(|a, b| sum(&a.1).total_cmp(&sum(&b.1)))?;
+    if found.abs_diff(period) > NEIGHBOURS {
+        return None;
+    }
     let gain: Vec<f64> = claimed.iter().zip(&best).map(|(a, b)| a - b).collect();
     let scatter = gain.iter().map(|g| g * g).sum::<f64>().sqrt();
     let share = |squares: &[f64]| (0.5 * sum(squares) / squares.len() as f64).sqrt();
-    let clear = share(&claimed) > ROUNDING.sqrt() && sum(&gain) > CLEARLY * scatter;
+    let clear = share(&best) <= REPEATS
+        && share(&claimed) > ROUNDING.sqrt()
+        && sum(&gain) > CLEARLY * scatter;
     clear.then(|| PeriodFault::Neighbour {
         period: found,
         mismatch: share(&best),

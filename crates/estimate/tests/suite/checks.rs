@@ -287,6 +287,25 @@ fn a_wrong_period_is_found_out_by_the_force_and_a_right_one_is_not() {
     };
 }
 
+/// Four samples off, every period close by is as wrong as the claimed one: the right one is named, also with noise on
+/// the force, and none of those in between.
+#[test]
+fn a_period_some_samples_off_is_replaced_by_the_right_one_only() {
+    let sampling = Sampling::new(0.01, 256).unwrap();
+    for seed in 0..20 {
+        for lines in [1..=100, 1..=20] {
+            let force = Multisine::flat(lines, 2.0, Phases::Random { seed }).unwrap();
+            let force = force.sample(sampling).unwrap().repeated(16).unwrap();
+            let force = noise::add_white(&force, NoiseLevel::FractionOfRms(0.05), seed).unwrap();
+            for claimed in [252, 253, 259, 260, 261] {
+                let whole = 4096 / claimed * claimed;
+                let found = claimed_period(&force.window(0, whole).unwrap(), claimed).unwrap();
+                assert_eq!((found.verdict(), found.value()), (Verdict::Bad, 256.0), "{found}");
+            }
+        }
+    }
+}
+
 /// Rows missing from a record, and rows of a second run behind it: the samples on the two sides of a
 /// gap return after other lags, too, which says nothing of the record.
 #[test]
