@@ -3,6 +3,7 @@
 mod of_hits;
 mod segment_length;
 pub mod table;
+mod whole;
 
 use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
@@ -53,7 +54,8 @@ pub fn frf(measurement: &Measurement, how: &FrfSettings) -> Result<FrfTable, Ana
 /// are averaged together: auto- and cross-spectra of the segments of all of them.
 ///
 /// The records need the same columns and time step, and periods or segments of the same length; one may be
-/// longer than another. Each force need act in one of them only.
+/// longer than another. Without either, records that end at rest or repeat one another are averaged whole; others are
+/// cut into segments as one record is. Each force need act in one of them only.
 ///
 /// # Errors
 /// As [`frf`]; [`AnalysisError::NoRecord`] without a record, and [`AnalysisError::Estimate`] if the records
@@ -84,8 +86,10 @@ pub fn frf_of_records(
     {
         return Ok(FrfTable::interleaved(&records, &parts, how));
     }
-    let chosen = match &records[..] {
-        [recorded] if !period_given => how.segments.chosen(recorded, lines)?,
+    let chosen = match records.iter().min_by_key(|recorded| recorded.held.force.len()) {
+        Some(shortest) if !period_given && !whole::close(&records) => {
+            how.segments.chosen(shortest, lines)?
+        }
         _ => None,
     };
     let segments = chosen.as_ref().map_or(&how.segments, |(segments, _)| segments);
@@ -319,7 +323,13 @@ impl Responses {
         }
         let noise = average.idle_inputs();
         let acting: Vec<usize> = (0..driven.len()).filter(|at| !noise.contains(at)).collect();
-        let frf = average.of_inputs(&acting).frf(estimator.estimator())?;
+        let mut average = average.of_inputs(&acting);
+        // Of periods the scatter has told; lines that were asked for stand.
+        if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
+        {
+            average = average.at(&average.driven())?;
+        }
+        let (frf, lines) = (average.frf(estimator.estimator())?, average.lines().clone());
         let [driven, idle] =
             [acting, noise].map(|all| all.iter().map(|input| driven[*input]).collect());
         Ok(Self { frf, lines, driven, idle, segments, counts })

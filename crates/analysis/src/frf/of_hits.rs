@@ -15,7 +15,7 @@ use crate::measurement::Windowed;
 use crate::text::significant;
 
 /// Number of parts of a window by which it is told whether the response has died out.
-const PARTS: usize = 20;
+pub(super) const PARTS: usize = 20;
 
 /// RMS of the last part, or before the pulse, over that of the largest part, from which the response has not
 /// died out.
@@ -115,7 +115,7 @@ pub(super) fn of_hits(
 }
 
 /// RMS of some samples of a response over that of its largest part, of the channel where that is largest.
-fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
+pub(super) fn over_largest(response: &Record, samples: Range<usize>) -> f64 {
     let rms = |samples: &[f64]| {
         (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
     };

@@ -18,6 +18,14 @@ const MEAN_EVIDENCE: f64 = 3.0;
 /// Largest −ln p, beyond the logarithm of their number, up to which nothing shows: a probability of 10⁻³.
 const LARGEST_EVIDENCE: f64 = 6.9;
 
+/// Power of a force over that of its strongest line, below which a line may be undriven.
+const WEAK: f64 = 0.01;
+/// Number of neighbouring lines by which it is told whether anything shows: of so many the mean of −ln p stays
+/// below [`MEAN_EVIDENCE`] in all but one of 10⁵ cases where nothing does.
+const STRETCH: usize = 8;
+/// Half the width, in lines, of the peak that a window makes of one line.
+const PEAK: usize = 2;
+
 /// Sums from which frequency responses are estimated, gathered stretch by stretch; memory does not grow
 /// with the record.
 #[derive(Debug, Clone)]
@@ -157,6 +165,77 @@ impl FrfAverage {
             }
         }
         sum <= MEAN_EVIDENCE * count && largest <= LARGEST_EVIDENCE + f64::ln(count)
+    }
+
+    /// Returns the places of the lines, counted from 0, that a force drives.
+    ///
+    /// Where every force is weaker than a hundredth of its strongest line in power, and on eight neighbouring lines
+    /// no response has anything in common with it, the channel shows its noise, and the responses to it would be
+    /// those to noise. The weak lines around such a stretch, and as many lines as the peak of a window reaches,
+    /// carry what leaks from further away. All lines are driven if none is left otherwise.
+    ///
+    /// # Source
+    /// That of [`FrfAverage::idle_inputs`]; the limits are ours.
+    pub fn driven(&self) -> Vec<usize> {
+        let (count, averages) = (self.sums.len(), self.averages());
+        let all = || (0..count).collect();
+        if averages <= self.inputs as f64 {
+            return all();
+        }
+        let strongest =
+            |input: usize| self.sums.iter().map(|sum| sum.force_power(input)).fold(0.0, f64::max);
+        let limits: Vec<f64> = (0..self.inputs).map(|input| WEAK * strongest(input)).collect();
+        let is_weak = |sum: &CrossSpectra| {
+            limits.iter().enumerate().all(|(input, limit)| sum.force_power(input) < *limit)
+        };
+        let weak: Vec<bool> = self.sums.iter().map(is_weak).collect();
+        let evidence = |place: usize| -> (f64, f64) {
+            let of = |input| self.sums[place].evidence_of_motion(input, averages);
+            let each = (0..self.inputs).filter_map(of).flatten();
+            each.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0))
+        };
+        let shown: Vec<(f64, f64)> =
+            (0..count).map(|at| if weak[at] { evidence(at) } else { (0.0, 0.0) }).collect();
+        let mut undriven = vec![false; count];
+        for first in 0..(count + 1).saturating_sub(STRETCH) {
+            let stretch = first..first + STRETCH;
+            let (sum, number) = shown[stretch.clone()]
+                .iter()
+                .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
+            if weak[stretch.clone()].iter().all(|weak| *weak) && sum <= MEAN_EVIDENCE * number {
+                undriven[stretch].fill(true);
+            }
+        }
+        let mut left_out = vec![false; count];
+        let mut first = 0;
+        for run in weak.chunk_by(|a, b| a == b) {
+            let run = first..first + run.len();
+            first = run.end;
+            if undriven[run.clone()].contains(&true) {
+                left_out[run.start.saturating_sub(PEAK)..(run.end + PEAK).min(count)].fill(true);
+            }
+        }
+        let driven: Vec<usize> = (0..count).filter(|at| !left_out[*at]).collect();
+        if driven.is_empty() { all() } else { driven }
+    }
+
+    /// Returns the same average on some of the lines, by their places, counted from 0.
+    ///
+    /// # Errors
+    /// What [`Lines::new`] refuses.
+    ///
+    /// # Panics
+    /// If there is no such line.
+    pub fn at(&self, places: &[usize]) -> Result<Self, EstimateError> {
+        let lines = places.iter().map(|at| self.lines.as_slice()[*at]);
+        let lines = Lines::new(self.lines.sampling(), lines)?;
+        let sums = places.iter().map(|at| self.sums[*at].clone()).collect();
+        Ok(Self { lines, sums, ..self.clone() })
+    }
+
+    /// Lines of a segment.
+    pub fn lines(&self) -> &Lines {
+        &self.lines
     }
 
     /// Returns whether a response has something in common with a force, from so many independent averages.
