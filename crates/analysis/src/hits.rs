@@ -2,12 +2,21 @@
 
 use std::fmt;
 
-use mechid_signal::{Hit, HitFault, HitRule, Record, hits};
+use mechid_signal::{Hit, HitFault, HitRule, Record, hits, message};
 use serde::Serialize;
 
 use crate::AnalysisError;
 use crate::measurement::Windowed;
 use crate::text::significant;
+
+/// Part of the largest force above which a sample belongs to a pulse.
+const PULSE: f64 = 0.05;
+
+/// Part of the samples of a hammer test that belong to pulses, at most.
+const RARE: f64 = 0.05;
+
+/// Largest pull of a hammer over its largest push: filters ring, and a hammer does not pull.
+const ONE_SIDED: f64 = 0.2;
 
 /// One hit of a record, used or left out.
 #[derive(Debug, Clone, Serialize)]
@@ -82,6 +91,34 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
         }
     }
     text
+}
+
+/// Returns a remark on a record that looks like a hammer test, of those that are not cut into hits.
+pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
+    records.iter().find_map(|record| {
+        let held = &record.held;
+        let [dof] = held.driven[..] else { return None };
+        let force = held.force.channel(dof);
+        let found = hits(force, held.force.sampling().dt(), &HitRule::default()).ok()?;
+        let (mut pull, mut push, mut pulses) = (0.0_f64, 0.0_f64, 0);
+        let largest = found.all.iter().map(|hit| hit.peak.abs()).fold(0.0, f64::max);
+        for f in force.iter().map(|f| f - found.offset) {
+            (pull, push) = (pull.min(f), push.max(f));
+            pulses += usize::from(f.abs() > PULSE * largest);
+        }
+        let smaller = push.min(-pull);
+        let is_hammer = !found.all.is_empty()
+            && smaller <= ONE_SIDED * largest
+            && pulses as f64 <= RARE * force.len() as f64;
+        is_hammer.then(|| {
+            format!(
+                "the force of {} is zero but for {}, as that of a hammer: `hits` cuts such a record into its hits, \
+                 leaves bad ones out, and fits the others each as a record of its own",
+                held.file,
+                message::count(found.all.len(), "short pulse")
+            )
+        })
+    })
 }
 
 /// Good hits of records, each a record of its own, and a row for every hit.

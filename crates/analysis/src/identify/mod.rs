@@ -120,7 +120,10 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
         false => fit(&unknowns).map(|fitted| (fitted, None)),
     };
     let (fitted, unscaled) = fitted.map_err(|error| explained(error, &records))?;
-    let summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
+    let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
+    if how.hits.is_none() && how.nonlinear.is_none() && !period_given {
+        summary.remarks.extend(hits::uncut(&records));
+    }
     Ok(Identified {
         measurements: measurements.to_vec(),
         records,

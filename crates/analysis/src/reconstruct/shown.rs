@@ -4,17 +4,29 @@ use mechid_force::Channel;
 use mechid_model::ResponseQuantity;
 
 use super::method::{How, Request};
+use crate::reconstruct::options::Method;
 use crate::text::significant;
 
 /// Returns a remark on the frequencies at which the responses show less of a force than their noise.
 ///
-/// Displacements show a force down to a constant one; where there is one there is nothing to say.
+/// Displacements show a force down to a constant one; where there is one there is nothing to say. Dynamic stiffness
+/// does not tell where the noise prevails; lines or a band that were asked for are an answer to that.
 pub fn remark(channels: &[Channel], request: &Request, how: &How) -> Option<String> {
     if channels.iter().any(|channel| channel.quantity == ResponseQuantity::Displacement) {
         return None;
     }
     let accelerated = channels.iter().all(|c| c.quantity == ResponseQuantity::Acceleration);
     let responses = if accelerated { "accelerations" } else { "velocities and accelerations" };
+    if request.method == Method::FrequencyDomain
+        && request.lines.is_none()
+        && request.band_hz.is_none()
+    {
+        return Some(format!(
+            "the {responses} do not show a constant force, and the slower a force is the less of it: this method takes \
+             their noise at low frequencies for a large force; state the `lines` or the `band_hz` of the force, use \
+             `method` shrinkage, which finds where the noise prevails, or measure a displacement as well"
+        ));
+    }
     let hz = |value| significant(value, 4);
     match (how.seen_from_hz?, how.band_hz?, request.band_hz) {
         (seen, [low, high], None) if seen > 0.0 => Some(format!(
