@@ -138,6 +138,11 @@ fn another(channels: &[Vec<f64>], period: usize) -> Option<PeriodFault> {
     let first = (apart..squares.len()).find(alike)?;
     let around = (first..squares.len()).take_while(alike);
     let nearest = around.min_by(|a, b| squares[*a].total_cmp(&squares[*b]))?;
+    // What wanders slowly repeats better after several periods.
+    let repeats = squares.get(period).is_some_and(|square| *square <= WORST * WORST);
+    if repeats && nearest % period == 0 {
+        return None;
+    }
     // Each of so many may be half a sample longer or shorter.
     let times = (period as f64 / nearest as f64).round();
     let off = (period as f64 - times * nearest as f64).abs();
