@@ -10,7 +10,7 @@ use mechid::io::{input_name, read_sparse_system};
 use mechid::modes::SelectedModes;
 use mechid::report::ToFigure as _;
 
-use crate::args::{PlotArgs, ReportArgs, StyleArgs};
+use crate::args::{PlotArgs, ReportArgs, StyleArgs, at_least_one};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -40,7 +40,7 @@ pub struct ModalArgs {
     #[arg(value_name = "SYSTEM.json")]
     system: PathBuf,
     /// Find only this many modes, those of the lowest natural frequencies
-    #[arg(long, value_name = "COUNT", conflicts_with = "plot")]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot")]
     modes: Option<usize>,
     /// With --modes: find those nearest to this frequency, in Hz
     #[arg(long, value_name = "HZ", requires = "modes")]

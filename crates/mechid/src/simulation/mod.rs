@@ -18,7 +18,7 @@ use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
     InitialState, Instability, ModelError, Response, SecondOrderSystem, SparseSystem,
 };
-use mechid_signal::{Record, SignalError, Spectrum, noise};
+use mechid_signal::{Record, SignalError, Spectrum, message, noise};
 use nalgebra::{Complex, DMatrix};
 
 #[cfg(feature = "parquet")]
@@ -274,6 +274,10 @@ impl Described {
 /// Periods of the force from rest after which a steady state of a nonlinear machine is searched for.
 const SETTLING: usize = 50;
 
+/// Excess over 1 of a Floquet multiplier that rounding makes of a double one, such as that of a machine
+/// without damping: about the root of what the multipliers are known to (pure number).
+const MULTIPLIER_ROUNDING: f64 = 1e-4;
+
 /// Steps through one force record, or through the period that repeats.
 fn stepped(
     experiment: &Experiment,
@@ -294,8 +298,14 @@ fn stepped(
             Some(_) => {
                 let rest = InitialState::rest(machine.dense()?.dof());
                 let system = machine.with_forces()?;
-                let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)?;
-                Ok(orbit.response().clone())
+                let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)
+                    .map_err(SimulateError::of_orbit)?;
+                match orbit.multipliers().first() {
+                    Some(multiplier) if multiplier.norm() > 1.0 + MULTIPLIER_ROUNDING => {
+                        Err(SimulateError::UnstableOrbit { multiplier: *multiplier })
+                    }
+                    _ => Ok(orbit.response().clone()),
+                }
             }
         },
         ResponseKind::FromRest | ResponseKind::From(_) => {
@@ -366,6 +376,31 @@ pub enum SimulateError {
         /// The growing free response.
         instability: Instability,
     },
+    /// A periodic response of a nonlinear machine that no run stays on.
+    #[error(
+        "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
+         Floquet multiplier), so that no machine stays on it; choose \"response\": \"from-rest\" to see \
+         where the response goes, or another amplitude or frequency",
+        multiplier_text(*.multiplier)
+    )]
+    UnstableOrbit {
+        /// The largest Floquet multiplier.
+        multiplier: Complex<f64>,
+    },
+    /// The search for the periodic response of a nonlinear machine ends without one.
+    #[error(
+        "no response that repeats every {period} s was found from rest and {SETTLING} periods: the best \
+         changes by {missed:.1e} of its size in a period. Choose \"response\": \"from-rest\" to see where \
+         the response goes; where it repeats after several periods of the force only, describe these as \
+         one (`samples`, `lines`)",
+        period = message::number(*period)
+    )]
+    NoPeriodicOrbit {
+        /// Period of the force, in seconds.
+        period: f64,
+        /// Change in a period, relative to the largest displacement, velocity or acceleration.
+        missed: f64,
+    },
     /// The response of an unstable machine overflows.
     #[error("the machine is unstable, {instability}: {error}; choose a shorter record")]
     UnstableOverflow {
@@ -377,7 +412,29 @@ pub enum SimulateError {
     },
 }
 
+/// The number with four decimals, of a complex one its modulus too.
+fn multiplier_text(multiplier: Complex<f64>) -> String {
+    let number = |value: f64| message::number_to(value, 4);
+    match multiplier.im {
+        0.0 => format!("{}", number(multiplier.re)),
+        im => format!(
+            "{} ± {}i, of modulus {}",
+            number(multiplier.re),
+            number(im.abs()),
+            number(multiplier.norm())
+        ),
+    }
+}
+
 impl SimulateError {
+    /// Says of a failed search what the description of an experiment can change.
+    fn of_orbit(error: IntegrateError) -> Self {
+        match error {
+            IntegrateError::NoOrbit { period, missed } => Self::NoPeriodicOrbit { period, missed },
+            error => Self::Integrate(error),
+        }
+    }
+
     /// Adds the reason to the overflow of a run.
     fn of_unstable(self, instability: Option<Instability>) -> Self {
         match (self, instability) {
@@ -534,6 +591,27 @@ mod tests {
         }
         let exact = simulated(r#"{ "name": "exact" }"#, r#""periodic""#);
         assert!(matches!(exact, Err(SimulateError::ExactNonlinear)));
+    }
+
+    /// Judge: of ẍ + 1.5 ẋ − x + x³ = 0 at rest λ² + 1.5 λ − 1 = 0, so that a disturbance grows by e^(λT),
+    /// λ = 1/2, in a period; at rest on the other side of zero, with + x, it dies out.
+    #[test]
+    fn an_orbit_that_no_machine_stays_on_is_refused() {
+        let simulated = |stiffness: f64| {
+            let text = format!(
+                r#"{{ "system": {{ "mass": 1, "damping": 1.5, "stiffness": {stiffness} }},
+                     "nonlinear": {{ "terms": "k3: x1^3", "coefficients": [1] }},
+                     "sampling": {{ "samples": 200, "rate_hz": 100 }}, "excitation": [],
+                     "scheme": {{ "name": "runge-kutta-4", "load": "linear" }},
+                     "response": "periodic" }}"#
+            );
+            simulate(&Experiment::parse("test.json", &text).unwrap())
+        };
+        let refused = simulated(-1.0).unwrap_err();
+        let SimulateError::UnstableOrbit { multiplier } = refused else { panic!("{refused}") };
+        assert!((multiplier - std::f64::consts::E).norm() < 1e-6, "{multiplier}");
+        assert!(refused.to_string().contains("a disturbance by 2.7183 "), "{refused}");
+        assert!(simulated(1.0).is_ok());
     }
 
     #[test]
