@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use mechid_model::{Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_model::{Matrix, Parameter, SecondOrderSystem, UncertainSystem};
 use mechid_signal::message;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -141,6 +141,64 @@ impl Estimate {
             residual_nrmse: self.residual_nrmse.clone(),
             condition: self.condition,
             undetermined: self.undetermined.clone(),
+        })
+    }
+
+    /// Returns the machine without the decay that an exponential window exp(−σt) on force and response adds, from
+    /// the fit of responses under it: these are of M, C + 2σM and K + σC + σ²M.
+    ///
+    /// `rate` is σ, in 1/s; `unknowns` has the known entries of the machine itself, and the same ones free.
+    ///
+    /// # Errors
+    /// [`EstimateError::Undetermined`] if the data leave an entry open, [`EstimateError::Size`] if others are free.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
+    pub fn without_added_decay(
+        &self,
+        rate: f64,
+        unknowns: Unknowns,
+    ) -> Result<Self, EstimateError> {
+        self.check_determined()?;
+        crate::least_squares::size("free entries", self.parameters.len(), unknowns.free().len())?;
+        let count = self.parameters.len();
+        let mut change = DMatrix::identity(count, count);
+        for (at, p) in self.parameters.iter().enumerate() {
+            let weights = match p.matrix() {
+                Matrix::Mass => continue,
+                Matrix::Damping => [-2.0 * rate, 0.0],
+                Matrix::Stiffness => [rate * rate, -rate],
+            };
+            for (matrix, weight) in [Matrix::Mass, Matrix::Damping].into_iter().zip(weights) {
+                let is_same = |q: &Parameter| {
+                    (q.matrix(), q.row(), q.column()) == (matrix, p.row(), p.column())
+                };
+                if let Some(place) = self.parameters.iter().position(is_same).filter(|q| *q != at) {
+                    change[(at, place)] = weight;
+                }
+            }
+        }
+        let [mass, damping, stiffness] = self.unknowns.assemble(&self.values);
+        let stiffness = stiffness - &damping * rate + &mass * (rate * rate);
+        let damping = damping - &mass * (2.0 * rate);
+        let value = |p: &Parameter| {
+            let of = match p.matrix() {
+                Matrix::Mass => &mass,
+                Matrix::Damping => &damping,
+                Matrix::Stiffness => &stiffness,
+            };
+            of[(p.row(), p.column())]
+        };
+        let values = self.parameters.iter().map(value).collect();
+        let covariance = &change * self.covariance() * change.transpose();
+        Self::new(Findings {
+            unknowns,
+            values,
+            covariance: covariance.into(),
+            degrees_of_freedom: self.degrees_of_freedom,
+            residual_nrmse: self.residual_nrmse.clone(),
+            condition: self.condition,
+            undetermined: Vec::new(),
         })
     }
 

@@ -62,7 +62,9 @@ pub use parquet::{
     ParquetCell, ParquetColumn, ParquetFile, ParquetRecordWriter, ParquetValues, RecordRows,
     parquet_bytes, read_parquet_metadata, read_parquet_rows, write_parquet,
 };
-pub use responses::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+pub use responses::{
+    ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
+};
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{
     NonlinearDescription, SystemMatrices, read_nonlinear, read_sparse_system, read_system,

@@ -16,7 +16,9 @@ use crate::{IoError, Table, uff};
 /// `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`; beside it may
 /// stand `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to all forces) or
 /// `coherence_i_j`. A text with one response may leave `h_i_j_` and `_i` out. This is what
-/// `mechid frf --output` writes.
+/// `mechid frf --output` writes. Two further columns have one number in all rows: `time_derivative` says what was
+/// measured (0 displacement, 1 velocity, 2 acceleration), `added_decay` what an exponential window adds to the decay
+/// of every mode, in 1/s.
 ///
 /// A universal file has a dataset 58 or 58b per response (function type 4) and coherence (6); its
 /// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 become SI units.
@@ -41,6 +43,9 @@ pub struct FrequencyResponses {
     pub functions: Vec<ResponseFunction>,
     /// Coherences, in the order of the file.
     pub coherence: Vec<CoherenceFunction>,
+    /// Rate, in 1/s, that an exponential window on force and response adds to the decay of every mode; `None`
+    /// without one, or if the file does not state it.
+    pub added_decay: Option<f64>,
     /// Remarks on what was left out or converted.
     pub remarks: Vec<String>,
 }
@@ -121,6 +126,12 @@ impl FrequencyResponses {
             let (file, available) = (responses.file, table.available());
             return Err(IoError::Responses { file, available });
         }
+        let quantity = constant(table, DERIVATIVE)?.and_then(|order| {
+            let of = |quantity: &ResponseQuantity| derivative(*quantity) == order;
+            ResponseQuantity::ALL.into_iter().find(of)
+        });
+        responses.functions.iter_mut().for_each(|function| function.quantity = quantity);
+        responses.added_decay = constant(table, ADDED_DECAY)?.filter(|rate| *rate > 0.0);
         Ok(responses)
     }
 
@@ -171,6 +182,30 @@ impl FrequencyResponses {
 
 /// Names of the column with the frequencies.
 const FREQUENCY: [&str; 4] = ["frequency_hz", "frequency", "freq", "f"];
+
+/// Name of the column that says what was measured, as the order of a time derivative of the displacement.
+pub const DERIVATIVE: &str = "time_derivative";
+
+/// Name of the column with the rate that an exponential window adds to the decay of every mode, in 1/s.
+pub const ADDED_DECAY: &str = "added_decay";
+
+/// Order of the time derivative of the displacement that a quantity is, a pure number from 0 to 2.
+pub fn derivative(quantity: ResponseQuantity) -> f64 {
+    match quantity {
+        ResponseQuantity::Displacement => 0.0,
+        ResponseQuantity::Velocity => 1.0,
+        ResponseQuantity::Acceleration => 2.0,
+    }
+}
+
+/// Returns the number that all rows of a column have; `None` if there is no such column, or they differ.
+fn constant(table: &Table, name: &str) -> Result<Option<f64>, IoError> {
+    if table.find(name).is_err() {
+        return Ok(None);
+    }
+    let values = table.column(name)?;
+    Ok(values.first().copied().filter(|first| values.iter().all(|value| value == first)))
+}
 
 /// Point of a table with a single response.
 const ALONE: &str = "1";

@@ -72,6 +72,7 @@ impl ResponseTable {
             frequency_hz: frequency_hz.as_array().to_vec(),
             coherence: points.iter().enumerate().filter_map(of_point).collect(),
             functions,
+            added_decay: None,
             remarks: Vec::new(),
         }))
     }

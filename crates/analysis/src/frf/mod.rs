@@ -198,8 +198,8 @@ impl Estimator {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Segmentation {
-    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments or, of one
-    /// record without a period, as many as its coherence asks for.
+    /// Number of samples in a segment, for a random excitation; `None`: the periods are the segments or, of records
+    /// without a period, as many as the coherence asks for.
     pub segment: Option<usize>,
     /// Window that weights the samples of a segment.
     pub window: Weight,

@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
 use mechid_estimate::{Segments, Window};
-use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
+use mechid_io::{
+    ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
+};
 use mechid_signal::message;
 use nalgebra::Complex;
 use serde::Serialize;
@@ -341,13 +343,15 @@ impl FrfTable {
         Ok(FrequencyResponses {
             file: self.file.clone(),
             frequency_hz: self.frequency_hz.clone(),
+            added_decay: self.added_decay,
             functions: functions.collect(),
             coherence: coherence.collect(),
             remarks: Vec::new(),
         })
     }
 
-    /// One row per frequency; fields are empty where another force has the line to itself.
+    /// One row per frequency; fields are empty where another force has the line to itself. What was measured, and
+    /// the decay that an exponential window adds, are the same number in every row.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
         for r in &self.responses {
@@ -356,6 +360,14 @@ impl FrfTable {
         }
         for c in &self.coherence {
             let _ = write!(text, ",coherence_{}", c.motion);
+        }
+        let order = self.quantity.parse().ok().map(derivative);
+        let alike = [(DERIVATIVE, order), (ADDED_DECAY, self.added_decay)];
+        let alike = alike.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        let mut ending = String::new();
+        for (name, value) in alike {
+            let _ = write!(text, ",{name}");
+            let _ = write!(ending, ",{value:?}");
         }
         for (at, hz) in self.frequency_hz.iter().enumerate() {
             let _ = write!(text, "\n{hz:?}");
@@ -370,6 +382,7 @@ impl FrfTable {
             for c in &self.coherence {
                 let _ = write!(text, ",{:?}", c.values[at]);
             }
+            text += &ending;
         }
         text + "\n"
     }

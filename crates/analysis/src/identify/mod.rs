@@ -20,6 +20,7 @@
 //! | `unscaled` | equations of motion that the data fix up to factors only |
 //! | `rows`, `summary` | the result: rows of its tables; numbers, checks, remarks |
 
+mod added_decay;
 pub mod checks;
 mod derivatives;
 pub(crate) mod fitted;

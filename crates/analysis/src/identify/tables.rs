@@ -1,5 +1,6 @@
 //! Identification from frequency responses that were measured elsewhere.
 
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -15,6 +16,7 @@ use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix};
 use serde::{Deserialize, Serialize};
 
+use super::added_decay;
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
 use super::rows::{
@@ -27,7 +29,7 @@ use crate::AnalysisError;
 use crate::machine::Machine;
 use crate::measurement::Channels;
 use crate::modal::{ShapedMode, shape_table};
-use crate::text::{compact, paragraph};
+use crate::text::{compact, paragraph, significant};
 
 /// Settings of an identification from tables of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -68,6 +70,7 @@ pub fn identify_responses(
     tables: &[FrequencyResponses],
     how: &IdentifyResponses,
 ) -> Result<IdentifiedResponses, AnalysisError> {
+    let added_decay = added_decay::of_tables(tables)?;
     let measured = tables.iter().map(|table| Tabulated::of(table, how));
     let measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
     let first = measured.first().ok_or(AnalysisError::NoRecord)?;
@@ -77,11 +80,19 @@ pub fn identify_responses(
     }
     let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
     let fit = |unknowns: &Unknowns| {
-        let fit = Fit::of(&data, unknowns, &measured, how.method)?;
-        Ok((fit, before_spectral_fit(&data, unknowns)?))
+        let windowed = match added_decay {
+            Some(rate) => &added_decay::unknowns(unknowns, rate)?,
+            None => unknowns,
+        };
+        let fit = Fit::of(&data, windowed, &measured, how.method)?;
+        let of_machine = match added_decay {
+            Some(rate) => fit.estimate.without_added_decay(rate, unknowns.clone())?,
+            None => fit.estimate.clone(),
+        };
+        Ok((fit, of_machine, before_spectral_fit(&data, windowed)?))
     };
     let unknowns = how.structure.apply(how.mass.unknowns(data.dof())?)?;
-    let ((fit, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
+    let ((fit, of_machine, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
         before.into_iter().map(|finding| (When::Before, None, finding)).collect();
     for (table, measured) in tables.iter().zip(&measured) {
@@ -95,7 +106,7 @@ pub fn identify_responses(
         CheckRow::new(when, name, &finding, &Channels::default())
     };
     let checks = findings.into_iter().map(row).collect();
-    let estimate = &fit.estimate;
+    let estimate = &of_machine;
     let system = estimate.system()?;
     let each = estimate.residual_nrmse();
     let hz = |rows: &mut dyn Iterator<Item = f64>| rows.map(|omega| omega / TAU).collect();
@@ -117,7 +128,7 @@ pub fn identify_responses(
         modes: ShapedMode::all(&estimate.modes()?, false)?,
         fit: FitRow {
             nrmse: (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt(),
-            unexplained_motion: unexplained_motion(&data, &system)?,
+            unexplained_motion: unexplained_motion(&data, &fit.estimate.system()?)?,
             misfit_ratio: fit.misfit.map(|misfit| misfit.ratio),
             noise: fit.noise.clone(),
             force_noise: Vec::new(),
@@ -132,6 +143,13 @@ pub fn identify_responses(
             .iter()
             .map(Unscaled::to_string)
             .chain(tables.iter().flat_map(|table| table.remarks.iter().cloned()))
+            .chain(added_decay.map(|rate| {
+                format!(
+                    "an exponential window adds {} 1/s to the decay of every mode of the table: it was taken off \
+                     damping and stiffness",
+                    significant(rate, 4)
+                )
+            }))
             .chain(fit.misfit.map(|misfit| misfit.to_string()))
             .chain(of_covariance(estimate))
             .collect(),
@@ -140,7 +158,7 @@ pub fn identify_responses(
         unscaled,
         analysis: how.clone(),
     };
-    Ok(IdentifiedResponses { estimate: fit.estimate, data, summary })
+    Ok(IdentifiedResponses { estimate: of_machine, fitted: fit.estimate, data, summary })
 }
 
 /// A machine identified from tables of frequency responses.
@@ -149,6 +167,7 @@ pub fn identify_responses(
 #[derive(Debug)]
 pub struct IdentifiedResponses {
     estimate: Estimate,
+    fitted: Estimate,
     data: FrequencyData,
     summary: ResponseSummary,
 }
@@ -237,6 +256,12 @@ impl IdentifiedResponses {
         covariance(&self.estimate, self.summary.unscaled.as_ref())
     }
 
+    /// Returns the estimate that was fitted to [`IdentifiedResponses::data`]: [`IdentifiedResponses::estimate`]
+    /// with the decay that an exponential window adds.
+    pub fn fitted(&self) -> &Estimate {
+        &self.fitted
+    }
+
     /// Returns the frequency responses that were fitted: unit forces and displacements, with the noise
     /// of the latter.
     pub fn data(&self) -> &FrequencyData {
@@ -254,7 +279,7 @@ impl IdentifiedResponses {
     /// # Errors
     /// [`AnalysisError::Model`] if the identified system has no response at a line.
     pub fn add_fitted_lines(&mut self) -> Result<(), AnalysisError> {
-        self.summary.fitted_lines = Some(FittedLine::all(&self.data, &self.estimate)?);
+        self.summary.fitted_lines = Some(FittedLine::all(&self.data, &self.fitted)?);
         Ok(())
     }
 
@@ -379,6 +404,10 @@ struct Tabulated {
 impl Tabulated {
     fn of(table: &FrequencyResponses, how: &IdentifyResponses) -> Result<Self, AnalysisError> {
         let measured = quantity(table, how)?;
+        let table = &match table.added_decay {
+            Some(rate) => Cow::Owned(added_decay::as_derivatives(table, measured, rate)),
+            None => Cow::Borrowed(table),
+        };
         let points = match how.points.is_empty() {
             true => distinct(table.functions.iter().map(|f| &f.response)),
             false => how.points.clone(),
@@ -467,6 +496,10 @@ pub(crate) fn response_data(
     table: &FrequencyResponses,
     how: &IdentifyResponses,
 ) -> Result<(FrequencyData, Option<&'static str>), AnalysisError> {
+    if table.added_decay.is_some() {
+        let why = format!("{} is of an exponential window, which is for `identify`", table.file);
+        return Err(AnalysisError::Setting { setting: "exponential_percent", why });
+    }
     let tabulated = Tabulated::of(table, how)?;
     Ok((tabulated.data, tabulated.noise.source()))
 }

@@ -2,11 +2,13 @@
 
 use mechid_analysis::identify::{Band, LineChoice, Method, Nonlinear};
 use mechid_analysis::{
-    AnalysisError, Channels, FrfSettings, HitRule, Identified, Identify, Measurement,
-    ResponseQuantity, frf, identify,
+    AnalysisError, Channels, FrfSettings, HitRule, Identified, Identify, IdentifyResponses,
+    Measurement, ResponseQuantity, frf, frf_of_records, identify, identify_responses,
 };
-use mechid_problems::{HammerRecord, HammerTest};
-use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_io::FrequencyResponses;
+use mechid_model::Sdof;
+use mechid_problems::{HammerRecord, HammerTest, exact_harmonic_periodic};
+use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::{Complex, dmatrix};
 use rayon::prelude::*;
 
@@ -179,6 +181,79 @@ fn light_taps_between_hits_are_listed_and_cost_no_good_hit() {
     assert!(all >= 14 && inside + 2 >= all, "{inside} of {all}");
 }
 
+/// A record of hits that is not cut into them says so, and one that is no hammer test does not.
+#[test]
+fn a_hammer_test_that_is_not_cut_is_told_of() {
+    let rig = rig(ACCELERATION);
+    let is_told = |test: &Measurement| {
+        let how = Identify { hits: None, ..settings() };
+        let found = identify(std::slice::from_ref(test), &how).unwrap();
+        found.summary().remarks.iter().any(|remark| remark.contains("`hits` cuts"))
+    };
+    assert!(is_told(&hammer(&rig, 0, 1)) && is_told(&hammer(&rig, 1, 2)));
+    let sampling = Sampling::from_rate_hz(256.0, 4096).unwrap();
+    let force = Multisine::flat(8..=1000, 1.0, Phases::Random { seed: 1 }).unwrap();
+    let force = force.sample(sampling).unwrap();
+    let machine = Sdof::new(25.0, 188.0, 142_000.0).unwrap().system();
+    let exact = exact_harmonic_periodic(&machine, &force).unwrap();
+    let x = noise::add_white(exact.displacement(), NoiseLevel::FractionOfRms(0.01), 2).unwrap();
+    let responses = [(ResponseQuantity::Displacement, &x)];
+    let test = Measurement::from_records(&force, &responses).unwrap();
+    let found = identify(std::slice::from_ref(&test), &Identify::default()).unwrap();
+    assert!(!found.to_string().contains("`hits`"), "{found}");
+}
+
+/// Records without a period are cut into segments, several as one, unless they end at rest.
+#[test]
+fn several_random_records_are_not_averaged_whole() {
+    let sampling = Sampling::from_rate_hz(256.0, 3000).unwrap();
+    let of = |seed: u64, still: bool| {
+        let mut force = noise::white(sampling, 1, 1.0, seed).unwrap().channel(0).to_vec();
+        if still {
+            force[1500..].fill(0.0);
+        }
+        // A mass of 2 kg, exactly.
+        let response: Vec<f64> = force.iter().map(|f| 0.5 * f).collect();
+        let channels = Channels::new("f", ACCELERATION, "a");
+        Measurement::from_columns(sampling, &[("f", &force), ("a", &response)], &channels).unwrap()
+    };
+    let window = |records: &[Measurement]| {
+        let table = frf_of_records(records, &FrfSettings::default()).unwrap();
+        (table.segments.window, table.segments.count, table.remarks.len())
+    };
+    let (of_random, count, remarks) = window(&[0, 1, 2].map(|seed| of(seed, false)));
+    assert!(of_random == Some("hann") && count > 3 && remarks == 1, "{count} {remarks}");
+    assert_eq!(window(&[0, 1, 2].map(|seed| of(seed, true))), (None, 3, 0));
+    assert_eq!(window(&[0, 0, 0].map(|seed| of(seed, false))).0, None);
+}
+
+/// Lines at which the force channel shows its noise alone are no response to it.
+#[test]
+fn lines_without_force_are_left_out_of_segments() {
+    let sampling = Sampling::from_rate_hz(256.0, 8192).unwrap();
+    for seed in 0..10 {
+        let force = Multisine::flat(8..=2048, 1.0, Phases::Random { seed }).unwrap();
+        let force = force.sample(sampling).unwrap();
+        let response = Record::new(sampling, force.data() * 0.5).unwrap();
+        let noisy = |record: &Record, seed: u64| {
+            let level = NoiseLevel::FractionOfRms(0.005);
+            noise::add_white(record, level, seed).unwrap().channel(0).to_vec()
+        };
+        let (f, a) = (noisy(&force, 2 * seed), noisy(&response, 2 * seed + 1));
+        let channels = Channels::new("f", ACCELERATION, "a");
+        let test = Measurement::from_columns(sampling, &[("f", &f), ("a", &a)], &channels).unwrap();
+        let table = frf(&test, &FrfSettings::default()).unwrap();
+        let last = *table.frequency_hz.last().unwrap();
+        // The force ends at 64 Hz.
+        assert!((56.0..=66.0).contains(&last), "{last} Hz");
+        let largest = table.responses[0].magnitude.iter().copied().fold(0.0, f64::max);
+        assert!((largest - 0.5).abs() < 0.02, "{largest}");
+        // Lines that were asked for stand.
+        let how = FrfSettings { lines: "1:20".parse().unwrap(), ..FrfSettings::default() };
+        assert_eq!(frf(&test, &how).unwrap().frequency_hz.len(), 20);
+    }
+}
+
 /// Under an exponential window the response at iω is that at iω + σ; without one the response that is left at the end
 /// is told.
 #[test]
@@ -213,6 +288,26 @@ fn frequency_responses_are_those_of_the_machine_with_the_decay_of_the_window() {
             (apart, largest) = (apart.max((found - truth).norm()), largest.max(truth.norm()));
         }
         assert!(apart < 0.01 * largest, "{number}: {apart} of {largest}");
+    }
+    // The table that is written states its window and what was measured; a universal file, too.
+    let written = [
+        ("a.csv", table.csv()),
+        ("a.unv", table.to_responses(&[]).unwrap().to_universal_file().unwrap()),
+    ];
+    for (name, text) in written {
+        let read = FrequencyResponses::parse(name, text.as_bytes()).unwrap();
+        assert_eq!(read.added_decay, table.added_decay);
+        let how = IdentifyResponses { averages: Some(5.0), ..IdentifyResponses::default() };
+        let found = identify_responses(std::slice::from_ref(&read), &how).unwrap();
+        assert_eq!(found.summary().quantity, "acceleration");
+        for (mode, truth) in found.summary().modes.iter().zip(&rig.damping_ratios) {
+            let ratio = mode.row.damping_ratio.value / truth;
+            assert!((ratio - 1.0).abs() < 0.02, "{name}: {ratio}");
+        }
+        let quantity = Some(ResponseQuantity::Velocity);
+        let error = identify_responses(&[read], &IdentifyResponses { quantity, ..how });
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains("states acceleration, not velocity"), "{error}");
     }
     // Nothing is averaged over bad hits.
     assert_eq!((table.hits.len(), table.segments.averages), (5, 5.0));

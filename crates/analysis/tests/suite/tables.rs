@@ -69,6 +69,55 @@ fn exact_tables_give_the_machine_whatever_was_measured() {
     }
 }
 
+/// Under a window exp(−σt) the response at iω is that of the machine at iω + σ, whatever was measured.
+#[test]
+fn the_decay_that_a_window_adds_is_taken_off() {
+    let sigma = 4.3;
+    for system in [oscillator(), coupled()] {
+        for quantity in ResponseQuantity::ALL {
+            let mut table = exact(&system, quantity);
+            let n = system.dof();
+            for (at, hz) in table.frequency_hz.iter().enumerate() {
+                let s = Complex::new(sigma, TAU * hz);
+                let dynamic = system.mass().map(|m| s * s * m)
+                    + system.damping().map(|c| s * c)
+                    + system.stiffness().map(Complex::from);
+                let order = match quantity {
+                    ResponseQuantity::Displacement => 0,
+                    ResponseQuantity::Velocity => 1,
+                    ResponseQuantity::Acceleration => 2,
+                };
+                let response = dynamic.lu().try_inverse().unwrap() * s.powi(order);
+                for (number, function) in table.functions.iter_mut().enumerate() {
+                    function.values[at] = response[(number / n, number % n)];
+                }
+            }
+            let how = IdentifyResponses::default();
+            let worst = |table: &FrequencyResponses| {
+                let found = identify_responses(std::slice::from_ref(table), &how).unwrap();
+                let pairs = found.estimate().parameters().zip(entries(&system));
+                pairs.map(|(p, exact)| (p.value / exact - 1.0).abs()).fold(0.0, f64::max)
+            };
+            assert!(worst(&table) > 0.1, "a table that does not state its window");
+            table.added_decay = Some(sigma);
+            assert!(worst(&table) < 1e-8, "{quantity}: {}", worst(&table));
+        }
+    }
+    // Known entries are those of the machine; a known damping needs a known mass.
+    let mut table = exact(&oscillator(), ResponseQuantity::Displacement);
+    table.added_decay = Some(sigma);
+    let known = |form: &str| {
+        let how = IdentifyResponses { structure: form.parse().unwrap(), ..Default::default() };
+        identify_responses(std::slice::from_ref(&table), &how)
+    };
+    assert_eq!(known("m=25").unwrap().estimate().mass()[(0, 0)], 25.0);
+    let error = known("c=188").unwrap_err();
+    assert!(matches!(error, AnalysisError::Setting { setting: "structure", .. }), "{error}");
+    let other = exact(&oscillator(), ResponseQuantity::Displacement);
+    let error = identify_responses(&[table.clone(), other], &Default::default()).unwrap_err();
+    assert!(matches!(error, AnalysisError::Setting { .. }), "{error}");
+}
+
 /// Frequency responses in a text and in a universal file, from sixteen noisy periods: the fit of the
 /// periods themselves, of the text and of the universal file agree.
 #[test]

@@ -213,7 +213,7 @@ struct TimeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Frequency responses")]
 pub struct SegmentArgs {
-    /// Samples of a segment, for a random excitation [default: the periods are the segments; of one record
+    /// Samples of a segment, for a random excitation [default: the periods are the segments; of records
     /// without --period, chosen by the coherence]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one)]
     segment: Option<usize>,

@@ -3,11 +3,16 @@
 use super::lines::{Line, Lines, number};
 use crate::contents::Fault;
 
+/// Beginning of a second line of description that states the decay that a window adds, in 1/s.
+pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
+
 /// Description of the function in a dataset 58.
 #[derive(Debug)]
 pub(crate) struct Header {
     /// The first line, empty if it says NONE.
     pub title: String,
+    /// Rate, in 1/s, that an exponential window adds to every decay, as the second line states it.
+    pub added_decay: Option<f64>,
     /// 1 is a response in time, 4 a frequency response function.
     pub function: u32,
     /// Node and direction at which it was measured.
@@ -37,7 +42,8 @@ impl Header {
         let mut next =
             || lines.required("a dataset 58 ends within its eleven lines of description");
         let title = label(next()?.text);
-        for _ in 2..=5 {
+        let added_decay = next()?.text.strip_prefix(ADDED_DECAY.as_bytes()).and_then(number);
+        for _ in 3..=5 {
             next()?;
         }
         let (what, form, abscissa, ordinate) = (next()?, next()?, next()?, next()?);
@@ -58,6 +64,7 @@ impl Header {
         let is_even = spacing == 1;
         Ok(Self {
             title,
+            added_decay,
             function: whole(&what, 0, 5)?,
             response: degree_of_freedom(response, &what)?,
             reference: (reference.0 != 0)

@@ -109,6 +109,8 @@ fn add(
         return Err(id.fault(format!("value {} of the function is not finite", at + 1)));
     }
     same_frequencies(responses, id, frequency_hz)?;
+    responses.added_decay =
+        responses.added_decay.or(header.added_decay.filter(|rate| rate.is_finite() && *rate > 0.0));
     let response = header.response.clone();
     if header.function == 6 {
         let values = numbers.iter().map(|z| z.re).collect();

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use mechid_model::ResponseQuantity;
 
+use super::header::ADDED_DECAY;
 use crate::responses::{FrequencyResponses, ResponseFunction};
 
 /// Relative deviation of evenly spaced frequencies from a constant step.
@@ -25,10 +26,15 @@ pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, 
     let _ = writeln!(text, "    -1\n   164\n{:10}{:20}{:10}", 1, "SI: Meter (newton)", 2);
     let one = "  1.00000000000000000D+00";
     let _ = writeln!(text, "{one}{one}{one}\n  2.73150000000000000D+02\n    -1");
+    let about = match responses.added_decay {
+        Some(rate) => format!("{ADDED_DECAY}{rate:e}"),
+        None => "NONE".into(),
+    };
     for function in &responses.functions {
         let numbers = function.values.iter().flat_map(|z| [z.re, z.im]).collect();
         let of = Dataset {
             title: &title,
+            about: &about,
             function: 4,
             response: point(&function.response)?,
             reference: point(&function.reference)?,
@@ -42,6 +48,7 @@ pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, 
     for coherence in &responses.coherence {
         let of = Dataset {
             title: &title,
+            about: &about,
             function: 6,
             response: point(&coherence.response)?,
             reference: match &coherence.reference {
@@ -74,6 +81,8 @@ fn ordinate(function: &ResponseFunction) -> [Ordinate; 2] {
 
 struct Dataset<'a> {
     title: &'a str,
+    /// Second line of description.
+    about: &'a str,
     /// 4 is a frequency response function, 6 a coherence.
     function: u32,
     /// Node and direction.
@@ -89,7 +98,7 @@ struct Dataset<'a> {
 impl Dataset<'_> {
     fn write(&self, text: &mut String) {
         let _ = writeln!(text, "    -1\n    58");
-        for line in [self.title, "NONE", "NONE", "NONE", "NONE"] {
+        for line in [self.title, self.about, "NONE", "NONE", "NONE"] {
             let _ = writeln!(text, "{line}");
         }
         let ((node, direction), (from, along)) = (self.response, self.reference);

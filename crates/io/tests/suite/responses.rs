@@ -46,6 +46,7 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
         functions: vec![function("1+X", 1.0), function("2-RY", -3e-12)],
         coherence: vec![coherence("1+X", 0.3), coherence("2-RY", 0.5)],
         frequency_hz,
+        added_decay: Some(4.964_321),
         remarks: Vec::new(),
     }
 }
@@ -67,6 +68,7 @@ fn universal_files_are_read_back() {
         assert_eq!(numbers, ["   151", "   164", "    58", "    58", "    58", "    58"]);
         let read = FrequencyResponses::parse("b.unv", text.as_bytes()).unwrap();
         assert!(read.remarks.is_empty(), "{:?}", read.remarks);
+        assert_eq!(read.added_decay, written.added_decay);
         let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * a.abs();
         let pairs = written.frequency_hz.iter().zip(&read.frequency_hz);
         assert!(pairs.into_iter().all(|(a, b)| near(*a, *b, 1e-7)), "{:?}", read.frequency_hz);

@@ -105,10 +105,10 @@ impl ToFigure for Identified {
 }
 
 impl ToFigure for IdentifiedResponses {
-    /// Draws measured and identified receptance.
+    /// Draws measured and identified receptance, both under the exponential window of the table if it has one.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().files.join(", ");
-        let system = self.estimate().system().map_err(AnalysisError::from)?;
+        let system = self.fitted().system().map_err(AnalysisError::from)?;
         let point = |dof: usize| self.summary().points[dof].clone();
         let names = Names { displacement: &point, force: &point };
         receptance_or_responses(&title, self.data(), &system, names, style)

@@ -1,0 +1,96 @@
+//! The decay that an exponential window adds to frequency responses, taken off again.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::Unknowns;
+use mechid_io::FrequencyResponses;
+use mechid_model::{Matrix, Parameter, ResponseQuantity};
+use nalgebra::Complex;
+
+use crate::AnalysisError;
+
+/// Returns the decay that all tables have in common, in 1/s; `None` without a window.
+///
+/// # Errors
+/// [`AnalysisError::Setting`] if they differ.
+pub(super) fn of_tables(tables: &[FrequencyResponses]) -> Result<Option<f64>, AnalysisError> {
+    let Some(first) = tables.first() else { return Ok(None) };
+    match tables.iter().find(|table| table.added_decay != first.added_decay) {
+        None => Ok(first.added_decay),
+        Some(other) => {
+            let why = format!(
+                "the windows of {} and {} add different decays: identify from each by itself",
+                first.file, other.file
+            );
+            Err(AnalysisError::Setting { setting: "exponential_percent", why })
+        }
+    }
+}
+
+/// Returns a table whose velocities and accelerations are iω and (iω)² times the displacement, as the estimators take
+/// them: under the window they are iω + σ and (iω + σ)² times it.
+pub(super) fn as_derivatives(
+    table: &FrequencyResponses,
+    quantity: ResponseQuantity,
+    rate: f64,
+) -> FrequencyResponses {
+    let mut table = table.clone();
+    for (at, hz) in table.frequency_hz.iter().enumerate() {
+        let ratio = Complex::new(0.0, TAU * hz) / Complex::new(rate, TAU * hz);
+        let factor = match quantity {
+            ResponseQuantity::Displacement => return table,
+            ResponseQuantity::Velocity => ratio,
+            ResponseQuantity::Acceleration => ratio * ratio,
+        };
+        for function in &mut table.functions {
+            function.values[at] *= factor;
+            if let Some(errors) = &mut function.standard_error {
+                errors[at] *= factor.norm();
+            }
+        }
+    }
+    table
+}
+
+/// Returns the known entries of the machine that responses under the window have: M, C + 2σM and K + σC + σ²M.
+///
+/// # Errors
+/// [`AnalysisError::Setting`] if the window mixes a known entry with one that is not.
+pub(super) fn unknowns(unknowns: &Unknowns, rate: f64) -> Result<Unknowns, AnalysisError> {
+    let mut windowed = unknowns.clone();
+    for p in Parameter::all(unknowns.dof()).filter(|p| p.matrix() == Matrix::Mass) {
+        let (row, column) = (p.row(), p.column());
+        let [mass, damping, stiffness] =
+            Matrix::ALL.map(|matrix| unknowns.fixed(matrix, row, column));
+        let mixed = |known: Matrix, free: Matrix| {
+            let name = |matrix| {
+                Ok::<_, AnalysisError>(Parameter::new(matrix, row, column, unknowns.dof())?)
+            };
+            let (known, free) = (name(known)?, name(free)?);
+            let why = format!(
+                "the exponential window of the table mixes {known}, which is known, with {free}, which is not: \
+                 leave {known} free, or state {free} as well"
+            );
+            Err(AnalysisError::Setting { setting: "structure", why })
+        };
+        match (damping, mass) {
+            (Some(_), None) => return mixed(Matrix::Damping, Matrix::Mass),
+            // Of proportional damping they follow from the others.
+            (Some(damping), Some(mass)) if !unknowns.has_proportional_damping() => {
+                let value = damping + 2.0 * rate * mass;
+                windowed = windowed.fix(Matrix::Damping, row, column, value)?;
+            }
+            _ => {}
+        }
+        match (stiffness, damping, mass) {
+            (Some(_), None, _) => return mixed(Matrix::Stiffness, Matrix::Damping),
+            (Some(_), _, None) => return mixed(Matrix::Stiffness, Matrix::Mass),
+            (Some(stiffness), Some(damping), Some(mass)) => {
+                let value = stiffness + rate * damping + rate * rate * mass;
+                windowed = windowed.fix(Matrix::Stiffness, row, column, value)?;
+            }
+            _ => {}
+        }
+    }
+    Ok(windowed)
+}
