@@ -122,13 +122,12 @@ pub(super) fn fit(
     }
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&closed, &fit.estimate, Extent::Open)?;
-    // Only what a force still explains can be a delay of it.
-    let explained = |finding: &Finding| {
+    let explains = |finding: &Finding| {
         finding.subject() == Subject::CrossCorrelation && finding.verdict() > Verdict::Good
     };
-    let is_late = residuals.iter().any(|left| left.findings().iter().any(explained));
+    let is_explained = residuals.iter().any(|left| left.findings().iter().any(explains));
     let dt = records[0].held.force.sampling().dt();
-    let late = is_late.then(|| delay_of_open_records(&data, dt, unknowns, &fit)).flatten();
+    let late = delay_of_open_records(&data, dt, unknowns, &fit, is_explained);
     let windows = match excitation {
         Excitation::Lasting => "the windows are no periods",
         Excitation::Hits(_) => "hits are no periods",

@@ -28,7 +28,7 @@ const ALONE: f64 = 1e-3;
 /// The same of others that have nothing to do with it: the noise of their load cells.
 const ALONE_BESIDE_NOISE: f64 = 0.1;
 
-/// Coherence with a force from which another is a part of it, and the fewest lines that tell.
+/// Coherence from line to line from which a force is a part of another, and the fewest lines that tell.
 const PART_OF_IT: f64 = 0.5;
 const FEWEST_LINES: usize = 8;
 
@@ -48,8 +48,8 @@ pub struct ActingAlone<'a> {
 }
 
 impl<'a> ActingAlone<'a> {
-    /// Tells noise in the channel of an idle force from a part of the force that acts, by their coherence over the
-    /// lines that are driven by one force.
+    /// Tells noise in the channel of an idle force from a part of the force that acts, by its coherence from line to
+    /// line where one force acts.
     pub fn of(data: &'a FrequencyData) -> Self {
         let n = data.dof();
         let limits = DMatrix::from_fn(n, n, |k, j| {
@@ -60,16 +60,13 @@ impl<'a> ActingAlone<'a> {
                 amplitude > 0.0
                     && others.into_iter().all(|other| data.force()[(*row, other)].norm() <= limit)
             };
-            let (mut lines, mut cross, mut power) = (0, Complex::from(0.0), 0.0);
-            for row in (0..data.len()).filter(driven) {
-                let [one, other] = [j, k].map(|at| data.force()[(row, at)]);
-                // Each line counts alike, whatever drives it.
-                let ratio = other / one;
-                cross += ratio;
-                power += ratio.norm_sqr();
-                lines += 1;
-            }
-            let coherence = cross.norm_sqr() / (lines as f64 * power);
+            // Each line counts alike, whatever drives it.
+            let part = |row: usize| data.force()[(row, k)] / data.force()[(row, j)];
+            let parts: Vec<Complex<f64>> = (0..data.len()).filter(driven).map(part).collect();
+            let power: f64 = parts.iter().map(|part| part.norm_sqr()).sum();
+            // A part of a force hardly turns from line to line, or always alike where it is late.
+            let alike: Complex<f64> = parts.windows(2).map(|two| two[0].conj() * two[1]).sum();
+            let (lines, coherence) = (parts.len(), alike.norm() / power);
             match lines >= FEWEST_LINES && coherence < PART_OF_IT {
                 true => ALONE_BESIDE_NOISE,
                 false => ALONE,

@@ -44,6 +44,9 @@ const PARABOLAS: usize = 8;
 const LEAST_PART: f64 = 0.1;
 const RESOLVED: f64 = 0.005;
 
+/// Part of the residual power that a first parabola leaves at most where nothing else speaks for a delay.
+const PROMISING: f64 = 0.5;
+
 /// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
 const PREFERRED: f64 = 0.99;
 
@@ -80,10 +83,11 @@ fn delay_of_equations(equations: &LateForce<'_>, dt: f64, driven: &[usize]) -> O
     Some(0.5 * (low + high))
 }
 
-/// Finds a delay of the responses of open records ([`Finding::Delay`]) that accounts for what their forces still
-/// explain of the residual of a `fit` by maximum likelihood: with it that residual is less, and no longer correlated
-/// with them. `dt` is the sampling interval in s; sinusoids beside the response are taken off the `records`. `None`
-/// where no delay of up to 16 samples (64 where the response hardly follows the force) does both.
+/// Finds a delay of the responses of open records ([`Finding::Delay`]) that accounts for the residual of a `fit` by
+/// maximum likelihood: with it no force explains anything of what is left, and that is less than noise makes it. Where
+/// no force explains anything of the residual without the delay either (`is_explained` is false), no more than a
+/// quarter of its power may be left. `dt` is the sampling interval in s; sinusoids beside the response are taken off
+/// the `records`. `None` where no delay of up to 16 samples (64 where the response hardly follows the force) does so.
 ///
 /// The loads of the ends are found with each delay; without that they take up a part of it.
 ///
@@ -94,6 +98,7 @@ pub fn delay_of_open_records(
     dt: f64,
     unknowns: &Unknowns,
     fit: &OutputErrorFit,
+    is_explained: bool,
 ) -> Option<Finding> {
     let (first, others) = records.split_first()?;
     let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
@@ -116,6 +121,9 @@ pub fn delay_of_open_records(
         };
         samples += step * reach;
         delayed = likelihood.cost(samples * dt)?;
+        if !is_explained && delayed > PROMISING * undelayed {
+            return None;
+        }
         reach *= f64::clamp(step.abs(), LEAST_PART, 1.0);
         if reach < RESOLVED {
             break;
@@ -125,8 +133,9 @@ pub fn delay_of_open_records(
     let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
     let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
     let remaining = delayed / undelayed;
+    let is_most = is_explained || remaining <= DELAY_REMAINING;
     let told = || Finding::Delay { samples, seconds: samples * dt, remaining };
-    (is_significant && explains(records, samples * dt, unknowns)?).then(told)
+    (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(told)
 }
 
 /// Returns whether no force explains anything of the residual of a fit with the delay (s).

@@ -256,7 +256,7 @@ pub enum Finding {
         /// Level of the response on even lines without force, where odd ones alone are driven, against that on the
         /// driven ones, in dB; `None` where others are driven or there is no more than noise.
         even_db: Option<f64>,
-        /// The same of odd lines without force.
+        /// The same of odd lines without force, in dB.
         odd_db: Option<f64>,
         /// Probability that noise alone makes one of the terms explain as much.
         #[cfg_attr(feature = "serde", serde(flatten))]

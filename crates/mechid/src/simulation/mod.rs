@@ -384,7 +384,7 @@ pub enum SimulateError {
         multiplier_text(*.multiplier)
     )]
     UnstableOrbit {
-        /// The largest Floquet multiplier.
+        /// The largest Floquet multiplier (pure number).
         multiplier: Complex<f64>,
     },
     /// The search for the periodic response of a nonlinear machine ends without one.

@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn records_with_crosstalk_are_separated_and_one_alone_is_drawn_as_responses() {
         let both = record(0, 0.02).and(&record(1, 0.02)).unwrap();
-        let found = separated(&both);
+        let found = separated(&both, &ActingAlone::of(&both));
         assert_eq!(found.len(), 20);
         for (omega, h) in found {
             let truth = machine().receptance(omega).unwrap();
