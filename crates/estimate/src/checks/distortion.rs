@@ -14,10 +14,10 @@ use crate::{EstimateError, Unknowns};
 /// not.
 ///
 /// # Errors
-/// As [`distortion`].
+/// The errors of [`distortion`].
 ///
 /// # Source
-/// That of [`distortion`].
+/// The source of [`distortion`].
 pub fn distortion_of_periods(
     band: &Lines,
     force: &Record,

@@ -15,8 +15,8 @@ use crate::relations::Relations;
 /// Steps of the search from one delay to the next.
 const STEPS: usize = 30;
 
-/// What maximum likelihood leaves of the lines of open records with the force some time later, the loads of their
-/// ends being found anew with each delay.
+/// Maximum likelihood for the lines of open records with the force some time later, the loads of their ends being
+/// found anew with each delay.
 pub(crate) struct LateOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,

@@ -169,13 +169,13 @@ impl FrfAverage {
 
     /// Returns the places of the lines, counted from 0, that a force drives.
     ///
-    /// Where every force is weaker than a hundredth of its strongest line in power, and on eight neighbouring lines
-    /// no response has anything in common with it, the channel shows its noise, and the responses to it would be
-    /// those to noise. The weak lines around such a stretch, and as many lines as the peak of a window reaches,
-    /// carry what leaks from further away. All lines are driven if none is left otherwise.
+    /// A line is not driven where every force is weaker than a hundredth of its strongest line in power, and on
+    /// eight neighbouring lines no response has anything in common with it: the channel shows its noise, and the
+    /// responses to it would be those to noise. The weak lines around such a stretch, and as many lines as the peak
+    /// of a window reaches, carry what leaks from further away. All lines are driven if none is left otherwise.
     ///
     /// # Source
-    /// That of [`FrfAverage::idle_inputs`]; the limits are ours.
+    /// The coherence is that of [`FrfAverage::idle_inputs`]; the limits are ours.
     pub fn driven(&self) -> Vec<usize> {
         let (count, averages) = (self.sums.len(), self.averages());
         let all = || (0..count).collect();
