@@ -242,6 +242,7 @@ fn kind(model: &NoiseModel) -> &'static str {
         NoiseModel::Smooth { bands_hz, .. } if bands_hz.is_empty() => "smooth",
         NoiseModel::Smooth { order: 0, .. } => "bands",
         NoiseModel::Smooth { .. } => "smooth with bands",
+        NoiseModel::UnmeasuredForce { .. } => "unmeasured force",
         NoiseModel::Neighbours { .. } => "neighbours",
         NoiseModel::PerLine => "per line",
     }

@@ -235,6 +235,8 @@ pub(crate) struct Smooth {
     pub(crate) log_power: DMatrix<f64>,
     /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
     pub(crate) misfit: f64,
+    /// Bayesian information criterion of the choice, where there was one.
+    pub(crate) cost: f64,
 }
 
 /// The spectrum that makes sample variances (lines × channels, positive) most likely, by rising `omega`
@@ -263,7 +265,33 @@ pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth
         mean(&mut variances.column(channel).rows(group * at, group).iter().copied())
     });
     let found = searched(&few, &means, nu * group as f64);
-    fit(found.form.finer(group as f64), omega, variances, nu)
+    let all = fit(found.form.finer(group as f64), omega, variances, nu);
+    Smooth { cost: found.cost, ..all }
+}
+
+/// The better of this spectrum and one of which the powers over `relative` ones (lines × channels) are smooth,
+/// and whether that is the second.
+pub(crate) fn choose_beside(
+    omega: &[f64],
+    variances: &DMatrix<f64>,
+    nu: f64,
+    relative: &DMatrix<f64>,
+) -> (Smooth, bool) {
+    let own = choose(omega, variances, nu);
+    let log = relative.map(f64::ln);
+    if !log.iter().all(|log| log.is_finite()) {
+        return (own, false);
+    }
+    // A common factor says nothing; without it the numbers are those of the variances.
+    let mean = log.row_mean();
+    let log = DMatrix::from_fn(log.nrows(), log.ncols(), |line, at| log[(line, at)] - mean[at]);
+    let mut other = choose(omega, &variances.zip_map(&log, |v, log| v * (-log).exp()), nu);
+    // The sum of the logarithms is zero, and so the likelihoods compare as they are.
+    if other.cost >= own.cost {
+        return (own, false);
+    }
+    other.log_power += log;
+    (other, true)
 }
 
 /// The same, looked for on all lines.
@@ -297,7 +325,7 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
         }
     }
     let white = || fit(Form { order: 0, bumps: Vec::new() }, omega, variances, nu);
-    best.map_or_else(white, |(_, smooth)| smooth)
+    best.map_or_else(white, |(cost, smooth)| Smooth { cost, ..smooth })
 }
 
 /// The spectrum of a given form.
@@ -325,7 +353,7 @@ pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) 
             }
         }
     }
-    Smooth { form, basis, log_power, misfit }
+    Smooth { form, basis, log_power, misfit, cost: f64::INFINITY }
 }
 
 /// Widths of the bands that are looked at: 1, 2, 3, 4, 6, 8, 12 …, to a third of the lines.

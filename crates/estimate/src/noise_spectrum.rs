@@ -103,16 +103,18 @@ impl NoiseSpectrum {
         Self::new(omega, covariance)
     }
 
-    /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`.
+    /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`; it may
+    /// be smooth over the `relative` powers of the channels (rows × 2n) instead of being smooth itself.
     pub(crate) fn of_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
         measured: ResponseQuantity,
         degrees_of_freedom: usize,
         pooling: Pooling,
+        relative: Option<&DMatrix<f64>>,
     ) -> Result<Self, EstimateError> {
         let Pooled { mut covariance, model, freedom, basis } =
-            pooled(omega, covariance, degrees_of_freedom as f64, pooling);
+            pooled(omega, covariance, degrees_of_freedom as f64, pooling, relative);
         to_displacement(omega, &mut covariance, measured);
         let known = Self::new(omega.to_vec(), covariance)?;
         Ok(Self {

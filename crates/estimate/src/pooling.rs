@@ -100,6 +100,13 @@ pub enum NoiseModel {
         /// Bands with levels of their own, such as those of a disturbance: lowest and highest line, in Hz.
         bands_hz: Vec<[f64; 2]>,
     },
+    /// Response of the machine to unmeasured forces of one smooth spectrum, at all degrees of freedom.
+    UnmeasuredForce {
+        /// Order of the polynomial of log power of the forces in log frequency.
+        order: usize,
+        /// Bands in which the forces have levels of their own: lowest and highest line, in Hz.
+        bands_hz: Vec<[f64; 2]>,
+    },
     /// Means over neighbouring lines.
     Neighbours {
         /// Number of lines to either side.
@@ -113,7 +120,10 @@ impl fmt::Display for NoiseModel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::White => f.write_str("white"),
-            Self::Smooth { order, bands_hz } => {
+            Self::Smooth { order, bands_hz } | Self::UnmeasuredForce { order, bands_hz } => {
+                if matches!(self, Self::UnmeasuredForce { .. }) {
+                    f.write_str("that of the response to an unmeasured force, ")?;
+                }
                 match order {
                     0 => f.write_str("white")?,
                     order => write!(f, "smooth (order {order})")?,
@@ -146,8 +156,15 @@ pub(crate) struct Pooled {
     pub(crate) basis: Option<DMatrix<f64>>,
 }
 
-/// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled.
-pub(crate) fn pooled(omega: &[f64], covariance: Covariances, nu: f64, pooling: Pooling) -> Pooled {
+/// Sample covariances at `omega` (rad/s), each of `nu` complex deviations, pooled; a smooth spectrum may be one
+/// times `relative` powers (lines × channels) where these are given.
+pub(crate) fn pooled(
+    omega: &[f64],
+    covariance: Covariances,
+    nu: f64,
+    pooling: Pooling,
+    relative: Option<&DMatrix<f64>>,
+) -> Pooled {
     let lines = covariance.len();
     match pooling {
         Pooling::PerLine => {
@@ -166,8 +183,8 @@ pub(crate) fn pooled(omega: &[f64], covariance: Covariances, nu: f64, pooling: P
             let freedom = nu * window(0).len() as f64;
             Pooled { covariance: places.unsorted(means), model, freedom, basis: None }
         }
-        Pooling::Smooth => Candidate::new(omega, covariance, nu).smooth(),
-        Pooling::Automatic => Candidate::new(omega, covariance, nu).best(),
+        Pooling::Smooth => Candidate::new(omega, covariance, nu, relative).smooth(),
+        Pooling::Automatic => Candidate::new(omega, covariance, nu, relative).best(),
     }
 }
 
@@ -214,10 +231,17 @@ struct Candidate {
     /// Channels that have noise.
     noisy: Vec<usize>,
     smooth: Option<Smooth>,
+    /// Whether it is smooth over the relative powers only.
+    is_relative: bool,
 }
 
 impl Candidate {
-    fn new(omega: &[f64], covariance: Covariances, nu: f64) -> Self {
+    fn new(
+        omega: &[f64],
+        covariance: Covariances,
+        nu: f64,
+        relative: Option<&DMatrix<f64>>,
+    ) -> Self {
         let places = Places::new(omega);
         let (omega, covariance) = (places.sorted(omega), places.sorted(&covariance));
         let channels = 0..covariance.first().map_or(0, DMatrix::nrows);
@@ -229,25 +253,45 @@ impl Candidate {
                 sum.is_finite() && sum > f64::MIN_POSITIVE / f64::EPSILON
             })
             .collect();
-        let smooth = (!noisy.is_empty()).then(|| {
+        let chosen = (!noisy.is_empty()).then(|| {
             let variances = DMatrix::from_fn(omega.len(), noisy.len(), |line, at| {
                 covariance[line][(noisy[at], noisy[at])].re
             });
-            noise_shape::choose(&omega, &variances, nu)
+            match relative {
+                None => (noise_shape::choose(&omega, &variances, nu), false),
+                Some(relative) => {
+                    let relative = DMatrix::from_fn(omega.len(), noisy.len(), |line, at| {
+                        relative[(places.0[line], noisy[at])]
+                    });
+                    noise_shape::choose_beside(&omega, &variances, nu, &relative)
+                }
+            }
         });
-        Self { places, omega, covariance, nu, noisy, smooth }
+        let is_relative = matches!(chosen, Some((_, true)));
+        let smooth = chosen.map(|(smooth, _)| smooth);
+        Self { places, omega, covariance, nu, noisy, smooth, is_relative }
     }
 
     /// The smooth spectrum, with the mean correlation of the channels.
     fn smooth(&self) -> Pooled {
         let lines = self.covariance.len();
-        let Some(smooth) = self.smooth.as_ref().filter(|smooth| smooth.form.terms() > 1) else {
+        let Some(smooth) =
+            self.smooth.as_ref().filter(|smooth| self.is_relative || smooth.form.terms() > 1)
+        else {
             return white(mean(&self.covariance, 0..lines), self.nu, lines);
         };
         let deviations = self.deviations(smooth);
         let level = mean(&scaled(&self.covariance, &deviations, |value, by| value / by), 0..lines);
         let covariance = scaled(&vec![level; lines], &deviations, |value, by| value * by);
-        let model = model_of(&smooth.form, &self.omega);
+        let model = match model_of(&smooth.form, &self.omega) {
+            NoiseModel::Smooth { order, bands_hz } if self.is_relative => {
+                NoiseModel::UnmeasuredForce { order, bands_hz }
+            }
+            NoiseModel::White if self.is_relative => {
+                NoiseModel::UnmeasuredForce { order: 0, bands_hz: Vec::new() }
+            }
+            other => other,
+        };
         let freedom = freedom(&smooth.form, self.nu, lines, self.covariance[0].nrows() / 2);
         let mut basis = smooth.basis.clone();
         for (sorted, row) in smooth.basis.row_iter().zip(&self.places.0) {
@@ -289,7 +333,7 @@ impl Candidate {
             wide => Pooling::Neighbours(wide),
         };
         let Self { places, omega, covariance, nu, .. } = self;
-        let means = pooled(&omega, covariance, nu, pooling);
+        let means = pooled(&omega, covariance, nu, pooling, None);
         Pooled { covariance: places.unsorted(means.covariance), ..means }
     }
 

@@ -9,6 +9,7 @@ use mechid_estimate::frequency_domain::{
     instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_model::SecondOrderSystem;
 use mechid_signal::Extent;
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
@@ -60,7 +61,7 @@ pub(super) fn fit(
         spectra.push((periods(recorded, &lines)?, lines));
     }
     let data = together(&spectra, &RepeatedPeriods::mean)?;
-    let Found { estimator, estimate, mut misfit, noise: models, remark } =
+    let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
         found(&spectra, &data, unknowns, method, noise)?;
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
@@ -70,7 +71,10 @@ pub(super) fn fit(
         let checks = steady_periods(&held.force, motion, held.period)?;
         // What differs between windows that are no periods is no noise.
         let repeats = !checks.iter().any(no_period);
-        let data = if repeats { with_noise(periods, noise)? } else { periods.mean()? };
+        let data = match repeats {
+            true => with_noise(periods, noise, noise_through.as_ref())?,
+            false => periods.mean()?,
+        };
         misfit = misfit.filter(|_| repeats);
         before.push(checks);
         let band = fitted_band(&estimate, lines)?;
@@ -162,6 +166,8 @@ struct Found {
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
+    /// Machine to whose response to unmeasured forces the noise may be alike.
+    noise_through: Option<SecondOrderSystem>,
     remark: Option<String>,
 }
 
@@ -174,14 +180,32 @@ fn found(
     method: Option<Method>,
     noise: Pooling,
 ) -> Result<Found, AnalysisError> {
-    let with_noise = |periods: &RepeatedPeriods| with_noise(periods, noise);
+    let with_noise = |periods: &RepeatedPeriods| with_noise(periods, noise, None);
     let least_squares = |remark| -> Result<Found, AnalysisError> {
         let estimator = "least squares on the equation of motion, in the frequency domain";
         let estimate = equation_error(data, unknowns)?;
-        Ok(Found { estimator, estimate, misfit: None, noise: Vec::new(), remark })
+        let none = Vec::new();
+        Ok(Found { estimator, estimate, misfit: None, noise: none, noise_through: None, remark })
     };
     let likelihood = |noisy: &FrequencyData| -> Result<Found, EstimateError> {
-        let fit = output_error_pooling(noisy, unknowns, noise)?;
+        let mut fit = output_error_pooling(noisy, unknowns, noise)?;
+        let mut noise_through = None;
+        if noisy.noise().is_some() && fit.noise.iter().any(|model| *model != NoiseModel::White) {
+            let machine = fit.estimate.system()?;
+            let of_forces =
+                |periods: &RepeatedPeriods| self::with_noise(periods, noise, Some(&machine));
+            let beside = together(spectra, &of_forces).ok();
+            let is_of_forces =
+                |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+            let beside = beside.filter(|data| {
+                data.noise().is_some_and(|noise| noise.models().iter().any(is_of_forces))
+            });
+            // The machine found first stands where the search from anew fails.
+            let again = beside.and_then(|data| output_error_pooling(&data, unknowns, noise).ok());
+            if let Some(again) = again {
+                (fit, noise_through) = (again, Some(machine));
+            }
+        }
         let source = "estimated from the periods";
         let fewest = spectra.iter().map(|(periods, _)| periods.count()).min().unwrap_or(1);
         Ok(Found {
@@ -190,6 +214,7 @@ fn found(
             misfit: noisy.noise().map(|_| Misfit { ratio: fit.misfit_ratio, noise: source }),
             remark: Some(of_noise(fewest, noisy.noise().is_some(), &fit.noise)),
             noise: fit.noise,
+            noise_through,
         })
     };
     match method {
@@ -202,6 +227,7 @@ fn found(
                 estimate: instrumental_variables(&first, &second, unknowns)?,
                 misfit: None,
                 noise: Vec::new(),
+                noise_through: None,
                 remark: None,
             })
         }
@@ -296,14 +322,22 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     Ok(all)
 }
 
-/// The mean of the periods, with their noise if they show more than rounding.
-fn with_noise(periods: &RepeatedPeriods, noise: Pooling) -> Result<FrequencyData, EstimateError> {
+/// The mean of the periods, with their noise if they show more than rounding, which may be the response of a
+/// machine to unmeasured forces.
+fn with_noise(
+    periods: &RepeatedPeriods,
+    noise: Pooling,
+    machine: Option<&SecondOrderSystem>,
+) -> Result<FrequencyData, EstimateError> {
     if periods.count() < 2 {
         return periods.mean();
     }
     // Rounding has no spectrum that could be found.
     match periods.mean_with_noise(Pooling::AllLines)?.noise_above_rounding() {
-        Some(_) => periods.mean_with_noise(noise),
+        Some(_) => match machine {
+            Some(machine) => periods.mean()?.with_noise(periods.noise_beside(noise, machine)?),
+            None => periods.mean_with_noise(noise),
+        },
         None => periods.mean(),
     }
 }

@@ -53,11 +53,11 @@ fn is_open(identified: &Identified) -> bool {
     fitted.drawn.is_some() && fitted.coherence.is_none()
 }
 
-/// Of 100 intervals of 95 % fewer than 88 % hold with a probability of 0.003; a warning on right data is to be
+/// Of 50 intervals of 95 % fewer than 42 hold with a probability of 0.002; a warning on right data is to be
 /// seen in 1 of 50 records.
 #[test]
 fn a_random_test_needs_no_settings() {
-    const RUNS: u64 = 100;
+    const RUNS: u64 = 50;
     let each: Vec<[bool; 5]> = (0..RUNS)
         .into_par_iter()
         .map(|seed| {
@@ -68,9 +68,9 @@ fn a_random_test_needs_no_settings() {
         .collect();
     let [open, m, c, k, warned] =
         [0, 1, 2, 3, 4].map(|at| each.iter().filter(|run| run[at]).count());
-    assert_eq!(open, 100);
-    assert!(m >= 88 && c >= 88 && k >= 88, "{m} {c} {k}");
-    assert!(warned <= 5, "{warned} of 100 warn");
+    assert_eq!(open, 50);
+    assert!(m >= 42 && c >= 42 && k >= 42, "{m} {c} {k}");
+    assert!(warned <= 4, "{warned} of 50 warn");
 }
 
 #[test]
@@ -125,8 +125,8 @@ fn a_late_response_is_told_by_its_delay() {
         let delay = checks.filter(|check| check.subject == Subject::Delay);
         delay.filter_map(|check| check.value).collect::<Vec<f64>>()
     };
-    for samples in [-2.0, 0.1, 0.5, 3.3] {
-        for seed in 0..3 {
+    for samples in [-2.0, 0.1, 3.3] {
+        for seed in 0..2 {
             let told = told(&[late(samples, seed)]);
             assert!(
                 matches!(told[..], [found] if (found - samples).abs() < 0.03),
@@ -145,8 +145,8 @@ fn a_period_stays_one() {
         let how = Identify::spectra(Method::MaximumLikelihood);
         is_open(&identify(&[test], &how).unwrap())
     };
-    let wrong = (0..60).into_par_iter().filter(|seed| open(*seed)).count();
-    assert!(wrong <= 1, "{wrong} of 60");
+    let wrong = (0..16).into_par_iter().filter(|seed| open(*seed)).count();
+    assert_eq!(wrong, 0, "of 16");
     // Nor is a period that was given.
     let periods = random_test(0).period(SAMPLES).unwrap();
     assert!(!is_open(&identify(&[periods], &Identify::default()).unwrap()));
@@ -240,14 +240,14 @@ fn with_force_noise(levels: Option<Vec<f64>>) -> Identify {
 /// Taken for exact, noise of 1 % makes a third of them miss.
 #[test]
 fn noise_on_the_force_is_read_above_its_band() {
-    let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 60);
+    let (share, warned, all) = judged(&rig(), 0.01, &with_force_noise(None), 30);
     assert!(share >= 0.88, "{share}");
-    assert!(warned <= 3, "{warned} of 60 warn");
+    assert!(warned <= 3, "{warned} of 30 warn");
     // 1 % of 84 N, what is left of 100 N in the band; of 256 lines to 1/16 in the root.
     let levels = all.iter().map(|found| found.summary().fit.force_noise[0].levels_n[0].unwrap());
-    let mean = levels.sum::<f64>() / 60.0;
+    let mean = levels.sum::<f64>() / 30.0;
     assert!((mean / 0.837 - 1.0).abs() < 0.03, "{mean}");
-    let (exact, ..) = judged(&rig(), 0.01, &with_force_noise(Some(vec![0.0])), 60);
+    let (exact, ..) = judged(&rig(), 0.01, &with_force_noise(Some(vec![0.0])), 30);
     assert!(exact < share - 0.05, "{exact} taken as exact, {share} with its noise");
 }
 

@@ -155,10 +155,12 @@ fn a_record_and_its_table_agree() {
     for found in [of_text.estimate(), of_universal.estimate()] {
         for (a, b) in of_record.estimate().parameters().zip(found.parameters()) {
             let apart = (a.value - b.value).abs() / a.standard_error;
-            assert!(apart < 0.1, "{a} against {b}");
-            // Those of the record allow for weights from sixteen periods, by 7 %.
+            // Both weigh by levels of 15 deviations, of the noise on different lines: an estimate moves by 1/√15 of its
+            // standard error with either, at random.
+            assert!(apart < 0.8, "{a} against {b}");
+            // Those of the record allow for such weights, by 7 %; of the few lines that decide, both are known to some 15 %.
             let ratio = a.standard_error / b.standard_error;
-            assert!((1.0..1.1).contains(&ratio), "{ratio}");
+            assert!((0.8..1.35).contains(&ratio), "{ratio}");
         }
     }
     let checks = &of_universal.summary().checks;

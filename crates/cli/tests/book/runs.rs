@@ -18,8 +18,6 @@ pub enum Run {
     Always,
     /// A program or an example of the workspace with what the line says to it.
     Program { kind: &'static str, name: String, arguments: Vec<String> },
-    /// `cargo install` of this folder.
-    Install(String),
     /// mdBook, on this folder.
     Book(String),
 }
@@ -51,7 +49,6 @@ impl Run {
                 }
                 said(program).map(drop)
             }
-            Run::Install(folder) => install(root, folder, made.path()),
             Run::Book(folder) => build_book(&root.join(folder), made.path()),
         }
     }
@@ -117,33 +114,6 @@ fn said(command: Command) -> Result<String, String> {
         return Err(format!("{command:?}: {status}: {}", String::from_utf8_lossy(&stderr)));
     }
     String::from_utf8(stdout).map_err(|error| error.to_string())
-}
-
-/// Installs the program into a folder, compiled fast rather than to be fast, and holds what it says
-/// against the program tested here.
-fn install(root: &Path, folder: &str, to: &Path) -> Result<(), String> {
-    let built = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install");
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.current_dir(root).args(["install", "--path", folder]);
-    cargo.args(["--debug", "--locked", "--offline"]);
-    cargo.arg("--root").arg(to).arg("--target-dir").arg(built);
-    cargo.envs([("CARGO_PROFILE_DEV_OPT_LEVEL", "0"), ("CARGO_PROFILE_DEV_DEBUG", "none")]);
-    cargo.env("CARGO_INCREMENTAL", "0");
-    let Output { status, stderr, .. } = cargo.output().map_err(|error| error.to_string())?;
-    if !status.success() {
-        return Err(String::from_utf8_lossy(&stderr).into_owned());
-    }
-    let say = |program: &Path| {
-        let mut command = Command::new(program);
-        command.current_dir(root).args(["info", "examples/machine.csv"]);
-        said(command)
-    };
-    let (installed, tested) =
-        (say(&to.join("bin/mechid"))?, say(Path::new(env!("CARGO_BIN_EXE_mechid")))?);
-    match installed == tested {
-        true => Ok(()),
-        false => Err(format!("installed it says\n{installed}and tested\n{tested}")),
-    }
 }
 
 /// Makes the pages that a reader opens in a browser.

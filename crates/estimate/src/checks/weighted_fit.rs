@@ -10,7 +10,7 @@ use super::concentration::{Part, concentration};
 use super::finding::{Finding, PValue, Reference};
 use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
 use super::thresholds::ROUNDING;
-use crate::frequency_domain::{FrequencyData, NoiseSpectrum, Whitened, motion_level};
+use crate::frequency_domain::{FrequencyData, NoiseModel, NoiseSpectrum, Whitened, motion_level};
 use crate::relations::Relations;
 use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
@@ -60,7 +60,8 @@ pub struct AfterSpectralFit {
 /// record states no noise, or only rounding.
 ///
 /// The noise of an open record begins and ends at values that differ: that jump, which ties low lines together, is left
-/// out of the tests. The data are those whose own ends are taken off.
+/// out of the tests. The data are those whose own ends are taken off. So is what the response to an unmeasured force
+/// leaves at the ends of several periods, where the noise is found to be one.
 ///
 /// # Errors
 /// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
@@ -192,13 +193,24 @@ impl WeightedFit {
         }
         let end = &values + linear.step();
         let jumps = |at: usize| -> Vec<DVector<f64>> {
-            let jump = |channel| {
-                let (data, unknowns) = (records[at].of_jump(channel), estimate.unknowns());
+            let seen = |data: FrequencyData| {
                 let covariance = |row| covariance(at, row);
-                Whitened::residual_of(&data, unknowns, &entries_of(&values), covariance)
+                let entries = entries_of(&values);
+                Whitened::residual_of(&data, estimate.unknowns(), &entries, covariance)
             };
-            let channels = if extent == Extent::Open { records[at].dof() } else { 0 };
-            (0..channels).filter_map(jump).map(|jump| jump.residual).collect()
+            let (record, channels) = (&records[at], 0..records[at].dof());
+            let jumps: Vec<FrequencyData> = match extent {
+                Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
+                Extent::WholePeriod if has_unmeasured_force(record) => {
+                    let loads = |dof| (0..LOADS as usize).map(move |power| (dof, power));
+                    channels
+                        .flat_map(loads)
+                        .map(|(dof, power)| record.of_load(dof, power))
+                        .collect()
+                }
+                Extent::WholePeriod => Vec::new(),
+            };
+            jumps.into_iter().filter_map(seen).map(|jump| jump.residual).collect()
         };
         let step = entries_of(&end) - DVector::from_vec(entries);
         let [m, c, k] = estimate.unknowns().assemble(entries_of(&values).as_slice());
@@ -406,6 +418,12 @@ fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
     Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
         v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
     }))
+}
+
+/// Returns whether the noise of a record is the response to an unmeasured force.
+fn has_unmeasured_force(data: &FrequencyData) -> bool {
+    let of_force = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+    data.noise().is_some_and(|noise| noise.models().iter().any(of_force))
 }
 
 /// Leaves some `parts` out of the values, and adds them to the orthonormal columns that are explained.

@@ -321,6 +321,23 @@ impl FrequencyData {
         }
     }
 
+    /// A load that the ends of a record put on degree of freedom `dof`, a polynomial's term s^`power`, without a motion.
+    pub(crate) fn of_load(&self, dof: usize, power: usize) -> Self {
+        let load = |row: usize, column: usize| {
+            let omega = self.omega[row];
+            let unit = self.measured.per_displacement(omega).inv();
+            match column == dof {
+                true => unit * Complex::new(0.0, omega).powu(power as u32),
+                false => Complex::ZERO,
+            }
+        };
+        Self {
+            force: DMatrix::from_fn(self.len(), self.dof(), load),
+            displacement: DMatrix::zeros(self.len(), self.dof()),
+            ..self.clone()
+        }
+    }
+
     /// Second differences of neighbouring lines of the same spacing, in which the ends of a record count little:
     /// the spectra under a Hann window. Rows at the ends of a band stay as they are.
     ///

@@ -41,6 +41,7 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
+mod between_lines;
 mod cholesky;
 mod data;
 mod ends;

@@ -1,9 +1,10 @@
 //! Repeated periods of one experiment: their mean, their scatter, and independent halves.
 
-use mechid_model::ResponseQuantity;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::between_lines::{BetweenLines, periods_as_one};
 use super::{FrequencyData, Lines, NoiseSpectrum, Pooling};
 use crate::EstimateError;
 
@@ -27,8 +28,13 @@ pub struct RepeatedPeriods {
     /// motions as measured, then the forces.
     sum: DMatrix<Complex<f64>>,
     half_sums: [DMatrix<Complex<f64>>; 2],
-    /// Per line Σ (z − z̄)(z − z̄)ᴴ over the periods so far, 2n×2n.
+    /// Per line Σ (z − z̄)(z − z̄)ᴴ over the periods so far, 2n×2n, or what is as large: from between the lines
+    /// of periods taken as one.
     scatter: Vec<DMatrix<Complex<f64>>>,
+    /// Periods whose scatter is still to come.
+    together: BetweenLines,
+    /// Their sum.
+    together_sum: DMatrix<Complex<f64>>,
 }
 
 /// A force whose periods differ from their mean by this part of it, in the RMS, repeats to rounding.
@@ -71,8 +77,16 @@ impl RepeatedPeriods {
             count: 0,
             half_sums: [zero.clone(), zero.clone()],
             scatter: vec![DMatrix::zeros(2 * dof, 2 * dof); zero.nrows()],
+            together: Self::together(lines, dof, periods),
+            together_sum: zero.clone(),
             sum: zero,
         }
+    }
+
+    /// No periods yet of those that are taken as one next, where `remaining` are to come.
+    fn together(lines: &Lines, dof: usize, remaining: usize) -> BetweenLines {
+        let (period, channels) = (lines.sampling().len(), 2 * dof);
+        BetweenLines::new(periods_as_one(remaining, period, channels), period, channels)
     }
 
     /// Adds the whole periods of a stretch of force (N) and motion, one period or more; an incomplete
@@ -101,29 +115,16 @@ impl RepeatedPeriods {
             let channels = [motion, force].into_iter().flat_map(|record| {
                 (0..dof).map(move |channel| &record.channel(channel)[start..start + period])
             });
-            for (mut column, samples) in both.column_iter_mut().zip(channels) {
+            for (mut column, samples) in both.column_iter_mut().zip(channels.clone()) {
                 reader.read(|input| input.copy_from_slice(samples), column.iter_mut());
             }
+            self.together.hold(channels);
             self.add(&both);
         }
         Ok(())
     }
 
-    /// # Source
-    /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
     fn add(&mut self, period: &DMatrix<Complex<f64>>) {
-        if self.count > 0 {
-            let before = self.count as f64;
-            let weight = Complex::from(before / (before + 1.0));
-            let mut deviation = DVector::zeros(period.ncols());
-            for (line, scatter) in self.scatter.iter_mut().enumerate() {
-                let both = period.row(line).into_iter().zip(self.sum.row(line));
-                for (apart, (z, sum)) in deviation.iter_mut().zip(both) {
-                    *apart = z - sum / before;
-                }
-                scatter.gerc(weight, &deviation, &deviation, Complex::from(1.0));
-            }
-        }
         let half = self.expected / 2;
         if self.count < half {
             self.half_sums[0] += period;
@@ -132,7 +133,36 @@ impl RepeatedPeriods {
             self.half_sums[1] += period;
         }
         self.sum += period;
+        self.together_sum += period;
         self.count += 1;
+        if let Some(periods) = self.together.complete() {
+            self.add_scatter(periods);
+            let remaining = self.expected.saturating_sub(self.count);
+            self.together = Self::together(&self.lines, self.dof, remaining);
+            self.together_sum.fill(Complex::default());
+        }
+    }
+
+    /// Adds the scatter of the last `periods`: what is between their lines, and how far their mean is from that
+    /// of all before.
+    ///
+    /// # Source
+    /// Welford (1962), Technometrics 4, 419–420: the scatter about the mean in one pass.
+    fn add_scatter(&mut self, periods: usize) {
+        self.together.add_scatter(self.lines.as_slice(), &mut self.scatter);
+        let (before, now) = ((self.count - periods) as f64, periods as f64);
+        if before == 0.0 {
+            return;
+        }
+        let weight = Complex::from(before * now / (before + now));
+        let mut deviation = DVector::zeros(self.sum.ncols());
+        for (line, scatter) in self.scatter.iter_mut().enumerate() {
+            let both = self.together_sum.row(line).into_iter().zip(self.sum.row(line));
+            for (apart, (last, all)) in deviation.iter_mut().zip(both) {
+                *apart = last / now - (all - last) / before;
+            }
+            scatter.gerc(weight, &deviation, &deviation, Complex::from(1.0));
+        }
     }
 
     /// Number of whole periods.
@@ -179,17 +209,57 @@ impl RepeatedPeriods {
     /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
     /// pooled over lines; [`NoiseSpectrum::models`] tells what was chosen.
     ///
+    /// Up to 15 periods in a row, as far as memory allows, are taken as one record, between whose lines of a
+    /// period there is noise only; for the rest their means scatter.
     /// A force that is the same in every period to rounding is taken as exact.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewAverages`] if there is only one period.
+    /// [`EstimateError::TooFewAverages`] if there is only one period, or not yet all of those expected.
     ///
     /// # Source
+    /// Pintelon & Schoukens, the chapters of above: noise on the lines that are not excited.
     /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (smooth spectra: variances with
     /// a logarithmic link); Schwarz (1978), Annals of Statistics 6, 461–464 (order and bands); Stone
     /// (1974), Journal of the Royal Statistical Society B 36, 111–147 (choice by prediction).
     pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, EstimateError> {
-        self.at_least(2)?;
+        self.noise_relative_to(pooling, None)
+    }
+
+    /// The same where a smooth spectrum may also be that of the response of a `machine` to unmeasured forces.
+    ///
+    /// # Errors
+    /// As [`RepeatedPeriods::noise`]; [`EstimateError::Size`] for a machine of other degrees of freedom.
+    ///
+    /// # Source
+    /// As of [`RepeatedPeriods::noise`].
+    pub fn noise_beside(
+        &self,
+        pooling: Pooling,
+        machine: &SecondOrderSystem,
+    ) -> Result<NoiseSpectrum, EstimateError> {
+        let (n, omega) = (self.dof, self.lines.omega());
+        let (what, got) = ("degrees of freedom of the machine", machine.dof());
+        if got != n {
+            return Err(EstimateError::Size { what, got, expected: n });
+        }
+        // At a pole on a line the noise has no level to compare with.
+        let Ok(receptances) = machine.receptances(&omega) else { return self.noise(pooling) };
+        let of_forces = DMatrix::from_fn(omega.len(), 2 * n, |row, channel| {
+            if channel >= n {
+                return 1.0;
+            }
+            let gain: f64 = receptances[row].row(channel).iter().map(|g| g.norm_sqr()).sum();
+            gain * self.measured.per_displacement(omega[row]).norm_sqr()
+        });
+        self.noise_relative_to(pooling, Some(&of_forces))
+    }
+
+    fn noise_relative_to(
+        &self,
+        pooling: Pooling,
+        relative: Option<&DMatrix<f64>>,
+    ) -> Result<NoiseSpectrum, EstimateError> {
+        self.at_least(self.expected.max(2))?;
         let count = self.count;
         // Of the mean: the scatter of one period, divided by their number once more.
         let scale = Complex::from(1.0 / ((count - 1) * count) as f64);
@@ -208,6 +278,7 @@ impl RepeatedPeriods {
             self.measured,
             count - 1,
             pooling,
+            relative,
         )
     }
 

@@ -200,8 +200,8 @@ fn with_coloured_noise(
     Ok(last)
 }
 
-/// The noise that a residual shows, of each channel by itself: at each line as much more than that of the round
-/// before as the residual is more than its noise. What the noise of the force accounts for is not counted twice.
+/// The noise that a residual shows, of each channel by itself, or of unmeasured forces: at each line as much more
+/// than that of the round before as the residual is more than its noise. What the noise of the force accounts for is not counted twice.
 fn spectrum_of_residual(
     data: &FrequencyData,
     unknowns: &Unknowns,
@@ -228,7 +228,12 @@ fn spectrum_of_residual(
         covariance
     });
     let covariance = covariance.collect();
-    let noise = NoiseSpectrum::of_measured(data.omega(), covariance, data.measured(), 1, pooling)?;
+    let mut of_forces = misfit.gain().insert_columns(n, n, 1.0);
+    for (mut row, omega) in of_forces.row_iter_mut().zip(data.omega()) {
+        row.columns_mut(0, n).scale_mut(data.measured().per_displacement(*omega).norm_sqr());
+    }
+    let (omega, measured, forces) = (data.omega(), data.measured(), Some(&of_forces));
+    let noise = NoiseSpectrum::of_measured(omega, covariance, measured, 1, pooling, forces)?;
     Ok(noise.with_force_variance(data.force_variance()))
 }
 

@@ -14,10 +14,10 @@ const CASE: Case = Case { modes: 2, channels: 2, noise: 0.01, coloured: false, c
 #[test]
 fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
     for (case, runs) in [
-        (CASE, 60),
-        (Case { modes: 5, channels: 4, ..CASE }, 12),
-        (Case { noise: 0.05, close: true, ..CASE }, 40),
-        (Case { coloured: true, ..CASE }, 40),
+        (CASE, 40),
+        (Case { modes: 5, channels: 4, ..CASE }, 6),
+        (Case { noise: 0.05, close: true, ..CASE }, 20),
+        (Case { coloured: true, ..CASE }, 20),
     ] {
         let outcome = case.run(runs);
         let name = case.name();
@@ -40,7 +40,7 @@ fn intervals_hold_and_the_scatter_is_that_of_the_bound() {
 #[test]
 fn noise_alone_has_no_modes() {
     for coloured in [false, true] {
-        assert_eq!(found_in_noise(2, coloured, 50), 0);
+        assert_eq!(found_in_noise(2, coloured, 20), 0);
     }
 }
 

@@ -253,17 +253,17 @@ fn warnings(damping: f64, noise: f64, runs: u64) -> (usize, usize) {
     (found.len(), warned.count())
 }
 
-/// Judge: growth −c / 2m. False alarms at a level of 1 %: of 400 estimates of a machine that neither
-/// grows nor decays 4 ± 2.
+/// Judge: growth −c / 2m. False alarms at a level of 1 %: of 150 estimates of a machine that neither
+/// grows nor decays 1.5 ± 1.2.
 #[test]
 fn growth_is_told_where_noise_does_not_explain_it() {
-    let (growing, warned) = warnings(1e-6, 0.05, 400);
-    assert!((160..240).contains(&growing), "{growing}");
-    assert!(warned <= 11, "{warned}");
+    let (growing, warned) = warnings(1e-6, 0.05, 150);
+    assert!((51..=99).contains(&growing), "{growing}");
+    assert!(warned <= 6, "{warned}");
     // Lightly damped: ζ of 0.1 %.
-    let (_, warned) = warnings(0.447, 0.01, 200);
+    let (_, warned) = warnings(0.447, 0.01, 60);
     assert_eq!(warned, 0);
-    assert_eq!(warnings(-9.0, 0.01, 50), (50, 50));
+    assert_eq!(warnings(-9.0, 0.01, 20), (20, 20));
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn intervals_of_frequency_and_damping_hold() {
     let unknowns = Unknowns::known_mass(system.mass()).unwrap();
     let experiment = Experiment::new(system.clone(), unknowns, 2, 0.01);
     let truth = system.modes().unwrap();
-    let runs = 2000u64;
+    let runs = 1000u64;
     let held: Vec<Vec<bool>> = (0..runs)
         .into_par_iter()
         .map(|seed| {
@@ -297,7 +297,7 @@ fn intervals_of_frequency_and_damping_hold() {
         .collect();
     for quantity in 0..4 {
         let coverage = held.iter().filter(|h| h[quantity]).count() as f64 / runs as f64;
-        // As for the parameters themselves: 95 % ± four times 0.5 %.
+        // As for the parameters themselves: 95 % ± three times 0.7 %.
         assert!((0.93..=0.97).contains(&coverage), "{quantity}: {coverage}");
     }
 }

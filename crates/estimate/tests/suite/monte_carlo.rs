@@ -60,19 +60,25 @@ fn row(experiment: &Experiment, scatter: &Scatter, name: &str) -> String {
     )
 }
 
-/// The comparison in the book (`choose/estimators.md`), computed.
-fn table() -> Vec<String> {
+/// The comparison in the book (`choose/estimators.md`), computed: all of it to be written there, otherwise the
+/// rows that no other test has.
+fn table() -> Vec<Option<String>> {
+    let is_written = std::env::var_os("MECHID_BLESS").is_some();
     let mut rows = Vec::new();
     for (machine, runs) in [("oscillator", 2000), ("bearing", 400)] {
         for noise in [0.01, 0.05] {
             for periods in [2, 16] {
+                if !is_written && (noise, periods) != (0.05, 2) {
+                    rows.extend(ESTIMATORS.map(|_| None));
+                    continue;
+                }
                 let experiment = match machine {
                     "oscillator" => unknown_mass(oscillator(), periods, noise),
                     _ => known_mass(bearing(), periods, noise),
                 };
                 let scatter = experiment.scatter(&ESTIMATORS.map(|(e, _)| e), runs);
                 for ((_, name), scatter) in ESTIMATORS.iter().zip(&scatter) {
-                    rows.push(format!("| {machine} | {}", row(&experiment, scatter, name)));
+                    rows.push(Some(format!("| {machine} | {}", row(&experiment, scatter, name))));
                 }
             }
         }

@@ -116,7 +116,7 @@ fn assert_honest(judged: &[(String, f64, f64, f64)], runs: u64) {
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn intervals_of_a_duffing_oscillator_hold() {
-    let (clean, runs) = (duffing(0.3), runs(60));
+    let (clean, runs) = (duffing(0.3), runs(30));
     let (unknowns, terms) = (Unknowns::unknown_mass(1).unwrap(), "k3: x^3".parse().unwrap());
     let found: Vec<_> = (0..runs)
         .into_par_iter()
@@ -161,7 +161,7 @@ fn intervals_of_a_cubic_spring_between_two_masses_hold() {
 #[test]
 #[allow(clippy::print_stderr, reason = "the study by hand is read")]
 fn terms_that_are_not_there_are_not_selected() {
-    let (clean, runs) = (duffing(0.3), runs(100));
+    let (clean, runs) = (duffing(0.3), runs(40));
     let unknowns = Unknowns::unknown_mass(1).unwrap();
     let candidates: Terms =
         "k2: x^2, k3: x^3, k5: x^5, c2: |v| v, c3: v^3, cx: x^2 v".parse().unwrap();

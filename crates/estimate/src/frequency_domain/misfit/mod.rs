@@ -115,6 +115,14 @@ impl<'a> Misfit<'a> {
         })
     }
 
+    /// Σ |G|² of each channel over the forces, rows × n, in (m/N)²: the power that its displacement has where all
+    /// forces have the same, at the parameters last accepted.
+    pub(super) fn gain(&self) -> DMatrix<f64> {
+        DMatrix::from_fn(self.rows.len(), self.data.dof(), |row, channel| {
+            self.rows[row].receptance().row(channel).iter().map(|g| g.norm_sqr()).sum()
+        })
+    }
+
     /// L⁻¹(X − G F), rows × n, at the parameters last accepted.
     pub(super) fn white(&self) -> ComplexMatrix {
         let rows: Vec<_> = self.rows.iter().map(|row| row.white().transpose()).collect();

@@ -1,0 +1,126 @@
+//! What stands between the lines of several periods taken as one: noise, for what repeats is zero there.
+
+use mechid_signal::transform;
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Maximum number of periods in a row that are taken as one, an odd one.
+const MAX_PERIODS: usize = 15;
+/// Maximum number of samples, of all channels, that are held: 8 MB.
+const MAX_HELD: usize = 1 << 20;
+
+/// Periods in a row, held until their spectrum can be taken as that of one record.
+///
+/// The spectrum of B periods has B − 1 lines between two of one period. A noise whose memory is not short
+/// against a period (an unmeasured force through a resonance) is there what it is on the lines of the mean; the
+/// scatter of the periods also has what their ends leave in each of them, most of which cancels in the mean.
+#[derive(Debug, Clone)]
+pub(super) struct BetweenLines {
+    /// Samples of a period.
+    period: usize,
+    /// Periods that are taken as one; where it is one period there is nothing between its lines.
+    periods: usize,
+    /// Periods that are held.
+    held: usize,
+    /// Samples × channels; none where there is nothing between lines.
+    samples: DMatrix<f64>,
+}
+
+/// Periods that are to be taken as one where `remaining` are to come.
+///
+/// An odd number, so that no line between two is as near to the one as to the other; as many as may be held, in
+/// parts that hardly differ.
+pub(super) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
+    let fit = (MAX_HELD / (period * channels).max(1)).clamp(1, MAX_PERIODS);
+    let most = fit - (fit + 1) % 2;
+    let parts = remaining.div_ceil(most).max(1);
+    // So many odd numbers have that sum.
+    let parts = parts + (parts + remaining) % 2;
+    let one = remaining.div_ceil(parts);
+    one + (one + 1) % 2
+}
+
+impl BetweenLines {
+    pub(super) fn new(periods: usize, period: usize, channels: usize) -> Self {
+        let samples = if periods > 1 { periods * period } else { 0 };
+        Self { period, periods, held: 0, samples: DMatrix::zeros(samples, channels) }
+    }
+
+    /// Holds the next period, its channels in their order.
+    pub(super) fn hold<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
+        let start = self.held * self.period;
+        self.held += 1;
+        if self.periods == 1 {
+            return;
+        }
+        for (mut column, samples) in self.samples.column_iter_mut().zip(channels) {
+            column.rows_mut(start, self.period).copy_from_slice(samples);
+        }
+    }
+
+    /// Number of periods where all that are taken as one are held.
+    pub(super) fn complete(&self) -> Option<usize> {
+        (self.held == self.periods).then_some(self.periods)
+    }
+
+    /// Adds B Σ z zᴴ, z the amplitudes between lines, to the scatter of each line of a period: as much as
+    /// B − 1 periods scatter about their mean.
+    ///
+    /// Each line has those nearer to it than to another line of a period.
+    pub(super) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
+        if self.periods == 1 {
+            return;
+        }
+        let plan = transform::forward(self.samples.nrows());
+        let mut input = plan.make_input_vec();
+        let mut spectrum = |samples: &[f64]| {
+            let mut output = plan.make_output_vec();
+            input.copy_from_slice(samples);
+            plan.process(&mut input, &mut output).expect("buffers come from the plan");
+            output
+        };
+        let spectra: Vec<Vec<Complex<f64>>> =
+            self.samples.column_iter().map(|column| spectrum(column.as_slice())).collect();
+        let all = self.periods;
+        let scale = 2.0 / self.samples.nrows() as f64;
+        let mut z = DVector::zeros(spectra.len());
+        for (&line, scatter) in lines.iter().zip(scatter) {
+            for away in 1..=all / 2 {
+                // No line of a period is at zero or at half the sampling rate, so that both exist.
+                for at in [all * line - away, all * line + away] {
+                    for (z, spectrum) in z.iter_mut().zip(&spectra) {
+                        *z = spectrum[at] * scale;
+                    }
+                    scatter.gerc(Complex::from(all as f64), &z, &z, Complex::from(1.0));
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_are_odd_and_as_large_as_may_be_held() {
+        for (periods, expected) in [
+            (1, vec![1]),
+            (2, vec![1, 1]),
+            (3, vec![3]),
+            (4, vec![3, 1]),
+            (8, vec![5, 3]),
+            (15, vec![15]),
+            (16, vec![9, 7]),
+            (31, vec![11, 11, 9]),
+        ] {
+            let (mut parts, mut remaining) = (Vec::new(), periods);
+            while remaining > 0 {
+                parts.push(periods_as_one(remaining, 100, 2));
+                remaining -= parts[parts.len() - 1];
+            }
+            assert_eq!(parts, expected, "{periods}");
+        }
+        // As many samples as may be held, more, and half as many.
+        assert_eq!([1, 2, 3].map(|parts| periods_as_one(4, MAX_HELD / parts, 1)), [1, 1, 3]);
+    }
+}
