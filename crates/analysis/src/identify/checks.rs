@@ -1,5 +1,6 @@
 //! Checks before and after the fit, record by record.
 
+use mechid_estimate::IdentifiedMode;
 use mechid_estimate::checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, instability, kinematics, mass_symmetry, power, quantised_channels,
@@ -42,10 +43,11 @@ pub enum When {
     After,
 }
 
-/// All findings before and after a fit, with one error rate for the statistical tests among them; `scaled` is
-/// false where some equations of motion are known up to factors only.
+/// All findings before and after a fit, with one error rate for the statistical tests among them; `modes` are
+/// those of the estimate, `scaled` is false where some equations of motion are known up to factors only.
 pub(crate) fn rows(
     fitted: &Fitted,
+    modes: &[IdentifiedMode],
     records: &[&Block],
     scaled: bool,
 ) -> Result<Vec<CheckRow>, AnalysisError> {
@@ -62,7 +64,7 @@ pub(crate) fn rows(
         add(When::After, Some(at), checks);
     }
     add(When::After, None, &fitted.after_all);
-    add(When::After, None, instability(&fitted.estimate.modes()?).as_slice());
+    add(When::After, None, instability(modes).as_slice());
     if scaled {
         add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
     }

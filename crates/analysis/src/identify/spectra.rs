@@ -85,10 +85,12 @@ pub(super) fn fit(
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
     let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
-    for ((recorded, left), checks) in records.iter().zip(&residuals).zip(&mut after) {
-        let checks: &mut Vec<Finding> = checks;
-        if left.findings().iter().any(is_told) {
-            checks.extend(nonlinear_term(&recorded.held, unknowns, lines)?);
+    if unknowns.free().len() <= TERM_PARAMETERS {
+        for ((recorded, left), checks) in records.iter().zip(&residuals).zip(&mut after) {
+            let checks: &mut Vec<Finding> = checks;
+            if left.findings().iter().any(is_told) {
+                checks.extend(nonlinear_term(&recorded.held, unknowns, lines)?);
+            }
         }
     }
     Ok(Fitted {
@@ -146,9 +148,6 @@ fn nonlinear_term(
     unknowns: &Unknowns,
     rule: LineRule<'_>,
 ) -> Result<Option<Finding>, AnalysisError> {
-    if unknowns.free().len() > TERM_PARAMETERS {
-        return Ok(None);
-    }
     let band = Lines::new(held.force.sampling().with_len(held.period)?, all_lines(held, rule)?)?;
     let (response, kind) = held.response();
     // A record alone may not determine the machine, as that of one shaker of several.

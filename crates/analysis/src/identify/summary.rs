@@ -141,7 +141,7 @@ impl IdentificationSummary {
     ) -> Result<Self, AnalysisError> {
         let records: Vec<&Block> = records.iter().map(|r| &r.held).collect();
         let estimate = &fitted.estimate;
-        let system = estimate.system()?;
+        let (system, modes) = (estimate.system()?, estimate.modes()?);
         let unexplained_motion = fitted.unexplained_motion(&system)?;
         let carried = rows::carries_covariance(estimate);
         let row = |r: &&Block| RecordRow { file: r.file.clone(), window: WindowRow::of(r) };
@@ -156,7 +156,7 @@ impl IdentificationSummary {
             parameters: parameters(estimate, unscaled.as_ref())?,
             proportional_damping: ProportionalDamping::of(estimate)?,
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
-            modes: ShapedMode::all(&estimate.modes()?, false)?,
+            modes: ShapedMode::all(&modes, false)?,
             fit: FitRow {
                 nrmse: match fitted.is_weighted() {
                     true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
@@ -177,7 +177,7 @@ impl IdentificationSummary {
             channels: Channels::clone(&records[0].names),
             records: records.iter().map(row).collect(),
             hits,
-            checks: checks::rows(fitted, &records, unscaled.is_none())?,
+            checks: checks::rows(fitted, &modes, &records, unscaled.is_none())?,
             fitted_lines: None,
             validation: None,
             remarks: Vec::new(),

@@ -97,16 +97,17 @@ fn of_samples(residual: &fitted::SampleResidual) -> Result<Vec<Correlations>, An
 }
 
 fn of_lines(residual: &SpectralResidual) -> Vec<Correlations> {
-    let with_forces = |channel: usize| {
-        let with = |force: usize| Some((force, residual.with_force(channel, force)?));
-        (0..residual.dof()).filter_map(with).collect()
-    };
-    let of = |channel: usize| Correlations {
+    let empty = |channel: usize| Correlations {
         own: residual.line_to_line(channel).map(OwnCorrelation::Lines),
         lag: residual.lag(),
-        forces: with_forces(channel),
+        forces: Vec::new(),
     };
-    let all: Vec<Correlations> = (0..residual.dof()).map(of).collect();
+    let mut all: Vec<Correlations> = (0..residual.dof()).map(empty).collect();
+    for force in 0..residual.dof() {
+        for (channel, correlation) in all.iter_mut().zip(residual.with_force(force)) {
+            channel.forces.extend(correlation.map(|correlation| (force, correlation)));
+        }
+    }
     let any = all.iter().any(|channel| channel.own.is_some() || !channel.forces.is_empty());
     if any { all } else { Vec::new() }
 }

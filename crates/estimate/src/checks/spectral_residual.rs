@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::concentration::Part;
@@ -115,20 +115,23 @@ impl SpectralResidual {
             findings.push(Finding::Misfit { ratio, p_value, source, concentration: None });
         }
         let dof = self.data.dof();
-        let of_channel = |residual: usize| {
-            let whiteness = self.line_to_line(residual).map(|correlation| Finding::Whiteness {
+        let of_forces: Vec<Vec<Option<Correlation>>> =
+            (0..dof).into_par_iter().map(|force| self.with_force(force)).collect();
+        let whiteness = |residual: usize| {
+            self.line_to_line(residual).map(|correlation| Finding::Whiteness {
                 residual: Residual::Lines { residual },
                 test: correlation.test(self.rounding),
                 span: None,
-            });
-            let with_forces = (0..dof).filter_map(move |force| {
-                let test = self.with_force(residual, force)?.test(self.rounding);
-                Some(Finding::CrossCorrelation { residual, force, test })
-            });
-            whiteness.into_iter().chain(with_forces).collect::<Vec<_>>()
+            })
         };
-        let correlations: Vec<Vec<Finding>> = (0..dof).into_par_iter().map(of_channel).collect();
-        findings.extend(correlations.into_iter().flatten());
+        let whiteness: Vec<Option<Finding>> = (0..dof).into_par_iter().map(whiteness).collect();
+        for (residual, whiteness) in whiteness.into_iter().enumerate() {
+            findings.extend(whiteness);
+            findings.extend(of_forces.iter().enumerate().filter_map(|(force, of_channels)| {
+                let test = of_channels[residual].as_ref()?.test(self.rounding);
+                Some(Finding::CrossCorrelation { residual, force, test })
+            }));
+        }
         findings
     }
 
@@ -257,20 +260,19 @@ impl SpectralResidual {
         })
     }
 
-    /// Correlation of the residual of a channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of
+    /// Correlation of the residual of each channel with a force, Re Σ F̄(l) r(l) e^{iωτ}, at an odd number of
     /// lags τ, multiples of [`SpectralResidual::lag`] around 0: up to 51, fewer where there are few lines.
-    /// `None` if the force is zero.
+    /// `None` for a channel without residual, and if the force is zero.
     ///
     /// # Panics
-    /// If there is no such channel or force.
+    /// If there is no such force.
     ///
     /// # Source
     /// White (1980), Econometrica 48, 817–838, for the covariance of the correlations; Box (1954),
     /// Annals of Mathematical Statistics 25, 290–302, for their sum of squares.
-    pub fn with_force(&self, channel: usize, force: usize) -> Option<Correlation> {
-        let lines = self.data.len();
+    pub fn with_force(&self, force: usize) -> Vec<Option<Correlation>> {
+        let (lines, dof) = (self.data.len(), self.data.dof());
         let forces = self.force.column(force);
-        let rows: Vec<usize> = (0..lines).map(|line| self.row(line, channel)).collect();
         let (lags, lag) = (LAGS.min(lines / LINES_PER_CORRELATION), self.lag());
         let mut weights = DMatrix::zeros(2 * lags + 1, 2 * lines);
         for (line, (f, omega)) in forces.iter().zip(self.data.omega()).enumerate() {
@@ -284,19 +286,28 @@ impl SpectralResidual {
                 weight *= turn;
             }
         }
-        let places: Vec<usize> = rows.iter().flat_map(|row| [*row, row + 1]).collect();
-        let residual =
-            DVector::from_iterator(places.len(), places.iter().map(|row| self.values[*row]));
-        let products = &weights * &residual;
-        let covariance = self.covariance(&weights, &places)?;
-        let size = residual.norm() * forces.norm();
-        let mean = covariance.trace();
-        Some(Correlation {
-            coefficients: products.iter().map(|product| product / size).collect(),
-            bound: 1.96 * (mean / weights.nrows() as f64).sqrt() / size,
-            statistic: products.norm_squared() / mean * weights.nrows() as f64,
-            p_value: share_above_of(products.norm_squared(), mean, covariance.norm_squared()),
-        })
+        // Residual and variance of channel c, the latter times the weights of the first lag.
+        let right = DMatrix::from_fn(2 * lines, 2 * dof, |at, column| {
+            let row = self.row(at / 2, column % dof) + at % 2;
+            match column < dof {
+                true => self.values[row],
+                false => self.deviations[row].powi(2) * weights[(0, at)],
+            }
+        });
+        let products = &weights * &right;
+        let of_channel = |channel: usize| {
+            let (sums, white) = (products.column(channel), products.column(dof + channel));
+            let covariance = self.covariance(&weights, white, channel)?;
+            let size = right.column(channel).norm() * forces.norm();
+            let mean = covariance.trace();
+            Some(Correlation {
+                coefficients: sums.iter().map(|product| product / size).collect(),
+                bound: 1.96 * (mean / weights.nrows() as f64).sqrt() / size,
+                statistic: sums.norm_squared() / mean * weights.nrows() as f64,
+                p_value: share_above_of(sums.norm_squared(), mean, covariance.norm_squared()),
+            })
+        };
+        (0..dof).map(of_channel).collect()
     }
 
     /// Lag at which the correlation with a force is computed, in s: half a period of the highest line.
@@ -304,21 +315,32 @@ impl SpectralResidual {
         PI / self.data.omega().iter().copied().fold(0.0, f64::max)
     }
 
-    /// Covariance A P Σ P Aᵀ of weighted sums A over the `own` rows, with P = I − QQᵀ and the variances
-    /// Σ that the residuals show themselves.
-    fn covariance(&self, weights: &DMatrix<f64>, places: &[usize]) -> Option<DMatrix<f64>> {
-        let scaled = |mut matrix: DMatrix<f64>| {
-            for (mut column, row) in matrix.column_iter_mut().zip(places) {
-                column *= self.deviations[*row];
+    /// Covariance A P Σ P Aᵀ of weighted sums A over the rows of a channel, with P = I − QQᵀ and the variances
+    /// Σ that the residuals show themselves. `white` is the first column of A Σ Aᵀ.
+    ///
+    /// Real and imaginary part of a line have one variance, so that the entries of A Σ Aᵀ depend on the
+    /// distance of two lags alone.
+    fn covariance(
+        &self,
+        weights: &DMatrix<f64>,
+        white: DVectorView<'_, f64>,
+        channel: usize,
+    ) -> Option<DMatrix<f64>> {
+        let count = weights.nrows();
+        let mut covariance = DMatrix::from_fn(count, count, |a, b| white[a.abs_diff(b)]);
+        if self.explained.ncols() > 0 {
+            let row = |line| self.row(line, channel);
+            let places: Vec<usize> =
+                (0..self.data.len()).map(row).flat_map(|row| [row, row + 1]).collect();
+            let mut explained = self.explained.select_rows(&places);
+            let loads = weights * &explained;
+            for (mut row, place) in explained.row_iter_mut().zip(&places) {
+                row *= self.deviations[*place].powi(2);
             }
-            matrix
-        };
-        let explained = self.explained.select_rows(places);
-        let loads = weights * &explained;
-        let white = scaled(weights.clone());
-        let cross = &white * scaled(explained.transpose()).transpose() * loads.transpose();
-        let inner = &loads * &self.explained_spread * loads.transpose();
-        let covariance = &white * white.transpose() - &cross - cross.transpose() + inner;
+            let cross = weights * explained * loads.transpose();
+            let inner = &loads * &self.explained_spread * loads.transpose();
+            covariance += inner - &cross - cross.transpose();
+        }
         (covariance.trace() > 0.0).then_some(covariance)
     }
 }
@@ -347,4 +369,60 @@ fn covariance_of_squares(powers: &[f64], a: usize, b: usize) -> f64 {
         pairs().sum::<f64>().powi(2) - pairs().map(|pair| pair * pair).sum::<f64>()
     };
     2.0 * parallelograms + if a == b { diagonal() } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::ResponseQuantity;
+
+    use super::*;
+
+    /// The correlations with a force are those of the sums written out: every product, and A P Σ P Aᵀ.
+    #[test]
+    fn correlations_with_a_force_are_those_of_the_sums_written_out() {
+        let (lines, dof) = (30, 2);
+        let number = |i: usize, j: usize| ((7 * i + 5 * j + 1) as f64).sin();
+        let complex = |i: usize, j: usize| Complex::new(number(i, j), number(j + 3, i + 11));
+        let omega: Vec<f64> = (0..lines).map(|line| 3.0 + line as f64).collect();
+        let force = DMatrix::from_fn(lines, dof, complex);
+        let motion = DMatrix::from_fn(lines, dof, |i, j| complex(i + 40, j));
+        let quantity = ResponseQuantity::Displacement;
+        let data = FrequencyData::from_amplitudes(omega, force, motion, quantity).unwrap();
+        let values = DVector::from_fn(2 * lines * dof, |at, _| number(at, 2));
+        for columns in [0, 5] {
+            let explained = match columns {
+                0 => DMatrix::zeros(values.len(), 0),
+                _ => DMatrix::from_fn(values.len(), columns, number).qr().q(),
+            };
+            let residual =
+                SpectralResidual::new(data.clone(), true, values.clone(), explained.clone());
+            let identity = DMatrix::<f64>::identity(values.len(), values.len());
+            let free = identity - &explained * explained.transpose();
+            let variances = residual.deviations.map(|deviation| deviation * deviation);
+            let covariance = &free * DMatrix::from_diagonal(&variances) * &free;
+            for (force, channel) in [(0, 0), (0, 1), (1, 0)] {
+                let lags = (lines / LINES_PER_CORRELATION) as f64;
+                let row = |lag: f64| {
+                    let mut row = nalgebra::RowDVector::zeros(values.len());
+                    for (line, omega) in data.omega().iter().enumerate() {
+                        let turn = Complex::cis(omega * lag * residual.lag());
+                        let weight = data.force()[(line, force)].conj() * turn;
+                        let at = residual.row(line, channel);
+                        (row[at], row[at + 1]) = (weight.re, -weight.im);
+                    }
+                    row
+                };
+                let rows: Vec<_> =
+                    (0..=2 * lags as usize).map(|at| row(at as f64 - lags)).collect();
+                let weights = DMatrix::from_rows(&rows);
+                let sums = &weights * &values;
+                let all = &weights * &covariance * weights.transpose();
+                let expected = sums.norm_squared() / all.trace() * sums.len() as f64;
+                let found = residual.with_force(force)[channel].clone().unwrap();
+                assert!((found.statistic / expected - 1.0).abs() < 1e-12);
+                let p = share_above_of(sums.norm_squared(), all.trace(), all.norm_squared());
+                assert!((found.p_value - p).abs() < 1e-12, "{} {p}", found.p_value);
+            }
+        }
+    }
 }

@@ -67,9 +67,13 @@ impl Whitened {
         let mut residual = DVector::zeros(2 * n * data.len());
         let mut sensitivity = DMatrix::zeros(residual.len(), parameters.len());
         for (row, &omega) in data.omega().iter().enumerate() {
-            let line = Line::of(&system, data, row, &covariance(row))?;
+            let mut line = Line::of(&system, data, row, &covariance(row))?;
             let at = 2 * n * row..2 * n * (row + 1);
             write_real(&line.residual, &mut residual.as_mut_slice()[at.clone()]);
+            if parameters.is_empty() {
+                continue;
+            }
+            line.whiten_receptance()?;
             for (parameter, mut column) in parameters.iter().zip(sensitivity.column_iter_mut()) {
                 let derivative = line.derivative(parameter, omega);
                 write_real(&derivative, &mut column.as_mut_slice()[at.clone()]);
@@ -82,9 +86,11 @@ impl Whitened {
 
 /// One line.
 struct Line {
+    /// L.
+    lower: ComplexMatrix,
     /// L⁻¹(X − G F).
     residual: DVector<Complex<f64>>,
-    /// L⁻¹G.
+    /// G and, once it is whitened, L⁻¹G.
     receptance: ComplexMatrix,
     /// G F̂ with the force F̂ that, within its noise, agrees best with the displacement.
     likely_displacement: DVector<Complex<f64>>,
@@ -98,20 +104,32 @@ impl Line {
         covariance: &ComplexMatrix,
     ) -> Option<Self> {
         let n = data.dof();
-        let mut receptance = system.receptance(data.omega()[row]).ok()?;
+        let receptance = system.receptance(data.omega()[row]).ok()?;
         let block = |i: usize, j: usize| covariance.view((i * n, j * n), (n, n));
+        let force = data.force().row(row).transpose();
+        let modelled = &receptance * &force;
+        let mut residual = data.displacement().row(row).transpose() - &modelled;
+        // A force without noise is its own most likely one.
+        let is_exact = covariance.columns(n, n).iter().all(|entry| *entry == Complex::ZERO);
+        if is_exact {
+            let lower = cholesky(block(0, 0).into_owned())?;
+            lower.solve_lower_triangular_mut(&mut residual).then_some(())?;
+            return Some(Self { lower, residual, receptance, likely_displacement: modelled });
+        }
         let adjoint = receptance.adjoint();
         let cross = block(1, 0) - block(1, 1) * &adjoint;
         let total = block(0, 0) - block(0, 1) * &adjoint - &receptance * &cross;
         let lower = cholesky(total)?;
-        let force = data.force().row(row).transpose();
-        let mut residual = data.displacement().row(row).transpose() - &receptance * &force;
         lower.solve_lower_triangular_mut(&mut residual).then_some(())?;
         let mut twice = residual.clone();
         lower.ad_solve_lower_triangular_mut(&mut twice).then_some(())?;
         let likely_displacement = &receptance * (force - cross * twice);
-        lower.solve_lower_triangular_mut(&mut receptance).then_some(())?;
-        Some(Self { residual, receptance, likely_displacement })
+        Some(Self { lower, residual, receptance, likely_displacement })
+    }
+
+    /// Replaces G by L⁻¹G.
+    fn whiten_receptance(&mut self) -> Option<()> {
+        self.lower.solve_lower_triangular_mut(&mut self.receptance).then_some(())
     }
 
     /// Derivative of −L⁻¹(X − G F̂): −L⁻¹G E_ij X̂ (iω)^p.
