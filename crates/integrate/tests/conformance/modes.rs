@@ -139,6 +139,50 @@ fn a_free_chain_drifts_and_oscillates() {
     }
 }
 
+/// Judge: the closed form; the highest of them is sixty times the lowest.
+#[test]
+fn many_modes_of_a_chain_are_found_from_one_shift() {
+    let n = 150;
+    let found = sparse_modes(&chain(n, true), ModeSearch::Lowest, 60).unwrap();
+    assert_eq!(found.len(), 60);
+    for (r, found) in (1..).zip(found) {
+        let exact = 40.0 * (f64::from(r) * PI / (2.0 * (n + 1) as f64)).sin();
+        let gap = found.mode.natural_frequency() / exact - 1.0;
+        assert!(gap.abs() < 1e-10 && found.residual < 1e-12, "{r}: {gap:e} {:e}", found.residual);
+    }
+}
+
+/// The drift is the mode nearest to a low frequency, and one of those about a higher one.
+#[test]
+fn a_free_chain_has_modes_near_low_frequencies() {
+    let n = 100;
+    let (system, exact) =
+        (chain(n, false), |r: usize| 40.0 * (r as f64 * PI / (2.0 * n as f64)).sin());
+    for (omega, order) in [(6e-3, [0, 1, 2, 3]), (1.7 * exact(1), [2, 1, 3, 0])] {
+        let found = sparse_modes(&system, ModeSearch::NearOmega(omega), 4).unwrap();
+        assert_eq!(found.len(), 4);
+        for (found, r) in found.iter().zip(order) {
+            assert_eq!(found.is_rigid_body, r == 0, "{omega}, {r}");
+            assert!((found.mode.natural_frequency() - exact(r)).abs() < 1e-6, "{omega}, {r}");
+        }
+    }
+}
+
+#[test]
+fn all_modes_come_where_more_are_asked_for() {
+    let n = 5;
+    for count in [11, usize::MAX] {
+        let found = sparse_modes(&chain(n, false), ModeSearch::Lowest, count).unwrap();
+        let oscillating: Vec<f64> =
+            found.iter().filter(|m| !m.is_rigid_body).map(|m| m.mode.natural_frequency()).collect();
+        assert!(oscillating.len() == n - 1 && found.len() > oscillating.len());
+        for (r, omega) in (1..).zip(oscillating) {
+            let exact = 40.0 * (f64::from(r) * PI / (2.0 * n as f64)).sin();
+            assert!((omega / exact - 1.0).abs() < 1e-12, "{r}: {omega} {exact}");
+        }
+    }
+}
+
 #[test]
 fn what_cannot_be_searched_is_refused() {
     let system = chain(5, true);
