@@ -81,12 +81,18 @@ pub enum CliError {
 }
 
 impl CliError {
-    /// Returns the message; `spelled` writes the settings that the analysis names as options.
-    pub fn message(&self, spelled: impl Fn(&str) -> String) -> String {
+    /// Returns the message of a command that `raises` limits or has no such option; `spelled` writes the settings
+    /// that the analysis names as options.
+    pub fn message(&self, raises: bool, spelled: impl Fn(&str) -> String) -> String {
         match self {
-            Self::Io(error @ IoError::TooLarge { .. })
-            | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { .. })) => {
-                format!("{error}; if the record is really so large, use --raise-limits")
+            Self::Io(error @ IoError::TooLarge { file, at, limit })
+            | Self::Analysis(AnalysisError::Io(error @ IoError::TooLarge { file, at, limit })) => {
+                match raises {
+                    true => {
+                        format!("{error}; if the record is really so large, use --raise-limits")
+                    }
+                    false => format!("{file}, {at}: {limit}, which this command cannot raise"),
+                }
             }
             // A file's own words stay as they are.
             Self::Analysis(AnalysisError::Io(error)) => error.to_string(),

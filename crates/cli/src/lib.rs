@@ -61,8 +61,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
         Err(error) => {
             // A message that cannot be told changes nothing: the exit code stays.
-            let _ =
-                writeln!(stderr(), "error: {}", outcome::shown(&error.message(options::spelled)));
+            let command = arguments.get(1).and_then(|word| word.to_str()).unwrap_or_default();
+            let raises = options::has(command, "raise-limits");
+            let message = error.message(raises, options::spelled);
+            let _ = writeln!(stderr(), "error: {}", outcome::shown(&message));
             ExitCode::from(FAILURE)
         }
     }

@@ -24,10 +24,16 @@ pub fn spelled(message: &str) -> String {
 /// Returns the option of any subcommand that a setting stands for.
 fn option(setting: &str) -> Option<String> {
     let name = setting.replace('_', "-");
-    let is_option = |command: &clap::Command| {
-        command.get_arguments().any(|argument| argument.get_long() == Some(name.as_str()))
-    };
-    Cli::command().get_subcommands().any(is_option).then_some(name)
+    Cli::command().get_subcommands().any(|command| takes(command, &name)).then_some(name)
+}
+
+/// Returns whether the subcommand of some name takes an option.
+pub fn has(subcommand: &str, option: &str) -> bool {
+    Cli::command().find_subcommand(subcommand).is_some_and(|command| takes(command, option))
+}
+
+fn takes(command: &clap::Command, option: &str) -> bool {
+    command.get_arguments().any(|argument| argument.get_long() == Some(option))
 }
 
 #[cfg(test)]

@@ -70,7 +70,7 @@ pub struct SelectedDofs<'a> {
 }
 
 impl SelectedDofs<'_> {
-    fn check(&self, dof: usize) -> Result<(), IntegrateError> {
+    pub(crate) fn check(&self, dof: usize) -> Result<(), IntegrateError> {
         let mut forced = vec![false; dof];
         for &at in self.forced {
             match forced.get_mut(at) {

@@ -79,10 +79,9 @@ impl Equations {
             }
         };
         let mut factored = factored.map_err(|error| {
-            error.or_singular(self.dof(), |smallest| IntegrateError::SingularEffectiveMass {
-                scheme,
-                dt,
-                smallest,
+            error.or_singular(self.dof(), |smallest| match (gamma_hat, beta_hat) {
+                (0.0, 0.0) => IntegrateError::SingularMass { scheme, smallest },
+                _ => IntegrateError::SingularEffectiveMass { scheme, dt, smallest },
             })
         })?;
         let newton = self.forces.as_ref().map(|forces| {

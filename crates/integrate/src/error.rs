@@ -92,6 +92,17 @@ pub enum IntegrateError {
         /// The value found.
         value: f64,
     },
+    /// M is singular, and the scheme solves the equation of motion for the acceleration.
+    #[error(
+        "{scheme}: the mass matrix is singular (pivot {smallest:.1e} of its terms), so that forces determine \
+         no acceleration: every motion needs a mass, and rigid connections fewer degrees of freedom"
+    )]
+    SingularMass {
+        /// Name of the scheme.
+        scheme: &'static str,
+        /// Smallest pivot of its factorisation, rows divided by the size of their terms (pure number).
+        smallest: f64,
+    },
     /// The matrix the scheme has to solve with is singular.
     #[error(
         "{scheme}: the effective mass matrix is singular at Δt = {dt} s (pivot {smallest:.1e} of its terms)",

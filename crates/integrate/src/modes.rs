@@ -7,6 +7,7 @@ mod space;
 use mechid_model::{EIGENVALUE_ROUNDING, Matrix, Mode, SecondOrderSystem, SparseSystem};
 use nalgebra::{Complex, DMatrix};
 
+pub(crate) use self::inverse::dynamic_stiffness;
 use self::inverse::{FREE_SHIFT, Inverse, fastest};
 use self::shift::{Reach, joined, next_shift};
 use self::space::{Space, residual_of};

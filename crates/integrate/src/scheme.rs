@@ -41,8 +41,8 @@ pub trait Scheme: fmt::Debug + Send + Sync {
     /// All the work that is done once for a system and a step of `dt` seconds, stable or not.
     ///
     /// # Errors
-    /// [`IntegrateError::TimeStep`], [`IntegrateError::SingularEffectiveMass`],
-    /// [`IntegrateError::FactorsTooLarge`], and
+    /// [`IntegrateError::TimeStep`], [`IntegrateError::SingularMass`],
+    /// [`IntegrateError::SingularEffectiveMass`], [`IntegrateError::FactorsTooLarge`], and
     /// [`IntegrateError::Components`] if starting values do not fit the system.
     fn prepare_unchecked(
         &self,

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use mechid_model::{SecondOrderSystem, SparseSystem, Terms};
+use mechid_model::{Matrix, SecondOrderSystem, SparseSystem, Terms};
 use mechid_signal::message;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
@@ -15,6 +15,10 @@ use crate::{IoError, Limits, json, read_matrix_market};
 /// Number of degrees of freedom up to which a machine described by Matrix Market files is taken as one
 /// described by lists of rows.
 const DENSE_DOF: usize = 64;
+
+/// Number of degrees of freedom up to which all entries of such a machine are held where they are needed: of more
+/// all modes or the response at every line take minutes.
+const ALL_ENTRIES_DOF: usize = 300;
 
 /// The matrices of a system as rows of numbers: the `system` of every JSON report, which
 /// [`read_system`] reads back.
@@ -48,6 +52,10 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
     let (file, mut described) = json::read::<Described>(path.as_ref())?;
     match described.system.load(&file, json::folder(path.as_ref()))? {
         None => described.system.system(&file),
+        Some(sparse) if sparse.dof() <= ALL_ENTRIES_DOF => {
+            let [m, c, k] = Matrix::ALL.map(|which| DMatrix::from(sparse.matrix(which)));
+            SecondOrderSystem::new(m, c, k).map_err(|source| IoError::Model { file, source })
+        }
         Some(sparse) => Err(too_many(&file, sparse.dof())),
     }
 }
@@ -73,8 +81,9 @@ struct Described {
 /// Refusal of a sparse machine where all entries of its matrices are needed.
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
-        "the machine has {dof} degrees of freedom in Matrix Market files: of more than {DENSE_DOF} only \
-         the response from a start can be simulated, and some of the modes found"
+        "the machine has {dof} degrees of freedom in Matrix Market files, too many for what needs all entries \
+         of the matrices: simulate finds its response, stability the largest steps, and modal --modes COUNT \
+         some of its modes; for the rest reduce it to the degrees of freedom that are measured"
     );
     IoError::Description { file: file.into(), what }
 }

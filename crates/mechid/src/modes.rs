@@ -149,8 +149,9 @@ impl fmt::Display for SelectedModes {
             if !mode.is_rigid_body && growth > rounding {
                 writeln!(
                     f,
-                    "\nmode {number} is unstable: its free response grows e-fold every {} s",
-                    significant(growth.recip(), 3)
+                    "\nmode {number} is unstable: its free response grows e-fold every {} s, at {} 1/s",
+                    significant(growth.recip(), 3),
+                    significant(growth, 3)
                 )?;
             }
         }

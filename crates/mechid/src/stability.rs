@@ -5,9 +5,9 @@ use std::fmt;
 
 use mechid_analysis::text::{compact, paged_table, significant};
 use mechid_integrate::{
-    Accuracy, IntegrateError, Scheme, accuracy, critical_step, spectral_radius,
+    Accuracy, IntegrateError, Matrices, Scheme, accuracy, critical_step, spectral_radius,
 };
-use mechid_model::{Sdof, SecondOrderSystem};
+use mechid_model::Sdof;
 use serde::Serialize;
 
 /// Spectral radii above 1 by less than this are rounding.
@@ -28,8 +28,8 @@ pub struct NamedScheme {
 /// A machine, and the step with which it is to be stepped.
 #[derive(Debug, Clone, Copy)]
 pub struct SteppedMachine<'a> {
-    /// The machine.
-    pub system: &'a SecondOrderSystem,
+    /// M, C and K of the machine, as they are stored.
+    pub system: Matrices<'a>,
     /// Step, in s.
     pub dt: f64,
 }
@@ -154,9 +154,9 @@ impl MachineStability {
         SteppedMachine { system, dt }: SteppedMachine<'_>,
     ) -> Result<Self, IntegrateError> {
         Ok(Self {
-            critical_step_s: critical_step(scheme, system)?,
+            critical_step_s: critical_step(scheme, &system)?,
             step_s: dt,
-            spectral_radius: spectral_radius(scheme, system, dt)?,
+            spectral_radius: spectral_radius(scheme, &system, dt)?,
         })
     }
 }

@@ -101,6 +101,15 @@ pub struct RecordArgs {
     pub detrend: Option<DetrendChoice>,
 }
 
+/// Parses a positive, finite number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if value > 0.0 && f64::is_finite(value) => Ok(value),
+        Ok(value) => Err(format!("a positive number is needed, got {value}")),
+        Err(e) => Err(format!("a number is needed: {e}")),
+    }
+}
+
 /// Parses a count of at least one.
 pub fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {

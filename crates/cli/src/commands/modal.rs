@@ -10,7 +10,7 @@ use mechid::io::{input_name, read_sparse_system};
 use mechid::modes::SelectedModes;
 use mechid::report::ToFigure as _;
 
-use crate::args::{PlotArgs, ReportArgs, StyleArgs, at_least_one};
+use crate::args::{PlotArgs, ReportArgs, StyleArgs, at_least_one, positive};
 use crate::error::CliError;
 use crate::outcome::{Files, Outcome};
 
@@ -26,7 +26,9 @@ use crate::outcome::{Files, Outcome};
 ///
 /// A large machine, up to some 100,000 degrees of freedom in Matrix Market files, has too many modes
 /// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency. They
-/// have no standard errors and no picture; --json has their shapes.
+/// have no standard errors and no picture; --json has their shapes. Each is exact to rounding; that
+/// none between them was missed is likely, not proved. Instability is told of the modes found, not
+/// of others.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   mechid identify rotor.csv --force fx,fy --displacement x,y --json > found.json
@@ -43,7 +45,8 @@ pub struct ModalArgs {
     #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "plot")]
     modes: Option<usize>,
     /// With --modes: find those nearest to this frequency, in Hz
-    #[arg(long, value_name = "HZ", requires = "modes")]
+    #[arg(long, value_name = "HZ", requires = "modes", value_parser = positive,
+          allow_negative_numbers = true)]
     near_hz: Option<f64>,
     #[command(flatten)]
     plot: PlotArgs,

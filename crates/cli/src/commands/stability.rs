@@ -6,10 +6,10 @@ use clap::Args;
 use mechid::analysis::text::compact;
 use mechid::integrate::{
     Bathe, CentralDifference, GeneralisedAlpha, Houbolt, MatrixExponential, Newmark, RungeKutta4,
-    Scheme, WilsonTheta,
+    Scheme, System, WilsonTheta,
 };
 use mechid::io::Experiment;
-use mechid::{NamedScheme, SteppedMachine, compare_schemes, stability_figure};
+use mechid::{NamedScheme, SimulatedSystem, SteppedMachine, compare_schemes, stability_figure};
 
 use crate::args::{PlotArgs, ReportArgs};
 use crate::error::CliError;
@@ -81,11 +81,17 @@ impl StabilityArgs {
             None => None,
             Some(file) => {
                 let experiment = Experiment::read(file)?;
-                Some((experiment.system()?, experiment.force()?.sampling().dt()))
+                let system = match experiment.sparse_system() {
+                    Some(sparse) => SimulatedSystem::Sparse(sparse.clone()),
+                    None => SimulatedSystem::Dense(experiment.system()?),
+                };
+                Some((system, experiment.force()?.sampling().dt()))
             }
         };
-        let machine = machine.as_ref().map(|(system, dt)| SteppedMachine { system, dt: *dt });
-        let dof = machine.map_or(1, |machine| machine.system.dof());
+        let machine = machine
+            .as_ref()
+            .map(|(system, dt)| SteppedMachine { system: system.matrices(), dt: *dt });
+        let dof = machine.map_or(1, |machine| System::dof(&machine.system));
         if dof <= MatrixExponential::MOST_DOF {
             let (label, scheme) = ("matrix exponential".into(), MatrixExponential::LINEAR);
             schemes.push(NamedScheme { label, scheme: Box::new(scheme) });

@@ -106,7 +106,8 @@ fn some_modes_of_a_large_machine_are_found() {
     }
     for (rest, expected) in [
         ("--near-hz 3", "--modes"),
-        ("--modes 2 --near-hz 0", "near a positive frequency"),
+        ("--modes 2 --near-hz 0", "a positive number is needed, got 0"),
+        ("--modes 2 --near-hz nan", "a positive number is needed, got NaN"),
         ("--modes 2 --plot x.svg", "--plot"),
     ] {
         let refused = refused(home.path(), &format!("modal chain/chain.json {rest}"));
@@ -137,7 +138,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
     chain(home.path(), 100, "");
     let described = fs::read_to_string(home.path().join("chain/chain.json")).unwrap();
     for (from, to, expected) in [
-        ("\"from-rest\"", "\"periodic\"", "its periodic response is not computed"),
+        ("\"from-rest\"", "\"periodic\"", "schemes do not find its periodic response"),
         ("k.mtx", "lost.mtx", "lost.mtx"),
         ("\"mass\": \"m.mtx\"", "\"mass\": 3", "100"),
         ("\"stiffness\": \"k.mtx\"", "\"stiffness\": [[1]]", "the"),
@@ -153,7 +154,45 @@ fn what_a_large_machine_does_not_have_is_refused() {
         assert!(refused.contains(expected), "{to}: {refused}");
     }
     fs::write(home.path().join("chain/chain.json"), described).unwrap();
+    chain(home.path(), 400, "");
     let refused = refused(home.path(), "modal chain/chain.json");
-    assert!(refused.contains("100 degrees of freedom in Matrix Market files"), "{refused}");
+    assert!(refused.contains("400 degrees of freedom in Matrix Market files"), "{refused}");
+    assert!(refused.contains("modal --modes"), "{refused}");
     assert!(!home.path().join("x.csv").exists());
+}
+
+/// Judge: the limit of central differences, 2 over the highest frequency 60 sin(n π / 2(n + 1)) rad/s, less what
+/// damping makes of it; and the spectrum of the force in the equations of motion.
+#[test]
+fn a_large_machine_has_a_steady_state_and_largest_steps() {
+    let home = tempfile::tempdir().unwrap();
+    let n = 100;
+    chain(home.path(), n, r#", "outputs": [1, 2, 3]"#);
+    let told = mechid(home.path(), "stability chain/chain.json --step 0.1 --json");
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let limit = |name: &str| {
+        let mut schemes = told["schemes"].as_array().unwrap().iter();
+        let scheme = schemes.find(|s| s["name"].as_str().unwrap().starts_with(name)).unwrap();
+        scheme["machine"]["critical_step_s"].as_f64()
+    };
+    let exact = 2.0 / (60.0 * (n as f64 * PI / (2 * (n + 1)) as f64).sin());
+    let found = limit("central difference").unwrap();
+    assert!((found / exact - 1.0).abs() < 0.01, "{found} {exact}");
+    assert_eq!(limit("Houbolt"), None);
+
+    let path = home.path().join("chain/chain.json");
+    let described = fs::read_to_string(&path).unwrap();
+    let described = described.replace("from-rest", "periodic").replace("newmark", "exact");
+    fs::write(&path, described).unwrap();
+    mechid(home.path(), "simulate chain/chain.json --output steady.csv");
+    let read = |name: &str| column(home.path(), "steady.csv", name);
+    let [x1, x2, x3] = [1, 2, 3].map(|at| read(&format!("displacement_{at}")));
+    let [v1, v2, v3] = [1, 2, 3].map(|at| read(&format!("velocity_{at}")));
+    let (a, force) = (read("acceleration_2"), read("force_2"));
+    let largest = force.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
+    for k in 0..force.len() {
+        let inner =
+            a[k] + 0.2 * v2[k] - 0.1 * (v1[k] + v3[k]) + 1800.0 * x2[k] - 900.0 * (x1[k] + x3[k]);
+        assert!((inner - force[k]).abs() < 1e-9 * largest, "{k}: {inner} {}", force[k]);
+    }
 }

@@ -202,7 +202,7 @@ fn real_part(system: &SparseSystem, shift: Complex<f64>) -> (CsrMatrix<f64>, Vec
 }
 
 /// K + σC + σ²M, and the sizes of the sums' terms row by row.
-fn dynamic_stiffness(
+pub(crate) fn dynamic_stiffness(
     system: &SparseSystem,
     shift: Complex<f64>,
 ) -> (CscMatrix<Complex<f64>>, Vec<f64>) {

@@ -10,9 +10,9 @@ mod summary;
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
-    AllowUnstable, Convention, IntegrateError, SampledForce, Scheme, SelectedDofs,
+    AllowUnstable, Convention, IntegrateError, Matrices, SampledForce, Scheme, SelectedDofs,
     SystemWithForces, TermForces, integrate, integrate_periodic, integrate_selected,
-    periodic_orbit,
+    periodic_orbit, sparse_steady_state,
 };
 use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
@@ -78,6 +78,14 @@ impl SimulatedSystem {
         }
     }
 
+    /// M, C and K for a scheme.
+    pub fn matrices(&self) -> Matrices<'_> {
+        match self {
+            Self::Dense(system) => Matrices::Dense(system),
+            Self::Sparse(system) => Matrices::Sparse(system),
+        }
+    }
+
     /// The system, if all entries of its matrices are stored.
     pub fn dense(&self) -> Option<&SecondOrderSystem> {
         match self {
@@ -117,7 +125,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         None if experiment.response != ResponseKind::Periodic => {
             return Err(SimulateError::ExactFromRest);
         }
-        None => machine.exact_periodic(&period)?,
+        None => machine.exact_periodic(experiment, &period)?,
         Some(scheme) => {
             let within = scheme.inner_instant();
             let middle = within.map(|part| match interpolated(experiment, &period, part)? {
@@ -205,7 +213,7 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
     refuse_unstable_periodic(experiment, instability)?;
     let Some(scheme) = scheme(experiment)? else {
         return match experiment.response {
-            ResponseKind::Periodic => machine.exact_periodic(force),
+            ResponseKind::Periodic => machine.exact_periodic(experiment, force),
             ResponseKind::FromRest | ResponseKind::From(_) => Err(SimulateError::ExactFromRest),
         };
     };
@@ -242,10 +250,19 @@ impl Described {
         }
     }
 
-    fn exact_periodic(&self, force: &Record) -> Result<Response, SimulateError> {
-        match &self.nonlinear {
-            None => Ok(exact_periodic(self.dense()?, force)?),
-            Some(_) => Err(SimulateError::ExactNonlinear),
+    fn exact_periodic(
+        &self,
+        experiment: &Experiment,
+        force: &Record,
+    ) -> Result<Response, SimulateError> {
+        match (&self.nonlinear, &self.linear) {
+            (Some(_), _) => Err(SimulateError::ExactNonlinear),
+            (None, SimulatedSystem::Dense(system)) => Ok(exact_periodic(system, force)?),
+            (None, SimulatedSystem::Sparse(system)) => {
+                let (forced, observed) = (experiment.forced()?, experiment.outputs()?);
+                let dofs = SelectedDofs { forced: &forced, observed: &observed };
+                Ok(sparse_steady_state(system, dofs, force)?)
+            }
         }
     }
 
@@ -352,10 +369,11 @@ pub enum SimulateError {
          newmark or runge-kutta-4, and steps that are short against the fastest motion"
     )]
     ExactNonlinear,
-    /// The periodic response of a sparse machine.
+    /// The periodic response of a sparse machine by a scheme.
     #[error(
-        "the machine has {dof} degrees of freedom in Matrix Market files: its periodic response is not \
-         computed; choose \"response\": \"from-rest\", and a record that is long against the decay"
+        "the machine has {dof} degrees of freedom in Matrix Market files: schemes do not find its periodic \
+         response, which takes a matrix of all entries; choose \"exact\" of a machine without nonlinear terms, \
+         or \"response\": \"from-rest\" and a record that is long against the decay"
     )]
     SparsePeriodic {
         /// Number of degrees of freedom.
