@@ -78,7 +78,7 @@ impl SimulatedSystem {
         }
     }
 
-    /// M, C and K for a scheme.
+    /// M (kg), C (N·s/m) and K (N/m), each n × n, as they are stored.
     pub fn matrices(&self) -> Matrices<'_> {
         match self {
             Self::Dense(system) => Matrices::Dense(system),
