@@ -142,6 +142,25 @@ impl Canvas {
         );
     }
 
+    /// Straight lines apart from one another, as one path: hundreds of them stay a small file.
+    pub fn segments(&mut self, all: impl IntoIterator<Item = (Point, Point)>, stroke: Stroke) {
+        let path: String = all.into_iter().map(|(from, to)| chain(&[from, to])).collect();
+        if !path.is_empty() {
+            self.path(&path, None, Some(stroke));
+        }
+    }
+
+    /// Discs of one radius, in px, and one colour, which is written once.
+    pub fn discs(&mut self, centers: &[Point], radius: f64, color: Color) {
+        let _ = writeln!(self.body, "<g{}>", paint(Some(color), None));
+        let r = num(radius);
+        for (x, y) in centers {
+            let (x, y) = (num(*x), num(*y));
+            let _ = writeln!(self.body, r#"<circle cx="{x}" cy="{y}" r="{r}"/>"#);
+        }
+        self.close_group();
+    }
+
     /// A chain of straight lines.
     pub fn polyline(&mut self, points: &[Point], stroke: Stroke) {
         self.path(&chain(points), None, Some(stroke));

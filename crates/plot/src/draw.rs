@@ -7,7 +7,7 @@ use crate::layout::{Layout, PanelLayout, Place, TICK};
 use crate::legend;
 use crate::marks::{BAND_OPACITY, LEAST_RADIUS, marker, marker_radius};
 use crate::panel::Panel;
-use crate::style::{Color, LABEL_SIZE, PANEL_TITLE_SIZE, Resolved, TICK_SIZE, TITLE_SIZE};
+use crate::style::{Color, LABEL_SIZE, Marker, PANEL_TITLE_SIZE, Resolved, TICK_SIZE, TITLE_SIZE};
 use crate::trace;
 
 /// Height of the middle of a digit above the baseline, as a fraction of the font size.
@@ -66,10 +66,8 @@ fn grid(layout: &PanelLayout, sheet: &mut Canvas) {
                  stroke: Stroke,
                  vertical: bool,
                  sheet: &mut Canvas| {
-        for value in values {
-            let (from, to) = if vertical { down(x.pixel(value)) } else { across(y.pixel(value)) };
-            sheet.line(from, to, stroke);
-        }
+        let line = |value| if vertical { down(x.pixel(value)) } else { across(y.pixel(value)) };
+        sheet.segments(values.map(line), stroke);
     };
     lines(&mut layout.x_ticks.minor.iter().copied(), FINE_GRID, true, sheet);
     lines(&mut layout.y_ticks.minor.iter().copied(), FINE_GRID, false, sheet);
@@ -117,8 +115,12 @@ fn draw_curve(
         draw_stems(panel, layout, &points, style.color, sheet);
     }
     if curve.has_markers() && (curve.kind != Kind::Stems || radius > LEAST_RADIUS) {
-        for point in trace::thin_markers(points.clone(), layout.size.0, radius) {
-            marker(sheet, style.marker, point, radius, style.color);
+        let markers = trace::thin_markers(points.clone(), layout.size.0, radius);
+        match style.marker {
+            Marker::Circle => sheet.discs(&markers, radius, style.color),
+            shape => markers
+                .into_iter()
+                .for_each(|point| marker(sheet, shape, point, radius, style.color)),
         }
     }
     if curve.has_line() {
@@ -139,9 +141,8 @@ fn draw_stems(
     let stems = trace::thin_stems(points, base);
     // Hundreds of wide stems would merge into one block.
     let width = (layout.size.0 / stems.len() as f64 * 0.5).clamp(0.5, 1.3);
-    for (x, y) in stems {
-        sheet.line((x, base), (x, y), Stroke::solid(color, width));
-    }
+    let stems = stems.into_iter().map(|(x, y)| ((x, base), (x, y)));
+    sheet.segments(stems, Stroke::solid(color, width));
 }
 
 fn axes(panel: &Panel, layout: &PanelLayout, sheet: &mut Canvas) {

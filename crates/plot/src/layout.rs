@@ -321,8 +321,12 @@ fn ranges(figure: &Figure, columns: usize) -> Result<Vec<Ranges>, PlotError> {
     };
     let mut ranges = Vec::with_capacity(figure.panels.len());
     for (index, panel) in figure.panels.iter().enumerate() {
-        let extent = if figure.share_x { common(index) } else { extents[index] };
-        let (x, y) = (panel.x_range(extent), panel.y_range());
+        let column = || figure.panels.iter().skip(index % columns).step_by(columns);
+        let (extent, markers) = match figure.share_x {
+            true => (common(index), column().any(Panel::has_markers)),
+            false => (extents[index], panel.has_markers()),
+        };
+        let (x, y) = (panel.x_range(extent, markers), panel.y_range());
         for (axis, (low, high)) in [(&panel.x, x), (&panel.y, y)] {
             // Numbers near the ends of f64 leave no room for a margin or have no finite difference.
             let length = axis.scale.forward(high) - axis.scale.forward(low);

@@ -192,10 +192,15 @@ impl Panel {
         extent(self.curves.iter().flat_map(|curve| curve.x.iter().copied()).chain(references))
     }
 
-    /// The abscissae the panel shows when all points lie in `extent`.
-    pub(crate) fn x_range(&self, extent: (f64, f64)) -> (f64, f64) {
-        // Lines run from edge to edge; a marker or a stem needs room to stand.
-        let margin = if self.curves.iter().any(Curve::has_markers) { 0.03 } else { 0.0 };
+    /// Returns whether a marker or a stem needs room to stand beside the outermost points.
+    pub(crate) fn has_markers(&self) -> bool {
+        self.curves.iter().any(Curve::has_markers)
+    }
+
+    /// The abscissae the panel shows when all points lie in `extent`, with room for markers or not.
+    pub(crate) fn x_range(&self, extent: (f64, f64), markers: bool) -> (f64, f64) {
+        // Lines run from edge to edge.
+        let margin = if markers { 0.03 } else { 0.0 };
         self.x.range.unwrap_or_else(|| {
             let (low, high) = padded(self.x.scale, extent.0, extent.1, margin);
             // Positive times and frequencies do not get an axis with negative ones.

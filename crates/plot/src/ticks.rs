@@ -25,7 +25,10 @@ fn linear(low: f64, high: f64, wanted: f64, step: Option<f64>) -> Ticks {
     // A step that gives more than forty labels is not used.
     let step = step
         .filter(|step| *step > 0.0 && step.is_finite() && (high - low) / step <= 40.0)
-        .unwrap_or_else(|| step_of_two_ticks(low, high, nice_step((high - low) / wanted)));
+        .unwrap_or_else(|| {
+            let usual = step_of_two_ticks(low, high, nice_step((high - low) / wanted));
+            step_to_the_ends(low, high, wanted, usual)
+        });
     let exponent = common_exponent(low.abs().max(high.abs()));
     let unit = 10f64.powi(exponent);
     let decimals = decimals(step / unit);
@@ -52,6 +55,26 @@ fn multiples(low: f64, high: f64, step: f64) -> (f64, usize) {
 fn step_of_two_ticks(low: f64, high: f64, step: f64) -> f64 {
     let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
     finer.take(3).find(|step| multiples(low, high, *step).1 >= 2).unwrap_or(step)
+}
+
+/// Part of an axis beyond its last tick, at either end, above which finer steps are tried.
+const END: f64 = 0.1;
+
+/// Number of ticks over the number wanted, up to which they may be finer to reach the ends.
+const CROWDED: f64 = 1.6;
+
+/// Returns `step`, or one of the next finer ones whose ticks come nearer to the ends of the axis, if they have room.
+fn step_to_the_ends(low: f64, high: f64, wanted: f64, step: f64) -> f64 {
+    let near = |step: &f64| {
+        let (first, count) = multiples(low, high, *step);
+        let last = (first + count as f64 - 1.0) * step;
+        count > 0 && (first * step - low).max(high - last) <= END * (high - low)
+    };
+    let finer = std::iter::successors(Some(step), |step| Some(nice_step(step / 2.6)));
+    let mut finer = finer
+        .take(3)
+        .filter(|fine| *fine == step || multiples(low, high, *fine).1 as f64 <= CROWDED * wanted);
+    finer.find(near).unwrap_or(step)
 }
 
 /// The least of 1, 2, 5 × 10ⁿ that is not below `rough`.
@@ -90,11 +113,36 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         return short_logarithmic(low, high, wanted, &inside, first..=last);
     }
     let stride = (decades.len() as f64 / wanted).ceil().max(1.0) as i32;
-    let words = decades.iter().all(|n| (-2..=3).contains(n));
+    let words = decades.iter().all(|n| (-2..=4).contains(n));
     let label = |n: i32| {
         if words { plain(10f64.powi(n), (-n).max(0) as usize) } else { power(n) }
     };
     let (mut major, mut minor) = (Vec::new(), Vec::new());
+    let span = (high / low).log10();
+    if stride == 1 && 2.0 * span <= wanted {
+        let label = |value: f64| {
+            let n = (value * (1.0 + 1e-9)).log10().floor() as i32;
+            match (value / 10f64.powi(n)).round() as i32 {
+                1 => label(n),
+                _ if words => plain(value, (-n).max(0) as usize),
+                digit => format!("{digit}×{}", power(n)),
+            }
+        };
+        let labelled = subdivisions(first..=last, &[1, 2, 5]).filter(|value| inside(*value));
+        let mut labelled: Vec<f64> = labelled.collect();
+        // As many as have room; otherwise powers of ten, and the ends.
+        if labelled.len() as f64 > wanted {
+            let ends = [labelled.first().copied(), labelled.last().copied()];
+            let is_decade = |value: f64| decades.iter().any(|n| is_same(value, 10f64.powi(*n)));
+            labelled.retain(|value| ends.contains(&Some(*value)) || is_decade(*value));
+        }
+        let unlabelled = subdivisions(first..=last, &[1, 2, 3, 4, 5, 6, 7, 8, 9]).filter(|value| {
+            inside(*value) && !labelled.iter().any(|other| is_same(*other, *value))
+        });
+        minor.extend(unlabelled);
+        major.extend(labelled.iter().map(|value| (*value, label(*value))));
+        return Ticks { major, minor, factor: None };
+    }
     for &n in &decades {
         if n.rem_euclid(stride) == 0 {
             major.push((10f64.powi(n), label(n)));
@@ -108,6 +156,11 @@ fn logarithmic(low: f64, high: f64, wanted: f64) -> Ticks {
         );
     }
     Ticks { major, minor, factor: None }
+}
+
+/// Returns whether two ticks are one.
+fn is_same(a: f64, b: f64) -> bool {
+    (a / b - 1.0).abs() < 1e-6
 }
 
 /// Less than a decade between labelled powers: label 1, 2, 5 inside the decade, or a linear choice when that is too few.
@@ -178,6 +231,11 @@ mod tests {
             labels(&linear(1.9, 4.1, 11.0, None)),
             ["2.0", "2.2", "2.4", "2.6", "2.8", "3.0", "3.2", "3.4", "3.6", "3.8", "4.0"]
         );
+        // Steps of 50 would end at 200.
+        let to_the_end = linear(0.0, 249.0, 11.0, None);
+        assert_eq!(to_the_end.major.last().unwrap().1, "240");
+        // In a narrow axis they have no room.
+        assert_eq!(labels(&linear(0.0, 249.0, 4.0, None)), ["0", "100", "200"]);
         // ±50 lie outside, and 0 alone would not tell how long the axis is.
         assert_eq!(labels(&linear(-44.7, 44.7, 2.0, None)), ["−40", "−20", "0", "20", "40"]);
         let small = linear(-2.1e-4, 2.1e-4, 4.0, None);
@@ -187,6 +245,18 @@ mod tests {
         assert_eq!(
             (labels(&large), large.factor.as_deref()),
             (vec!["0.0", "0.5", "1.0", "1.5", "2.0"], Some("×10^{6}"))
+        );
+    }
+
+    #[test]
+    fn short_logarithmic_axes_are_labelled_to_their_ends() {
+        let lifted = logarithmic(1.8e-5, 6e-3, 6.0);
+        assert_eq!(labels(&lifted), ["2×10^{−5}", "10^{−4}", "10^{−3}", "5×10^{−3}"]);
+        // Each is drawn once, labelled or not: 17 of the three decades.
+        assert_eq!(lifted.major.len() + lifted.minor.len(), 8 + 9 + 6);
+        assert_eq!(
+            labels(&logarithmic(20.0, 2e4, 12.0)),
+            ["20", "50", "100", "200", "500", "1000", "2000", "5000", "10000", "20000"]
         );
     }
 
@@ -202,6 +272,7 @@ mod tests {
             ["10^{−12}", "10^{−9}", "10^{−6}", "10^{−3}", "10^{0}"]
         );
         assert_eq!(labels(&logarithmic(1.5, 60.0, 6.0)), ["2", "5", "10", "20", "50"]);
+        assert_eq!(labels(&logarithmic(2.4, 155.0, 11.0)), ["5", "10", "20", "50", "100"]);
         assert_eq!(labels(&logarithmic(5.1, 5.9, 5.0)), ["5.2", "5.4", "5.6", "5.8"]);
     }
 }
