@@ -22,16 +22,21 @@ const UNEVEN: f64 = 4.0;
 /// Level over the largest one from which the band is driven.
 const DRIVEN: f64 = 0.01;
 
+/// Standard deviation of noise over the RMS of the signal, below which it is none: it moves no parameter.
+const NOTHING: f64 = 1e-5;
+
 /// Mean of the squares of Hann's window.
 const HANN: f64 = 0.375;
 
 /// Standard deviation of the noise of each channel, in its unit, from the lines above the band that the signal
-/// drives; `None` where it drives all of them, or where they are too few (about 500 samples) to tell.
+/// drives; `None` where it drives all of them, where their spectrum falls off slowly, or where they are too few (about
+/// 500 samples) to tell.
 ///
 /// The spectrum under Hann's window, in means over 64 lines, has to be even over three of them at least below half
 /// the sampling rate, and there to have less than a hundredth of the power that it has in the band. The noise is
 /// taken to be as strong in the band: it is an upper bound where something else is left above the band, and a lower
-/// one where a filter takes noise away there. A channel of zeros has no noise.
+/// one where a filter takes noise away there. Where any of these means is so small that noise as strong as that is
+/// below 10⁻⁵ of the RMS of the signal, it is the level, even or not. A channel of zeros has no noise.
 ///
 /// ```
 /// use mechid_signal::{NoiseLevel, Record, Sampling, noise, noise_above_band};
@@ -68,18 +73,30 @@ pub fn noise_above_band(record: &Record) -> Result<Vec<Option<f64>>, SignalError
         // Without the constant and half the sampling rate.
         let powers: Vec<f64> =
             (1..samples.div_ceil(2)).map(|n| spectrum.line(n, channel).norm_sqr()).collect();
-        even_level(&powers).map(|level| (level * samples as f64 / (4.0 * HANN)).sqrt())
+        let deviation = |level: f64| (level * samples as f64 / (4.0 * HANN)).sqrt();
+        // Of noise alone no mean could be lower: what is uneven is leakage.
+        let rms = record.column(channel).variance().sqrt();
+        let lowest = levels(&powers).into_iter().map(deviation).reduce(f64::min);
+        let none = lowest.filter(|lowest| *lowest <= NOTHING * rms);
+        none.or_else(|| even_level(&levels(&powers)).map(deviation))
     };
     Ok((0..record.channels()).map(of_channel).collect())
 }
 
+fn mean(powers: &[f64]) -> f64 {
+    powers.iter().sum::<f64>() / powers.len() as f64
+}
+
+/// Mean powers of lines, the highest ones first.
+fn levels(powers: &[f64]) -> Vec<f64> {
+    powers.rchunks_exact(LINES).map(mean).collect()
+}
+
 /// Mean power of the highest lines as far as it is even, if they are not driven.
-fn even_level(powers: &[f64]) -> Option<f64> {
-    let mean = |lines: &[f64]| lines.iter().sum::<f64>() / lines.len() as f64;
-    let levels: Vec<f64> = powers.rchunks_exact(LINES).map(mean).collect();
+fn even_level(levels: &[f64]) -> Option<f64> {
     let strongest = levels.iter().copied().fold(0.0, f64::max);
     let mut alike = 0;
-    for level in &levels {
+    for level in levels {
         let so_far = mean(&levels[..alike.max(1)]);
         if *level > FACTOR * so_far || level * FACTOR < so_far {
             break;
@@ -127,7 +144,7 @@ mod tests {
     #[test]
     fn without_noise_next_to_nothing_is_left() {
         let found = noise_above_band(&force(8192, 0.0, 1)).unwrap()[0];
-        assert!(found.is_none_or(|level| level < 1e-6), "{found:?}");
+        assert!(found.is_some_and(|level| level < 1e-6), "{found:?}");
     }
 
     #[test]

@@ -105,9 +105,9 @@ impl ForceNoise {
         let all: Vec<(Option<f64>, f64)> = records.iter().flat_map(driven).collect();
         let source = records.first().map(|(_, noise)| noise.source);
         let Some(levels) = all.iter().map(|(level, _)| *level).collect::<Option<Vec<f64>>>() else {
-            return "the force is driven up to half the sampling rate, or the record is too short, so that its \
-                    noise is not known: it is taken for none, and biases the estimate if there is any; state it \
-                    (`force_noise`)"
+            return "the noise of the force is not known, for above the band that it drives its spectrum has no \
+                    even floor (it drives all lines or falls off slowly, or the record is too short): the noise is \
+                    taken for none, and biases the estimate if there is any; state it (`force_noise`)"
                 .into();
         };
         let of = match source {
