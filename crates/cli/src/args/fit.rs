@@ -9,7 +9,7 @@ use mechid::analysis::identify::{
     IdentifyResponses, KnownMass, LeftOut, LineChoice, Method, Nonlinear, Refinement, ResponseFit,
     SampleFit, Structure, ValidationWindow,
 };
-use mechid::analysis::{Channels, Segmentation, Window};
+use mechid::analysis::{Segmentation, Window};
 use mechid::estimate::frequency_domain::Pooling;
 use mechid::estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
@@ -88,11 +88,6 @@ pub struct FitArgs {
     structure: Vec<Form>,
     #[command(flatten)]
     hits: HitArgs,
-    /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
-    /// them all
-    #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one,
-          help_heading = "Hammer tests")]
-    struck: Vec<usize>,
     #[command(flatten)]
     nonlinear: NonlinearArgs,
     #[command(flatten)]
@@ -323,7 +318,7 @@ impl FitArgs {
     /// Reads the records, identifies the machine, and predicts the validation record.
     pub fn identify(&self) -> Result<Identified, CliError> {
         self.check_options()?;
-        let channels = self.channels_of_records()?;
+        let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
         let first = self.input.open(&channels[0])?;
         let mut records = vec![first.clone()];
         for &start in &self.more_starts {
@@ -349,18 +344,6 @@ impl FitArgs {
         let other = identified.validation_window(other, &ValidationWindow { start, samples })?;
         identified.add_validation(&other)?;
         Ok(identified)
-    }
-
-    /// Returns the columns of each record.
-    fn channels_of_records(&self) -> Result<Vec<Channels>, CliError> {
-        let (channels, records) = (self.channels.channels(), 1 + self.more.len());
-        if self.struck.is_empty() {
-            channels.check_pairs()?;
-            return Ok(vec![channels; records]);
-        }
-        let of_records = channels.struck(&self.struck, records)?;
-        of_records.iter().try_for_each(Channels::check_pairs)?;
-        Ok(of_records)
     }
 
     /// Identifies the machine from tables of frequency responses, if the files are such.

@@ -1,9 +1,10 @@
 //! Arguments of hammer tests.
 
 use clap::Args;
-use mechid::analysis::HitRule;
+use mechid::analysis::{Channels, HitRule};
 
 use super::at_least_one;
+use crate::error::CliError;
 
 /// Hits of a hammer.
 #[derive(Debug, Args)]
@@ -32,9 +33,27 @@ pub struct HitArgs {
     /// Samples of a hit, those before it included [default: up to the next hit]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one, requires = "hits")]
     hit_samples: Option<usize>,
+    /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
+    /// them all
+    #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
+    struck: Vec<usize>,
 }
 
 impl HitArgs {
+    /// Returns the columns of each of some records, with the force where it is struck.
+    pub fn channels_of(
+        &self,
+        channels: &Channels,
+        records: usize,
+    ) -> Result<Vec<Channels>, CliError> {
+        let of_records = match self.struck.is_empty() {
+            true => vec![channels.clone(); records],
+            false => channels.struck(&self.struck, records)?,
+        };
+        of_records.iter().try_for_each(Channels::check_pairs)?;
+        Ok(of_records)
+    }
+
     /// Returns the rule by which hits are found, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
         let usual = HitRule::default();

@@ -25,6 +25,7 @@ use crate::outcome::{Files, Outcome};
       --estimator hv --band-hz 5:400 --output frf.csv
   mechid frf a.csv b.csv --force f --acceleration a --segment 1024 --plot frf.svg
   mechid frf hammer.csv --force f --acceleration a --hits --exponential-percent 1
+  mechid frf point1.csv point2.csv --force f --struck 1,2 --acceleration a1,a2 --hits
   mechid frf rotor.csv --force fx,fy --displacement x,y --period 512 --json")]
 pub struct FrfArgs {
     #[command(flatten)]
@@ -84,8 +85,7 @@ impl FrfArgs {
 
     /// Reads, averages, and reports.
     pub fn run(&self) -> Result<Outcome, CliError> {
-        let channels = self.channels.channels();
-        channels.check_pairs()?;
+        let channels = self.hits.channels_of(&self.channels.channels(), 1 + self.more.len())?;
         let how = FrfSettings {
             estimator: self.estimator.into(),
             lines: self.lines.choice(),
@@ -94,9 +94,9 @@ impl FrfArgs {
             hits: self.hits.rule(),
             exponential_percent: self.exponential_percent,
         };
-        let mut records = vec![self.input.open(&channels)?];
-        for record in &self.more {
-            records.push(self.input.open_other(record, &channels, self.input.window())?);
+        let mut records = vec![self.input.open(&channels[0])?];
+        for (record, channels) in self.more.iter().zip(&channels[1..]) {
+            records.push(self.input.open_other(record, channels, self.input.window())?);
         }
         let table = mechid::frf_of_records(&records, &how)?;
         let mut outcome = Outcome::new(table.to_string(), &table)?

@@ -4,6 +4,7 @@ mod bearing;
 mod checks;
 mod fleet;
 mod forces;
+mod hammer;
 mod identification;
 mod info;
 mod large;
