@@ -15,7 +15,7 @@ pub use self::measured::Drawn;
 use self::measured::{OnTheWay, Shown, Span, measured};
 pub use self::summary::RecordSummary;
 use crate::AnalysisError;
-use crate::measurement::units::doubtful_time;
+use crate::measurement::units::{contradicted_rate, doubtful_time};
 use crate::measurement::{Detrend, IN_MEMORY_SAMPLES, Reading, Window};
 
 /// Number of columns drawn at most.
@@ -141,6 +141,7 @@ impl Inspection<'_> {
         summary.remarks.extend(dt.zip(time).and_then(|(dt, time)| {
             doubtful_time(table, &time, signal::Sampling::new(dt, samples).ok()?)
         }));
+        summary.remarks.extend(contradicted_rate(table, self.reading));
         let mut drawn = Vec::new();
         if let (Some(window), false) = (window, shown.is_empty()) {
             summary.remarks.extend(window.looked_at(table.file()));

@@ -96,6 +96,34 @@ impl Channels {
         named(self.response(kind), &kind.to_string(), dof)
     }
 
+    /// Returns the kind of response that is named first, of displacement, velocity and acceleration.
+    pub fn first_response(&self) -> Option<ResponseQuantity> {
+        ResponseQuantity::ALL.into_iter().find(|kind| !self.response(*kind).is_empty())
+    }
+
+    /// Returns the names in several records of the same machine put together: a force has the name from the first
+    /// record in which it acts, and one that acts at several places in turn, as a hammer does, that of its place,
+    /// too: `force at a1`.
+    pub(crate) fn together(records: &[&Self]) -> Self {
+        let mut all = records.first().map(|first| Self::clone(first)).unwrap_or_default();
+        for (dof, name) in all.force.iter_mut().enumerate() {
+            let mut acting = records.iter().filter_map(|record| record.force.get(dof));
+            if let Some(found) = acting.find(|name| *name != ABSENT) {
+                name.clone_from(found);
+            }
+        }
+        let Some(kind) = all.first_response() else { return all };
+        let force = (0..all.force.len()).map(|dof| {
+            let name = &all.force[dof];
+            let roves = all.force.iter().filter(|other| *other == name).count() > 1;
+            match roves && name != ABSENT {
+                true => format!("{name} at {}", all.response_name(kind, dof)),
+                false => name.clone(),
+            }
+        });
+        Self { force: force.collect(), ..all.clone() }
+    }
+
     /// Returns the columns of some records in which one force acts, each on another degree of freedom (`dofs`,
     /// one per record, counted from 1), as that of a hammer does.
     ///

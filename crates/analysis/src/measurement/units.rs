@@ -1,8 +1,9 @@
 //! Conversion of columns to SI units, and time axes in a doubtful unit.
 
-use mechid_io::{Quantity, Table, TimeAxis, Unit};
-use mechid_signal::Sampling;
+use mechid_io::{Quantity, Table, TimeAxis, Unit, escaped};
+use mechid_signal::{Sampling, message};
 
+use super::Reading;
 use crate::AnalysisError;
 use crate::text::compact;
 
@@ -77,6 +78,28 @@ impl ToSi {
     pub fn factor(&self, column: usize) -> f64 {
         self.factors.get(column).copied().unwrap_or(1.0)
     }
+}
+
+/// Relative difference of two sampling rates that are one: a time column is printed with some digits.
+const SAME_RATE: f64 = 1e-4;
+
+/// Returns a remark if the sampling rate that was asked for is not that of the file: of its time column, or of a number
+/// that states it by its name (`Fs`).
+pub(crate) fn contradicted_rate(table: &Table, reading: &Reading) -> Option<String> {
+    let rate_hz = reading.sample_rate_hz?;
+    let of_file = Reading { sample_rate_hz: None, ..reading.clone() };
+    let time = of_file.time_axis(table)?;
+    let own_hz = table.sampling(&time, &[] as &[&str]).ok()?.rate_hz();
+    if (own_hz - rate_hz).abs() <= SAME_RATE * rate_hz {
+        return None;
+    }
+    let source = match (&time, table.stated_rate()) {
+        (TimeAxis::Column(name), _) => format!("column {}", table.label(table.find(name).ok()?)),
+        (_, Some((name, value))) => format!("{} = {}", escaped(name), message::number(*value)),
+        _ => return None,
+    };
+    let [rate, own] = [rate_hz, own_hz].map(|hz| compact(hz, 8));
+    Some(format!("{}: `sample_rate` {rate} Hz is used; {source} says {own} Hz", table.file()))
 }
 
 /// Sampling rate, in Hz, below which a time column without a unit is doubtful whatever its length:

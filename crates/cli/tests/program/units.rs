@@ -144,6 +144,9 @@ fn milliseconds_that_do_not_say_so_are_asked_about() {
         let told = |file: &str| mechid(folder, &call.replace("RECORD", file));
         assert!(told("bare.csv").contains(asked), "{call}: {}", told("bare.csv"));
         let rate = told("bare.csv --sample-rate 128");
+        let contradicted = "bare.csv: --sample-rate 128 Hz is used; column 1 \"t\" says 0.128 Hz";
+        assert!(rate.contains(contradicted), "{call}: {rate}");
+        assert!(!told("si.csv --sample-rate 128").contains("is used"), "{call}");
         for told in [told("said.csv"), told("si.csv"), rate] {
             assert!(!told.contains("has no unit"), "{call}: {told}");
         }

@@ -1,0 +1,104 @@
+//! Settings for reading a record file.
+
+use std::path::{Path, PathBuf};
+
+use mechid_io::{Limits, ReadOptions, RecordFile, Table, TimeAxis};
+use serde::{Deserialize, Serialize};
+
+#[cfg(feature = "parquet")]
+use super::many;
+use super::{Channels, Measurement, Window};
+use crate::AnalysisError;
+
+/// Settings for reading a record file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Reading {
+    /// Number of header lines to skip above a table of text.
+    pub skip_lines: u64,
+    /// Time column, by name or number counted from 1; `None`: the file's own time axis, or a column
+    /// called time or t.
+    pub time: Option<String>,
+    /// Sampling rate, in Hz, where there is no time column.
+    pub sample_rate_hz: Option<f64>,
+    /// Constant to subtract from every channel.
+    pub detrend: Detrend,
+    /// Column whose value names the record of each row, where a Parquet file holds many records.
+    pub record_column: Option<String>,
+    /// Record to read of such a file, by its value in that column; `None`: the only one.
+    pub record_id: Option<String>,
+    /// Factor by which to raise the limits on what a file may ask of memory ([`mechid_io::Limits`]);
+    /// `None`: 1.
+    pub limits_factor: Option<usize>,
+}
+
+/// Constant to subtract from a channel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Detrend {
+    /// No constant.
+    #[default]
+    None,
+    /// The mean of the whole record, not only of the window.
+    Mean,
+}
+
+impl Reading {
+    /// Opens a record file, of whose text at most `rows` rows are held in memory.
+    ///
+    /// # Errors
+    /// As [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
+    /// for, or several and none is asked for.
+    pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
+        #[cfg(feature = "parquet")]
+        if let Some(column) = &self.record_column {
+            return many::open_one(self, path, column);
+        }
+        #[cfg(not(feature = "parquet"))]
+        if self.record_column.is_some() {
+            let why = "this program was compiled without Parquet".into();
+            return Err(AnalysisError::Setting { setting: "record_column", why });
+        }
+        let options = ReadOptions { skip_lines: self.skip_lines, limits: self.limits() };
+        Ok(RecordFile::open(path, &options, rows)?)
+    }
+
+    pub(super) fn limits(&self) -> Limits {
+        Limits::DEFAULT.times(self.limits_factor.unwrap_or(1))
+    }
+
+    /// Returns the time axis asked for, that of the file, or the time column found by its name.
+    pub fn time_axis<'a>(&'a self, table: &'a Table) -> Option<TimeAxis<'a>> {
+        match (self.sample_rate_hz, &self.time) {
+            (Some(rate_hz), _) => Some(TimeAxis::RateHz(rate_hz)),
+            (None, Some(column)) => Some(TimeAxis::Column(column)),
+            (None, None) if table.has_time_axis() => Some(TimeAxis::OfFile),
+            (None, None) => table.time_column().map(TimeAxis::Column),
+        }
+    }
+}
+
+/// A record file with all that says what is in it: the saved form of a [`Measurement`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RecordPlan {
+    /// The file; `-` is standard input.
+    pub path: PathBuf,
+    /// Columns of force and response.
+    pub channels: Channels,
+    /// Settings for reading the file.
+    pub reading: Reading,
+    /// Samples to use.
+    pub window: Window,
+}
+
+impl RecordPlan {
+    /// Opens the record.
+    ///
+    /// # Errors
+    /// As [`Measurement::open_with`].
+    pub fn open(&self) -> Result<Measurement, AnalysisError> {
+        let measurement = Measurement::open_with(&self.path, &self.channels, &self.reading)?;
+        Ok(Measurement { window: self.window.clone(), ..measurement })
+    }
+}
