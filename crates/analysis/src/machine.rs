@@ -4,14 +4,18 @@ use std::path::Path;
 
 use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, identified_modes};
-use mechid_io::{ParameterCovariance, input_name, read_covariance, read_nonlinear, read_system};
+use mechid_io::{
+    ParameterCovariance, input_name, read_covariance, read_json, read_nonlinear, read_system,
+};
 use mechid_model::{
     NonlinearParameter, NonlinearSystem, Parameter, SecondOrderSystem, Terms,
     UncertainNonlinearSystem, UncertainSystem,
 };
 use nalgebra::DMatrix;
+use serde::Deserialize;
 
 use crate::AnalysisError;
+use crate::measurement::Channels;
 
 /// A system with the covariance of its parameters, where it was identified.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,6 +28,9 @@ pub struct Machine {
     pub degrees_of_freedom: usize,
     /// The system with its nonlinear terms; `None` for a linear one.
     pub nonlinear: Option<NonlinearPart>,
+    /// Names of the channels that the system was identified from, one per degree of freedom; empty if they are
+    /// not known.
+    pub names: Channels,
 }
 
 /// A system with nonlinear terms, as its channels show it.
@@ -50,7 +57,13 @@ impl Machine {
     /// Takes a system as exactly known.
     pub fn known(system: SecondOrderSystem) -> Self {
         let uncertain = UncertainSystem::exact(system);
-        Self { name: "the system".into(), uncertain, degrees_of_freedom: 0, nonlinear: None }
+        Self {
+            name: "the system".into(),
+            uncertain,
+            degrees_of_freedom: 0,
+            nonlinear: None,
+            names: Channels::default(),
+        }
     }
 
     /// Takes what was identified, with the covariance of its parameters.
@@ -63,12 +76,13 @@ impl Machine {
             uncertain: estimate.uncertain_system()?,
             degrees_of_freedom: estimate.degrees_of_freedom(),
             nonlinear: None,
+            names: Channels::default(),
         })
     }
 
     /// Reads the `system` of a JSON file (`-`: of standard input) and, if it is there, its
-    /// `covariance` and its `nonlinear` terms: the description of an experiment, or the result of an
-    /// identification.
+    /// `covariance`, its `nonlinear` terms and the names of its `channels` or `points`: the description of an
+    /// experiment, or the result of an identification.
     ///
     /// # Errors
     /// [`AnalysisError::Io`] if the file cannot be read, [`AnalysisError::UnknownParameter`] if the
@@ -76,6 +90,7 @@ impl Machine {
     pub fn read(path: impl AsRef<Path>) -> Result<Self, AnalysisError> {
         let path = path.as_ref();
         let (name, system) = (input_name(path), read_system(path)?);
+        let names = read_json::<Named>(path)?.into_channels();
         let nonlinear = match read_nonlinear(path)? {
             None => None,
             Some(read) => {
@@ -91,7 +106,7 @@ impl Machine {
             }
         };
         let Some(covariance) = read_covariance(path)? else {
-            return Ok(Self { name, nonlinear, ..Self::known(system) });
+            return Ok(Self { name, nonlinear, names, ..Self::known(system) });
         };
         let (nonlinear, covariance) = match nonlinear {
             None => (None, covariance),
@@ -117,7 +132,7 @@ impl Machine {
         let parameters = parameters(&name, &system, &covariance)?;
         let degrees_of_freedom = covariance.degrees_of_freedom;
         let uncertain = UncertainSystem::new(system, parameters, covariance.matrix())?;
-        Ok(Self { name, uncertain, degrees_of_freedom, nonlinear })
+        Ok(Self { name, uncertain, degrees_of_freedom, nonlinear, names })
     }
 
     /// Returns the error for a method that would leave out the nonlinear terms.
@@ -161,6 +176,26 @@ impl Machine {
     /// [`AnalysisError::Estimate`] if the system has no modes.
     pub fn modes(&self) -> Result<Vec<IdentifiedMode>, AnalysisError> {
         Ok(identified_modes(&self.uncertain, self.degrees_of_freedom)?)
+    }
+}
+
+/// Names in the JSON of an identification.
+#[derive(Deserialize)]
+struct Named {
+    /// Of records.
+    channels: Option<Channels>,
+    /// Of frequency responses measured elsewhere, where force and response share them.
+    points: Option<Vec<String>>,
+}
+
+impl Named {
+    fn into_channels(self) -> Channels {
+        let of_points = |points: Vec<String>| Channels {
+            force: points.clone(),
+            displacement: points,
+            ..Channels::default()
+        };
+        self.channels.or(self.points.map(of_points)).unwrap_or_default()
     }
 }
 

@@ -25,6 +25,9 @@ pub struct ModalSummary {
     /// Nonlinear terms that modes of small amplitudes leave out, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear_terms: Option<Terms>,
+    /// Names of the responses, one per degree of freedom; empty if they are not known.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub response_names: Vec<String>,
     /// Modes of the system, by rising frequency.
     pub modes: Vec<ShapedMode>,
     /// Frequency of each mode without damping over its amplitude, as far as the data reached from which
@@ -80,10 +83,20 @@ impl ModalSummary {
             degrees_of_freedom: machine.system().dof(),
             confidence: CONFIDENCE,
             nonlinear_terms: machine.nonlinear.as_ref().map(|p| p.system().terms().clone()),
+            response_names: machine.response_names(),
             modes: ShapedMode::all(&modes, known)?,
             backbone: machine.backbone()?,
             system: SystemMatrices::from(machine.system()),
         })
+    }
+}
+
+impl Machine {
+    /// Returns the names of the responses, one per degree of freedom; none if they are not known.
+    fn response_names(&self) -> Vec<String> {
+        let of =
+            |kind| (0..self.system().dof()).map(move |dof| self.names.response_name(kind, dof));
+        self.names.first_response().map(of).into_iter().flatten().collect()
     }
 }
 
@@ -175,8 +188,14 @@ impl ModalSummary {
             small.collect::<String>(),
             self.mode_table(),
             self.instability(),
-            shape_table(&self.modes, |at| format!("direction {}", at + 1))
+            shape_table(&self.modes, |at| self.name(at))
         ) + &self.backbone_table()
+    }
+
+    /// Returns the name of a degree of freedom, counted from 0.
+    fn name(&self, dof: usize) -> String {
+        let name = self.response_names.get(dof);
+        name.map_or_else(|| format!("direction {}", dof + 1), Clone::clone)
     }
 
     /// Returns a line for each unstable mode; where the interval of its growth rate contains zero, the

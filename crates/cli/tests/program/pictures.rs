@@ -112,8 +112,8 @@ fn a_resonance_is_marked_and_stands_where_it_belongs() {
     let (static_y, peak) = (curve(0)[0].1, 1.0 / (2.0 * 0.05 * (1.0 - 0.05f64.powi(2)).sqrt()));
     let first = 1.0 / ((1.0 - 0.04f64).powi(2) + (2.0 * 0.05 * 0.2f64).powi(2)).sqrt();
     let labels = panels[0].descendants().filter(|n| n.has_tag_name("tspan"));
-    let decades: Vec<f64> =
-        labels.map(|n| n.parent().unwrap().attribute("y").unwrap().parse().unwrap()).collect();
+    let labels = labels.filter_map(|n| n.parent()).filter(|n| n.text() == Some("10"));
+    let decades: Vec<f64> = labels.map(|n| n.attribute("y").unwrap().parse().unwrap()).collect();
     near(static_y - highest.1, (decades[0] - decades[1]) * (peak / first).log10());
     // Force and motion are a quarter of a turn apart at the natural frequency.
     let turned = tick(panels[1], "−90", "end");
@@ -132,9 +132,12 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
     let svg = drawn(folder.path(), "modal two.json");
     // sqrt(k/m) and sqrt(3 k/m) of two equal masses on three equal springs.
     let marks = "natural frequencies, 5.0329, 8.7173 Hz";
-    has(&svg, &["x1/F1", "x1/F2 = x2/F1", "x2/F2", marks]);
+    has(&svg, &["x1 / F1", "x1 / F2 = x2 / F1", "x2 / F2", marks]);
     let svg = drawn(folder.path(), "modal eight.json");
-    has(&svg, &["eight.json, driving points 1 to 6 of 8", "x1/F1", "x6/F6", "natural frequencies"]);
+    has(
+        &svg,
+        &["eight.json, driving points 1 to 6 of 8", "x1 / F1", "x6 / F6", "natural frequencies"],
+    );
     let document = Document::parse(&svg).unwrap();
     for panel in of_class(document.root(), "panel") {
         assert_eq!(of_class(panel, "curve").len(), 6);
@@ -217,8 +220,9 @@ fn a_record_is_drawn_over_time_and_by_frequency() {
     let stems: Vec<Vec<(f64, f64)>> = stems
         .descendants()
         .filter_map(|n| n.attribute("d"))
-        .map(|d| {
-            let numbers = d.split([' ', 'M', 'L']).filter(|part| !part.is_empty());
+        .flat_map(|d| d.split('M').filter(|stem| !stem.is_empty()))
+        .map(|stem| {
+            let numbers = stem.split([' ', 'L']).filter(|part| !part.is_empty());
             let numbers: Vec<f64> = numbers.map(|n| n.parse().unwrap()).collect();
             numbers.chunks(2).map(|pair| (pair[0], pair[1])).collect()
         })
@@ -251,7 +255,7 @@ fn columns_beyond_eight_and_the_time_are_left_out_and_told() {
     );
     // Where there is no time axis; and the column of time, asked for.
     let svg = drawn(folder.path(), "info other.csv --columns clock,2 --start 101");
-    has(&svg, &["1 clock", "Sample", "Frequency (cycles/sample)", "150", "300"]);
+    has(&svg, &["1 clock", "Sample", "Frequency (cycles/sample)", "120", "300"]);
 }
 
 #[test]

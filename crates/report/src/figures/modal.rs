@@ -7,6 +7,7 @@ use mechid_model::SecondOrderSystem;
 use mechid_plot::Figure;
 use mechid_plot::charts::Quantity;
 
+use super::receptance::Names;
 use super::style::{FigureStyle, FrequencyScale};
 use super::trace::Trace;
 use crate::ReportError;
@@ -52,6 +53,7 @@ pub type Resonance = (f64, f64);
 pub fn figure(
     file: &str,
     system: &SecondOrderSystem,
+    names: Names<'_>,
     modes: &[Resonance],
     style: FigureStyle,
 ) -> Result<Figure, ReportError> {
@@ -65,7 +67,7 @@ pub fn figure(
     let frequency_hz = grid(&modes);
     let omega: Vec<f64> = frequency_hz.iter().map(|hz| TAU * hz).collect();
     let receptances = system.receptances(&omega)?;
-    let pairs = pairs(system);
+    let pairs = pairs(system, names);
     let alone = pairs.len() == 1;
     let traces = pairs.into_iter().map(|(i, j, name)| {
         let name = if alone { String::new() } else { name };
@@ -86,9 +88,9 @@ pub fn figure(
 }
 
 /// Returns motion, force, and the name of each curve.
-fn pairs(system: &SecondOrderSystem) -> Vec<(usize, usize, String)> {
+fn pairs(system: &SecondOrderSystem, names: Names<'_>) -> Vec<(usize, usize, String)> {
     let dof = system.dof();
-    let name = |i: usize, j: usize| format!("x{}/F{}", i + 1, j + 1);
+    let name = |i: usize, j: usize| names.pair(i, j);
     if dof > PAIRS {
         return (0..dof.min(DRIVING_POINTS)).map(|i| (i, i, name(i, i))).collect();
     }
