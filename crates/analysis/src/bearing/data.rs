@@ -14,7 +14,8 @@ use super::IdentifyBearing;
 use crate::AnalysisError;
 use crate::identify::Disturbance;
 use crate::identify::left_out::LineRule;
-use crate::identify::tables::{IdentifyResponses, response_data};
+use crate::identify::tables::IdentifyResponses;
+use crate::identify::tabulated::response_data;
 use crate::measurement::{Block, CHUNK_SAMPLES, Hold, Measurement, Windowed};
 
 /// Degrees of freedom from which the noise of a line is known well enough to weight with it: the loss
