@@ -7,9 +7,10 @@ mod whole;
 
 use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
-use mechid_signal::{HitRule, Record, Spectrum};
+use mechid_signal::{HitRule, Record, Spectrum, message};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use self::of_hits::average_of_hits;
 pub use self::table::FrfTable;
 use crate::AnalysisError;
 use crate::identify::left_out::{LeftOut, LineRule};
@@ -333,6 +334,16 @@ impl Responses {
         let [driven, idle] =
             [acting, noise].map(|all| all.iter().map(|input| driven[*input]).collect());
         Ok(Self { frf, lines, driven, idle, segments, counts })
+    }
+
+    /// Returns the number of averages in words, such as `15 segments of 1024 samples`.
+    pub fn averages(&self) -> String {
+        let piece = match self.segments {
+            Segments::Periods(_) => "period",
+            Segments::Windowed { .. } => "segment",
+        };
+        let samples = message::count(self.segments.samples(), "sample");
+        format!("{} of {samples}", message::count(self.counts.iter().sum(), piece))
     }
 
     /// Returns the remark on force channels that show noise only, of a record that is named or not.

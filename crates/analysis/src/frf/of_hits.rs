@@ -30,7 +30,22 @@ pub(super) struct OfHits {
     pub remarks: Vec<String>,
 }
 
-/// Averages the responses to all good hits of some records, each cut to the length of the shortest.
+/// Averages over hits, and what the responses in their windows look like.
+pub(crate) struct AverageOfHits {
+    pub average: FrfAverage,
+    /// Lines of the shortest window.
+    lines: Lines,
+    /// Degrees of freedom that were struck, counted from 0.
+    pub driven: Vec<usize>,
+    segments: Segments,
+    /// Rate at which the exponential window decays, in 1/s.
+    added_decay: Option<f64>,
+    /// RMS of the last part of a window, and before the pulse, over that of the largest part.
+    left: f64,
+    before: f64,
+}
+
+/// Averages the responses to some hits, each cut to the length of the shortest.
 ///
 /// An exponential window exp(−σt) on force and response makes of M, C and K the machine M, C + 2σM and
 /// K + σC + σ²M, exactly: every eigenvalue moves by −σ, and the response at iω is that of the machine at
@@ -38,23 +53,21 @@ pub(super) struct OfHits {
 ///
 /// # Source
 /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
-pub(super) fn of_hits(
-    records: &[Windowed],
-    rule: &HitRule,
+pub(crate) fn average_of_hits(
+    hits: &[Windowed],
     lines: LineRule<'_>,
-    how: &FrfSettings,
-) -> Result<OfHits, AnalysisError> {
-    let cut = cut(records, rule)?;
-    let first = &cut.hits[0].held;
-    let mut driven: Vec<usize> = cut.hits.iter().flat_map(|h| h.held.driven.clone()).collect();
+    exponential_percent: Option<f64>,
+) -> Result<AverageOfHits, AnalysisError> {
+    let first = &hits[0].held;
+    let mut driven: Vec<usize> = hits.iter().flat_map(|h| h.held.driven.clone()).collect();
     driven.sort_unstable();
     driven.dedup();
     let (kind, outputs) = (first.response().1, first.response().0.channels());
-    let len = cut.hits.iter().map(|hit| hit.held.force.len()).min().unwrap_or(0);
+    let len = hits.iter().map(|hit| hit.held.force.len()).min().unwrap_or(0);
     let sampling = first.force.sampling().with_len(len)?;
     let chosen = lines.lines(&first.force.window(0, len)?, len)?;
     let lines = Lines::new(sampling, chosen)?;
-    let added_decay = match how.exponential_percent {
+    let added_decay = match exponential_percent {
         None => None,
         Some(percent) if percent > 0.0 && percent < 100.0 => {
             Some(-(0.01 * percent).ln() / sampling.duration())
@@ -76,7 +89,7 @@ pub(super) fn of_hits(
     let mut average = FrfAverage::new(lines.clone(), [driven.len(), outputs], kind, segments)?;
     let all: Vec<usize> = (0..outputs).collect();
     let (mut left, mut before) = (0.0_f64, 0.0_f64);
-    for hit in &cut.hits {
+    for hit in hits {
         let force = weighted(&hit.held.force, &driven)?;
         let response = weighted(hit.held.response().0, &all)?;
         let pulse = force.data().row_iter().position(|row| row.amax() > 0.0).unwrap_or(0);
@@ -84,6 +97,19 @@ pub(super) fn of_hits(
         left = left.max(over_largest(&response, len - len.div_ceil(PARTS)..len));
         average.push(&force, &response)?;
     }
+    Ok(AverageOfHits { average, lines, driven, segments, added_decay, left, before })
+}
+
+/// Averages the responses to all good hits of some records.
+pub(super) fn of_hits(
+    records: &[Windowed],
+    rule: &HitRule,
+    lines: LineRule<'_>,
+    how: &FrfSettings,
+) -> Result<OfHits, AnalysisError> {
+    let cut = cut(records, rule)?;
+    let averaged = average_of_hits(&cut.hits, lines, how.exponential_percent)?;
+    let AverageOfHits { average, lines, driven, segments, added_decay, left, before } = averaged;
     let frf = average.frf(how.estimator.estimator())?;
     let mut remarks = Vec::new();
     if left > DIED_OUT {

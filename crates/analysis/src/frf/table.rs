@@ -16,7 +16,7 @@ use super::of_hits::OfHits;
 use super::{FrfSettings, Responses};
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
-use crate::measurement::Windowed;
+use crate::measurement::{Channels, Windowed};
 use crate::text::{compact, paragraph, significant, text_table};
 
 /// Frequency responses with coherence and standard errors.
@@ -198,7 +198,9 @@ impl FrfTable {
         };
         let remarks =
             records.iter().flat_map(|recorded| recorded.held.unit_remarks.iter().cloned());
-        let (names, dofs) = (&measured.names, 0..measured.force.channels());
+        let dofs = 0..measured.force.channels();
+        let names: Vec<&Channels> = records.iter().map(|recorded| &*recorded.held.names).collect();
+        let names = Channels::together(&names);
         Self {
             file: measured.file.clone(),
             first_sample: measured.first_sample,

@@ -9,10 +9,10 @@ use nalgebra::{Complex, DMatrix};
 use super::RecordReview;
 use crate::AnalysisError;
 use crate::frf::average;
-use crate::identify::Identified;
 use crate::identify::lines::{LineChoice, choose_lines};
 use crate::identify::prediction::Prediction;
 use crate::identify::spectra::periods;
+use crate::identify::{Identified, ResponseCoherence};
 use crate::measurement::{Block, IN_MEMORY_SAMPLES, Windowed};
 
 /// Part of an open record that a segment takes; half overlapped, this makes fifteen segments. Of a
@@ -38,6 +38,8 @@ pub struct Receptance {
     pub data: FrequencyData,
     /// Origin of the receptance, in words.
     pub origin: String,
+    /// Coherence of responses and forces, of records that are no periods.
+    pub coherence: Option<ResponseCoherence>,
 }
 
 /// Rows of data on which one force acts alone, so that motion over force is the receptance.
@@ -92,51 +94,59 @@ impl Receptance {
     /// # Errors
     /// If the records show none.
     pub fn of(identified: &Identified, parts: &[RecordReview<'_>]) -> Result<Self, AnalysisError> {
-        // One window without averages shows little of a random response.
-        let fitted = identified.fitted();
-        if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
-            let origin =
-                "measured on the lines of each hit, without what the ends of its window add";
-            return Ok(Self { data: data.clone(), origin: origin.into() });
-        }
-        let of_responses = fitted.coherence.is_some();
-        let of_lines = identified.drawn_spectra();
-        if let Some(data) = of_lines.filter(|_| of_responses || fitted.drawn.is_none()) {
-            let origin = match fitted.prediction {
-                Prediction::Steady => "measured on the lines used",
-                Prediction::Sampled { .. } => "averaged over segments, on the lines used",
-            };
-            return Ok(Self { data: data.clone(), origin: origin.into() });
-        }
-        let first = parts[0].held();
-        // The beginning of a period is none.
-        let held = first.periods > 1 || first.held_to().is_none();
-        let period = match identified.fitted().prediction {
-            Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => held,
-            Prediction::Sampled { .. } => first.periods > 1,
+        let (data, origin) = measured(identified, parts)?;
+        Ok(Self { data, origin, coherence: identified.coherence()? })
+    }
+}
+
+/// Measured receptance and its origin in words.
+fn measured(
+    identified: &Identified,
+    parts: &[RecordReview<'_>],
+) -> Result<(FrequencyData, String), AnalysisError> {
+    // One window without averages shows little of a random response.
+    let fitted = identified.fitted();
+    if let Some(data) = fitted.drawn.as_ref().filter(|_| identified.is_hammer_test()) {
+        let origin = "measured on the lines of each hit, without what the ends of its window add";
+        return Ok((data.clone(), origin.into()));
+    }
+    let of_responses = fitted.coherence.is_some();
+    let of_lines = identified.drawn_spectra();
+    if let Some(data) = of_lines.filter(|_| of_responses || fitted.drawn.is_none()) {
+        let origin = match fitted.prediction {
+            Prediction::Steady => "measured on the lines used",
+            Prediction::Sampled { .. } => "averaged over segments, on the lines used",
         };
-        let each = |part: &RecordReview<'_>| match period {
-            true => of_periods(part),
-            false => of_segments(part.recorded),
-        };
-        let mut data = each(&parts[0])?;
-        for part in &parts[1..] {
-            data = data.and(&each(part)?)?;
-        }
-        let origin = match period {
-            true => "measured on the lines of whole periods that carry force".into(),
-            false => format!(
-                "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
+        return Ok((data.clone(), origin.into()));
+    }
+    let first = parts[0].held();
+    // The beginning of a period is none.
+    let held = first.periods > 1 || first.held_to().is_none();
+    let period = match identified.fitted().prediction {
+        Prediction::Steady | Prediction::Sampled { extent: Extent::WholePeriod, .. } => held,
+        Prediction::Sampled { .. } => first.periods > 1,
+    };
+    let each = |part: &RecordReview<'_>| match period {
+        true => of_periods(part),
+        false => of_segments(part.recorded),
+    };
+    let mut data = each(&parts[0])?;
+    for part in &parts[1..] {
+        data = data.and(&each(part)?)?;
+    }
+    let origin = match period {
+        true => "measured on the lines of whole periods that carry force".into(),
+        false => format!(
+            "by H1 from segments of {} samples, half overlapped and weighted by a Hann window, \
                  where the force explains at least half of the motion (a resonance narrower than \
                  the lines looks blunter than it is)",
-                segment(first)
-            ),
-        };
-        // A held or linear force is weaker than its samples there, and the motion with it.
-        let origin =
-            origin + "; towards half the sampling rate the force between the samples shows, too";
-        Ok(Self { data, origin })
-    }
+            segment(first)
+        ),
+    };
+    // A held or linear force is weaker than its samples there, and the motion with it.
+    let origin =
+        origin + "; towards half the sampling rate the force between the samples shows, too";
+    Ok((data, origin))
 }
 
 fn of_periods(part: &RecordReview<'_>) -> Result<FrequencyData, AnalysisError> {

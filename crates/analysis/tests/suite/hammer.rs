@@ -119,6 +119,10 @@ fn the_receptance_of_hits_is_that_of_the_machine() {
         }
     }
     assert!(seen.iter().all(|lines| *lines > 200), "{seen:?}");
+    let coherence = found.coherence().unwrap().expect("six hits on two places");
+    assert_eq!((coherence.averages.as_str(), coherence.values.ncols()), ("6 hits", 2));
+    assert!(coherence.frequency_hz.iter().all(|hz| (2.0..=150.0).contains(hz)));
+    assert!(coherence.values.iter().all(|value| (0.0..=1.0).contains(value)));
     assert!(worst < 6.0 * noise && worst < 0.01 * largest, "{worst} of {largest}, noise {noise}");
 }
 

@@ -80,6 +80,16 @@ fn several_records_have_ends_of_their_own() {
     let one = identify(&tests[..1], &Identify::default()).unwrap();
     let error = |found: &Identified| found.estimate().parameter("k").unwrap().standard_error;
     assert!(is_open(&all) && !warns(&all), "{all}");
+    // The coherence is that which a frequency response of the record has, in the band of the fit.
+    let coherence = one.coherence().unwrap().unwrap();
+    let table = frf(&tests[0], &FrfSettings::default()).unwrap();
+    let skipped =
+        table.frequency_hz.iter().position(|hz| *hz >= coherence.frequency_hz[0]).unwrap();
+    assert!(coherence.frequency_hz.len() > 30);
+    for (at, value) in coherence.values.iter().enumerate() {
+        assert_eq!(coherence.frequency_hz[at], table.frequency_hz[skipped + at]);
+        assert!((value - table.coherence[0].values[skipped + at]).abs() < 1e-12);
+    }
     // Three times the data.
     let gain = error(&one) / error(&all);
     assert!((1.2..2.4).contains(&gain), "{gain}");

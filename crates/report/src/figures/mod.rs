@@ -75,7 +75,7 @@ pub(crate) fn displacement_name(channels: &Channels, kind: ResponseQuantity, dof
 
 impl ToFigure for Identified {
     /// Draws measured and identified receptance, or, where no line separates the forces, the amplitudes of
-    /// the response, measured and predicted, and the coherence of averaged responses; for a fit in the time
+    /// the response, measured and predicted, and the coherence of random and hammer tests; for a fit in the time
     /// domain measured and predicted response of the first record; with nonlinear terms the restoring force.
     fn styled_figure(&self, style: FigureStyle) -> Result<Figure, ReportError> {
         let title = self.summary().title();
@@ -94,8 +94,8 @@ impl ToFigure for Identified {
                     receptance_or_responses(&title, data, &system, names, style)?
                 };
                 let name = |dof| channels.response_name(data.measured(), dof);
-                Ok(match &self.fitted().coherence {
-                    Some(coherence) => drawn.panel(receptance::coherence(coherence, &name, style)),
+                Ok(match self.coherence()? {
+                    Some(coherence) => drawn.panel(receptance::coherence(&coherence, &name, style)),
                     None => drawn,
                 })
             }
@@ -186,6 +186,15 @@ impl ToFigure for Machine {
             .iter()
             .map(|mode| (mode.natural_frequency_hz.value, mode.damping_ratio.value))
             .collect();
-        modal::figure(&self.name, self.system(), &resonances, style)
+        let displacement = |dof: usize| match self.names.first_response() {
+            Some(kind) => displacement_name(&self.names, kind, dof),
+            None => format!("x{}", dof + 1),
+        };
+        let force = |dof: usize| match self.names.force.is_empty() {
+            true => format!("F{}", dof + 1),
+            false => self.names.force_name(dof),
+        };
+        let names = Names { displacement: &displacement, force: &force };
+        modal::figure(&self.name, self.system(), names, &resonances, style)
     }
 }

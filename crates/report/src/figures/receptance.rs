@@ -24,7 +24,7 @@ pub struct Names<'a> {
 
 impl Names<'_> {
     /// Name of a receptance.
-    fn pair(&self, motion: usize, force: usize) -> String {
+    pub(super) fn pair(&self, motion: usize, force: usize) -> String {
         format!("{} / {}", (self.displacement)(motion), (self.force)(force))
     }
 }

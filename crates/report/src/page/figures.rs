@@ -149,6 +149,15 @@ pub fn receptance(identified: &Identified, measured: &Receptance) -> Result<Draw
             (picture::responses("", &measured.data, &system, names, style)?, caption)
         }
     };
+    let Some(coherence) = &measured.coherence else {
+        return drawn("receptance".into(), figure, caption);
+    };
+    let name = |dof| channels.response_name(measured.data.measured(), dof);
+    let figure = figure.panel(picture::coherence(coherence, &name, style));
+    let caption = format!(
+        "{caption} Below, the part of the response's power that is linear in the forces, from {}.",
+        coherence.averages
+    );
     drawn("receptance".into(), figure, caption)
 }
 

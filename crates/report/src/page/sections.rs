@@ -15,6 +15,7 @@ use mechid_analysis::review::reconstruction::Reconstruction;
 use mechid_analysis::review::residual::{Residual, sizes};
 use mechid_analysis::review::{RecordReview, judgement};
 use mechid_analysis::text::{compact, significant};
+use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 
 use super::tables::Table;
@@ -188,7 +189,9 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
     let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
     let matrices = matrices(&report.parameters);
     let dofs = contents.review.identified.estimate().dof();
-    let shapes = shapes(&report.modes);
+    let names = &report.channels;
+    let kind = names.first_response().unwrap_or(ResponseQuantity::Displacement);
+    let shapes = shapes(&report.modes, |dof| names.response_name(kind, dof));
     let numbered: Vec<String> = (1..=dofs).map(|dof| dof.to_string()).collect();
     let columns: Vec<&str> =
         std::iter::once("").chain(numbered.iter().map(String::as_str)).collect();
@@ -235,8 +238,8 @@ fn matrices(parameters: &[ParameterRow]) -> Vec<(String, Vec<Vec<String>>)> {
     parameters.chunk_by(|a, b| a.matrix == b.matrix).map(of_one).collect()
 }
 
-/// Shapes of the modes, modulus and phase of each degree of freedom.
-fn shapes(modes: &[ShapedMode]) -> Markup {
+/// Shapes of the modes, modulus and phase of each response, which `channel` names.
+fn shapes(modes: &[ShapedMode], channel: impl Fn(usize) -> String) -> Markup {
     let name = |(number, mode): (usize, &ShapedMode)| {
         let [re, im] = mode.eigenvalue;
         format!("mode {number}, {} Hz", significant(re.hypot(im) / TAU, 4))
@@ -248,10 +251,10 @@ fn shapes(modes: &[ShapedMode]) -> Markup {
             let [re, im] = mode.shape[dof].value;
             format!("{} ∠ {:.1}°", significant(re.hypot(im), 4), im.atan2(re).to_degrees())
         });
-        std::iter::once((dof + 1).to_string()).chain(cells).collect()
+        std::iter::once(channel(dof)).chain(cells).collect()
     };
     let rows = (0..modes.first().map_or(0, |mode| mode.shape.len())).map(row).collect();
-    let caption = "Mode shapes, modulus and phase by degree of freedom; the largest entry is 1";
+    let caption = "Mode shapes, modulus and phase of each response; the largest entry is 1";
     Table { caption, header: &header, numbers_from: 1, rows }.html()
 }
 
@@ -265,7 +268,8 @@ fn fit_rows(contents: &Contents<'_>) -> Vec<Vec<String>> {
         let text = format!("{count}, between {first} and {last} ({low} to {high} Hz)");
         rows.push(pair("Lines", text));
     }
-    rows.push(pair("Residual of the fit (NRMSE)", percent(fit.nrmse)));
+    let residual = fit.residual_name();
+    rows.extend(residual.map(|name| pair(&name.replacen('r', "R", 1), percent(fit.nrmse))));
     if let Some(part) = fit.unexplained_motion {
         rows.push(pair("Motion the linear model leaves unexplained", percent(part)));
     }
