@@ -382,8 +382,8 @@ pub enum EstimateError {
     },
     /// The noise covariance of a line cannot be inverted.
     #[error(
-        "the noise covariance at {frequency_hz} Hz is singular: a displacement without noise, or fewer \
-         periods than degrees of freedom; pool it over more lines"
+        "the noise covariance at {frequency_hz} Hz is singular: a displacement without noise, or no \
+         more periods than degrees of freedom; pool it over more lines"
     )]
     SingularNoise {
         /// Frequency, in Hz.

@@ -9,8 +9,8 @@ use mechid_estimate::frequency_domain::{FrequencyData, Lines, NoiseModel};
 use mechid_estimate::nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
-use nalgebra::DMatrix;
 
+use super::coherence::ResponseCoherence;
 use super::force_noise::ForceNoise;
 use super::nonlinear::SelectionSummary;
 use super::prediction::{Model, Prediction};
@@ -36,6 +36,9 @@ pub struct Fitted {
     pub equations: usize,
     /// The spectra, if it was done in the frequency domain, and the lines of the first record.
     pub frequency: Option<(Lines, FrequencyData)>,
+    /// The same spectra with the noise that the scatter of their periods shows, of every record; `None` where one
+    /// has a single period, and of other fits.
+    pub scattered: Option<FrequencyData>,
     /// Coherence of the frequency responses of the first record, if such were fitted.
     pub coherence: Option<ResponseCoherence>,
     /// Findings before the fit on all records together.
@@ -63,15 +66,6 @@ pub struct Fitted {
     pub drawn: Option<FrequencyData>,
     /// Remarks on how the fit was done.
     pub remarks: Vec<String>,
-}
-
-/// Multiple coherence of the motions with all forces.
-#[derive(Debug, Clone)]
-pub struct ResponseCoherence {
-    /// Frequencies, in Hz, one per row of `values`.
-    pub frequency_hz: Vec<f64>,
-    /// Values of frequencies × motions, a ratio from 0 to 1 each.
-    pub values: DMatrix<f64>,
 }
 
 /// Result of a fit with nonlinear terms.
@@ -163,10 +157,10 @@ impl Fitted {
         (each.iter().map(|e| e * e).sum::<f64>() / each.len() as f64).sqrt()
     }
 
-    /// Returns whether frequency responses were fitted, weighted by their noise.
-    pub(crate) fn is_weighted(&self) -> bool {
+    /// Returns whether the response was fitted, weighted by its noise, and not the force.
+    pub(crate) fn fits_response(&self) -> bool {
         let noise_stated = self.frequency.as_ref().is_some_and(|(_, data)| data.noise().is_some());
-        noise_stated && !self.least_squares
+        !self.noise.is_empty() || (noise_stated && !self.least_squares)
     }
 
     /// RMS of measured minus modelled response over RMS of the measured response, on the lines used:

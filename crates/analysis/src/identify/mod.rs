@@ -6,13 +6,14 @@
 //! | `lines`, `left_out` | spectral lines to use and to leave out |
 //! | `spectra`, `responses`, `samples` | the three kinds of fit: whole periods, averaged frequency responses, samples in time |
 //! | `open_records` | lines of records that are no periods, with the loads of their ends |
-//! | `tables` | frequency responses that were measured elsewhere |
+//! | `tables`, `tabulated` | frequency responses that were measured elsewhere, and such tables as data |
 //! | `nonlinear` | whole periods with nonlinear terms |
 //! | `derivatives` | velocity and acceleration that were not measured |
 //! | `prediction` | response of the identified system to a measured force |
 //! | `checks` | checks before and after a fit, in order |
 //! | `validation` | prediction of a record that was not fitted |
 //! | `mass`, `structure` | what is known of M, C and K |
+//! | `coherence` | coherence of the records that were fitted |
 //! | `fitted` | a fit: the estimate, how it came about, its residual |
 //! | `force_noise` | noise of the forces, stated or as the record shows it |
 //! | `sinusoids` | sinusoids beside the response to the forces, in open records |
@@ -22,6 +23,7 @@
 
 mod added_decay;
 pub mod checks;
+mod coherence;
 mod derivatives;
 pub(crate) mod fitted;
 mod fitted_lines;
@@ -41,6 +43,7 @@ pub(crate) mod spectra;
 pub mod structure;
 pub mod summary;
 pub mod tables;
+pub(crate) mod tabulated;
 mod unscaled;
 pub mod validation;
 
@@ -55,7 +58,8 @@ use mechid_signal::Extent;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
-pub use self::fitted::{Fitted, Misfit, Residual, ResponseCoherence, SampleResidual, WithTerms};
+pub use self::coherence::ResponseCoherence;
+pub use self::fitted::{Fitted, Misfit, Residual, SampleResidual, WithTerms};
 pub use self::fitted_lines::FittedLine;
 pub use self::force_noise::{ForceNoise, ForceNoiseSource};
 use self::left_out::LineRule;
@@ -124,6 +128,9 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
     if how.hits.is_none() && how.nonlinear.is_none() && !period_given {
         summary.remarks.extend(hits::uncut(&records));
+        if matches!(how.fit, Fit::Spectra { .. }) {
+            summary.remarks.extend(records.iter().find_map(spectra::unsaid_period));
+        }
     }
     Ok(Identified {
         measurements: measurements.to_vec(),
@@ -210,9 +217,23 @@ impl Identify {
                 let likelihood = matches!(method, None | Some(Method::MaximumLikelihood));
                 let wrong =
                     |setting, why: &str| Err(AnalysisError::Setting { setting, why: why.into() });
+                if *noise != Pooling::Automatic && !likelihood {
+                    return wrong("noise", "it weights `method` maximum-likelihood alone");
+                }
+                if *noise == Pooling::PerLine && *extent == Some(Extent::Open) {
+                    return wrong(
+                        "noise",
+                        "per-line is for periods: an open record has no scatter at a line",
+                    );
+                }
+                // Weights that were asked for are used.
+                let method = match noise {
+                    Pooling::Automatic => *method,
+                    _ => Some(Method::MaximumLikelihood),
+                };
                 let rule = NoiseRule { response: *noise, force: force_noise.as_deref() };
                 let open = || open_records::fit(records, unknowns, lines, rule, excitation);
-                let periods = || spectra::fit(records, unknowns, lines, *method, *noise);
+                let periods = || spectra::fit(records, unknowns, lines, method, *noise);
                 // A hit dies out in its window or not, and periods are not asked about the noise of their force.
                 let is_open = self.hits.is_some() || (force_noise.is_some() && !period_given);
                 let extent = extent.or(is_open.then_some(Extent::Open));
@@ -310,6 +331,7 @@ impl Identified {
         self.check_scale()?;
         Ok(Machine {
             nonlinear: self.fitted.nonlinear_part()?,
+            names: self.names().clone(),
             ..Machine::of_estimate(&self.fitted.estimate)?
         })
     }
@@ -363,6 +385,7 @@ impl Identified {
                 "the response of a system with nonlinear terms is no matter of single lines",
             );
         }
+        let data = self.fitted.scattered.as_ref().unwrap_or(data);
         self.summary.fitted_lines = Some(FittedLine::all(data, &self.fitted.estimate)?);
         Ok(())
     }
@@ -424,9 +447,9 @@ impl Identified {
         !self.summary.hits.is_empty()
     }
 
-    /// Returns the names of the channels of the first record, without units.
+    /// Returns the names of the channels, without units.
     pub fn names(&self) -> &Channels {
-        &self.records[0].held.names
+        &self.summary.channels
     }
 
     /// Returns each kind of response of the first record, measured and predicted.

@@ -213,6 +213,7 @@ pub(super) fn fit(
         least_squares: false,
         equations: estimated.equations() / dofs,
         frequency: spectra.map(|data| (band, data)),
+        scattered: None,
         coherence: None,
         before_all,
         before,

@@ -148,6 +148,7 @@ pub(super) fn fit(
         estimator: "maximum likelihood on open records, in the frequency domain",
         least_squares: false,
         equations: 2 * all.len(),
+        scattered: None,
         coherence: None,
         before_all: before_spectral_fit(&all, unknowns)?,
         frequency: lines.into_iter().next().map(|lines| (lines, all)),
@@ -189,7 +190,8 @@ fn band(held: &Block, rule: LineRule<'_>) -> Result<Vec<usize>, AnalysisError> {
     rule.without.keep((first..=last).collect(), held.force.sampling())
 }
 
-fn joined(records: &[FrequencyData]) -> Result<FrequencyData, AnalysisError> {
+/// The rows of all records.
+pub(super) fn joined(records: &[FrequencyData]) -> Result<FrequencyData, AnalysisError> {
     let mut all = records[0].clone();
     for record in &records[1..] {
         all = all.and(record)?;

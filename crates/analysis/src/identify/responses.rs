@@ -1,7 +1,5 @@
 //! Fits frequency responses.
 
-use std::f64::consts::TAU;
-
 use mechid_estimate::checks::{
     Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
     delay_of_lines, leakage, linearity,
@@ -13,7 +11,8 @@ use mechid_estimate::{
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
 
-use super::fitted::{Fitted, Misfit, ResponseCoherence};
+use super::coherence::ResponseCoherence;
+use super::fitted::{Fitted, Misfit};
 use super::left_out::LineRule;
 use super::options::{Method, ResponseFit};
 use super::prediction::Prediction;
@@ -52,10 +51,7 @@ pub fn fit(
     // Says what the data leave open, before anything is made of it.
     estimate.system()?;
     let periodic = segments.are_periods();
-    let coherent = responses.first().map(|r| ResponseCoherence {
-        frequency_hz: r.frf.omega().iter().map(|omega| omega / TAU).collect(),
-        values: r.frf.coherence().clone(),
-    });
+    let coherent = responses.first().map(|r| ResponseCoherence::new(&r.frf, r.averages()));
     let modes = estimate.modes()?;
     let (mut before, mut after, mut misfit) = (Vec::new(), Vec::new(), misfit);
     for (Windowed { held, .. }, r) in records.iter().zip(&responses) {
@@ -92,6 +88,7 @@ pub fn fit(
         estimator: name,
         least_squares: *method == Some(Method::LeastSquares),
         equations: 2 * data.len(),
+        scattered: None,
         coherence: coherent,
         before_all: before_spectral_fit(&data, unknowns)?,
         frequency: responses.into_iter().next().map(|r| (r.lines, data)),

@@ -10,11 +10,12 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
-use mechid_signal::Extent;
+use mechid_signal::{Extent, Repetition, repetition};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
 use super::nonlinear::all_lines;
+use super::open_records::joined;
 use super::options::Method;
 use super::prediction::Prediction;
 use crate::AnalysisError;
@@ -60,6 +61,11 @@ pub(super) fn fit(
         let lines = Lines::new(held.force.sampling().with_len(held.period)?, chosen)?;
         spectra.push((periods(recorded, &lines)?, lines));
     }
+    if noise == Pooling::PerLine && spectra.iter().any(|(periods, _)| periods.count() < 2) {
+        let why = "per-line is the scatter of two periods or more at a line, and there is one: give `period`, or \
+                   another noise";
+        return Err(AnalysisError::Setting { setting: "noise", why: why.into() });
+    }
     let data = together(&spectra, &RepeatedPeriods::mean)?;
     let Found { estimator, estimate, mut misfit, noise: models, noise_through, remark } =
         found(&spectra, &data, unknowns, method, noise)?;
@@ -84,6 +90,7 @@ pub(super) fn fit(
     }
     let AfterSpectralFit { records: residuals, bias } =
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
+    let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
     let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
     if unknowns.free().len() <= TERM_PARAMETERS {
         for ((recorded, left), checks) in records.iter().zip(&residuals).zip(&mut after) {
@@ -98,6 +105,7 @@ pub(super) fn fit(
         estimator,
         least_squares: false,
         equations: 2 * data.len(),
+        scattered: scattered.transpose()?,
         coherence: None,
         before_all: before_spectral_fit(&data, unknowns)?,
         frequency: Some((spectra.swap_remove(0).1, data)),
@@ -152,6 +160,23 @@ fn nonlinear_term(
     let (response, kind) = held.response();
     // A record alone may not determine the machine, as that of one shaker of several.
     Ok(distortion_of_periods(&band, &held.force, response, kind, unknowns).unwrap_or(None))
+}
+
+/// Returns a remark on a window that was taken as one period and holds a whole number of them: their scatter, which
+/// shows the noise, was not used.
+pub(super) fn unsaid_period(record: &Windowed) -> Option<String> {
+    let (held, len) = (&record.held, record.held.force.len());
+    let force = held.force.channel(*held.driven.first()?);
+    let Repetition { period, mismatch } = repetition(force).filter(|_| held.period == len)?;
+    (len >= 2 * period && len % period == 0).then(|| {
+        format!(
+            "the force of {} repeats every {period} samples, to {} % of its RMS: with `period` {period} the {} periods \
+             are averaged, and their scatter shows the noise",
+            held.file,
+            significant(100.0 * mismatch, 2),
+            len / period
+        )
+    })
 }
 
 /// Returns whether a finding says that the windows are no periods of the record.

@@ -64,8 +64,7 @@ pub struct IdentificationSummary {
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
-    /// Names of the channels of the first record, without units, one per degree of freedom; `"0"` where
-    /// there is none.
+    /// Names of the channels, without units, one per degree of freedom; `"0"` where there is none.
     pub channels: Channels,
     /// Every record, the first included; of a hammer test every hit that was used.
     pub records: Vec<RecordRow>,
@@ -106,7 +105,7 @@ pub struct RecordRow {
 #[derive(Debug, Serialize)]
 pub struct FitRow {
     /// RMS of the residual over the RMS of the quantity fitted, a ratio: the force, or with maximum likelihood
-    /// the response.
+    /// the response in the quantity measured, of which it is `unexplained_motion`.
     pub nrmse: f64,
     /// RMS of measured minus modelled response over the RMS of the measured response, a ratio: the part that the
     /// linear model leaves unexplained. `None` where it was not computed.
@@ -158,7 +157,7 @@ impl IdentificationSummary {
             nonlinear: fitted.nonlinear.as_ref().map(NonlinearSummary::of).transpose()?,
             modes: ShapedMode::all(&modes, false)?,
             fit: FitRow {
-                nrmse: match fitted.is_weighted() {
+                nrmse: match fitted.fits_response() {
                     true => unexplained_motion.unwrap_or_else(|| fitted.nrmse()),
                     false => fitted.nrmse(),
                 },
@@ -174,7 +173,7 @@ impl IdentificationSummary {
                     None => estimate.unknowns().independent(),
                 },
             },
-            channels: Channels::clone(&records[0].names),
+            channels: Channels::together(&records.iter().map(|r| &*r.names).collect::<Vec<_>>()),
             records: records.iter().map(row).collect(),
             hits,
             checks: checks::rows(fitted, &modes, &records, unscaled.is_none())?,
@@ -251,8 +250,7 @@ impl IdentificationSummary {
         text.push('\n');
         if self.unscaled.is_some() {
             // No system is written that they could be computed from.
-            let kinds = ResponseQuantity::ALL;
-            let measured = kinds.into_iter().find(|kind| !self.channels.response(*kind).is_empty());
+            let measured = self.channels.first_response();
             let kind = measured.unwrap_or(ResponseQuantity::Displacement);
             text += &shape_table(&self.modes, |at| self.channels.response_name(kind, at));
             text.push('\n');
@@ -356,16 +354,27 @@ impl FitRow {
     /// Returns the quality of the fit as a table; `model` says what explains the motion.
     pub(super) fn lines(&self, model: &str) -> String {
         let percent = |fraction: f64| format!("{} %", significant(100.0 * fraction, 3));
-        let mut rows = vec![
-            vec!["residual of the fit (NRMSE)".into(), percent(self.nrmse)],
-            vec!["condition number".into(), significant(self.condition_number, 3)],
-            vec!["equations / unknowns".into(), format!("{} / {}", self.equations, self.unknowns)],
-        ];
+        let mut rows = Vec::new();
+        rows.extend(self.residual_name().map(|name| vec![name.into(), percent(self.nrmse)]));
         if let Some(unexplained) = self.unexplained_motion {
             let name = format!("motion the {model} leaves unexplained");
-            rows.insert(1, vec![name, percent(unexplained)]);
+            rows.push(vec![name, percent(unexplained)]);
         }
+        rows.extend([
+            vec!["condition number".into(), significant(self.condition_number, 3)],
+            vec!["equations / unknowns".into(), format!("{} / {}", self.equations, self.unknowns)],
+        ]);
         text_table(&rows)
+    }
+
+    /// Returns what [`nrmse`](Self::nrmse) is the residual of, in words; `None` where it is the part of the response
+    /// that is left unexplained.
+    pub fn residual_name(&self) -> Option<&'static str> {
+        match self.unexplained_motion {
+            None => Some("residual of the fit (NRMSE)"),
+            Some(unexplained) if unexplained == self.nrmse => None,
+            Some(_) => Some("residual of the force (NRMSE)"),
+        }
     }
 }
 

@@ -195,19 +195,14 @@ fn the_lines_of_a_fit_are_given_on_request() {
                 [&line.force, &line.measured, &line.fitted, &line.residual].map(|v| complex(v[0]));
             assert!((measured - fitted - residual).norm() <= 1e-12 * measured.norm());
             let exact = system.receptance(TAU * line.frequency_hz).unwrap()[(0, 0)] * force;
-            // Spectra do not carry the noise of their periods.
-            let error = line.measured_standard_error.as_ref().map(|errors| errors[0]);
-            assert_eq!(error.is_some(), matches!(how.fit, Fit::Responses(_)));
-            let error = error.unwrap_or(f64::INFINITY);
+            let error = line.measured_standard_error.as_ref().unwrap()[0];
             of_noise += (measured - exact).norm_sqr() / (2.0 * error * error) / 99.0;
             of_fit = of_fit.max((fitted - exact).norm() / line.fitted_standard_error[0]);
             // Three parameters from 198 numbers: the fit is better than the measurement.
             assert!(line.fitted_standard_error[0] < error, "{line:?}");
         }
-        // 198 squares of standard errors from nine degrees of freedom each; 4σ is 1 ± 0.6.
-        if matches!(how.fit, Fit::Responses(_)) {
-            assert!((0.5..1.7).contains(&of_noise), "{of_noise}");
-        }
+        // 198 squares of standard errors, of frequency responses from nine degrees of freedom each; 4σ is 1 ± 0.6.
+        assert!((0.5..1.7).contains(&of_noise), "{of_noise}");
         assert!(of_fit < 5.0, "{of_fit}");
         assert!(
             serde_json::to_value(&found).unwrap()["fitted_lines"][98]["residual"][0][1].is_f64()
