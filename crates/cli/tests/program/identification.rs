@@ -283,8 +283,27 @@ fn a_whole_period_closes() {
     }
     let segments = format!("{common} --from-frf h1 --segment 64 --extent period");
     refused(folder, &segments, &["--extent belongs to fits without --from-frf"]);
+    let weights = format!("{common} --method least-squares --noise smooth");
+    refused(folder, &weights, &["--noise: it weights --method maximum-likelihood alone"]);
+    let weights = format!("{common} --noise per-line --extent period");
+    refused(folder, &weights, &["--noise: per-line is the scatter of two periods or more"]);
     let lines = "--domain time --lines odd --plot a.svg";
     refused(folder, &format!("{common} {lines}"), &["--lines belongs to --domain frequency"]);
+}
+
+/// Periods without noise, and a period that is not said.
+#[test]
+fn periods_taken_as_one_are_told() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let force = noise::white(Sampling::new(0.01, 200).unwrap(), 1, 5.0, 3).unwrap();
+    let force = force.repeated(3).unwrap();
+    write(folder, "p.csv", &force, &exact_zoh_periodic(&oscillator(), &force).unwrap());
+    let call = "identify p.csv --force f --displacement x --lines 1:20";
+    let told = |call: &str| json(folder, call)["remarks"].to_string();
+    let words = "repeats every 200 samples";
+    assert!(told(&call.replace("1:20", "3:3:60")).contains(words));
+    assert!(!told(&format!("{call} --period 200")).contains(words));
 }
 
 #[test]
