@@ -1,6 +1,6 @@
 //! Coverage of the intervals of maximum likelihood, and scatter over the Cramér–Rao bound, under noise that
-//! is white, of the first order (0.9), 1/f, or white with a narrow disturbance: seeded experiments of 1, 2,
-//! 4 and 8 periods.
+//! is white, of the first order (0.9), 1/f, white with a narrow disturbance, or the response to an unmeasured
+//! force: seeded experiments of 1, 2, 4 and 8 periods.
 //!
 //! ```sh
 //! cargo run --release -p mechid-estimate --example coloured_noise_study -- 500 auto
@@ -20,7 +20,7 @@ use mechid_estimate::frequency_domain::{
     output_error_pooling,
 };
 use mechid_estimate::{Estimate, Unknowns};
-use mechid_model::ResponseQuantity;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, Test, chain, repeated, steady_test};
 use mechid_signal::{Multisine, Phases, Record, Sampling, noise};
@@ -46,10 +46,13 @@ enum Colour {
     OneOverF,
     /// White noise, and [`NARROW`] times its RMS in a resonance of the width of four lines.
     Narrow,
+    /// Response of the machine to a force of the first order (0.9) on its last mass, and white noise of a tenth of it.
+    UnmeasuredForce,
 }
 
 impl Colour {
-    const ALL: [Self; 4] = [Self::White, Self::Autoregressive, Self::OneOverF, Self::Narrow];
+    const ALL: [Self; 5] =
+        [Self::White, Self::Autoregressive, Self::OneOverF, Self::Narrow, Self::UnmeasuredForce];
 
     fn name(self) -> &'static str {
         match self {
@@ -57,6 +60,7 @@ impl Colour {
             Self::Autoregressive => "AR(0.9)",
             Self::OneOverF => "1/f",
             Self::Narrow => "narrow disturbance",
+            Self::UnmeasuredForce => "unmeasured force",
         }
     }
 
@@ -80,7 +84,7 @@ impl Colour {
         };
         let x = match self {
             Self::White => white(0),
-            Self::Autoregressive => recursion(0, 0.9, 0.0),
+            Self::Autoregressive | Self::UnmeasuredForce => recursion(0, 0.9, 0.0),
             Self::OneOverF => (0..9).fold(vec![0.0; all.len()], |sum, octave| {
                 let a = 1.0 - 0.8 * 0.5f64.powi(octave);
                 add(sum, &recursion(octave as u64, a, 0.0), (1.0 - a * a).sqrt())
@@ -167,13 +171,19 @@ impl Study {
         let (test, dof) = (machine.test()?, machine.dof());
         let period = test.force.sampling();
         let rms = |c| test.displacement.column(c).norm() / (period.len() as f64).sqrt();
-        let size = colour.size();
+        let sizes: Vec<f64> = match colour {
+            Colour::UnmeasuredForce => {
+                let long = response(&test.system, period.with_len(1 << 16)?, 1 << 40)?;
+                vec![long.column(dof - 1).norm() / f64::from(1 << 8); dof]
+            }
+            other => vec![other.size(); dof],
+        };
         Ok(Self {
             machine: machine.name(),
             lines: Lines::new(period, test.lines.iter().copied())?,
             unknowns: Unknowns::unknown_mass(dof)?,
             colour,
-            scale: (0..dof).map(|c| LEVEL * rms(c) / size).collect(),
+            scale: (0..dof).map(|c| LEVEL * rms(c) / sizes[c]).collect(),
             force: repeated(&test.force, periods)?,
             exact: repeated(&test.displacement, periods)?,
             periods,
@@ -192,10 +202,26 @@ impl Study {
     fn measure(&self, seed: u64) -> Result<RepeatedPeriods> {
         let (len, dof) = (self.exact.len(), self.scale.len());
         let mut motion = self.exact.data().clone();
+        if let Colour::UnmeasuredForce = self.colour {
+            // One force makes all channels move.
+            let by = self.scale[dof - 1];
+            let all = self.exact.sampling().with_len(4 * len)?;
+            motion += by * response(&self.test.system, all, seed)?.rows(len, len);
+            let white = noise::white(self.exact.sampling(), dof, 1.0, !seed)?;
+            let own = |c: usize| 0.1 * LEVEL * self.exact.column(c).norm() / (len as f64).sqrt();
+            for channel in 0..dof {
+                motion.column_mut(channel).axpy(own(channel), &white.column(channel), 1.0);
+            }
+            return self.periods(motion);
+        }
         for (channel, mut column) in motion.column_iter_mut().enumerate() {
             let drawn = self.colour.samples(len, seed * dof as u64 + channel as u64);
             column.iter_mut().zip(drawn).for_each(|(x, e)| *x += self.scale[channel] * e);
         }
+        self.periods(motion)
+    }
+
+    fn periods(&self, motion: DMatrix<f64>) -> Result<RepeatedPeriods> {
         let motion = Record::new(self.exact.sampling(), motion)?;
         let kind = ResponseQuantity::Displacement;
         Ok(RepeatedPeriods::new(&self.lines, &self.force, &motion, kind)?)
@@ -205,7 +231,21 @@ impl Study {
         let periods = self.measure(seed)?;
         Ok(match self.periods {
             1 => output_error_pooling(&periods.mean()?, &self.unknowns, pooling)?,
-            _ => output_error(&periods.mean_with_noise(pooling)?, &self.unknowns)?,
+            _ => {
+                let fit = output_error(&periods.mean_with_noise(pooling)?, &self.unknowns)?;
+                let is_free = matches!(pooling, Pooling::Automatic | Pooling::Smooth);
+                if !is_free || fit.noise == [NoiseModel::White] {
+                    return Ok(fit);
+                }
+                // As `identify` does.
+                let noise = periods.noise_beside(pooling, &fit.estimate.system()?)?;
+                match noise.models() {
+                    [NoiseModel::UnmeasuredForce { .. }] => {
+                        output_error(&periods.mean()?.with_noise(noise)?, &self.unknowns)?
+                    }
+                    _ => fit,
+                }
+            }
         })
     }
 
@@ -234,6 +274,15 @@ impl Study {
         let found = output_error(&exact.with_noise(noise)?, &self.unknowns)?.estimate;
         Ok(found.parameters().map(|p| p.standard_error).collect())
     }
+}
+
+/// Displacements of a steady state under a force of the first order on the last mass.
+fn response(system: &SecondOrderSystem, sampling: Sampling, seed: u64) -> Result<DMatrix<f64>> {
+    let mut force = DMatrix::zeros(sampling.len(), system.dof());
+    let drawn = Colour::UnmeasuredForce.samples(sampling.len(), seed);
+    force.column_mut(system.dof() - 1).copy_from_slice(&drawn);
+    let exact = exact_harmonic_periodic(system, &Record::new(sampling, force)?)?;
+    Ok(exact.displacement().data().clone())
 }
 
 fn kind(model: &NoiseModel) -> &'static str {

@@ -21,6 +21,9 @@ const LINES_PER_CORRELATION: usize = 8;
 /// Minimum number of residuals, real and imaginary parts, that the parameters leave free.
 pub(super) const FREE_RESIDUALS: f64 = 8.0;
 
+/// Least part of the power that is stated of the response to an unmeasured force that the mean of periods has.
+const LEAKED: f64 = 0.5;
+
 /// Residual of one record of a fit of spectra, in units of its noise.
 #[derive(Debug, Clone)]
 pub struct SpectralResidual {
@@ -31,6 +34,8 @@ pub struct SpectralResidual {
     values: DVector<f64>,
     /// Q of the covariance I − QQᵀ of the values.
     explained: DMatrix<f64>,
+    /// Both with what the ends of the record leave, where that is a part of the noise and of its stated power.
+    with_ends: Option<(DVector<f64>, DMatrix<f64>)>,
     /// Standard deviation of every residual before the parameters were fitted, from its own size.
     deviations: DVector<f64>,
     /// QᵀΣQ with the squares Σ of those deviations.
@@ -66,10 +71,16 @@ impl SpectralResidual {
             deviations,
             values,
             explained,
+            with_ends: None,
             rounding: false,
             force_decides: None,
             concentration: None,
         }
+    }
+
+    /// The same whose power is that of other values, of a covariance of their own, with what the ends leave.
+    pub(super) fn with_ends(self, with_ends: Option<(DVector<f64>, DMatrix<f64>)>) -> Self {
+        Self { with_ends, ..self }
     }
 
     /// The same, of rounding or not.
@@ -142,10 +153,18 @@ impl SpectralResidual {
         Some(Part {
             omega: self.data.omega(),
             dof: self.data.dof(),
-            values: &self.values,
-            explained: &self.explained,
+            values: self.whole().0,
+            explained: self.whole().1,
             unit: if nu > n + 1.0 && nu.is_finite() { nu / (nu - n) } else { 1.0 },
         })
+    }
+
+    /// Values and explained columns of the power.
+    fn whole(&self) -> (&DVector<f64>, &DMatrix<f64>) {
+        match &self.with_ends {
+            Some((values, explained)) => (values, explained),
+            None => (&self.values, &self.explained),
+        }
     }
 
     /// Number of degrees of freedom, each with a channel of the residual and one of the force.
@@ -170,16 +189,28 @@ impl SpectralResidual {
             let square = n * each * (n * each + 1.0) * nu * nu / ((nu - n) * (nu - n - 1.0));
             (groups * mean, groups * (square - mean * mean))
         };
-        let gram = self.explained.transpose() * &self.explained;
-        let all = self.values.len() as f64;
-        let free = (all - gram.trace()) / all;
-        let spread = (all - 2.0 * gram.trace() + gram.norm_squared()) / all;
-        // Real and imaginary parts have unit variance each.
-        let power = 0.5 * self.values.norm_squared();
-        let (mean, variance) = (mean * free, variance * spread);
+        let power_of = |values: &DVector<f64>, explained: &DMatrix<f64>| {
+            let gram = explained.transpose() * explained;
+            let all = values.len() as f64;
+            let free = (all - gram.trace()) / all;
+            let spread = (all - 2.0 * gram.trace() + gram.norm_squared()) / all;
+            // Real and imaginary parts have unit variance each.
+            let power = 0.5 * values.norm_squared();
+            (power, mean * free, share_above_of(power, mean * free, 0.5 * variance * spread))
+        };
+        let (values, explained) = self.whole();
+        let (power, mean, above) = power_of(values, explained);
         // Too little is no noise, either: then the periods differ by more than noise.
-        let above = share_above_of(power, mean, 0.5 * variance);
-        let p_value = PValue::of(2.0 * above.min(1.0 - above));
+        let below = match &self.with_ends {
+            // The noise of few periods also has what an unmeasured force leaves at the ends of each.
+            Some(_) if power > LEAKED * mean => 1.0,
+            _ => 1.0 - above,
+        };
+        let above = match &self.with_ends {
+            Some(_) => power_of(&self.values, &self.explained).2,
+            None => above,
+        };
+        let p_value = PValue::of((2.0 * above.min(below)).min(1.0));
         let is_excess = p_value.is_significant() && power > mean;
         let concentration = self.concentration.clone().filter(|_| is_excess);
         let source = NoiseSource::Periods;

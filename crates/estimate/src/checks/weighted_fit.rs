@@ -219,9 +219,12 @@ impl WeightedFit {
         let residuals = records.iter().enumerate().zip(weighted).zip(explained);
         let residuals = residuals.map(|(((at, data), weighted), explained)| {
             let values = weighted.residual - &explained * &coefficients;
+            let is_noise = extent == Extent::WholePeriod && has_unmeasured_force(data);
+            let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
             let (values, explained) = without(&jumps(at), values, explained);
             let of_force = if noise.is_none() { force_decides(data, estimate) } else { None };
             SpectralResidual::new(data.clone(), noise.is_some(), values, explained)
+                .with_ends(with_ends)
                 .of_rounding(is_rounding(data, &levels))
                 .with_force_decides(of_force)
                 .with_likely_force(

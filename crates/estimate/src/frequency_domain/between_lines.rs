@@ -1,10 +1,12 @@
-//! What stands between the lines of several periods taken as one: noise, for what repeats is zero there.
+//! Noise between the lines of several periods taken as one, where what repeats is zero.
 
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix, DVector};
 
-/// Maximum number of periods in a row that are taken as one, an odd one.
-const MAX_PERIODS: usize = 15;
+/// Maximum number of periods in a row that are taken as one.
+const MAX_PERIODS: usize = 16;
+/// Minimum number: of two the only line between is as near to the next line of a period.
+const MIN_PERIODS: usize = 3;
 /// Maximum number of samples, of all channels, that are held: 8 MB.
 const MAX_HELD: usize = 1 << 20;
 
@@ -27,16 +29,17 @@ pub(super) struct BetweenLines {
 
 /// Periods that are to be taken as one where `remaining` are to come.
 ///
-/// An odd number, so that no line between two is as near to the one as to the other; as many as may be held, in
-/// parts that hardly differ.
+/// As many as may be held, in parts that hardly differ.
 pub(super) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
-    let fit = (MAX_HELD / (period * channels).max(1)).clamp(1, MAX_PERIODS);
-    let most = fit - (fit + 1) % 2;
-    let parts = remaining.div_ceil(most).max(1);
-    // So many odd numbers have that sum.
-    let parts = parts + (parts + remaining) % 2;
-    let one = remaining.div_ceil(parts);
-    one + (one + 1) % 2
+    let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
+    if most.min(remaining) < MIN_PERIODS {
+        return 1;
+    }
+    let parts = remaining.div_ceil(most);
+    match remaining.div_ceil(parts) {
+        few if few < MIN_PERIODS => 1,
+        one => one,
+    }
 }
 
 impl BetweenLines {
@@ -65,7 +68,8 @@ impl BetweenLines {
     /// Adds B Σ z zᴴ, z the amplitudes between lines, to the scatter of each line of a period: as much as
     /// B − 1 periods scatter about their mean.
     ///
-    /// Each line has those nearer to it than to another line of a period.
+    /// Each line has those nearer to it than to another line of a period, and the one in the middle above it, so that
+    /// no two share any.
     pub(super) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
         if self.periods == 1 {
             return;
@@ -86,7 +90,8 @@ impl BetweenLines {
         for (&line, scatter) in lines.iter().zip(scatter) {
             for away in 1..=all / 2 {
                 // No line of a period is at zero or at half the sampling rate, so that both exist.
-                for at in [all * line - away, all * line + away] {
+                let below = (2 * away != all).then_some(all * line - away);
+                for at in below.into_iter().chain([all * line + away]) {
                     for (z, spectrum) in z.iter_mut().zip(&spectra) {
                         *z = spectrum[at] * scale;
                     }
@@ -102,16 +107,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_are_odd_and_as_large_as_may_be_held() {
+    fn parts_are_as_large_as_may_be_held() {
         for (periods, expected) in [
             (1, vec![1]),
             (2, vec![1, 1]),
             (3, vec![3]),
-            (4, vec![3, 1]),
-            (8, vec![5, 3]),
-            (15, vec![15]),
-            (16, vec![9, 7]),
-            (31, vec![11, 11, 9]),
+            (8, vec![8]),
+            (16, vec![16]),
+            (31, vec![16, 15]),
         ] {
             let (mut parts, mut remaining) = (Vec::new(), periods);
             while remaining > 0 {
@@ -120,7 +123,7 @@ mod tests {
             }
             assert_eq!(parts, expected, "{periods}");
         }
-        // As many samples as may be held, more, and half as many.
-        assert_eq!([1, 2, 3].map(|parts| periods_as_one(4, MAX_HELD / parts, 1)), [1, 1, 3]);
+        // As many samples as may be held, half and a third as many.
+        assert_eq!([1, 2, 3].map(|parts| periods_as_one(6, MAX_HELD / parts, 1)), [1, 1, 3]);
     }
 }

@@ -209,7 +209,7 @@ impl RepeatedPeriods {
     /// Covariance of the mean over the periods, of displacement (m) and force (N), line by line or
     /// pooled over lines; [`NoiseSpectrum::models`] tells what was chosen.
     ///
-    /// Up to 15 periods in a row, as far as memory allows, are taken as one record, between whose lines of a
+    /// Three to 16 periods in a row, as far as memory allows, are taken as one record, between whose lines of a
     /// period there is noise only; for the rest their means scatter.
     /// A force that is the same in every period to rounding is taken as exact.
     ///

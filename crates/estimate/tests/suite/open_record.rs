@@ -75,8 +75,8 @@ fn judge(rig: &RandomTest, runs: u64) -> ([f64; 2], Vec<f64>) {
     ([worst, all], ratios)
 }
 
-/// Of 120 intervals of 95 % fewer than 88 % hold with a probability of 0.001, of 60 fewer than 85 %; standard
-/// deviations of 60 scatter by 9 %.
+/// Of 60 intervals of 95 % fewer than 85 % hold with a probability of 0.001, of 40 fewer than 80 %; standard
+/// deviations of 40 scatter by 11 %.
 #[test]
 fn intervals_hold_whatever_the_damping_and_the_quantity() {
     let of = |damping_ratio, kind, runs, least: f64| {
@@ -87,10 +87,10 @@ fn intervals_hold_whatever_the_damping_and_the_quantity() {
             "{damping_ratio} {kind}: {ratios:?}"
         );
     };
-    of(0.001, ResponseQuantity::Displacement, 120, 0.88);
-    of(0.1, ResponseQuantity::Displacement, 60, 0.85);
+    of(0.001, ResponseQuantity::Displacement, 60, 0.85);
+    of(0.1, ResponseQuantity::Displacement, 40, 0.8);
     for kind in [ResponseQuantity::Velocity, ResponseQuantity::Acceleration] {
-        of(0.01, kind, 60, 0.85);
+        of(0.01, kind, 40, 0.8);
     }
 }
 
@@ -112,7 +112,7 @@ fn a_record_taken_as_a_period_misleads() {
     let rms =
         |errors: Vec<f64>| (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
     let all = |of: &(dyn Fn(FrequencyData) -> FrequencyData + Sync)| -> f64 {
-        rms((0..20).into_par_iter().map(|seed| error(&of(data(&rig, seed)))).collect())
+        rms((0..6).into_par_iter().map(|seed| error(&of(data(&rig, seed)))).collect())
     };
     let (period, open) = (all(&|data| data), all(&|data| data.of_open_record(rig.sampling)));
     assert!(period > 20.0 * open, "{period} {open}");

@@ -155,7 +155,7 @@ fn with_a_second_mass(force: &Record) -> Record {
     Record::from_channel(force.sampling(), motion.displacement().channel(0).to_vec()).unwrap()
 }
 
-/// The level is 1 %: of 400 runs 4, with a standard deviation of 2.
+/// The level is 1 %: of 200 runs 2, with a standard deviation of 1.4.
 #[test]
 fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
     let period = Sampling::new(0.02, 256).unwrap();
@@ -183,10 +183,10 @@ fn residuals_of_spectra_are_judged_with_the_noise_of_the_periods() {
                 found.verdict() == Verdict::Good
             })
         };
-        let right = faulted(400, |seed| good(seed, &Unknowns::unknown_mass(1).unwrap()));
+        let right = faulted(200, |seed| good(seed, &Unknowns::unknown_mass(1).unwrap()));
         let heavy = Unknowns::known_mass(&DMatrix::from_element(1, 1, 11.0)).unwrap();
         let [wrong, ..] = faulted(40, |seed| good(seed, &heavy));
-        assert!(right.iter().all(|share| *share < 0.0251), "{periods} periods: {right:?}");
+        assert!(right.iter().all(|share| *share <= 0.035), "{periods} periods: {right:?}");
         assert!(wrong > 0.95, "{periods} periods, a mass wrong by a tenth: {wrong}");
     }
 }

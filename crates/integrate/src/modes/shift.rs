@@ -1,4 +1,4 @@
-//! Where the search for modes begins again: shifts near those that have not converged, and how far about
+//! Shifts at which the search for modes begins again: near those that have not converged, and how far about
 //! one all have.
 
 use nalgebra::Complex;
