@@ -68,7 +68,7 @@ pub(crate) enum Gathered {
     /// Samples of the equation of motion.
     Instants(EquationOfMotion),
     /// Spectra of whole periods.
-    Periods(Estimator, RepeatedPeriods),
+    Periods(Estimator, Box<RepeatedPeriods>),
 }
 
 impl Gathered {
@@ -90,7 +90,7 @@ impl Gathered {
                 let lines = Lines::new(force.sampling().with_len(period)?, chosen)?;
                 let (kind, _) = beginning.first_motion();
                 let none = RepeatedPeriods::expecting(&lines, dof, kind, periods);
-                return Ok(Self::Periods(estimator, none));
+                return Ok(Self::Periods(estimator, Box::new(none)));
             }
         };
         Ok(Self::Steps(discretisation, Transitions::new(dof, force.sampling().dt())?))
