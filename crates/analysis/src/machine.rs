@@ -182,9 +182,9 @@ impl Machine {
 /// Names in the JSON of an identification.
 #[derive(Deserialize)]
 struct Named {
-    /// Of records.
+    /// Channels of records.
     channels: Option<Channels>,
-    /// Of frequency responses measured elsewhere, where force and response share them.
+    /// Points of frequency responses measured elsewhere, where force and response share them.
     points: Option<Vec<String>>,
 }
 

@@ -49,7 +49,7 @@ impl Identified {
     /// too few hits or segments.
     ///
     /// # Errors
-    /// If a file cannot be read again, and the errors of averages over segments.
+    /// An [`AnalysisError`] if a file cannot be read again, and the errors of averages over segments.
     pub fn coherence(&self) -> Result<Option<ResponseCoherence>, AnalysisError> {
         if let Some(fitted) = &self.fitted.coherence {
             return Ok(Some(fitted.clone()));

@@ -115,7 +115,7 @@ impl Measurement {
     /// A long text is gone through once and not held in memory.
     ///
     /// # Errors
-    /// As [`Measurement::open_with`].
+    /// The errors of [`Measurement::open_with`].
     pub fn open(path: impl AsRef<Path>, channels: &Channels) -> Result<Self, AnalysisError> {
         Self::open_with(path, channels, &Reading::default())
     }

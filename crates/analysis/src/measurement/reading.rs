@@ -47,7 +47,7 @@ impl Reading {
     /// Opens a record file, of whose text at most `rows` rows are held in memory.
     ///
     /// # Errors
-    /// As [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
+    /// The errors of [`RecordFile::open`]; [`AnalysisError::RecordId`] if the file does not hold the record asked
     /// for, or several and none is asked for.
     pub fn open(&self, path: &Path, rows: usize) -> Result<RecordFile, AnalysisError> {
         #[cfg(feature = "parquet")]
@@ -96,7 +96,7 @@ impl RecordPlan {
     /// Opens the record.
     ///
     /// # Errors
-    /// As [`Measurement::open_with`].
+    /// The errors of [`Measurement::open_with`].
     pub fn open(&self) -> Result<Measurement, AnalysisError> {
         let measurement = Measurement::open_with(&self.path, &self.channels, &self.reading)?;
         Ok(Measurement { window: self.window.clone(), ..measurement })

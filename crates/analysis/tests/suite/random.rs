@@ -53,7 +53,7 @@ fn is_open(identified: &Identified) -> bool {
     fitted.drawn.is_some() && fitted.coherence.is_none()
 }
 
-/// Of 50 intervals of 95 % fewer than 42 hold with a probability of 0.002; a warning on right data is to be
+/// Fewer than 42 of 50 intervals of 95 % hold with a probability of 0.002; a warning on right data is to be
 /// seen in 1 of 50 records.
 #[test]
 fn a_random_test_needs_no_settings() {

@@ -29,7 +29,7 @@ pub(super) struct BetweenLines {
 
 /// Periods that are to be taken as one where `remaining` are to come.
 ///
-/// As many as may be held, in parts that hardly differ.
+/// Parts hardly differ, and are as large as may be held.
 pub(super) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
     let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
     if most.min(remaining) < MIN_PERIODS {

@@ -228,10 +228,10 @@ impl RepeatedPeriods {
     /// The same where a smooth spectrum may also be that of the response of a `machine` to unmeasured forces.
     ///
     /// # Errors
-    /// As [`RepeatedPeriods::noise`]; [`EstimateError::Size`] for a machine of other degrees of freedom.
+    /// The errors of [`RepeatedPeriods::noise`]; [`EstimateError::Size`] for a machine of other degrees of freedom.
     ///
     /// # Source
-    /// As of [`RepeatedPeriods::noise`].
+    /// The sources of [`RepeatedPeriods::noise`].
     pub fn noise_beside(
         &self,
         pooling: Pooling,

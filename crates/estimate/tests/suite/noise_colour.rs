@@ -3,13 +3,14 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::Unknowns;
+use mechid_estimate::checks::{Verdict, after_spectral_fit};
 use mechid_estimate::frequency_domain::{
     FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, output_error,
     output_error_pooling,
 };
 use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
-use mechid_signal::{Multisine, Phases, Record, Sampling, noise};
+use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
@@ -169,6 +170,48 @@ fn the_noise_model_is_chosen_from_the_scatter() {
         });
         assert!(count >= 90, "{periods} periods: {count} of 100 with the disturbance");
     }
+}
+
+/// Judge: the closed-form response to a force that no channel shows, four times as long as the record. Taken as a
+/// smooth spectrum, such a noise makes the tests of the residual warn.
+#[test]
+fn an_unmeasured_force_is_found_and_is_no_cause_for_warnings() {
+    const RUNS: u64 = 24;
+    let rig = Rig::new(4);
+    let response = |len: usize, seed: u64| -> Vec<f64> {
+        let all = rig.lines.sampling().with_len(4 * len).unwrap();
+        let force = Record::from_channel(all, autoregressive(4 * len, seed)).unwrap();
+        let exact = exact_harmonic_periodic(&rig.system, &force).unwrap();
+        let x = exact.displacement().column(0);
+        // The white noise beside it has a tenth of its size.
+        let unit = x.norm() / (x.len() as f64).sqrt();
+        let part = x.rows(len, len).into_owned() / unit;
+        part.iter().zip(white(len, seed + 1_000)).map(|(x, e)| x + 0.1 * e).collect()
+    };
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let judged: Vec<[bool; 3]> = (0..RUNS)
+        .into_par_iter()
+        .map(|seed| {
+            let periods = rig.measure(response, seed);
+            let first = periods.mean_with_noise(Pooling::Automatic).unwrap();
+            let fit = output_error(&first, &unknowns).unwrap();
+            let machine = fit.estimate.system().unwrap();
+            let noise = periods.noise_beside(Pooling::Automatic, &machine).unwrap();
+            let is_found = matches!(noise.models(), [NoiseModel::UnmeasuredForce { .. }]);
+            let again = periods.mean().unwrap().with_noise(noise).unwrap();
+            let warns = |data: &FrequencyData| {
+                let estimate = output_error(data, &unknowns).unwrap().estimate;
+                let (records, extent) = (std::slice::from_ref(data), Extent::WholePeriod);
+                let left = after_spectral_fit(records, &estimate, extent).unwrap();
+                left.records[0].findings().iter().any(|one| one.verdict() != Verdict::Good)
+            };
+            [is_found, warns(&again), warns(&first)]
+        })
+        .collect();
+    let count = |at: usize| judged.iter().filter(|run| run[at]).count();
+    let [found, warned, smooth_warned] = [0, 1, 2].map(count);
+    assert!(found >= 22, "{found} of {RUNS}");
+    assert!(warned <= 3 && smooth_warned >= 8, "{warned} and {smooth_warned} of {RUNS} warn");
 }
 
 #[test]

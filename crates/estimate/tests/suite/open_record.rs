@@ -75,7 +75,7 @@ fn judge(rig: &RandomTest, runs: u64) -> ([f64; 2], Vec<f64>) {
     ([worst, all], ratios)
 }
 
-/// Of 60 intervals of 95 % fewer than 85 % hold with a probability of 0.001, of 40 fewer than 80 %; standard
+/// Fewer than 85 % of 60 intervals of 95 % hold with a probability of 0.001, and fewer than 80 % of 40; standard
 /// deviations of 40 scatter by 11 %.
 #[test]
 fn intervals_hold_whatever_the_damping_and_the_quantity() {
