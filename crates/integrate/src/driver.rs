@@ -117,7 +117,8 @@ pub fn integrate_selected<'a>(
     initial: &InitialState,
 ) -> Result<Response, IntegrateError> {
     dofs.check(system.dof())?;
-    let table = ForceTable::acting_on(scheme, system.dof(), dofs.forced, force.into())?;
+    let table = ForceTable::ending(scheme, dofs.forced.len(), force.into())?;
+    let table = table.acting_on(dofs.forced, system.dof());
     let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
     run(scheme, system, &table, initial, motion)?.into_response(&table)
 }

@@ -219,6 +219,21 @@ pub enum IntegrateError {
         /// Change that rounding alone can make.
         rounding: f64,
     },
+    /// The response of a large linear system that repeats is not found in the space searched.
+    #[error(
+        "the response that repeats every {period} s is not found to rounding: after {products} passes over the \
+         period the best still changes by {missed:.1e} of its size in a period; much of the free motion \
+         lasts longer than that: take a longer period",
+        period = message::number(*period)
+    )]
+    PeriodNotClosed {
+        /// Period of the force, in seconds.
+        period: f64,
+        /// Rest of the gap, relative to the largest displacement, velocity or acceleration.
+        missed: f64,
+        /// Number of passes over the period that the search took.
+        products: usize,
+    },
     /// Newton's method finds no response of a nonlinear system that repeats with the force.
     #[error(
         "no response that repeats every {period} s is found from there: the best still changes by \

@@ -68,16 +68,9 @@ impl<'a> ForceTable<'a> {
         Ok(Self { samples, mid_step, after, forced: None, dof })
     }
 
-    /// A force that acts on the degrees of freedom `forced` of `dof`, one for each channel, and ends
-    /// with its last sample.
-    pub(crate) fn acting_on(
-        scheme: &dyn Scheme,
-        dof: usize,
-        forced: &'a [usize],
-        force: SampledForce<'a>,
-    ) -> Result<Self, IntegrateError> {
-        let table = Self::ending(scheme, forced.len(), force)?;
-        Ok(Self { forced: Some(forced), dof, ..table })
+    /// The same acting on the degrees of freedom `forced` of `dof`, one for each channel.
+    pub(crate) fn acting_on(self, forced: &'a [usize], dof: usize) -> Self {
+        Self { forced: Some(forced), dof, ..self }
     }
 
     /// The same with the row behind the last sample known.

@@ -41,6 +41,7 @@
 //! [`critical_step`] and [`accuracy()`] tell what a step does to a motion.
 
 mod accuracy;
+mod arnoldi;
 mod bathe;
 mod central_difference;
 mod collocations;
@@ -63,6 +64,7 @@ mod periodic;
 mod run;
 mod runge_kutta;
 mod scheme;
+mod shooting;
 mod sparse;
 mod stability;
 mod steady_state;
@@ -86,8 +88,8 @@ pub use matrix_exponential::MatrixExponential;
 pub use modes::{ModeSearch, SparseMode, sparse_modes};
 pub use newmark::Newmark;
 pub use nonlinear::{ForceFunction, NonlinearForce, SystemWithForces, Tangents};
-pub use orbit::{PeriodicOrbit, periodic_orbit};
-pub use periodic::{integrate_periodic, integrate_periodic_function};
+pub use orbit::{PeriodicOrbit, periodic_orbit, periodic_orbit_selected};
+pub use periodic::{integrate_periodic, integrate_periodic_function, integrate_periodic_selected};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};
 pub use stability::{critical_step, spectral_radius};

@@ -3,9 +3,32 @@
 use mechid_model::{InitialState, RealSchur, Response};
 use nalgebra::{Complex, DMatrix, DVector};
 
+use crate::arnoldi::{self, Arnoldi};
 use crate::force::ForceTable;
-use crate::run::{Motion, Run};
-use crate::{IntegrateError, SampledForce, Scheme, System};
+use crate::run::Motion;
+use crate::shooting::{DIFFERENCE, Shooting};
+use crate::stability::krylov::scattered_number;
+use crate::{IntegrateError, SampledForce, Scheme, SelectedDofs, System};
+
+/// Number of degrees of freedom up to which the derivative of a period is formed whole.
+const WHOLE_DERIVATIVE: usize = 64;
+
+/// Relative residual to which the equations of a Newton step are solved where the derivative is not formed:
+/// each step then leaves about as much of the gap.
+const SOLVED: f64 = 1e-4;
+
+/// Residual of the largest multiplier at which the search for it ends, as a part of it or, if it is smaller,
+/// of 1.
+const KNOWN: f64 = 1e-6;
+
+/// What the multipliers of a derivative formed whole are known to, as a part of the largest.
+const WHOLE_KNOWN: f64 = 1e-9;
+
+/// Most vectors that are searched for the largest multiplier.
+const MOST_MULTIPLIER_VECTORS: usize = 200;
+
+/// Number of vectors between two looks at the largest multiplier.
+const LOOK: usize = 10;
 
 /// The gap after one period at which the search ends, as a part of the largest displacement,
 /// velocity or acceleration.
@@ -20,15 +43,12 @@ const MOST_STEPS: usize = 40;
 /// Smallest part of a Newton step that is tried where the whole leads away.
 const LEAST_PART: f64 = 1.0 / 64.0;
 
-/// Part of the largest displacement, velocity or acceleration that the state is moved by to form a
-/// derivative: central differences, whose error is its square.
-const DIFFERENCE: f64 = 1e-5;
-
 /// A periodic response, and what becomes of small disturbances of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeriodicOrbit {
     response: Response,
     multipliers: Vec<Complex<f64>>,
+    multiplier_error: f64,
 }
 
 impl PeriodicOrbit {
@@ -39,9 +59,16 @@ impl PeriodicOrbit {
 
     /// The 2n Floquet multipliers, largest first: pure numbers by which disturbances of the orbit
     /// are multiplied in each period, known to about 1e-9 of the largest. Those that belong to the
-    /// memory of a scheme alone are left out as far as they are smaller.
+    /// memory of a scheme alone are left out as far as they are smaller. Of more than 64 degrees of
+    /// freedom it is the largest alone, found by Arnoldi's iteration; none if numbers overflow.
     pub fn multipliers(&self) -> &[Complex<f64>] {
         &self.multipliers
+    }
+
+    /// What the largest multiplier is known to (pure number): of more than 64 degrees of freedom the norm
+    /// of its residual, which is large where many multipliers lie at one distance from zero.
+    pub fn multiplier_error(&self) -> f64 {
+        self.multiplier_error
     }
 
     /// Returns whether small disturbances die out: all multipliers lie within the unit circle.
@@ -59,9 +86,11 @@ impl PeriodicOrbit {
 /// periods: give several periods of the force for those. Nonlinear forces that depend on time must
 /// repeat with the force.
 ///
-/// A Newton step costs two passes over the period for each number of the state, so that this is for
-/// few degrees of freedom; of linear systems [`integrate_periodic`](crate::integrate_periodic) finds
-/// the response directly.
+/// Up to 64 degrees of freedom a Newton step costs two passes over the period for each number of the
+/// state. Of more the derivative of a period is not formed: the step is searched for in the space of
+/// its products (GMRES), two passes each, in a number that is small where most of the motion dies out
+/// within a period and large where many modes hardly lose any. Of linear systems
+/// [`integrate_periodic`](crate::integrate_periodic) finds the response directly.
 ///
 /// ```
 /// use mechid_integrate::{Connection, Newmark, SystemWithForces, periodic_orbit};
@@ -91,7 +120,8 @@ impl PeriodicOrbit {
 ///
 /// # Source
 /// Nayfeh & Balachandran, *Applied Nonlinear Dynamics* (1995), sections 6.3 (shooting) and 7.1
-/// (Floquet theory).
+/// (Floquet theory); Sánchez, Net, García-Archilla & Simó, "Newton–Krylov continuation of periodic orbits for
+/// Navier–Stokes flows", *J. Comput. Phys.* 201 (2004), for many degrees of freedom.
 pub fn periodic_orbit<'a>(
     scheme: &dyn Scheme,
     system: &dyn System,
@@ -100,181 +130,256 @@ pub fn periodic_orbit<'a>(
     settling: usize,
 ) -> Result<PeriodicOrbit, IntegrateError> {
     let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
-    guess.check_dof(system.dof())?;
-    let dt = table.sampling().dt();
-    let run = Run::new(scheme, system, dt)?;
-    let mut shooting = Shooting { run, table, dof: system.dof(), scales: DVector::zeros(0) };
-    let mut state = shooting.settle(guess, settling)?;
+    let motion = Motion::zeros(table.sampling().len(), system.dof());
+    closed(scheme, system, table, motion, guess, settling)
+}
+
+/// The same for a force on some degrees of freedom and the response of some: samples × `dofs.forced` (N) in,
+/// samples × `dofs.observed` out.
+///
+/// # Errors
+/// Those of [`periodic_orbit`]; [`IntegrateError::DofOutside`] and [`IntegrateError::ForcedTwice`].
+pub fn periodic_orbit_selected<'a>(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    dofs: SelectedDofs<'a>,
+    force: impl Into<SampledForce<'a>>,
+    guess: &InitialState,
+    settling: usize,
+) -> Result<PeriodicOrbit, IntegrateError> {
+    dofs.check(system.dof())?;
+    let table = ForceTable::periodic(scheme, dofs.forced.len(), force.into())?;
+    let table = table.acting_on(dofs.forced, system.dof());
+    let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
+    closed(scheme, system, table, motion, guess, settling)
+}
+
+fn closed(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    table: ForceTable<'_>,
+    motion: Motion<'_>,
+    guess: &InitialState,
+    settling: usize,
+) -> Result<PeriodicOrbit, IntegrateError> {
+    let dof = system.dof();
+    guess.check_dof(dof)?;
+    let mut shooting = Shooting::new(scheme, system, table)?;
+    let start = shooting.settle(guess, settling)?;
+    let (state, multipliers, multiplier_error) = match dof <= WHOLE_DERIVATIVE {
+        true => {
+            let (state, mut multipliers) = by_whole_derivative(&mut shooting, start)?;
+            multipliers.truncate(2 * dof);
+            let error = multipliers.first().map_or(0.0, |largest| WHOLE_KNOWN * largest.norm());
+            (state, multipliers, error)
+        }
+        false => {
+            let state = by_products(&mut shooting, start)?;
+            let largest = largest_multiplier(&mut shooting, &state)?;
+            let (multipliers, error) =
+                largest.map_or((vec![], f64::INFINITY), |(value, error)| (vec![value], error));
+            (state, multipliers, error)
+        }
+    };
+    let response = shooting.response(&state, motion)?;
+    Ok(PeriodicOrbit { response, multipliers, multiplier_error })
+}
+
+/// The state that repeats near `state`, and the multipliers, largest first.
+fn by_whole_derivative(
+    shooting: &mut Shooting<'_>,
+    mut state: DVector<f64>,
+) -> Result<(DVector<f64>, Vec<Complex<f64>>), IntegrateError> {
     let mut monodromy = None;
     let mut gap = shooting.gap(&state)?;
     for _ in 0..MOST_STEPS {
-        let missed = shooting.missed(&gap);
+        let missed = Shooting::missed(&gap);
         if missed <= CLOSED && monodromy.is_some() {
             break;
         }
-        let derivative = shooting.monodromy(&state)?;
-        let step = shooting.newton_step(&derivative, &gap)?;
+        let derivative = whole_derivative(shooting, &state)?;
+        let step = newton_step(shooting.period(), &derivative, &gap)?;
         monodromy = Some(derivative);
-        let Some([next, next_gap]) = shooting.nearer(&state, &step, missed)? else { break };
+        let Some([next, next_gap]) = nearer(shooting, &state, &step, missed)? else { break };
         (state, gap) = (next, next_gap);
     }
-    let missed = shooting.missed(&gap);
+    let missed = Shooting::missed(&gap);
     let Some(monodromy) = monodromy.filter(|_| missed <= ROUNDING) else {
         return Err(IntegrateError::NoOrbit { period: shooting.period(), missed });
     };
-    let response = shooting.response(&state)?;
     let mut multipliers = RealSchur::new(monodromy)?.eigenvalues();
     multipliers.sort_by(|one, other| other.norm().total_cmp(&one.norm()));
-    multipliers.truncate(2 * system.dof());
-    Ok(PeriodicOrbit { response, multipliers })
+    Ok((state, multipliers))
 }
 
-/// The map of a scheme over one period of the force.
-struct Shooting<'a> {
-    run: Run,
-    table: ForceTable<'a>,
-    dof: usize,
-    /// Sizes of the numbers of a state: the largest displacement for displacements, and so on.
-    scales: DVector<f64>,
-}
-
-impl Shooting<'_> {
-    fn samples(&self) -> usize {
-        self.table.sampling().len()
-    }
-
-    fn period(&self) -> f64 {
-        self.table.sampling().duration()
-    }
-
-    /// The state after the start from `guess` and `settling` periods; the scales come from the last
-    /// of them.
-    fn settle(
-        &mut self,
-        guess: &InitialState,
-        settling: usize,
-    ) -> Result<DVector<f64>, IntegrateError> {
-        let first = self.run.stepper().first();
-        let mut motions = vec![vec![0.0; 3 * self.dof]; first + 1];
-        self.run.start(guess, &self.table.early(first), &mut motions)?;
-        self.scales = self.sizes(&[]);
-        let mut state = DVector::from_column_slice(&self.run.state);
-        // What remains of the first period leads to the first sample of the next.
-        if first > 0 {
-            state = self.pass(&state, first % self.samples())?;
-        }
-        for _ in 0..settling {
-            state = self.pass(&state, 0)?;
-        }
-        let mut seen = vec![];
-        self.run.restart(state.as_slice());
-        for k in 0..self.samples() {
-            self.run.step(&self.table, k)?;
-            seen.push(self.run.state.clone());
-        }
-        self.scales = self.sizes(&seen);
-        Ok(state)
-    }
-
-    /// The largest displacement, velocity and acceleration (and what the scheme remembers) of
-    /// `states`, for each number of a state; 1 where nothing moves.
-    fn sizes(&mut self, states: &[Vec<f64>]) -> DVector<f64> {
-        let (dof, len) = (self.dof, self.run.stepper().state_len());
-        let size = |part: usize| {
-            let of = |state: &Vec<f64>| {
-                state.iter().skip(part * dof).take(dof).fold(0.0, |m: f64, z| m.max(z.abs()))
-            };
-            let most = states.iter().map(of).fold(0.0, f64::max);
-            if most > 0.0 { most } else { 1.0 }
+/// Derivative of the state at the end of the period by that at its beginning, both in parts of the scales.
+fn whole_derivative(
+    shooting: &mut Shooting<'_>,
+    state: &DVector<f64>,
+) -> Result<DMatrix<f64>, IntegrateError> {
+    let len = state.len();
+    let mut derivative = DMatrix::zeros(len, len);
+    for j in 0..len {
+        let mut moved = |by: f64| {
+            let mut moved = state.clone();
+            moved[j] += by * shooting.scales[j];
+            shooting.pass(&moved, 0)
         };
-        DVector::from_fn(len, |i, _| size(i / dof))
+        let difference = moved(DIFFERENCE)? - moved(-DIFFERENCE)?;
+        let column = difference.component_div(&shooting.scales) / (2.0 * DIFFERENCE);
+        derivative.set_column(j, &column);
     }
+    Ok(derivative)
+}
 
-    /// The state at the end of the period, from `state` at sample `from`.
-    fn pass(&mut self, state: &DVector<f64>, from: usize) -> Result<DVector<f64>, IntegrateError> {
-        self.run.restart(state.as_slice());
-        for k in from..self.samples() {
-            self.run.step(&self.table, k)?;
+/// The step that closes the orbit of the linearised map, in parts of the scales.
+fn newton_step(
+    period: f64,
+    derivative: &DMatrix<f64>,
+    gap: &DVector<f64>,
+) -> Result<DVector<f64>, IntegrateError> {
+    let len = gap.len();
+    let factored = (DMatrix::identity(len, len) - derivative).lu();
+    let smallest = factored.u().diagonal().abs().min();
+    let rounding = DIFFERENCE * DIFFERENCE;
+    if smallest.is_nan() || smallest <= rounding {
+        let size = derivative.norm().max(1.0);
+        return Err(IntegrateError::NoPeriodicState {
+            period,
+            reciprocal_condition: smallest / size,
+            rounding: rounding / size,
+        });
+    }
+    // Cannot fail: the pivots were just looked at.
+    Ok(factored.solve(gap).unwrap_or_else(|| DVector::zeros(len)))
+}
+
+/// The state after the largest part of `step` that leaves a smaller gap, and that gap.
+fn nearer(
+    shooting: &mut Shooting<'_>,
+    state: &DVector<f64>,
+    step: &DVector<f64>,
+    missed: f64,
+) -> Result<Option<[DVector<f64>; 2]>, IntegrateError> {
+    let mut part = 1.0;
+    while part >= LEAST_PART {
+        let next = state + step.component_mul(&shooting.scales) * part;
+        match shooting.gap(&next) {
+            Ok(gap) if Shooting::missed(&gap) < missed => return Ok(Some([next, gap])),
+            // Too far away for the equation of a step to have a solution.
+            Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
+            Err(other) => return Err(other),
         }
-        Ok(DVector::from_column_slice(&self.run.state))
     }
+    Ok(None)
+}
 
-    /// Change of the state in a period, in parts of the scales.
-    fn gap(&mut self, state: &DVector<f64>) -> Result<DVector<f64>, IntegrateError> {
-        let end = self.pass(state, 0)?;
-        Ok((end - state).component_div(&self.scales))
-    }
-
-    fn missed(&self, gap: &DVector<f64>) -> f64 {
-        // Not `amax`, which passes over NaN.
-        gap.iter().fold(0.0, |most, r| if r.abs() <= most { most } else { r.abs() })
-    }
-
-    /// Derivative of the state at the end of the period by that at its beginning, both in parts of
-    /// the scales.
-    fn monodromy(&mut self, state: &DVector<f64>) -> Result<DMatrix<f64>, IntegrateError> {
-        let len = state.len();
-        let mut derivative = DMatrix::zeros(len, len);
-        for j in 0..len {
-            let mut moved = |by: f64| {
-                let mut moved = state.clone();
-                moved[j] += by * self.scales[j];
-                self.pass(&moved, 0)
-            };
-            let difference = moved(DIFFERENCE)? - moved(-DIFFERENCE)?;
-            let column = difference.component_div(&self.scales) / (2.0 * DIFFERENCE);
-            derivative.set_column(j, &column);
+/// The state that repeats near `state`, without a matrix.
+fn by_products(
+    shooting: &mut Shooting<'_>,
+    mut state: DVector<f64>,
+) -> Result<DVector<f64>, IntegrateError> {
+    let rounding = DIFFERENCE * DIFFERENCE;
+    let most = shooting.most_vectors();
+    let mut gap = shooting.gap(&state)?;
+    for _ in 0..MOST_STEPS {
+        let missed = Shooting::missed(&gap);
+        if missed <= CLOSED {
+            break;
         }
-        Ok(derivative)
-    }
-
-    /// The step that closes the orbit of the linearised map, in parts of the scales.
-    fn newton_step(
-        &self,
-        derivative: &DMatrix<f64>,
-        gap: &DVector<f64>,
-    ) -> Result<DVector<f64>, IntegrateError> {
-        let len = gap.len();
-        let factored = (DMatrix::identity(len, len) - derivative).lu();
-        let smallest = factored.u().diagonal().abs().min();
-        let rounding = DIFFERENCE * DIFFERENCE;
-        if smallest.is_nan() || smallest <= rounding {
-            let size = derivative.norm().max(1.0);
+        let step = arnoldi::solve(&gap, SOLVED, most, |direction, derivative| {
+            shooting.derivative(&state, direction, derivative)
+        })?;
+        log::debug!(
+            "a gap of {missed:.1e}: {} products leave {:.1e}",
+            step.products,
+            step.residual
+        );
+        if step.reciprocal_condition <= rounding {
             return Err(IntegrateError::NoPeriodicState {
-                period: self.period(),
-                reciprocal_condition: smallest / size,
-                rounding: rounding / size,
+                period: shooting.period(),
+                reciprocal_condition: step.reciprocal_condition,
+                rounding,
             });
         }
-        // Cannot fail: the pivots were just looked at.
-        Ok(factored.solve(gap).unwrap_or_else(|| DVector::zeros(len)))
+        let Some([next, next_gap]) = nearer(shooting, &state, &step.vector, missed)? else { break };
+        (state, gap) = (next, next_gap);
     }
+    let missed = Shooting::missed(&gap);
+    if missed <= ROUNDING {
+        return Ok(state);
+    }
+    Err(IntegrateError::NoOrbit { period: shooting.period(), missed })
+}
 
-    /// The state after the largest part of `step` that leaves a smaller gap, and that gap.
-    fn nearer(
-        &mut self,
-        state: &DVector<f64>,
-        step: &DVector<f64>,
-        missed: f64,
-    ) -> Result<Option<[DVector<f64>; 2]>, IntegrateError> {
-        let mut part = 1.0;
-        while part >= LEAST_PART {
-            let next = state + step.component_mul(&self.scales) * part;
-            match self.gap(&next) {
-                Ok(gap) if self.missed(&gap) < missed => return Ok(Some([next, gap])),
-                // Too far away for the equation of a step to have a solution.
-                Ok(_) | Err(IntegrateError::NotSolved { .. }) => part *= 0.5,
-                Err(other) => return Err(other),
-            }
+/// The largest multiplier of the orbit through `state` and its residual; `None` if numbers overflow.
+fn largest_multiplier(
+    shooting: &mut Shooting<'_>,
+    state: &DVector<f64>,
+) -> Result<Option<(Complex<f64>, f64)>, IntegrateError> {
+    let most = shooting.most_vectors().min(MOST_MULTIPLIER_VECTORS).min(state.len());
+    let mut space = Arnoldi::new(scattered_number(state.len(), 0), most);
+    loop {
+        let more = space
+            .extend(|direction, derivative| shooting.derivative(state, direction, derivative))?;
+        if more && space.size() % LOOK != 0 {
+            continue;
         }
-        Ok(None)
+        let Some((values, residual)) = space.largest() else { return Ok(None) };
+        let Some(largest) = values.first() else { return Ok(None) };
+        if !more || residual <= KNOWN * largest.norm().max(1.0) {
+            return Ok(Some((*largest, residual)));
+        }
     }
+}
 
-    fn response(mut self, state: &DVector<f64>) -> Result<Response, IntegrateError> {
-        let mut motion = Motion::zeros(self.samples(), self.dof);
-        self.run.restart(state.as_slice());
-        motion.set(0, state.as_slice());
-        self.run.advance(&self.table, 0, self.samples(), &mut motion)?;
-        motion.into_response(&self.table)
+#[cfg(test)]
+mod tests {
+    use mechid_model::{SparseSystem, band};
+    use mechid_signal::{Record, Sampling};
+
+    use super::*;
+    use crate::{Bathe, Connection, Houbolt, Newmark, RungeKutta4, SystemWithForces};
+
+    /// Judge: the derivative formed whole, for the state and the largest multiplier.
+    #[test]
+    fn products_lead_to_the_orbit_of_the_whole_derivative() {
+        let dof = 12;
+        let stiffness = band(dof, &[(-1, -40.0), (0, 90.0), (1, -40.0)]);
+        let chain = SparseSystem::new(band(dof, &[(0, 1.0)]), band(dof, &[(0, 1.0)]), stiffness);
+        let chain = chain.unwrap();
+        let cubic = Connection::to_ground(2).spring(&[0.0, 0.0, 300.0]).unwrap();
+        let stop = Connection::between(5, 6).gap(0.02, 50.0).unwrap();
+        let system = SystemWithForces::new(&chain).with(cubic).unwrap().with(stop).unwrap();
+        let sampling = Sampling::new(0.02, 60).unwrap();
+        let turn = |k: usize| std::f64::consts::TAU * k as f64 / 60.0;
+        let force = (0..60).map(|k| 8.0 * turn(k).cos() + 5.0 * (2.0 * turn(k)).sin()).collect();
+        let force = Record::from_channel(sampling, force).unwrap();
+        let schemes: [&dyn Scheme; 4] = [
+            &Newmark::AVERAGE_ACCELERATION,
+            &Houbolt::default(),
+            &Bathe::HALVES,
+            &RungeKutta4::LINEAR,
+        ];
+        for scheme in schemes {
+            let prepared = || {
+                let table = ForceTable::periodic(scheme, 1, (&force).into()).unwrap();
+                let mut shooting =
+                    Shooting::new(scheme, &system, table.acting_on(&[2], dof)).unwrap();
+                let start = shooting.settle(&InitialState::rest(dof), 3).unwrap();
+                (shooting, start)
+            };
+            let (mut shooting, start) = prepared();
+            let (judge, multipliers) = by_whole_derivative(&mut shooting, start).unwrap();
+            let (mut shooting, start) = prepared();
+            let found = by_products(&mut shooting, start).unwrap();
+            let missed = (&found - &judge).component_div(&shooting.scales).amax();
+            assert!(missed < 1e-9, "{}: {missed:e}", scheme.name());
+            let (largest, error) = largest_multiplier(&mut shooting, &found).unwrap().unwrap();
+            let gap = (largest.norm() - multipliers[0].norm()).abs();
+            // Of a matrix without symmetry the error is a small multiple of the residual.
+            assert!(gap < 1e-5 && error < 1e-6, "{}: {gap:e} {error:e}", scheme.name());
+            assert!(largest.norm() > 0.1, "{largest}");
+        }
     }
 }

@@ -3,16 +3,27 @@
 use mechid_model::Response;
 use mechid_signal::Sampling;
 
-use crate::driver::Sampled;
+use crate::arnoldi;
+use crate::driver::{Sampled, SelectedDofs};
 use crate::force::ForceTable;
 use crate::period::Period;
 use crate::run::{Motion, Run};
+use crate::shooting::Shooting;
 use crate::transition::Transition;
 use crate::{IntegrateError, SampledForce, Scheme, System};
 
 /// The response is kept when its first state repeats to this part of itself: a tenth of what is
 /// promised.
 const CLOSED: f64 = 1e-13;
+
+/// Number of degrees of freedom up to which the map over a period is formed whole.
+const WHOLE_MAP: usize = 300;
+
+/// Relative residual to which the equations of the state that repeats are solved where the map is not formed.
+const SOLVED: f64 = 1e-9;
+
+/// Most searches, each for what the one before leaves.
+const MOST_SEARCHES: usize = 8;
 
 /// The response that repeats with the force, whose samples are one period (samples × n, in N).
 ///
@@ -22,10 +33,15 @@ const CLOSED: f64 = 1e-13;
 /// times for Houbolt and Wilson θ). Where rounding over the period, divided by a damping that is
 /// all but nothing, leaves a gap, the gap is taken through the same solve and the pass repeated.
 ///
+/// Of more than 300 degrees of freedom Φ is not formed: z_0 is searched for in the space of g, Φ g, Φ² g …
+/// (GMRES), whose vectors cost one pass each. Their number is small where most of the motion dies out within a
+/// period; where a thousand do not suffice, [`IntegrateError::PeriodNotClosed`] says so.
+///
 /// # Errors
 /// Those of [`integrate`](crate::integrate()); [`IntegrateError::LinearOnly`] if the system has
 /// nonlinear forces; and [`IntegrateError::NoPeriodicState`] if the free
-/// motion repeats too: a rigid body, or a scheme that sees an undamped mode exactly on a line.
+/// motion repeats too: a rigid body, or a scheme that sees an undamped mode exactly on a line;
+/// [`IntegrateError::PeriodNotClosed`].
 ///
 /// # Source
 /// Nayfeh & Balachandran, *Applied Nonlinear Dynamics* (1995), on shooting for periodic solutions;
@@ -35,24 +51,81 @@ pub fn integrate_periodic<'a>(
     system: &dyn System,
     force: impl Into<SampledForce<'a>>,
 ) -> Result<Response, IntegrateError> {
+    let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
+    let motion = Motion::zeros(table.sampling().len(), system.dof());
+    periodic(scheme, system, table, motion)
+}
+
+/// The same for a force on some degrees of freedom and the response of some: samples × `dofs.forced` (N) in,
+/// samples × `dofs.observed` out.
+///
+/// ```
+/// use mechid_integrate::{Newmark, SelectedDofs, integrate_periodic_selected};
+/// use mechid_model::{SparseSystem, band};
+/// use mechid_signal::{Record, Sampling};
+///
+/// // A steady 1 N at the first of 500 masses between walls: the string of springs is straight.
+/// let n = 500;
+/// let (mass, damping) = (band(n, &[(0, 1.0)]), band(n, &[(0, 20.0)]));
+/// let chain = SparseSystem::new(mass, damping, band(n, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]))?;
+/// let force = Record::from_channel(Sampling::new(0.02, 64)?, vec![1.0; 64])?;
+/// let dofs = SelectedDofs { forced: &[0], observed: &[0, 1] };
+/// let newmark = Newmark::AVERAGE_ACCELERATION;
+/// let response = integrate_periodic_selected(&newmark, &chain, dofs, &force)?;
+/// let [first, second] = [0, 1].map(|channel| response.displacement().channel(channel)[9]);
+/// assert!((1900.0 * first - 900.0 * second - 1.0).abs() < 1e-11);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// Those of [`integrate_periodic`]; [`IntegrateError::DofOutside`] and [`IntegrateError::ForcedTwice`].
+pub fn integrate_periodic_selected<'a>(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    dofs: SelectedDofs<'a>,
+    force: impl Into<SampledForce<'a>>,
+) -> Result<Response, IntegrateError> {
+    dofs.check(system.dof())?;
+    let table = ForceTable::periodic(scheme, dofs.forced.len(), force.into())?;
+    let table = table.acting_on(dofs.forced, system.dof());
+    let motion = Motion::observed(table.sampling().len(), system.dof(), dofs.observed);
+    periodic(scheme, system, table, motion)
+}
+
+fn periodic(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    table: ForceTable<'_>,
+    motion: Motion<'_>,
+) -> Result<Response, IntegrateError> {
     if !system.nonlinear_forces().is_empty() {
         return Err(IntegrateError::LinearOnly { what: "the periodic steady state" });
     }
-    let table = ForceTable::periodic(scheme, system.dof(), force.into())?;
+    match system.dof() <= WHOLE_MAP {
+        true => by_whole_map(scheme, system, &table, motion),
+        false => by_products(scheme, system, table, motion),
+    }
+}
+
+fn by_whole_map(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    table: &ForceTable<'_>,
+    mut motion: Motion<'_>,
+) -> Result<Response, IntegrateError> {
     let (samples, dof) = (table.sampling().len(), system.dof());
     let mut run = Run::new(scheme, system, table.sampling().dt())?;
     let period = Period::of(&Transition::of(run.stepper()), dof, table.sampling())?;
-    let mut motion = Motion::zeros(samples, dof);
-    run.step(&table, samples - 1)?;
+    run.step(table, samples - 1)?;
     run.restart(&period.at_rest(&run.state));
-    run.advance(&table, 0, samples, &mut motion)?;
+    run.advance(table, 0, samples, &mut motion)?;
     let mut start = period.repeat(&run.state);
     let mut missed_before = f64::INFINITY;
     // The first pass yields the answer; more only where rounding over the period leaves a gap.
     for _ in 0..4 {
         run.restart(&start);
         motion.set(0, &start);
-        run.advance(&table, 0, samples, &mut motion)?;
+        run.advance(table, 0, samples, &mut motion)?;
         let gap: Vec<f64> = run.state.iter().zip(&start).map(|(end, begin)| end - begin).collect();
         let correction = period.repeat(&gap);
         let missed = period.norm(&correction) / period.norm(&start);
@@ -62,7 +135,50 @@ pub fn integrate_periodic<'a>(
         missed_before = missed;
         start.iter_mut().zip(correction).for_each(|(z, dz)| *z += dz);
     }
-    motion.into_response(&table)
+    motion.into_response(table)
+}
+
+/// The same without the matrix.
+fn by_products(
+    scheme: &dyn Scheme,
+    system: &dyn System,
+    table: ForceTable<'_>,
+    motion: Motion<'_>,
+) -> Result<Response, IntegrateError> {
+    let rounding = f64::EPSILON * table.sampling().len() as f64;
+    let mut shooting = Shooting::new(scheme, system, table)?;
+    let mut start = shooting.last_step()?;
+    shooting.measure(&start)?;
+    let most = shooting.most_vectors();
+    let (mut missed_before, mut products) = (f64::INFINITY, 0);
+    for _ in 0..MOST_SEARCHES {
+        let gap = shooting.gap(&start)?;
+        if !Shooting::missed(&gap).is_finite() {
+            // Refused with the sample that overflows.
+            return shooting.response(&start, motion);
+        }
+        let found = arnoldi::solve(&gap, SOLVED, most, |state, end| shooting.free(state, end))?;
+        products += found.products;
+        log::debug!("{} products leave {:.1e} of the gap", found.products, found.residual);
+        if found.reciprocal_condition <= rounding {
+            return Err(IntegrateError::NoPeriodicState {
+                period: shooting.period(),
+                reciprocal_condition: found.reciprocal_condition,
+                rounding,
+            });
+        }
+        start += found.vector.component_mul(&shooting.scales);
+        let size = Shooting::missed(&start.component_div(&shooting.scales));
+        let missed = Shooting::missed(&found.vector) / size;
+        // What a search has solved and the next one corrects by as much is rounding.
+        let solved = found.residual <= SOLVED;
+        if solved && (missed <= CLOSED || missed > 0.1 * missed_before) || size == 0.0 {
+            return shooting.response(&start, motion);
+        }
+        missed_before = missed;
+    }
+    let missed = Shooting::missed(&shooting.gap(&start)?);
+    Err(IntegrateError::PeriodNotClosed { period: shooting.period(), missed, products })
 }
 
 /// Integrates as [`integrate_periodic`] does, for a force given as a function of time with the period of
@@ -79,4 +195,94 @@ pub fn integrate_periodic_function(
 ) -> Result<Response, IntegrateError> {
     let sampled = Sampled::of(scheme, system.dof(), sampling, &mut force)?;
     integrate_periodic(scheme, system, sampled.force())
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::{SparseSystem, band};
+    use mechid_signal::{Multisine, Phases, Record};
+    use nalgebra_sparse::SparseEntryMut;
+
+    use super::*;
+    use crate::*;
+
+    /// A chain whose masses move between walls and through oil.
+    fn chain(dof: usize, damping: f64) -> SparseSystem {
+        let stiffness = band(dof, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]);
+        let mass = band(dof, &[(0, 1.0)]);
+        SparseSystem::new(mass, band(dof, &[(-1, -0.2), (0, damping), (1, -0.3)]), stiffness)
+            .unwrap()
+    }
+
+    fn schemes() -> Vec<Box<dyn Scheme>> {
+        vec![
+            Box::new(CentralDifference::default()),
+            Box::new(Houbolt::default()),
+            Box::new(WilsonTheta::new(1.4).unwrap()),
+            Box::new(Newmark::AVERAGE_ACCELERATION),
+            Box::new(GeneralisedAlpha::new(0.7).unwrap()),
+            Box::new(Bathe::HALVES),
+            Box::new(RungeKutta4::LINEAR),
+        ]
+    }
+
+    fn record(samples: usize) -> Record {
+        let sampling = Sampling::new(0.01, samples).unwrap();
+        Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap().sample(sampling).unwrap()
+    }
+
+    /// Judge: the map formed whole, of every scheme. With the weaker damping nearly half of the 140 modes keep a
+    /// tenth of their motion for a period, so that (I − Φ)⁻¹ multiplies rounding.
+    #[test]
+    fn a_search_finds_what_the_whole_map_gives() {
+        let force = record(160);
+        for (damping, tolerance) in [(8.0, 1e-12), (2.0, 1e-12)] {
+            let system = chain(70, damping);
+            for scheme in schemes() {
+                let response = |whole: bool| {
+                    let dofs = SelectedDofs { forced: &[3], observed: &[0, 3, 69] };
+                    let table = ForceTable::periodic(&*scheme, 1, (&force).into()).unwrap();
+                    let table = table.acting_on(dofs.forced, 70);
+                    let motion = Motion::observed(160, 70, dofs.observed);
+                    match whole {
+                        true => by_whole_map(&*scheme, &system, &table, motion).unwrap(),
+                        false => by_products(&*scheme, &system, table, motion).unwrap(),
+                    }
+                };
+                let (found, judge) = (response(false), response(true));
+                let pairs = [
+                    (found.displacement(), judge.displacement()),
+                    (found.velocity(), judge.velocity()),
+                    (found.acceleration(), judge.acceleration()),
+                ];
+                for (found, judge) in pairs {
+                    let missed = (found.data() - judge.data()).amax() / judge.data().amax();
+                    assert!(missed < tolerance, "{} {damping}: {missed:e}", scheme.name());
+                }
+            }
+        }
+    }
+
+    /// A chain that no wall holds: its free motion repeats.
+    #[test]
+    fn what_does_not_repeat_is_refused_at_any_size() {
+        let mut stiffness = band(400, &[(-1, -900.0), (0, 1800.0), (1, -900.0)]);
+        for end in [0, 399] {
+            if let Some(SparseEntryMut::NonZero(entry)) = stiffness.get_entry_mut(end, end) {
+                *entry = 900.0;
+            }
+        }
+        let damping = &stiffness * 0.02;
+        let free = SparseSystem::new(band(400, &[(0, 1.0)]), damping, stiffness).unwrap();
+        let dofs = SelectedDofs { forced: &[0], observed: &[0] };
+        let force = Multisine::flat(1..=9, 1.0, Phases::SchroederBinary).unwrap();
+        let force = force.sample(Sampling::new(0.1, 400).unwrap()).unwrap();
+        let scheme = Newmark::AVERAGE_ACCELERATION;
+        let refused = integrate_periodic_selected(&scheme, &free, dofs, &force);
+        let none = matches!(
+            refused,
+            Err(IntegrateError::NoPeriodicState { .. } | IntegrateError::PeriodNotClosed { .. })
+        );
+        assert!(none, "{refused:?}");
+    }
 }

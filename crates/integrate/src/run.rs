@@ -116,6 +116,8 @@ pub(crate) struct Run {
     owed: Vec<f64>,
     /// The forces of the present step, by [`Instant`](crate::Instant).
     rows: [Vec<f64>; 4],
+    /// No force.
+    none: Vec<f64>,
 }
 
 /// The step of a small system as products of fixed size.
@@ -145,7 +147,8 @@ impl Run {
         };
         let rows = [(); 4].map(|()| vec![0.0; n]);
         let [state, change, owed] = [(); 3].map(|()| vec![0.0; len]);
-        Ok(Self { stepper, dt, small, state, change, owed, rows })
+        let none = vec![0.0; n];
+        Ok(Self { stepper, dt, small, state, change, owed, rows, none })
     }
 
     /// Starts the stepper and keeps the state it starts in.
@@ -212,6 +215,12 @@ impl Run {
         }
         let [now, middle, next, beyond] = &self.rows;
         let loads = Loads { time: k as f64 * self.dt, now, middle, next, beyond };
+        self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
+    }
+
+    /// One step without force through the stepper itself.
+    pub(crate) fn free_step(&mut self) -> Result<(), IntegrateError> {
+        let loads = Loads::none(&self.none);
         self.stepper.step(&mut self.state, &mut self.owed, &loads, &mut self.change)
     }
 

@@ -1,10 +1,12 @@
 //! The eigenvalue of largest modulus of an operator that is known by its products alone.
 
 use std::collections::VecDeque;
-
-use nalgebra::{Complex, DMatrix, DVector};
+use std::convert::Infallible;
 
 use mechid_model::RealSchur;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::arnoldi::Arnoldi;
 
 /// Number of products in one round.
 const ROUND: usize = 32;
@@ -37,41 +39,21 @@ pub(super) fn dominant(
     start: DVector<f64>,
     mut apply: impl FnMut(&[f64], &mut [f64]),
 ) -> Option<Dominant> {
-    let len = start.len();
-    let most = ROUND.min(len);
-    let mut basis = vec![start.normalize()];
-    let mut hessenberg = DMatrix::zeros(most + 1, most);
-    let mut size = most;
-    for j in 0..most {
-        let mut next = DVector::zeros(len);
-        apply(basis[j].as_slice(), next.as_mut_slice());
-        let before = next.norm();
-        for _ in 0..2 {
-            for (i, q) in basis.iter().enumerate() {
-                let part = q.dot(&next);
-                next.axpy(-part, q, 1.0);
-                hessenberg[(i, j)] += part;
-            }
-        }
-        let norm = next.norm();
-        if norm <= 1e-14 * before {
-            size = j + 1;
+    let most = ROUND.min(start.len());
+    let mut space = Arnoldi::new(start, most);
+    loop {
+        let Ok(more) = space.extend(|x, y| {
+            apply(x, y);
+            Ok::<_, Infallible>(())
+        });
+        if !more {
             break;
         }
-        hessenberg[(j + 1, j)] = norm;
-        basis.push(next / norm);
     }
-    if !hessenberg.iter().all(|v| v.is_finite()) {
-        return None;
-    }
-    let square = hessenberg.view((0, 0), (size, size)).into_owned();
+    let square = space.square()?;
     let eigenvalues = RealSchur::new(square.clone()).ok()?.eigenvalues();
     let value = eigenvalues.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
-    let coordinates = eigenvector(&square, 1, value, 0)?;
-    let mut vector = DVector::zeros(len);
-    for (q, y) in basis.iter().zip(&coordinates) {
-        vector.zip_apply(q, |v: &mut Complex<f64>, q| *v += y * q);
-    }
+    let vector = space.combined(eigenvector(&square, 1, value, 0)?.as_slice());
     Some(Dominant { value, vector })
 }
 

@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use mechid_integrate::*;
-use mechid_model::{InitialState, SecondOrderSystem};
+use mechid_model::{InitialState, SecondOrderSystem, SparseSystem, band};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{DMatrix, dvector};
 
@@ -147,4 +147,59 @@ fn orbits_that_are_not_isolated_or_not_there_are_refused() {
         Err(IntegrateError::NoOrbit { .. } | IntegrateError::NoPeriodicState { .. })
     );
     assert!(none, "{refused:?}");
+}
+
+/// Coupled masses between walls, one with a cubic spring, that move as chosen: found with second order, whatever
+/// the number of masses.
+#[test]
+fn a_chosen_response_of_many_masses_is_an_orbit() {
+    let (dof, omega) = (150, 6.0);
+    let stiffness = band(dof, &[(-1, -900.0), (0, 1900.0), (1, -900.0)]);
+    let (mass, damping) = (band(dof, &[(0, 1.0)]), band(dof, &[(-1, -1.0), (0, 5.0), (1, -1.0)]));
+    let chain = SparseSystem::new(mass, damping, stiffness).unwrap();
+    let cubic = Connection::to_ground(40).spring(&[0.0, 0.0, 4e3]).unwrap();
+    let system = SystemWithForces::new(&chain).with(cubic).unwrap();
+    // x_i = a_i cos ωt with the shape of the string, so that its neighbours pull it back by its curvature.
+    let shape = |i: usize| (std::f64::consts::PI * (i as f64 + 1.0) / (dof as f64 + 1.0)).sin();
+    let curved = 2.0 - 2.0 * (std::f64::consts::PI / (dof as f64 + 1.0)).cos();
+    let (k, c) = (100.0 + 900.0 * curved, 3.0 + curved);
+    let error = |len: usize| {
+        let sampling = Sampling::new(TAU / omega / len as f64, len).unwrap();
+        let force = DMatrix::from_fn(len, dof, |sample, i| {
+            let (sin, cos) = (omega * sampling.time(sample)).sin_cos();
+            let elastic = if i == 40 { 4e3 * (shape(i) * cos).powi(3) } else { 0.0 };
+            shape(i) * ((k - omega * omega) * cos - c * omega * sin) + elastic
+        });
+        let force = Record::new(sampling, force).unwrap();
+        let scheme = Newmark::AVERAGE_ACCELERATION;
+        let orbit = periodic_orbit(&scheme, &system, &force, &InitialState::rest(dof), 4).unwrap();
+        assert!(orbit.is_stable() && orbit.multiplier_error() < 0.1, "{orbit:?}");
+        let seen = DMatrix::from_fn(len, dof, |sample, i| {
+            shape(i) * (omega * sampling.time(sample)).cos()
+        });
+        (orbit.response().displacement().data() - seen).amax()
+    };
+    let (coarse, fine) = (error(40), error(80));
+    assert!(((coarse / fine).log2() - 2.0).abs() < 0.2, "{coarse:e} {fine:e}");
+}
+
+/// At rest at the top of its hill the first of many masses, ẍ + 1.5 ẋ − x + x³ = 0, leaves by e^(λT),
+/// λ² + 1.5 λ − 1 = 0.
+#[test]
+fn the_instability_of_one_mass_among_many_shows_in_the_largest_multiplier() {
+    let dof = 100;
+    let mut stiffness = band(dof, &[(0, 9.0)]);
+    stiffness.values_mut()[0] = -1.0;
+    let damping = band(dof, &[(0, 1.5)]);
+    let masses = SparseSystem::new(band(dof, &[(0, 1.0)]), damping, stiffness).unwrap();
+    let cubic = Connection::to_ground(0).spring(&[0.0, 0.0, 1.0]).unwrap();
+    let system = SystemWithForces::new(&masses).with(cubic).unwrap();
+    let none = Record::from_channel(Sampling::new(0.01, 200).unwrap(), vec![0.0; 200]).unwrap();
+    let dofs = SelectedDofs { forced: &[7], observed: &[0] };
+    let (scheme, rest) = (AllowUnstable(&RungeKutta4::LINEAR), InitialState::rest(dof));
+    let orbit = periodic_orbit_selected(&scheme, &system, dofs, &none, &rest, 0).unwrap();
+    assert!(!orbit.is_stable());
+    let [largest] = orbit.multipliers() else { panic!("{orbit:?}") };
+    assert!((largest - std::f64::consts::E).norm() < 1e-5, "{largest}");
+    assert_eq!(orbit.response().dof(), 1);
 }
