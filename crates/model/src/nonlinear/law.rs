@@ -182,19 +182,112 @@ impl Law for SaturatingDamping {
     }
 }
 
+/// A stop with clearance on either side, then a spring: gap(q, a) is q − a beyond a, q + a below −a and zero
+/// between; its coefficient is the stiffness of the spring.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    clearance: f64,
+}
+
+impl Gap {
+    /// A stop with the clearance a (m) on either side.
+    ///
+    /// # Errors
+    /// [`ModelError::Parameter`] unless a is positive and finite.
+    pub fn new(clearance: f64) -> Result<Self, ModelError> {
+        require("clearance of a gap", clearance, "positive", clearance > 0.0)?;
+        Ok(Self { clearance })
+    }
+}
+
+impl Law for Gap {
+    fn value(&self, q: f64, _: f64) -> f64 {
+        q - q.clamp(-self.clearance, self.clearance)
+    }
+
+    fn slopes(&self, q: f64, _: f64) -> [f64; 2] {
+        [f64::from(u8::from(q.abs() > self.clearance)), 0.0]
+    }
+
+    fn dimension(&self) -> [i32; 2] {
+        [1, 0]
+    }
+
+    fn expression(&self, q: &str, _: &str) -> String {
+        format!("gap({q}, {})", self.clearance)
+    }
+
+    fn constants(&self) -> Vec<Constant> {
+        vec![Constant { name: "a", unit: "m", value: self.clearance }]
+    }
+
+    fn with_constants(&self, values: &[f64]) -> Option<Arc<dyn Law>> {
+        let [clearance] = values else { return None };
+        Some(Arc::new(Self::new(*clearance).ok()?))
+    }
+}
+
+/// tanh(q̇/b): Coulomb friction that is regularised, whose coefficient is the force of sliding; below the
+/// velocity b it creeps where dry friction sticks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Friction {
+    velocity: f64,
+}
+
+impl Friction {
+    /// Friction with the velocity b (m/s) above which it slides.
+    ///
+    /// # Errors
+    /// [`ModelError::Parameter`] unless b is positive and finite.
+    pub fn new(velocity: f64) -> Result<Self, ModelError> {
+        require("velocity of a friction", velocity, "positive", velocity > 0.0)?;
+        Ok(Self { velocity })
+    }
+}
+
+impl Law for Friction {
+    fn value(&self, _: f64, v: f64) -> f64 {
+        (v / self.velocity).tanh()
+    }
+
+    fn slopes(&self, _: f64, v: f64) -> [f64; 2] {
+        let part = (v / self.velocity).tanh();
+        [0.0, (1.0 - part * part) / self.velocity]
+    }
+
+    fn dimension(&self) -> [i32; 2] {
+        [0, 0]
+    }
+
+    fn expression(&self, _: &str, v: &str) -> String {
+        format!("tanh({v}/{})", self.velocity)
+    }
+
+    fn constants(&self) -> Vec<Constant> {
+        vec![Constant { name: "b", unit: "m/s", value: self.velocity }]
+    }
+
+    fn with_constants(&self, values: &[f64]) -> Option<Arc<dyn Law>> {
+        let [velocity] = values else { return None };
+        Some(Arc::new(Self::new(*velocity).ok()?))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn slopes_are_the_derivatives_of_the_values() {
-        let laws: [Box<dyn Law>; 6] = [
+        let laws: [Box<dyn Law>; 8] = [
             Box::new(Power::new(2, 0).unwrap()),
             Box::new(Power::new(3, 1).unwrap()),
             Box::new(Power::new(0, 3).unwrap()),
             Box::new(Power::new(0, 0).unwrap()),
             Box::new(QuadraticDamping),
             Box::new(SaturatingDamping::new(0.7).unwrap()),
+            Box::new(Gap::new(0.5).unwrap()),
+            Box::new(Friction::new(0.4).unwrap()),
         ];
         for law in laws {
             for (q, v) in [(0.3, -0.5), (-1.2, 0.8), (0.0, 0.0)] {
@@ -216,10 +309,15 @@ mod tests {
         assert!(Power::new(1, 0).unwrap_err().to_string().contains("an entry of K or C"));
         assert!(Power::new(0, 1).is_err() && Power::new(10, 0).is_err());
         for b in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(SaturatingDamping::new(b).is_err());
+            assert!(SaturatingDamping::new(b).is_err() && Gap::new(b).is_err());
+            assert!(Friction::new(b).is_err());
         }
         let law = SaturatingDamping::new(2.0).unwrap();
         assert_eq!(law.with_constants(&[3.0]).unwrap().constants()[0].value, 3.0);
         assert!(law.with_constants(&[-3.0]).is_none() && law.with_constants(&[]).is_none());
+        let gap = Gap::new(2.0).unwrap().with_constants(&[0.5]).unwrap();
+        assert_eq!([-0.75, 0.4, 1.5].map(|q| gap.value(q, 9.0)), [-0.25, 0.0, 1.0]);
+        let friction = Friction::new(2.0).unwrap().with_constants(&[0.5]).unwrap();
+        assert_eq!(friction.value(9.0, -0.5), -1f64.tanh());
     }
 }

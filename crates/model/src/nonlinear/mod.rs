@@ -7,7 +7,7 @@ mod term;
 mod uncertain;
 
 pub use backbone::BackbonePoint;
-pub use law::{Constant, Law, Power, QuadraticDamping, SaturatingDamping};
+pub use law::{Constant, Friction, Gap, Law, Power, QuadraticDamping, SaturatingDamping};
 pub use term::{Coordinate, Term, Terms};
 pub use uncertain::{NonlinearParameter, UncertainNonlinearSystem};
 

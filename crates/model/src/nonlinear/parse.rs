@@ -3,7 +3,9 @@
 use std::str::FromStr;
 use std::sync::Arc;
 
-use super::{Coordinate, Law, Power, QuadraticDamping, SaturatingDamping, Term, Terms};
+use super::{
+    Coordinate, Friction, Gap, Law, Power, QuadraticDamping, SaturatingDamping, Term, Terms,
+};
 use crate::ModelError;
 
 impl FromStr for Terms {
@@ -16,9 +18,22 @@ impl FromStr for Terms {
     fn from_str(text: &str) -> Result<Self, ModelError> {
         match text.trim() {
             "" => Ok(Self::none()),
-            text => Self::new(text.split(',').map(str::parse).collect::<Result<_, _>>()?),
+            text => Self::new(apart(text).map(str::parse).collect::<Result<_, _>>()?),
         }
     }
+}
+
+/// The parts of `text` between commas that stand outside parentheses.
+fn apart(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0_usize;
+    text.split(move |c| {
+        match c {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        c == ',' && depth == 0
+    })
 }
 
 impl TryFrom<String> for Terms {
@@ -71,6 +86,9 @@ impl Parser {
     }
 
     fn law(mut self) -> Result<(Coordinate, Arc<dyn Law>), String> {
+        if let Some(law) = self.function()? {
+            return Ok(law);
+        }
         let mut product = Product::default();
         while self.peek().is_some_and(|c| c != '/') {
             self.factor(&mut product)?;
@@ -89,6 +107,54 @@ impl Parser {
                 _ => return Err("|v| stands in |v| v only".to_owned()),
             };
         Ok((coordinate, law))
+    }
+
+    /// `gap(x1, 0.001)` or `tanh(v1/0.01)`; nothing if the text begins otherwise.
+    fn function(&mut self) -> Result<Option<(Coordinate, Arc<dyn Law>)>, String> {
+        let named = |error: ModelError| error.to_string();
+        let found: (Coordinate, Arc<dyn Law>) = if self.take_word("gap(") {
+            let (coordinate, clearance) =
+                self.argument('x', ',').ok_or("a gap is written gap(x1, 0.001)")?;
+            (coordinate, Arc::new(Gap::new(number(&clearance)?).map_err(named)?))
+        } else if self.take_word("tanh(") {
+            let (coordinate, velocity) =
+                self.argument('v', '/').ok_or("friction is written tanh(v1/0.01)")?;
+            (coordinate, Arc::new(Friction::new(number(&velocity)?).map_err(named)?))
+        } else {
+            return Ok(None);
+        };
+        match self.peek() {
+            None => Ok(Some(found)),
+            Some(c) => Err(format!("unexpected {c} after the expression")),
+        }
+    }
+
+    /// A displacement or velocity, whichever `letter` says, and the text between the sign after it and the
+    /// parenthesis that closes.
+    fn argument(&mut self, letter: char, sign: char) -> Option<(Coordinate, String)> {
+        let (found, coordinate) = self.variable().ok()?;
+        if found != letter || !self.take(sign) {
+            return None;
+        }
+        let text = self.until_closed();
+        self.take(')').then_some((coordinate, text))
+    }
+
+    /// The text before the next parenthesis that closes, or to the end.
+    fn until_closed(&mut self) -> String {
+        let start = self.at;
+        while self.peek().is_some_and(|c| c != ')') {
+            self.at += 1;
+        }
+        self.text[start..self.at].iter().collect()
+    }
+
+    fn take_word(&mut self, word: &str) -> bool {
+        let begins = word.chars().enumerate().all(|(i, c)| self.text.get(self.at + i) == Some(&c));
+        if begins {
+            self.at += word.chars().count();
+        }
+        begins
     }
 
     /// `x1`, `v1^3`, `(x1-x2)^2`, `|v1|`, with a `*` before or after it.
@@ -154,18 +220,14 @@ impl Parser {
         if self.variable()? != ('v', coordinate) || !self.take('/') {
             return Err(form());
         }
-        let start = self.at;
-        while self.peek().is_some_and(|c| c != ')') {
-            self.at += 1;
-        }
-        let number: String = self.text[start..self.at].iter().collect();
+        let text = self.until_closed();
         for c in [')', '^', '2', ')'] {
             self.expect(c).map_err(|_| form())?;
         }
         if let Some(c) = self.peek() {
             return Err(format!("unexpected {c} after the expression"));
         }
-        number.parse().map_err(|_| format!("{number} is not a number"))
+        number(&text)
     }
 
     fn whole_number(&mut self) -> Result<u32, String> {
@@ -196,6 +258,10 @@ impl Parser {
     }
 }
 
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().map_err(|_| format!("{text} is not a number"))
+}
+
 fn shown(character: Option<char>) -> String {
     character.map_or_else(|| "the end".to_owned(), String::from)
 }
@@ -208,9 +274,10 @@ mod tests {
     fn what_is_written_is_read_back() {
         let text = "k2: x1^2, k3: x1^3, c2: |v1| v1, cx: x2^2 v2, f: x1^0, \
                     k12: (x1-x2)^3, c12: |(v1-v3)| (v1-v3), s: v1^3/(1 + (v1/0.25)^2), \
-                    s2: (v2-v1)^3/(1 + ((v2-v1)/1e-3)^2)";
+                    s2: (v2-v1)^3/(1 + ((v2-v1)/1e-3)^2), g: gap(x2, 1e-4), g12: gap((x1-x2), 0.02), \
+                    r: tanh(v1/0.01), r12: tanh((v1-v2)/1e-3)";
         let terms: Terms = text.parse().unwrap();
-        assert_eq!(terms.len(), 9);
+        assert_eq!(terms.len(), 13);
         assert_eq!(terms.to_string().parse::<Terms>().unwrap(), terms);
         let first = |text: &str| text.parse::<Term>().unwrap().to_string();
         assert_eq!(first(" k3 : x * x*x"), "k3: x1^3");
@@ -227,6 +294,8 @@ mod tests {
             ("a: v^3/(1+(v/2)^2)", "N·s³/m³"),
             ("a: x^0", "N"),
             ("a: x^7", "N/m⁷"),
+            ("a: gap(x, 0.1)", "N/m"),
+            ("a: tanh(v/0.1)", "N"),
         ] {
             assert_eq!(text.parse::<Term>().unwrap().unit(), unit);
         }
@@ -251,6 +320,15 @@ mod tests {
             ("c: v^3/(1+(v/a)^2)", "a is not a number"),
             ("c: v^3/(1+(v/-2)^2)", "must be positive"),
             ("3k: x^3", "begins with a letter"),
+            ("g: gap(x1)", "written gap(x1, 0.001)"),
+            ("g: gap(v1, 0.1)", "written gap(x1, 0.001)"),
+            ("g: gap(x1, 0.1", "written gap(x1, 0.001)"),
+            ("g: gap(x1, -0.1)", "clearance of a gap must be positive"),
+            ("g: gap(x1, a)", "a is not a number"),
+            ("g: gap(x1, 0.1)^2", "unexpected ^"),
+            ("r: tanh(x1/0.1)", "written tanh(v1/0.01)"),
+            ("r: tanh(v1)", "written tanh(v1/0.01)"),
+            ("r: tanh(v1/0)", "velocity of a friction must be positive"),
             ("c: v^3/(1+(v/2)^2) x", "unexpected x"),
         ] {
             let error = text.parse::<Term>().unwrap_err().to_string();

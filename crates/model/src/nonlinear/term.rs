@@ -189,7 +189,8 @@ impl PartialEq for Term {
 ///
 /// A term is written `name: expression`, terms are separated by commas. An expression is a product
 /// of powers of `x1` and `v1` (displacement and velocity of degree of freedom 1; `x` and `v` mean the
-/// same) or of `(x1-x2)` and `(v1-v2)`; `|v1| v1`; or `v1^3/(1 + (v1/b)^2)` with a number for b.
+/// same) or of `(x1-x2)` and `(v1-v2)`; `|v1| v1`; or, with numbers for a and b, `v1^3/(1 + (v1/b)^2)`, a stop
+/// `gap(x1, a)` with the clearance a on either side, or friction `tanh(v1/b)`.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(try_from = "String", into = "String"))]
