@@ -71,9 +71,11 @@ impl PeriodicOrbit {
         self.multiplier_error
     }
 
-    /// Returns whether small disturbances die out: all multipliers lie within the unit circle.
+    /// Returns whether small disturbances die out: all multipliers lie within the unit circle, and none
+    /// overflows.
     pub fn is_stable(&self) -> bool {
-        self.multipliers.iter().all(|multiplier| multiplier.norm() < 1.0)
+        let largest = self.multipliers.first();
+        largest.is_some_and(|multiplier| multiplier.norm() < 1.0)
     }
 }
 
@@ -322,7 +324,7 @@ fn largest_multiplier(
     loop {
         let more = space
             .extend(|direction, derivative| shooting.derivative(state, direction, derivative))?;
-        if more && space.size() % LOOK != 0 {
+        if more && !space.size().is_multiple_of(LOOK) {
             continue;
         }
         let Some((values, residual)) = space.largest() else { return Ok(None) };

@@ -10,9 +10,10 @@ mod summary;
 use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
-    AllowUnstable, Convention, IntegrateError, Matrices, SampledForce, Scheme, SelectedDofs,
-    SystemWithForces, TermForces, integrate, integrate_periodic, integrate_selected,
-    periodic_orbit, sparse_steady_state,
+    AllowUnstable, Convention, IntegrateError, Matrices, PeriodicOrbit, SampledForce, Scheme,
+    SelectedDofs, SystemWithForces, TermForces, integrate, integrate_periodic,
+    integrate_periodic_selected, integrate_selected, periodic_orbit, periodic_orbit_selected,
+    sparse_steady_state,
 };
 use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
@@ -266,12 +267,6 @@ impl Described {
         }
     }
 
-    /// M, C and K for a response that needs all their entries.
-    fn dense(&self) -> Result<&SecondOrderSystem, SimulateError> {
-        let sparse = || SimulateError::SparsePeriodic { dof: self.linear.dof() };
-        self.linear.dense().ok_or_else(sparse)
-    }
-
     /// M, C and K with the forces of the terms.
     fn with_forces(&self) -> Result<SystemWithForces<'_>, SimulateError> {
         let system = match &self.linear {
@@ -306,39 +301,50 @@ fn stepped(
     let unguarded = AllowUnstable(scheme);
     let scheme = if experiment.allow_unstable { &unguarded } else { scheme };
     let force = with_middle(force, middle);
+    let system = machine.with_forces()?;
+    // Of a sparse machine the force has the columns of some degrees of freedom.
+    let sparse = matches!(machine.linear, SimulatedSystem::Sparse(_));
+    let some = sparse.then(|| Ok::<_, IoError>((experiment.forced()?, experiment.outputs()?)));
+    let some = some.transpose()?;
+    let dofs = some.as_ref().map(|(forced, observed)| SelectedDofs { forced, observed });
     match experiment.response {
         ResponseKind::Periodic if has_given_start(experiment) => {
             Err(SimulateError::GivenStartPeriodic)
         }
-        ResponseKind::Periodic => match &machine.nonlinear {
-            None => Ok(integrate_periodic(scheme, machine.dense()?, force)?),
-            Some(_) => {
-                let rest = InitialState::rest(machine.dense()?.dof());
-                let system = machine.with_forces()?;
-                let orbit = periodic_orbit(scheme, &system, force, &rest, SETTLING)
-                    .map_err(SimulateError::of_orbit)?;
-                match orbit.multipliers().first() {
-                    Some(multiplier) if multiplier.norm() > 1.0 + MULTIPLIER_ROUNDING => {
-                        Err(SimulateError::UnstableOrbit { multiplier: *multiplier })
-                    }
-                    _ => Ok(orbit.response().clone()),
+        ResponseKind::Periodic if machine.nonlinear.is_none() => Ok(match dofs {
+            None => integrate_periodic(scheme, &system, force)?,
+            Some(dofs) => integrate_periodic_selected(scheme, &system, dofs, force)?,
+        }),
+        ResponseKind::Periodic => {
+            let rest = InitialState::rest(machine.linear.dof());
+            let orbit = match dofs {
+                None => periodic_orbit(scheme, &system, force, &rest, SETTLING),
+                Some(dofs) => {
+                    periodic_orbit_selected(scheme, &system, dofs, force, &rest, SETTLING)
                 }
-            }
-        },
+            };
+            stayed_on(&orbit.map_err(SimulateError::of_orbit)?)
+        }
         ResponseKind::FromRest | ResponseKind::From(_) => {
             let initial = experiment.initial_state()?;
-            match &machine.linear {
-                SimulatedSystem::Dense(_) => {
-                    Ok(integrate(scheme, &machine.with_forces()?, force, &initial)?)
-                }
-                SimulatedSystem::Sparse(_) => {
-                    let (forced, observed) = (experiment.forced()?, experiment.outputs()?);
-                    let dofs = SelectedDofs { forced: &forced, observed: &observed };
-                    Ok(integrate_selected(scheme, &machine.with_forces()?, dofs, force, &initial)?)
-                }
-            }
+            Ok(match dofs {
+                None => integrate(scheme, &system, force, &initial)?,
+                Some(dofs) => integrate_selected(scheme, &system, dofs, force, &initial)?,
+            })
         }
     }
+}
+
+/// The response of an orbit, unless its largest multiplier is known to lead away from it.
+fn stayed_on(orbit: &PeriodicOrbit) -> Result<Response, SimulateError> {
+    // None: it overflows.
+    let infinite = Complex::new(f64::INFINITY, 0.0);
+    let multiplier = orbit.multipliers().first().copied().unwrap_or(infinite);
+    let known = if orbit.multipliers().is_empty() { 0.0 } else { orbit.multiplier_error() };
+    if multiplier.norm() > 1.0 + MULTIPLIER_ROUNDING + known {
+        return Err(SimulateError::UnstableOrbit { multiplier });
+    }
+    Ok(orbit.response().clone())
 }
 
 /// A simulation that cannot be run.
@@ -369,16 +375,6 @@ pub enum SimulateError {
          newmark or runge-kutta-4, and steps that are short against the fastest motion"
     )]
     ExactNonlinear,
-    /// The periodic response of a sparse machine by a scheme.
-    #[error(
-        "the machine has {dof} degrees of freedom in Matrix Market files: schemes do not find its periodic \
-         response, which takes a matrix of all entries; choose \"exact\" of a machine without nonlinear terms, \
-         or \"response\": \"from-rest\" and a record that is long against the decay"
-    )]
-    SparsePeriodic {
-        /// Number of degrees of freedom.
-        dof: usize,
-    },
     /// A periodic response has no start.
     #[error(
         "a periodic response has no start: give displacements for Houbolt's first steps only with a \

@@ -8,6 +8,9 @@ use super::{
 };
 use crate::ModelError;
 
+/// A law and the coordinate it is of.
+type Factor = (Coordinate, Arc<dyn Law>);
+
 impl FromStr for Terms {
     type Err = ModelError;
 
@@ -85,7 +88,7 @@ impl Parser {
         Self { text: text.chars().filter(|c| !c.is_whitespace()).collect(), at: 0 }
     }
 
-    fn law(mut self) -> Result<(Coordinate, Arc<dyn Law>), String> {
+    fn law(mut self) -> Result<Factor, String> {
         if let Some(law) = self.function()? {
             return Ok(law);
         }
@@ -110,9 +113,9 @@ impl Parser {
     }
 
     /// `gap(x1, 0.001)` or `tanh(v1/0.01)`; nothing if the text begins otherwise.
-    fn function(&mut self) -> Result<Option<(Coordinate, Arc<dyn Law>)>, String> {
+    fn function(&mut self) -> Result<Option<Factor>, String> {
         let named = |error: ModelError| error.to_string();
-        let found: (Coordinate, Arc<dyn Law>) = if self.take_word("gap(") {
+        let found: Factor = if self.take_word("gap(") {
             let (coordinate, clearance) =
                 self.argument('x', ',').ok_or("a gap is written gap(x1, 0.001)")?;
             (coordinate, Arc::new(Gap::new(number(&clearance)?).map_err(named)?))
