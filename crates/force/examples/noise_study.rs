@@ -1,6 +1,6 @@
 //! Prints the tables of `docs/book/src/choose/force.md`:
-//! `cargo run --release -p mechid-force --example noise_study`, and with `-- coverage 200` that of
-//! the intervals, over 200 records each, or `-- accelerations 100` for accelerations alone.
+//! `cargo run --release -p mechid-force --example noise_study`, with `-- known` the first of them alone, with
+//! `-- coverage 200` that of the intervals, over 200 records each, or `-- accelerations 100` for accelerations alone.
 #![allow(clippy::print_stdout, reason = "an example talks to its reader")]
 
 #[allow(dead_code, reason = "the test uses the rest")]
@@ -19,6 +19,9 @@ fn main() {
         println!("{}", study::coverage::coverage_table(runs, methods));
         return;
     }
-    let [known, unknown] = study::tables();
-    println!("{known}\n{unknown}\n{}", study::rule_table(&study::rule_rows()));
+    println!("{}", study::known_table());
+    if arguments.first().is_some_and(|first| first == "known") {
+        return;
+    }
+    println!("{}\n{}", study::unknown_table(), study::rule_table(&study::rule_rows()));
 }

@@ -269,25 +269,31 @@ fn textbook_corner(case: &Case, m: &Measurement, trials: &[IdentifiedForce]) -> 
     (1..points.len() - 1).max_by(|a, b| curvature(*a).total_cmp(&curvature(*b))).unwrap()
 }
 
-/// The first two tables of the book (`choose/force.md`): excited lines known, and not known.
-pub fn tables() -> [String; 2] {
+/// The first table of the book (`choose/force.md`): the excited lines are known.
+pub fn known_table() -> String {
+    table(&KNOWN, true)
+}
+
+/// The same where the lines are not known.
+pub fn unknown_table() -> String {
+    table(&UNKNOWN, false)
+}
+
+fn table(methods: &[Method], floor: bool) -> String {
     let cases = cases();
-    let table = |methods: &[Method], floor: bool| {
-        let mut out = String::from("| Method |");
-        cases.iter().for_each(|c| out.push_str(&format!(" {} |", c.name)));
-        out.push_str("\n|---|---|---|---|---|\n");
-        let mut row = |name: &str, value: &dyn Fn(&Case) -> f64| {
-            out.push_str(&format!("| {name} |"));
-            cases.iter().for_each(|c| out.push_str(&format!(" {:.3} |", value(c))));
-            out.push('\n');
-        };
-        if floor {
-            row("*noise floor*", &|c| c.floor());
-        }
-        methods.iter().for_each(|m| row(m.0, &|c| rms_error(c, *m)));
-        out
+    let mut out = String::from("| Method |");
+    cases.iter().for_each(|c| out.push_str(&format!(" {} |", c.name)));
+    out.push_str("\n|---|---|---|---|---|\n");
+    let mut row = |name: &str, value: &dyn Fn(&Case) -> f64| {
+        out.push_str(&format!("| {name} |"));
+        cases.iter().for_each(|c| out.push_str(&format!(" {:.3} |", value(c))));
+        out.push('\n');
     };
-    [table(&KNOWN, true), table(&UNKNOWN, false)]
+    if floor {
+        row("*noise floor*", &|c| c.floor());
+    }
+    methods.iter().for_each(|m| row(m.0, &|c| rms_error(c, *m)));
+    out
 }
 
 /// A case, a filter's name and what each rule loses.
