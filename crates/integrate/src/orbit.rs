@@ -65,7 +65,7 @@ impl PeriodicOrbit {
         &self.multipliers
     }
 
-    /// What the largest multiplier is known to (pure number): of more than 64 degrees of freedom the norm
+    /// Error to which the largest multiplier is known (pure number): of more than 64 degrees of freedom the norm
     /// of its residual, which is large where many multipliers lie at one distance from zero.
     pub fn multiplier_error(&self) -> f64 {
         self.multiplier_error
