@@ -22,7 +22,7 @@ pub struct ModalSummary {
     pub degrees_of_freedom: usize,
     /// Level of the confidence intervals, a pure number such as 0.95.
     pub confidence: f64,
-    /// Nonlinear terms that modes of small amplitudes leave out, if there are any.
+    /// Nonlinear terms that the modes, those of the linear part, leave out, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear_terms: Option<Terms>,
     /// Names of the responses, one per degree of freedom; empty if they are not known.
@@ -180,7 +180,7 @@ impl ModalSummary {
         let small = self
             .nonlinear_terms
             .iter()
-            .map(|terms| format!("\nmodes of small amplitudes; the nonlinear terms are {terms}"));
+            .map(|terms| format!("\nmodes of the linear part; the nonlinear terms are {terms}"));
         format!(
             "{}: {dof} {freedom} of freedom, {modes} mode{}{}\n\n{}{}\n{}",
             self.file,

@@ -16,15 +16,13 @@ pub(crate) struct Arnoldi {
     /// H with one row more, that of the next vector; zeros where nothing was computed yet.
     hessenberg: DMatrix<f64>,
     size: usize,
-    /// Whether Φ leads out of the space, to a vector that the basis has already.
-    open: bool,
 }
 
 impl Arnoldi {
     /// The space of `start` alone, of which no product is known; it can have `most` dimensions.
     pub(crate) fn new(start: DVector<f64>, most: usize) -> Self {
         let hessenberg = DMatrix::zeros(most + 1, most);
-        Self { basis: vec![start.normalize()], hessenberg, size: 0, open: true }
+        Self { basis: vec![start.normalize()], hessenberg, size: 0 }
     }
 
     /// Number of products that are known.
@@ -51,12 +49,12 @@ impl Arnoldi {
         }
         let norm = next.norm();
         self.size = j + 1;
-        self.open = norm > 1e-14 * before;
-        if self.open {
+        let leads_out = norm > 1e-14 * before;
+        if leads_out {
             self.hessenberg[(j + 1, j)] = norm;
             self.basis.push(next / norm);
         }
-        Ok(self.open && self.size < self.hessenberg.ncols())
+        Ok(leads_out && self.size < self.hessenberg.ncols())
     }
 
     /// H, square; `None` if its numbers overflow.
@@ -77,19 +75,32 @@ impl Arnoldi {
         vector
     }
 
-    /// The eigenvalues of H, largest first, and the residual of the first: ‖Φ u − μ u‖ for its vector u of
-    /// norm 1.
-    pub(crate) fn largest(&self) -> Option<(Vec<Complex<f64>>, f64)> {
+    /// The eigenvalue of H of largest modulus with its vector; `None` if numbers overflow.
+    pub(crate) fn dominant(&self) -> Option<Dominant> {
         let square = self.square()?;
-        let mut values = RealSchur::new(square.clone()).ok()?.eigenvalues();
-        values.sort_by(|one, other| other.norm().total_cmp(&one.norm()));
-        let coordinates = eigenvector(&square, 1, *values.first()?, 0)?;
-        let last = coordinates[self.size - 1].norm();
-        Some((values, self.hessenberg[(self.size, self.size - 1)] * last))
+        let values = RealSchur::new(square.clone()).ok()?.eigenvalues();
+        let value = values.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
+        let coordinates = eigenvector(&square, 1, value, 0)?;
+        let leads_out = self.hessenberg[(self.size, self.size - 1)];
+        Some(Dominant {
+            value,
+            residual: leads_out * coordinates[self.size - 1].norm(),
+            vector: self.combined(coordinates.as_slice()),
+        })
     }
 }
 
-/// What a search in a Krylov space finds of (I − Φ) y = b.
+/// An approximate eigenvalue of largest modulus.
+#[derive(Debug, Clone)]
+pub(crate) struct Dominant {
+    pub(crate) value: Complex<f64>,
+    /// ‖Φ u − μ u‖.
+    pub(crate) residual: f64,
+    /// Its vector u, of norm 1.
+    pub(crate) vector: DVector<Complex<f64>>,
+}
+
+/// Solution of (I − Φ) y = b, as far as a search in a Krylov space finds it.
 pub(crate) struct Solution {
     /// y.
     pub(crate) vector: DVector<f64>,
@@ -229,9 +240,9 @@ mod tests {
                     Ok::<_, Infallible>(())
                 });
             }
-            let (values, residual) = space.largest().unwrap();
+            let Dominant { value, residual, .. } = space.dominant().unwrap();
             // Of a symmetric matrix the error is no larger than the residual.
-            assert!((values[0] - 0.95).norm() <= residual + 1e-13, "{size}: {residual:e}");
+            assert!((value - 0.95).norm() <= residual + 1e-13, "{size}: {residual:e}");
             assert!(residual < before, "{size}: {residual:e}");
             before = residual;
         }

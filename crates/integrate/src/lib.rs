@@ -51,6 +51,7 @@ mod effective;
 mod error;
 mod fixed_size;
 mod force;
+mod free_growth;
 mod generalised_alpha;
 mod houbolt;
 mod matrix_exponential;
@@ -82,6 +83,7 @@ pub use driver::{
 };
 pub use error::IntegrateError;
 pub use force::SampledForce;
+pub use free_growth::growth_per_period;
 pub use generalised_alpha::{AlphaAcceleration, GeneralisedAlpha};
 pub use houbolt::{Houbolt, HouboltStart};
 pub use matrix_exponential::MatrixExponential;

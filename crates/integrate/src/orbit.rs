@@ -3,7 +3,7 @@
 use mechid_model::{InitialState, RealSchur, Response};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::arnoldi::{self, Arnoldi};
+use crate::arnoldi::{self, Arnoldi, Dominant};
 use crate::force::ForceTable;
 use crate::run::Motion;
 use crate::shooting::{DIFFERENCE, Shooting};
@@ -21,7 +21,7 @@ const SOLVED: f64 = 1e-4;
 /// of 1.
 const KNOWN: f64 = 1e-6;
 
-/// What the multipliers of a derivative formed whole are known to, as a part of the largest.
+/// Error of the multipliers of a derivative formed whole, as a part of the largest.
 const WHOLE_KNOWN: f64 = 1e-9;
 
 /// Most vectors that are searched for the largest multiplier.
@@ -327,10 +327,9 @@ fn largest_multiplier(
         if more && !space.size().is_multiple_of(LOOK) {
             continue;
         }
-        let Some((values, residual)) = space.largest() else { return Ok(None) };
-        let Some(largest) = values.first() else { return Ok(None) };
-        if !more || residual <= KNOWN * largest.norm().max(1.0) {
-            return Ok(Some((*largest, residual)));
+        let Some(Dominant { value, residual, .. }) = space.dominant() else { return Ok(None) };
+        if !more || residual <= KNOWN * value.norm().max(1.0) {
+            return Ok(Some((value, residual)));
         }
     }
 }

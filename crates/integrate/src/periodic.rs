@@ -33,7 +33,7 @@ const MOST_SEARCHES: usize = 8;
 /// times for Houbolt and Wilson θ). Where rounding over the period, divided by a damping that is
 /// all but nothing, leaves a gap, the gap is taken through the same solve and the pass repeated.
 ///
-/// Of more than 300 degrees of freedom Φ is not formed: z_0 is searched for in the space of g, Φ g, Φ² g …
+/// The matrix Φ is not formed of more than 300 degrees of freedom: z_0 is searched for in the space of g, Φ g, Φ² g …
 /// (GMRES), whose vectors cost one pass each. Their number is small where most of the motion dies out within a
 /// period; where a thousand do not suffice, [`IntegrateError::PeriodNotClosed`] says so.
 ///

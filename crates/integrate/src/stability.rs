@@ -5,7 +5,7 @@
 //! wrong.
 
 pub(crate) mod krylov;
-mod passive;
+pub(crate) mod passive;
 
 use mechid_model::{Matrix, RealSchur, SecondOrderSystem};
 use nalgebra::{Complex, DMatrix, DVector};

@@ -67,6 +67,7 @@ pub use responses::{
 };
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{
-    NonlinearDescription, SystemMatrices, read_nonlinear, read_sparse_system, read_system,
+    NonlinearDescription, SystemMatrices, parse_sparse_system, read_nonlinear, read_sparse_system,
+    read_system,
 };
 pub use table::{Inventory, Quantity, RecordFile, Survey, Table, Tally, TimeAxis, Unit};

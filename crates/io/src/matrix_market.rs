@@ -17,7 +17,7 @@ use crate::{IoError, Limit, Limits};
 
 /// Numbers that [`Limits::numbers`] allows for each row of a matrix, which a row without entries needs
 /// memory for, too: 2²² rows by default.
-const NUMBERS_PER_ROW: usize = 64;
+pub(crate) const NUMBERS_PER_ROW: usize = 64;
 
 /// Entries of the other triangle of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,17 +3,22 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use mechid_model::{Matrix, SecondOrderSystem, SparseSystem, Terms};
+use mechid_model::{Matrix, SecondOrderSystem, SparseSystem, Terms, triplets};
 use mechid_signal::message;
 use nalgebra::DMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
-use serde::de::{Deserializer, SeqAccess, Visitor};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Serialize, de};
 
+use crate::matrix_market::NUMBERS_PER_ROW;
 use crate::{IoError, Limits, json, read_matrix_market};
 
-/// Number of degrees of freedom up to which a machine described by Matrix Market files is taken as one
-/// described by lists of rows.
+/// Most rows of a sparse matrix.
+const MOST_ROWS: usize = Limits::DEFAULT.numbers / NUMBERS_PER_ROW;
+
+/// Number of degrees of freedom up to which a machine described by sparse matrices is taken as one described by
+/// lists of rows.
 const DENSE_DOF: usize = 64;
 
 /// Number of degrees of freedom up to which all entries of such a machine are held where they are needed: of more
@@ -65,11 +70,16 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
 /// # Errors
 /// As [`read_system`].
 pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoError> {
-    let (file, mut described) = json::read::<Described>(path.as_ref())?;
-    match described.system.load(&file, json::folder(path.as_ref()))? {
-        None => Ok(SparseSystem::from(&described.system.system(&file)?)),
-        Some(sparse) => Ok(sparse),
-    }
+    let (file, described) = json::read::<Described>(path.as_ref())?;
+    described.sparse(&file, json::folder(path.as_ref()))
+}
+
+/// Reads the system in the text of such a file, as [`read_sparse_system`] does; `file` is its name in messages.
+///
+/// # Errors
+/// As [`read_system`].
+pub fn parse_sparse_system(file: &str, text: &str) -> Result<SparseSystem, IoError> {
+    json::parse::<Described>(file, text)?.sparse(file, Path::new(""))
 }
 
 /// A file with a system in it.
@@ -78,10 +88,19 @@ struct Described {
     system: SystemDescription,
 }
 
+impl Described {
+    fn sparse(mut self, file: &str, folder: &Path) -> Result<SparseSystem, IoError> {
+        match self.system.load(file, folder)? {
+            None => Ok(SparseSystem::from(&self.system.system(file)?)),
+            Some(sparse) => Ok(sparse),
+        }
+    }
+}
+
 /// Refusal of a sparse machine where all entries of its matrices are needed.
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
-        "the machine has {dof} degrees of freedom in Matrix Market files, too many for what needs all entries \
+        "the machine has {dof} degrees of freedom in sparse matrices, too many for what needs all entries \
          of the matrices: simulate finds its response, stability the largest steps, and modal --modes COUNT \
          some of its modes; for the rest reduce it to the degrees of freedom that are measured"
     );
@@ -170,16 +189,18 @@ impl SystemDescription {
         let named = [&mut self.damping, &mut self.stiffness].into_iter().flatten();
         for entries in [&mut self.mass].into_iter().chain(named) {
             if let Entries::File(path) = entries {
-                let read = read_matrix_market(folder.join(path), &Limits::DEFAULT)?;
-                sparse.push(read.nrows());
-                *entries = Entries::Sparse(read);
+                *entries =
+                    Entries::Sparse(read_matrix_market(folder.join(path), &Limits::DEFAULT)?);
+            }
+            if let Entries::Sparse(matrix) = entries {
+                sparse.push(matrix.nrows());
             }
         }
         if sparse.iter().all(|size| *size <= DENSE_DOF) {
             return Ok(None);
         }
         let (Some(damping), Some(stiffness)) = (&self.damping, &self.stiffness) else {
-            let what = "a machine in Matrix Market files needs mass, damping and stiffness".into();
+            let what = "a machine in sparse matrices needs mass, damping and stiffness".into();
             return Err(IoError::Description { file: file.into(), what });
         };
         let [mass, damping, stiffness] = [&self.mass, damping, stiffness].map(Entries::sparse);
@@ -226,7 +247,7 @@ impl SystemDescription {
     }
 }
 
-/// A number, a matrix as a list of rows of equal length, or one in a Matrix Market file.
+/// A number, a matrix as a list of rows of equal length, or a sparse matrix.
 #[derive(Debug, Clone, PartialEq)]
 enum Entries {
     Number(f64),
@@ -261,6 +282,46 @@ impl Entries {
     }
 }
 
+/// The entries of a sparse matrix that are not zero, each with its row and column, counted from 1; those at one
+/// place are added up.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ListedEntries {
+    size: usize,
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl ListedEntries {
+    fn matrix(self) -> Result<CsrMatrix<f64>, String> {
+        let Self { size, rows, columns, values } = self;
+        if rows.len() != values.len() || columns.len() != values.len() {
+            return Err(format!(
+                "a sparse matrix has a row, a column and a value for each entry, got {}, {} and {}",
+                message::count(rows.len(), "row"),
+                message::count(columns.len(), "column"),
+                message::count(values.len(), "value")
+            ));
+        }
+        if size > MOST_ROWS {
+            return Err(format!("a sparse matrix of {size} rows is larger than {MOST_ROWS}"));
+        }
+        let outside = rows.iter().zip(&columns).find(|(row, column)| {
+            let inside = 1..=size;
+            !inside.contains(*row) || !inside.contains(*column)
+        });
+        if let Some((row, column)) = outside {
+            return Err(format!(
+                "row {row}, column {column}: the matrix has rows and columns 1 to {size}"
+            ));
+        }
+        let places = rows.into_iter().zip(columns).map(|(row, column)| (row - 1, column - 1));
+        let entries = places.zip(values).map(|((row, column), value)| (row, column, value));
+        triplets(size, entries).map_err(|error| error.to_string())
+    }
+}
+
 impl<'de> Deserialize<'de> for Entries {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         struct EntriesVisitor;
@@ -270,7 +331,8 @@ impl<'de> Deserialize<'de> for Entries {
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str(
-                    "a number, a matrix as a list of rows, or the name of a Matrix Market file",
+                    "a number, a matrix as a list of rows, the name of a Matrix Market file, or the size, \
+                     rows, columns and values of a sparse matrix",
                 )
             }
 
@@ -293,6 +355,11 @@ impl<'de> Deserialize<'de> for Entries {
                 } else {
                     Err(E::invalid_value(de::Unexpected::Str(path), &self))
                 }
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Entries, A::Error> {
+                let listed = ListedEntries::deserialize(MapAccessDeserializer::new(map))?;
+                listed.matrix().map(Entries::Sparse).map_err(de::Error::custom)
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Entries, A::Error> {

@@ -5,6 +5,7 @@ use std::error::Error;
 use mechid::SimulateError;
 use mechid::analysis::AnalysisError;
 use mechid::estimate::EstimateError;
+use mechid::integrate::IntegrateError;
 use mechid::io::IoError;
 use mechid::model::ModelError;
 use mechid::report::ReportError;
@@ -29,6 +30,10 @@ impl Failure for AnalysisError {
 
 impl Failure for EstimateError {
     const CRATE: &'static str = "Estimate";
+}
+
+impl Failure for IntegrateError {
+    const CRATE: &'static str = "Integrate";
 }
 
 impl Failure for IoError {

@@ -36,7 +36,7 @@ mod _mechid {
     #[pymodule_export]
     use super::identified::{Identified, identify};
     #[pymodule_export]
-    use super::machine::Machine;
+    use super::machine::{Machine, selected_modes};
     #[pymodule_export]
     use super::measurement::Measurement;
     #[pymodule_export]

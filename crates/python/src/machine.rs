@@ -1,9 +1,13 @@
 //! M, C and K, and how well they are known.
 
+use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use mechid::analysis::{AnalysisError, ModalSummary};
+use mechid::integrate::ModeSearch;
+use mechid::io::parse_sparse_system;
 use mechid::model::{SecondOrderSystem, StateTransition};
+use mechid::modes::SelectedModes;
 use mechid::report::{ReportError, ToFigure as _};
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};
@@ -105,3 +109,22 @@ impl Machine {
         Ok((failure::json(py, &modes)?, modes.to_string()))
     }
 }
+
+/// Finds some modes of a described machine of any size (its JSON): JSON and text.
+#[pyfunction]
+#[pyo3(signature = (description, count, near_hz))]
+pub fn selected_modes(
+    py: Python<'_>,
+    description: &str,
+    count: usize,
+    near_hz: Option<f64>,
+) -> PyResult<(String, String)> {
+    let system = work::brief(py, || parse_sparse_system(NAME, description))?;
+    let search = near_hz.map_or(ModeSearch::Lowest, |hz| ModeSearch::NearOmega(TAU * hz));
+    let find = move || SelectedModes::of(NAME, &system, search, count);
+    let modes = work::watched(py, None, || Ok(()), find)?;
+    Ok((failure::json(py, &modes)?, modes.to_string()))
+}
+
+/// Name of a described machine in messages.
+const NAME: &str = "the machine";

@@ -292,6 +292,70 @@ def test_free_motion_is_the_closed_form(scheme: Any) -> None:
     assert np.abs(found["displacement"][:, 0] - truth).max() < 2e-3 * x0
 
 
+def chain(dof: int, damping: float) -> dict[str, Any]:
+    """M, C and K of masses between walls, as SciPy's sparse matrices; C and K are not symmetric."""
+    sparse = pytest.importorskip("scipy.sparse")
+
+    def band(under: float, on: float, over: float) -> Any:
+        return sparse.diags([under, on, over], [-1, 0, 1], shape=(dof, dof), format="csc")
+
+    return {"mass": band(0.0, 2.0, 0.0), "damping": band(-0.2, damping, -0.1), "stiffness": band(-900.0, 1900.0, -800.0)}
+
+
+@pytest.mark.parametrize("scheme", ["exact", "bathe"])
+def test_a_large_machine_is_three_sparse_matrices(scheme: str) -> None:
+    matrices, fs, samples = chain(1000, 40.0), 64.0, 512
+    found = mechid.simulate(
+        {
+            "system": matrices,
+            "sampling": {"samples": samples, "rate_hz": fs},
+            "excitation": [{"lines": [1, 2, 7], "amplitude": 5.0, "dof": 3}],
+            "outputs": [4, 1],
+            "scheme": {"name": scheme},
+        }
+    )
+    assert found.force.shape == (samples, 1) and found.displacement.shape == (samples, 2)
+    # Judge: the receptance at each line, by SciPy.
+    solve = pytest.importorskip("scipy.sparse.linalg").spsolve
+    m, c, k = (matrices[name] for name in ("mass", "damping", "stiffness"))
+    forces, lines = np.fft.rfft(found.force[:, 0]), np.zeros((samples // 2 + 1, 2), complex)
+    for line in (1, 2, 7):
+        omega = 2 * np.pi * line * fs / samples
+        load = np.zeros(1000, complex)
+        load[2] = forces[line]
+        lines[line] = solve((k - omega**2 * m + 1j * omega * c).tocsc(), load)[[3, 0]]
+    truth = np.fft.irfft(lines, samples, axis=0)
+    error = np.abs(found.displacement - truth).max() / np.abs(truth).max()
+    assert error < (1e-12 if scheme == "exact" else 2e-2)
+    with pytest.raises(ValueError, match="sparse matrices"):
+        found.machine  # noqa: B018
+
+
+def test_modes_of_a_large_machine() -> None:
+    matrices = chain(500, 1.0)
+    found = mechid.selected_modes(**matrices, count=4)
+    near = mechid.selected_modes(*matrices.values(), 3, near_hz=8.0)
+    # Judge: all eigenvalues, by NumPy.
+    m, c, k = (matrix.toarray() for matrix in matrices.values())
+    rate = np.block([[np.zeros((500, 500)), np.eye(500)], [-k / m[0, 0], -c / m[0, 0]]])
+    all_of_them = np.linalg.eigvals(rate)
+    all_of_them = all_of_them[all_of_them.imag > 0]
+    lowest = all_of_them[np.argsort(np.abs(all_of_them))][:4]
+    np.testing.assert_allclose(found.eigenvalue, lowest, rtol=1e-8)
+    np.testing.assert_allclose(found.natural_frequency_hz, np.abs(lowest) / (2 * np.pi), rtol=1e-8)
+    nearest = all_of_them[np.argsort(np.abs(all_of_them - 16j * np.pi))][:3]
+    np.testing.assert_allclose(np.sort(near.eigenvalue.imag), np.sort(nearest.imag), rtol=1e-8)
+    for value, shape in zip(found.eigenvalue, found.shape.T, strict=True):
+        left = np.abs((value**2 * m + value * c + k) @ shape).max()
+        assert left < 1e-10 * np.abs(k).max() and np.abs(shape).max() == pytest.approx(1.0)
+    assert (found.damping_ratio > 0).all() and not found.is_rigid_body.any()
+    assert found.residual.max() < 1e-12 and "mode" in str(found)
+    with pytest.raises(mechid.MechidError, match="3"):
+        mechid.selected_modes(np.eye(3), np.eye(2), np.eye(3), 1)
+    with pytest.raises(ValueError, match="square"):
+        mechid.selected_modes(matrices["mass"][:3], *list(matrices.values())[1:], count=1)
+
+
 def test_predictions_are_exact_between_samples() -> None:
     linalg = pytest.importorskip("scipy.linalg")
     rng = np.random.default_rng(3)

@@ -60,7 +60,7 @@ pub struct IdentificationSummary {
     /// Nonlinear terms, if there are any.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nonlinear: Option<NonlinearSummary>,
-    /// Modes, by rising frequency; with nonlinear terms, of small amplitudes.
+    /// Modes, by rising frequency; with nonlinear terms, of the linear part.
     pub modes: Vec<ShapedMode>,
     /// Quality of the fit.
     pub fit: FitRow,
@@ -327,7 +327,7 @@ impl IdentificationSummary {
 
     fn mode_table(&self) -> String {
         let small = self.nonlinear.is_some();
-        let what = if small { "mode of small amplitude" } else { "mode" };
+        let what = if small { "mode of the linear part" } else { "mode" };
         mode_table(what, &ShapedMode::rows(&self.modes))
     }
 

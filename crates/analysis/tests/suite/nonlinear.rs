@@ -65,7 +65,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
         "nonlinear terms: k2: x1^2, k3: x1^3",
         "before the fit: nonlinear: cubic stiffness of x1 (hardening)",
         "N/m³",
-        "mode of small amplitude",
+        "mode of the linear part",
         "motion the model leaves unexplained",
     ] {
         assert!(text.contains(part), "{part}: {text}");
@@ -100,7 +100,7 @@ fn a_spring_that_hardens_is_identified_saved_and_predicted() {
     assert!(blind.summary().channels[0].nrmse > 0.05, "{blind}");
 
     let modes = ModalSummary::of(&read).unwrap().to_string();
-    assert!(modes.contains("small amplitudes; the nonlinear terms are k2: x1^2"), "{modes}");
+    assert!(modes.contains("the linear part; the nonlinear terms are k2: x1^2"), "{modes}");
     // The displacement alone is not enough for its force.
     let refused = reconstruct(&test, &read, &Reconstruct::auto()).unwrap_err();
     assert!(matches!(refused, AnalysisError::NonlinearMachine { .. }), "{refused}");

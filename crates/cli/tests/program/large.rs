@@ -87,7 +87,7 @@ fn a_large_machine_in_files_moves_as_a_small_one_whose_end_is_far() {
         let rest = format!(r#", "outputs": [2, 1]{nonlinear}"#);
         chain(home.path(), 5000, &rest);
         let told = mechid(home.path(), "simulate chain/chain.json --output large.csv");
-        assert!(told.contains("5000 degrees of freedom in Matrix Market files"), "{told}");
+        assert!(told.contains("5000 degrees of freedom in sparse matrices"), "{told}");
         assert_eq!(told.contains("nonlinear term k3"), !nonlinear.is_empty(), "{told}");
         let text = fs::read_to_string(home.path().join("large.csv")).unwrap();
         let header = "time,force_2,displacement_2,displacement_1,velocity_2,velocity_1,\
@@ -190,7 +190,7 @@ fn what_a_large_machine_does_not_have_is_refused() {
     fs::write(home.path().join("chain/chain.json"), described).unwrap();
     chain(home.path(), 400, "");
     let refused = refused(home.path(), "modal chain/chain.json");
-    assert!(refused.contains("400 degrees of freedom in Matrix Market files"), "{refused}");
+    assert!(refused.contains("400 degrees of freedom in sparse matrices"), "{refused}");
     assert!(refused.contains("modal --modes"), "{refused}");
     assert!(!home.path().join("x.csv").exists());
 }

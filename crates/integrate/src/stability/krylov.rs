@@ -3,21 +3,12 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
-use mechid_model::RealSchur;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::arnoldi::Arnoldi;
+use crate::arnoldi::{Arnoldi, Dominant};
 
 /// Number of products in one round.
 const ROUND: usize = 32;
-
-/// An approximate eigenvalue of largest modulus.
-#[derive(Debug, Clone)]
-pub(super) struct Dominant {
-    pub(super) value: Complex<f64>,
-    /// Its vector, of norm 1.
-    pub(super) vector: DVector<Complex<f64>>,
-}
 
 /// A vector of norm 1 without structure, the same on every run.
 pub(super) fn scattered(len: usize) -> DVector<f64> {
@@ -50,11 +41,7 @@ pub(super) fn dominant(
             break;
         }
     }
-    let square = space.square()?;
-    let eigenvalues = RealSchur::new(square.clone()).ok()?.eigenvalues();
-    let value = eigenvalues.into_iter().max_by(|a, b| a.norm().total_cmp(&b.norm()))?;
-    let vector = space.combined(eigenvector(&square, 1, value, 0)?.as_slice());
-    Some(Dominant { value, vector })
+    space.dominant()
 }
 
 /// The eigenvector of norm 1 of a `matrix` with no more than `below` diagonals under the main one to its

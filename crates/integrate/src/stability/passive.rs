@@ -21,7 +21,7 @@ const LANCZOS_STEPS: usize = 100;
 
 /// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
 /// as far as diagonal dominance or factorisations without exchanges can prove it.
-pub(super) fn is_passive(system: &dyn System) -> bool {
+pub(crate) fn is_passive(system: &dyn System) -> bool {
     let symmetric = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness]
         .map(|which| Symmetric::of(system, which));
     let [Some(mass), Some(damping), Some(stiffness)] = symmetric else { return false };

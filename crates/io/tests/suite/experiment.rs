@@ -116,7 +116,7 @@ fn wrong_descriptions_say_what_is_wrong() {
         ),
         (
             description(r#"{ "mass": "1 kg", "damping": 1, "stiffness": 2 }"#, FORCE, ""),
-            "expected a number, a matrix as a list of rows, or the name of a Matrix Market file",
+            "expected a number, a matrix as a list of rows, the name of a Matrix Market file, or the size",
         ),
         (
             description(r#"{ "mass": [[1, 2], [3]], "damping": 1, "stiffness": 2 }"#, FORCE, ""),
@@ -146,6 +146,65 @@ fn wrong_descriptions_say_what_is_wrong() {
         };
         assert!(message.starts_with("s.json") || message.starts_with("lines "), "{message}");
         assert!(message.contains(part), "\"{part}\" is missing in: {message}");
+    }
+}
+
+/// A sparse matrix as it is written in a description, rows and columns from 1.
+fn listed(size: usize, entries: &[(usize, usize, f64)]) -> serde_json::Value {
+    let rows: Vec<usize> = entries.iter().map(|entry| entry.0).collect();
+    let columns: Vec<usize> = entries.iter().map(|entry| entry.1).collect();
+    let values: Vec<f64> = entries.iter().map(|entry| entry.2).collect();
+    serde_json::json!({ "size": size, "rows": rows, "columns": columns, "values": values })
+}
+
+#[test]
+fn sparse_matrices_stand_in_the_description() {
+    let described = |size: usize| {
+        let one: Vec<_> = (1..=size).map(|i| (i, i, 1.0)).collect();
+        // An entry in two parts, and one above the diagonal alone.
+        let more = [(1, 1, 2.0), (2, 1, -0.5)];
+        let k: Vec<_> = one.iter().copied().chain(more).collect();
+        let system = serde_json::json!({
+            "mass": listed(size, &one), "damping": listed(size, &[]), "stiffness": listed(size, &k)
+        });
+        parse(&description(&system.to_string(), FORCE, "")).unwrap()
+    };
+    let few = described(2);
+    assert!(few.sparse_system().is_none());
+    let stiffness = few.system().unwrap().stiffness().clone();
+    assert_eq!(stiffness, nalgebra::dmatrix![3.0, 0.0; -0.5, 1.0]);
+    let many = described(100);
+    let sparse = many.sparse_system().unwrap();
+    assert_eq!(sparse.dof(), 100);
+    let entry =
+        |i, j| sparse.matrix(mechid_model::Matrix::Stiffness).get_entry(i, j).unwrap().into_value();
+    assert_eq!([entry(0, 0), entry(1, 0), entry(0, 1), entry(99, 99)], [3.0, -0.5, 0.0, 1.0]);
+}
+
+#[test]
+fn wrong_sparse_matrices_say_what_is_wrong() {
+    let good = listed(2, &[(1, 1, 1.0), (2, 2, 1.0)]);
+    let wrong = |field: &str, value: serde_json::Value| {
+        let mut matrix = good.clone();
+        matrix[field] = value;
+        let system = serde_json::json!({ "mass": matrix, "damping": good, "stiffness": good });
+        parse(&description(&system.to_string(), FORCE, "")).unwrap_err().to_string()
+    };
+    for (field, value, part) in [
+        ("rows", serde_json::json!([1]), "got 1 row, 2 columns and 2 values"),
+        (
+            "rows",
+            serde_json::json!([0, 1]),
+            "row 0, column 1: the matrix has rows and columns 1 to 2",
+        ),
+        ("columns", serde_json::json!([1, 3]), "row 2, column 3"),
+        ("size", serde_json::json!(1_u64 << 40), "is larger than"),
+        ("size", serde_json::json!(-2), "invalid value"),
+        ("entries", serde_json::json!(1), "unknown field `entries`"),
+        ("values", serde_json::json!([1, null]), "invalid type: null"),
+    ] {
+        let message = wrong(field, value);
+        assert!(message.starts_with("s.json") && message.contains(part), "{message}");
     }
 }
 

@@ -11,7 +11,7 @@ use mechid_analysis::AnalysisError;
 use mechid_analysis::sweep::{Simulated, SweepSettings, SweepSummary, sweep_experiment};
 use mechid_integrate::{
     AllowUnstable, Convention, IntegrateError, Matrices, PeriodicOrbit, SampledForce, Scheme,
-    SelectedDofs, SystemWithForces, TermForces, integrate, integrate_periodic,
+    SelectedDofs, SystemWithForces, TermForces, growth_per_period, integrate, integrate_periodic,
     integrate_periodic_selected, integrate_selected, periodic_orbit, periodic_orbit_selected,
     sparse_steady_state,
 };
@@ -19,15 +19,15 @@ use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
     InitialState, Instability, ModelError, Response, SecondOrderSystem, SparseSystem,
 };
-use mechid_signal::{Record, SignalError, Spectrum, message, noise};
+use mechid_signal::{Record, Sampling, SignalError, Spectrum, message, noise};
 use nalgebra::{Complex, DMatrix};
 
 #[cfg(feature = "parquet")]
 pub use self::runs::{RunsSummary, simulate_runs};
 use self::schemes::{has_given_start, interpolated, scheme};
 pub use self::summary::{
-    FreeGrowth, SchemeConvention, SimulatedChannel, SimulatedMode, SimulatedTerms,
-    SimulationSummary,
+    FreeGrowth, LargestMultiplier, SchemeConvention, SimulatedChannel, SimulatedMode,
+    SimulatedTerms, SimulationSummary,
 };
 
 /// Result of [`simulate`]: the true response and the measured record.
@@ -59,6 +59,18 @@ pub struct Simulation {
     pub measured_response: Response,
     /// The fastest growing free response of an unstable machine; of a sparse one it is not computed.
     pub instability: Option<Instability>,
+    /// The largest Floquet multiplier of the periodic response of a nonlinear machine.
+    pub multiplier: Option<Multiplier>,
+}
+
+/// The factor by which a disturbance of a periodic response is multiplied in each period: a complex number
+/// without unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Multiplier {
+    /// The factor.
+    pub value: Complex<f64>,
+    /// Error to which it is known.
+    pub error: f64,
 }
 
 /// M, C and K of a simulated machine, as they are stored.
@@ -117,16 +129,16 @@ impl SimulatedSystem {
 pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
     let machine = Described::of(experiment)?;
     let instability = machine.instability()?;
-    refuse_unstable_periodic(experiment, instability)?;
     let (forced, outputs) = (experiment.forced()?, experiment.outputs()?);
     let period = experiment.force()?;
+    machine.refuse_unstable_periodic(experiment, instability, period.sampling())?;
     let force = repeated(&period, experiment.periods)?;
     let scheme = scheme(experiment)?;
-    let response = match &scheme {
+    let Stepped { response, multiplier } = match &scheme {
         None if experiment.response != ResponseKind::Periodic => {
             return Err(SimulateError::ExactFromRest);
         }
-        None => machine.exact_periodic(experiment, &period)?,
+        None => machine.exact_periodic(experiment, &period)?.into(),
         Some(scheme) => {
             let within = scheme.inner_instant();
             let middle = within.map(|part| match interpolated(experiment, &period, part)? {
@@ -186,20 +198,8 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
         measured_force,
         measured_response,
         instability,
+        multiplier,
     })
-}
-
-/// A steady state of an unstable machine solves its equations, but no run reaches it.
-fn refuse_unstable_periodic(
-    experiment: &Experiment,
-    instability: Option<Instability>,
-) -> Result<(), SimulateError> {
-    match (instability, &experiment.response) {
-        (Some(instability), ResponseKind::Periodic) => {
-            Err(SimulateError::UnstablePeriodic { instability })
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Computes the response of a described machine to `force` (samples × the degrees of freedom that
@@ -211,7 +211,7 @@ fn refuse_unstable_periodic(
 pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
     let machine = Described::of(experiment)?;
     let instability = machine.instability()?;
-    refuse_unstable_periodic(experiment, instability)?;
+    machine.refuse_unstable_periodic(experiment, instability, force.sampling())?;
     let Some(scheme) = scheme(experiment)? else {
         return match experiment.response {
             ResponseKind::Periodic => machine.exact_periodic(experiment, force),
@@ -221,6 +221,7 @@ pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, Simu
     let within = scheme.inner_instant().map(|part| interpolated(experiment, force, part));
     let middle = within.transpose()?.flatten();
     stepped(experiment, &*scheme, &machine, force, middle.as_ref())
+        .map(|stepped| stepped.response)
         .map_err(|error| error.of_unstable(instability))
 }
 
@@ -248,6 +249,29 @@ impl Described {
         match (&self.linear, &self.nonlinear) {
             (SimulatedSystem::Dense(system), None) => system.instability(),
             (SimulatedSystem::Sparse(_), None) | (_, Some(_)) => Ok(None),
+        }
+    }
+
+    /// A steady state of an unstable machine solves its equations, but no run reaches it.
+    fn refuse_unstable_periodic(
+        &self,
+        experiment: &Experiment,
+        instability: Option<Instability>,
+        period: Sampling,
+    ) -> Result<(), SimulateError> {
+        if experiment.response != ResponseKind::Periodic {
+            return Ok(());
+        }
+        if let Some(instability) = instability {
+            return Err(SimulateError::UnstablePeriodic { instability });
+        }
+        let growth = match (&self.linear, &self.nonlinear) {
+            (SimulatedSystem::Sparse(system), None) => growth_per_period(system, period)?,
+            _ => None,
+        };
+        match growth {
+            Some(factor) => Err(SimulateError::UnstableOrbit { multiplier: factor.into() }),
+            None => Ok(()),
         }
     }
 
@@ -290,6 +314,18 @@ const SETTLING: usize = 50;
 /// without damping: about the root of what the multipliers are known to (pure number).
 const MULTIPLIER_ROUNDING: f64 = 1e-4;
 
+/// A response, and of one that repeats of a nonlinear machine what becomes of disturbances.
+struct Stepped {
+    response: Response,
+    multiplier: Option<Multiplier>,
+}
+
+impl From<Response> for Stepped {
+    fn from(response: Response) -> Self {
+        Self { response, multiplier: None }
+    }
+}
+
 /// Steps through one force record, or through the period that repeats.
 fn stepped(
     experiment: &Experiment,
@@ -297,7 +333,7 @@ fn stepped(
     machine: &Described,
     force: &Record,
     middle: Option<&Record>,
-) -> Result<Response, SimulateError> {
+) -> Result<Stepped, SimulateError> {
     let unguarded = AllowUnstable(scheme);
     let scheme = if experiment.allow_unstable { &unguarded } else { scheme };
     let force = with_middle(force, middle);
@@ -312,8 +348,8 @@ fn stepped(
             Err(SimulateError::GivenStartPeriodic)
         }
         ResponseKind::Periodic if machine.nonlinear.is_none() => Ok(match dofs {
-            None => integrate_periodic(scheme, &system, force)?,
-            Some(dofs) => integrate_periodic_selected(scheme, &system, dofs, force)?,
+            None => integrate_periodic(scheme, &system, force)?.into(),
+            Some(dofs) => integrate_periodic_selected(scheme, &system, dofs, force)?.into(),
         }),
         ResponseKind::Periodic => {
             let rest = InitialState::rest(machine.linear.dof());
@@ -328,23 +364,24 @@ fn stepped(
         ResponseKind::FromRest | ResponseKind::From(_) => {
             let initial = experiment.initial_state()?;
             Ok(match dofs {
-                None => integrate(scheme, &system, force, &initial)?,
-                Some(dofs) => integrate_selected(scheme, &system, dofs, force, &initial)?,
+                None => integrate(scheme, &system, force, &initial)?.into(),
+                Some(dofs) => integrate_selected(scheme, &system, dofs, force, &initial)?.into(),
             })
         }
     }
 }
 
 /// The response of an orbit, unless its largest multiplier is known to lead away from it.
-fn stayed_on(orbit: &PeriodicOrbit) -> Result<Response, SimulateError> {
-    // None: it overflows.
-    let infinite = Complex::new(f64::INFINITY, 0.0);
-    let multiplier = orbit.multipliers().first().copied().unwrap_or(infinite);
-    let known = if orbit.multipliers().is_empty() { 0.0 } else { orbit.multiplier_error() };
-    if multiplier.norm() > 1.0 + MULTIPLIER_ROUNDING + known {
-        return Err(SimulateError::UnstableOrbit { multiplier });
+fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
+    let multiplier = match orbit.multipliers().first() {
+        Some(value) => Multiplier { value: *value, error: orbit.multiplier_error() },
+        // It overflows.
+        None => Multiplier { value: f64::INFINITY.into(), error: 0.0 },
+    };
+    if multiplier.value.norm() > 1.0 + MULTIPLIER_ROUNDING + multiplier.error {
+        return Err(SimulateError::UnstableOrbit { multiplier: multiplier.value });
     }
-    Ok(orbit.response().clone())
+    Ok(Stepped { response: orbit.response().clone(), multiplier: Some(multiplier) })
 }
 
 /// A simulation that cannot be run.
@@ -390,7 +427,7 @@ pub enum SimulateError {
         /// The growing free response.
         instability: Instability,
     },
-    /// A periodic response of a nonlinear machine that no run stays on.
+    /// A periodic response that no run stays on, of a nonlinear machine or a large one.
     #[error(
         "the periodic response is unstable: each period multiplies a disturbance by {} (the largest \
          Floquet multiplier), so that no machine stays on it; choose \"response\": \"from-rest\" to see \
@@ -625,7 +662,42 @@ mod tests {
         let SimulateError::UnstableOrbit { multiplier } = refused else { panic!("{refused}") };
         assert!((multiplier - std::f64::consts::E).norm() < 1e-6, "{multiplier}");
         assert!(refused.to_string().contains("a disturbance by 2.7183 "), "{refused}");
-        assert!(simulated(1.0).is_ok());
+        // λ² + 1.5 λ + 1 = 0: of modulus 1, real part −3/4, over 2 s.
+        let stable = simulated(1.0).unwrap();
+        let Multiplier { value, error } = stable.multiplier.unwrap();
+        assert!((value.norm() - (-1.5_f64).exp()).abs() < 1e-6 && error < 1e-6, "{value}");
+        let told = stable.summary().unwrap().to_string();
+        assert!(told.contains("multiplies a disturbance of the response by 0.2231 ± "), "{told}");
+        assert!(told.contains("it is stable"), "{told}");
+    }
+
+    /// Judge: each mass of a chain gains energy at the rate −c / 2m = 0.1 1/s for 0.64 s.
+    #[test]
+    fn a_large_machine_that_grows_has_no_periodic_response() {
+        let simulated = |damping: f64, scheme: &str| {
+            let n = 200;
+            let diagonal = |value: f64| {
+                let at: Vec<usize> = (1..=n).collect();
+                let values = vec![value; n];
+                format!(
+                    r#"{{ "size": {n}, "rows": {at:?}, "columns": {at:?}, "values": {values:?} }}"#
+                )
+            };
+            let [m, c, k] = [2.0, damping, 800.0].map(diagonal);
+            let text = format!(
+                r#"{{ "system": {{ "mass": {m}, "damping": {c}, "stiffness": {k} }},
+                     "sampling": {{ "samples": 64, "rate_hz": 100 }},
+                     "excitation": [{{ "lines": "1:5", "amplitude": 5 }}], "outputs": [1],
+                     "scheme": {{ "name": "{scheme}" }} }}"#
+            );
+            simulate(&Experiment::parse("test.json", &text).unwrap())
+        };
+        for scheme in ["newmark", "exact"] {
+            let refused = simulated(-0.4, scheme).unwrap_err();
+            let SimulateError::UnstableOrbit { multiplier } = refused else { panic!("{refused}") };
+            assert!((multiplier.re - 0.064_f64.exp()).abs() < 1e-3, "{multiplier}");
+            assert!(simulated(0.4, scheme).is_ok());
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@ use mechid_model::{Instability, ModelError, Term, Terms};
 use mechid_signal::{Record, message};
 use serde::Serialize;
 
-use super::Simulation;
+use super::{Multiplier, Simulation};
 
 /// Summary of a [`Simulation`]; `Display` writes it for a person, `Serialize` the same for programs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,7 +28,7 @@ pub struct SimulationSummary {
     pub sample_rate_hz: f64,
     /// Number of degrees of freedom of the machine.
     pub degrees_of_freedom: usize,
-    /// Oscillating modes of the machine, of a nonlinear one at small amplitude, by rising frequency;
+    /// Oscillating modes of the machine, of a nonlinear one of its linear part, by rising frequency;
     /// none of a sparse machine.
     pub modes: Vec<SimulatedMode>,
     /// Channels of the record, in its order.
@@ -36,6 +36,9 @@ pub struct SimulationSummary {
     /// The fastest growing free response of an unstable machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub instability: Option<FreeGrowth>,
+    /// The largest Floquet multiplier of the periodic response of a nonlinear machine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub multiplier: Option<LargestMultiplier>,
     /// Mass, damping and stiffness matrix, in SI units; not those of a sparse machine.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub system: Option<SystemMatrices>,
@@ -84,6 +87,19 @@ pub struct FreeGrowth {
     pub growth_rate: f64,
     /// Time in which the response doubles, in s.
     pub doubling_time_s: f64,
+    /// The same as a sentence.
+    pub text: String,
+}
+
+/// The factor by which a disturbance of a periodic response is multiplied in each period, at most.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LargestMultiplier {
+    /// Real and imaginary part, pure numbers.
+    pub value: [f64; 2],
+    /// Its modulus: below 1 disturbances die out (pure number).
+    pub modulus: f64,
+    /// Error to which it is known (pure number).
+    pub error: f64,
     /// The same as a sentence.
     pub text: String,
 }
@@ -149,6 +165,7 @@ impl Simulation {
                 .collect(),
             channels: self.groups().iter().flat_map(SimulatedChannel::of).collect(),
             instability: self.instability.as_ref().map(FreeGrowth::of),
+            multiplier: self.multiplier.map(LargestMultiplier::of),
             system: self.system.dense().map(SystemMatrices::from),
             nonlinear: self.nonlinear.clone(),
         })
@@ -220,6 +237,25 @@ impl FreeGrowth {
     }
 }
 
+impl LargestMultiplier {
+    fn of(multiplier: Multiplier) -> Self {
+        let Multiplier { value, error } = multiplier;
+        let modulus = value.norm();
+        let becomes = match modulus {
+            _ if modulus + error < 1.0 => "it is stable",
+            _ if modulus - error > 1.0 => "it lies at the limit of stability",
+            _ => "whether it is stable is not known",
+        };
+        let text = format!(
+            "each period multiplies a disturbance of the response by {} ± {} at most (the largest Floquet \
+             multiplier): {becomes}",
+            significant(modulus, 4),
+            significant(error, 1),
+        );
+        Self { value: [value.re, value.im], modulus, error, text }
+    }
+}
+
 impl SimulatedTerms {
     fn each(&self) -> impl Iterator<Item = (&Term, &f64)> {
         self.terms.iter().zip(&self.coefficients)
@@ -253,7 +289,7 @@ impl fmt::Display for SimulationSummary {
         }
         let header = |cells: [&str; 3]| cells.map(String::from).to_vec();
         let mode = match self.nonlinear {
-            Some(_) => "mode of small amplitude",
+            Some(_) => "mode of the linear part",
             None => "mode",
         };
         let mut rows = vec![header([mode, "natural frequency (Hz)", "damping ratio"])];
@@ -275,6 +311,9 @@ impl fmt::Display for SimulationSummary {
             rows.push(row);
         }
         f.write_str(&text_table(&rows))?;
+        if let Some(multiplier) = &self.multiplier {
+            writeln!(f, "\n{}", multiplier.text)?;
+        }
         match &self.instability {
             Some(growth) => writeln!(f, "\nwarning: the machine is unstable, {}", growth.text),
             None => Ok(()),

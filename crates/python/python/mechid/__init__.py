@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from ._doors import multisine as multisine
     from ._doors import predict as predict
     from ._doors import reconstruct as reconstruct
+    from ._doors import selected_modes as selected_modes
     from ._doors import simulate as simulate
     from ._doors import sweep as sweep
     from ._errors import MechidError as MechidError
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     from ._results import Predicted as Predicted
     from ._results import Receptances as Receptances
     from ._results import Reconstructed as Reconstructed
+    from ._results import SelectedModes as SelectedModes
     from ._results import Simulation as Simulation
     from ._results import Sweep as Sweep
     from ._results import Uncertain as Uncertain
@@ -63,6 +65,7 @@ _HOMES = {
     "multisine": "_doors",
     "predict": "_doors",
     "reconstruct": "_doors",
+    "selected_modes": "_doors",
     "simulate": "_doors",
     "sweep": "_doors",
     "MechidError": "_errors",
@@ -83,6 +86,7 @@ _HOMES = {
     "Predicted": "_results",
     "Receptances": "_results",
     "Reconstructed": "_results",
+    "SelectedModes": "_results",
     "Simulation": "_results",
     "Sweep": "_results",
     "Uncertain": "_results",
@@ -107,6 +111,7 @@ __all__ = [
     "Receptances",
     "Reconstructed",
     "ResponseTable",
+    "SelectedModes",
     "Simulation",
     "Sweep",
     "Uncertain",
@@ -122,6 +127,7 @@ __all__ = [
     "multisine",
     "predict",
     "reconstruct",
+    "selected_modes",
     "simulate",
     "sweep",
 ]

@@ -33,6 +33,7 @@ from ._results import (
     Machine,
     Multisine,
     Reconstructed,
+    SelectedModes,
     Simulation,
     Sweep,
     description_of,
@@ -738,7 +739,9 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
     ----------
     experiment : mapping or path
         ``system``, ``sampling``, ``excitation``, ``scheme``, ``response``, ``periods`` and ``noise``,
-        as in the JSON that ``mechid simulate`` takes, or the path of such a file.
+        as in the JSON that ``mechid simulate`` takes, or the path of such a file. The matrices of a
+        ``system`` may be NumPy arrays, or sparse ones of SciPy: of more than 64 degrees of freedom the
+        record has the columns that ``outputs`` and ``excitation`` name.
 
     Returns
     -------
@@ -753,6 +756,48 @@ def simulate(experiment: Mapping[str, Any] | str | os.PathLike[str]) -> Simulati
     if described is None:
         raise TypeError("an experiment is a mapping, or the path of a .json file")
     return Simulation(_mechid.simulate(*described))
+
+
+def selected_modes(
+    mass: Any,
+    damping: Any,
+    stiffness: Any,
+    count: int,
+    *,
+    near_hz: float | None = None,
+) -> SelectedModes:
+    """Find some modes of a machine of any size: the lowest, or those nearest to a frequency.
+
+    Of a machine of a few degrees of freedom `Machine.modes` are all of them. Each mode is exact to
+    rounding; that none between them was missed is likely, not proved.
+
+    Parameters
+    ----------
+    mass, damping, stiffness : array or sparse matrix
+        M, C and K in kg, N·s/m and N/m, n × n: SciPy's sparse matrices and arrays, NumPy arrays or
+        lists of rows. They need not be symmetric.
+    count : int
+        Number of modes.
+    near_hz : float, optional
+        Frequency that the modes are nearest to, in Hz.
+
+    Returns
+    -------
+    SelectedModes
+
+    Raises
+    ------
+    MechidError
+        If the matrices make no machine, or the search finds too few modes.
+    """
+    if count < 1:
+        raise ValueError(f"`count` must be at least 1, got {count}")
+    if near_hz is not None and not 0 < near_hz < float("inf"):
+        raise ValueError(f"`near_hz` must be positive, got {near_hz}")
+    matrices = {"mass": mass, "damping": damping, "stiffness": stiffness}
+    described = description_of({"system": matrices})
+    assert described is not None
+    return SelectedModes(_mechid.selected_modes(described[1], count, near_hz))
 
 
 def integrate(

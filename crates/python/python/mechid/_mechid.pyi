@@ -40,6 +40,7 @@ __all__ = [
     "predict_record",
     "program",
     "reconstruct",
+    "selected_modes",
     "simulate",
     "sweep",
 ]
@@ -96,6 +97,8 @@ class Machine:
     def receptances(self, omega: Sequence[float]) -> NDArray[np.complex128]: ...
     def svg(self) -> str: ...
     def modal(self) -> tuple[str, str]: ...
+
+def selected_modes(description: str, count: int, near_hz: float | None) -> tuple[str, str]: ...
 
 @final
 class Identified:

@@ -774,6 +774,71 @@ class Machine(Drawn):
 
 
 @final
+class SelectedModes(Result):
+    """Some of the modes of a machine of any size."""
+
+    _found: tuple[str, str]
+
+    def __init__(self, found: tuple[str, str]) -> None:
+        self.__dict__["_found"] = found
+
+    @property
+    def natural_frequency_hz(self) -> NDArray[np.float64]:
+        """Natural frequencies, in Hz, shape (modes,): those that were searched for first."""
+        return self._each("natural_frequency_hz")
+
+    @property
+    def damping_ratio(self) -> NDArray[np.float64]:
+        """Damping ratios, shape (modes,): negative if unstable, ±1 for a real eigenvalue."""
+        return self._each("damping_ratio")
+
+    @property
+    def eigenvalue(self) -> NDArray[np.complex128]:
+        """Eigenvalues with an imaginary part of at least zero, in rad/s, shape (modes,)."""
+        parts = self._each("eigenvalue").reshape(-1, 2)
+        return parts[:, 0] + 1j * parts[:, 1]
+
+    @property
+    def residual(self) -> NDArray[np.float64]:
+        """Norm of (λ²M + λC + K) φ relative to the size of its terms, shape (modes,)."""
+        return self._each("residual")
+
+    @property
+    def is_rigid_body(self) -> NDArray[np.bool_]:
+        """Whether a mode is a motion without restoring force, shape (modes,)."""
+        return np.array([mode["is_rigid_body"] for mode in self._told["modes"]], dtype=np.bool_)
+
+    @cached_property
+    def shape(self) -> NDArray[np.complex128]:
+        """Shapes, whose largest entry is 1: shape (degrees of freedom, modes)."""
+        parts = self._each("shape").reshape(-1, self._told["degrees_of_freedom"], 2)
+        return (parts[:, :, 0] + 1j * parts[:, :, 1]).T
+
+    def _each(self, field: str) -> NDArray[np.float64]:
+        return np.array([mode[field] for mode in self._told["modes"]], dtype=np.float64)
+
+    def to_json(self) -> str:
+        """Return the modes as ``mechid modal --modes COUNT --json`` prints them."""
+        return self._found[0]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing: such modes have no remarks."""
+        return ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Nothing: such modes have no settings."""
+        return {}
+
+    def __str__(self) -> str:
+        return self._found[1]
+
+    def __repr__(self) -> str:
+        return f"<SelectedModes: {len(self._told['modes'])}>"
+
+
+@final
 class FrequencyResponses(Drawn):
     """Frequency responses with coherence and standard errors."""
 
@@ -1105,10 +1170,10 @@ class Simulation:
         Raises
         ------
         ValueError
-            If it is a large one in Matrix Market files.
+            If it is a large one in sparse matrices.
         """
         if self._machine is None:
-            raise ValueError("the machine is a large one in Matrix Market files, which hold it")
+            raise ValueError("the machine is a large one in sparse matrices, which are in the description")
         return self._machine
 
     def measurement(self, *quantities: str, **window: Unpack[Window]) -> Measurement:
@@ -1178,7 +1243,7 @@ def machine_of(given: Machine | Estimated | str | os.PathLike[str]) -> Machine:
 def description_of(given: object) -> tuple[str, str] | None:
     """Return name and JSON of the experiment that is meant; None if it is something else."""
     if isinstance(given, Mapping) and "system" in given:
-        return "the description", json.dumps(given)
+        return "the description", json.dumps(given, default=_listed)
     if isinstance(given, (str, os.PathLike)) and os.fspath(given).lower().endswith(".json"):
         path = os.fspath(given)
         try:
@@ -1190,6 +1255,25 @@ def description_of(given: object) -> tuple[str, str] | None:
                 f"cannot read {path}: {error.strerror}", f"Io(Read {{ file: {quoted} }})"
             ) from None
     return None
+
+
+def _listed(value: object) -> object:
+    """Return an array as lists, and a sparse matrix, of SciPy or alike, as its entries."""
+    if hasattr(value, "tocoo"):
+        entries = value.tocoo()
+        if entries.shape[0] != entries.shape[1]:
+            raise ValueError(f"a sparse matrix must be square, got shape {entries.shape}")
+        rows, columns = np.asarray(entries.row) + 1, np.asarray(entries.col) + 1
+        values = np.asarray(entries.data, dtype=np.float64)
+        return {
+            "size": int(entries.shape[0]),
+            "rows": rows.tolist(),
+            "columns": columns.tolist(),
+            "values": values.tolist(),
+        }
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"a description has numbers, text, lists and matrices, got {type(value).__name__}")
 
 
 def one(sources: Sequence[object], door: str, record: RecordOptions) -> Measurement:

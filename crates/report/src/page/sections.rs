@@ -183,7 +183,7 @@ pub fn machine(contents: &Contents<'_>) -> Result<Markup, ReportError> {
         .map(|p| uncertain(p.name.clone(), &p.estimate, p.unit))
         .chain(terms.map(|p| uncertain(p.name.clone(), &p.estimate, &p.unit)))
         .collect();
-    let modes_of = if report.nonlinear.is_some() { "Modes of small amplitude" } else { "Modes" };
+    let modes_of = if report.nonlinear.is_some() { "Modes of the linear part" } else { "Modes" };
     let restoring = figures::restoring(contents.review.identified)?;
     let modes = ModeRow::quantities(&ShapedMode::rows(&report.modes), true).into_iter();
     let modes = modes.map(|(name, value, unit)| uncertain(name, &value, unit)).collect();
