@@ -24,7 +24,7 @@ use crate::outcome::{Files, Outcome};
 /// them. Of a machine whose nonlinear terms were identified the frequency of each mode over its
 /// amplitude is told and drawn instead, as far as the data reached.
 ///
-/// A large machine, up to some 100,000 degrees of freedom in Matrix Market files, has too many modes
+/// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes
 /// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency. They
 /// have no standard errors and no picture; --json has their shapes. Each is exact to rounding; that
 /// none between them was missed is likely, not proved. Instability is told of the modes found, not

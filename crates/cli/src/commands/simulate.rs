@@ -49,7 +49,7 @@ use crate::outcome::{Files, Outcome};
 ///   periods     how many
 ///
 ///   outputs     degrees of freedom whose response is recorded, counted from 1; without, all, and of
-///               more than 64 in Matrix Market files those that a force acts on
+///               more than 64 in sparse matrices those that a force acts on
 ///
 ///   noise       on force, displacement, velocity, acceleration: snr_db, standard_deviation or
 ///               fraction_of_rms; and a seed

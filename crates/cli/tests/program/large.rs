@@ -230,3 +230,50 @@ fn a_large_machine_has_a_steady_state_and_largest_steps() {
         assert!((inner - force[k]).abs() < 1e-9 * largest, "{k}: {inner} {}", force[k]);
     }
 }
+
+/// Judge: the record that the machine gave, whose steady state has no time step.
+#[test]
+fn a_machine_of_a_hundred_masses_finds_its_force_and_predicts_its_response() {
+    let home = tempfile::tempdir().unwrap();
+    let n = 100;
+    let all: Vec<usize> = (1..=n).collect();
+    chain(home.path(), n, &format!(r#", "outputs": {all:?}"#));
+    let path = home.path().join("chain/chain.json");
+    let described = fs::read_to_string(&path).unwrap();
+    let pulse = r#""kind": "half-sine", "peak": 5, "start_s": 0.1, "duration_s": 0.2"#;
+    let described = described.replace(pulse, r#""lines": "1:60", "amplitude": 5"#);
+    let described = described.replace("from-rest", "periodic").replace("newmark", "exact");
+    fs::write(&path, described).unwrap();
+    mechid(home.path(), "simulate chain/chain.json --output steady.csv");
+    let columns =
+        |name: &dyn Fn(usize) -> String| all.iter().map(|at| name(*at)).collect::<Vec<_>>();
+    let moved = columns(&|at| format!("displacement_{at}")).join(",");
+    mechid(
+        home.path(),
+        &format!(
+            "force steady.csv --system chain/chain.json --displacement {moved} --forced 2 \
+             --period 200 --method frequency-domain --output found.csv"
+        ),
+    );
+    let truth = column(home.path(), "steady.csv", "force_2");
+    let found = column(home.path(), "found.csv", "force_2");
+    for (k, (found, truth)) in found.iter().zip(&truth).enumerate() {
+        assert!((found - truth).abs() < 5e-9, "{k}: {found} {truth}");
+    }
+
+    let only = |quantity: &str| {
+        let at_two = |at: usize| if at == 2 { format!("{quantity}_2") } else { "0".into() };
+        columns(&at_two).join(",")
+    };
+    let told = mechid(
+        home.path(),
+        &format!(
+            "predict chain/chain.json steady.csv --force {} --displacement {} --period 200 --json",
+            only("force"),
+            only("displacement")
+        ),
+    );
+    let told: serde_json::Value = serde_json::from_str(&told).unwrap();
+    let error = told["channels"][0]["nrmse"].as_f64().unwrap();
+    assert!(error < 1e-10, "{error:e}");
+}

@@ -69,7 +69,7 @@ pub struct Simulation {
 pub struct Multiplier {
     /// The factor.
     pub value: Complex<f64>,
-    /// Error to which it is known.
+    /// Error to which it is known (pure number).
     pub error: f64,
 }
 

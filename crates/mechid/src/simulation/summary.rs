@@ -94,9 +94,9 @@ pub struct FreeGrowth {
 /// The factor by which a disturbance of a periodic response is multiplied in each period, at most.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LargestMultiplier {
-    /// Real and imaginary part, pure numbers.
+    /// Real and imaginary part of the factor, pure numbers.
     pub value: [f64; 2],
-    /// Its modulus: below 1 disturbances die out (pure number).
+    /// Modulus of the factor: below 1 disturbances die out (pure number).
     pub modulus: f64,
     /// Error to which it is known (pure number).
     pub error: f64,
@@ -283,7 +283,7 @@ impl fmt::Display for SimulationSummary {
         if self.system.is_none() {
             writeln!(
                 f,
-                "{} in Matrix Market files",
+                "{} in sparse matrices",
                 message::count(self.degrees_of_freedom, "degree of freedom")
             )?;
         }
