@@ -79,6 +79,7 @@ pub use mechid_integrate as integrate;
 pub use mechid_io as io;
 pub use mechid_model as model;
 pub use mechid_model::ResponseQuantity::{self, Acceleration, Displacement, Velocity};
+pub use mechid_model::exact_periodic;
 #[cfg(feature = "report")]
 pub use mechid_plot as plot;
 #[cfg(feature = "report")]
@@ -87,8 +88,7 @@ pub use mechid_signal as signal;
 #[cfg(feature = "parquet")]
 pub use simulation::{RunsSummary, simulate_runs};
 pub use simulation::{
-    SimulateError, SimulatedSystem, Simulation, SimulationSummary, exact_periodic, respond,
-    simulate, sweep,
+    SimulateError, SimulatedSystem, Simulation, SimulationSummary, respond, simulate, sweep,
 };
 #[cfg(feature = "report")]
 pub use stability::stability_figure;

@@ -60,6 +60,7 @@ mod second_order;
 mod serde_forms;
 mod sparse_system;
 mod state_transition;
+mod steady_state;
 mod uncertain_system;
 
 pub use discretisation::Discretisation;
@@ -80,4 +81,5 @@ pub use sdof::Sdof;
 pub use second_order::{Matrix, SecondOrderSystem};
 pub use sparse_system::{SparseSystem, band, lumped, triplets};
 pub use state_transition::StateTransition;
+pub use steady_state::exact_periodic;
 pub use uncertain_system::UncertainSystem;

@@ -18,8 +18,9 @@ use mechid_integrate::{
 use mechid_io::{Experiment, IoError, Level, NonlinearDescription, ResponseKind};
 use mechid_model::{
     InitialState, Instability, ModelError, Response, SecondOrderSystem, SparseSystem,
+    exact_periodic,
 };
-use mechid_signal::{Record, Sampling, SignalError, Spectrum, message, noise};
+use mechid_signal::{Record, Sampling, SignalError, message, noise};
 use nalgebra::{Complex, DMatrix};
 
 #[cfg(feature = "parquet")]
@@ -495,45 +496,6 @@ impl SimulateError {
             (error, _) => error,
         }
     }
-}
-
-/// The response that repeats with a force which is band-limited between its samples, line by line
-/// X_n = (K − ω²M + iωC)⁻¹ F_n: exact to rounding, no time step involved.
-///
-/// Of an unstable system it solves the equations, but no run reaches it: [`simulate`] refuses it.
-///
-/// Lines without force have no response; that spares DC for a system free to drift.
-///
-/// # Errors
-/// [`ModelError::SingularDynamicStiffness`] if a line drives an undamped system at its natural
-/// frequency; [`ModelError::Signal`] if the response overflows.
-///
-/// # Panics
-/// If the force has not one channel per degree of freedom.
-///
-/// # Source
-/// Dissertation eqs. (4.6.9)–(4.6.10).
-pub fn exact_periodic(system: &SecondOrderSystem, force: &Record) -> Result<Response, ModelError> {
-    let dof = system.dof();
-    if force.channels() != dof {
-        return Err(ModelError::ForceChannels { got: force.channels(), dof });
-    }
-    let forces = Spectrum::of(force);
-    let mut motions = [(); 3].map(|()| DMatrix::<Complex<f64>>::zeros(forces.len(), dof));
-    for n in 0..forces.len() {
-        let driven = forces.lines().row(n).transpose();
-        if driven.iter().all(|f| f.norm() == 0.0) {
-            continue;
-        }
-        let displacement = (system.receptance(forces.omega(n))? * driven).transpose();
-        let i_omega = Complex::new(0.0, forces.omega(n));
-        motions[0].set_row(n, &displacement);
-        motions[1].set_row(n, &(&displacement * i_omega));
-        motions[2].set_row(n, &(displacement * (i_omega * i_omega)));
-    }
-    let record = |lines| Spectrum::from_lines(force.sampling(), lines)?.to_record();
-    let [x, v, a] = motions.map(record);
-    Response::new(x?, v?, a?)
 }
 
 fn with_middle<'a>(force: &'a Record, middle: Option<&'a Record>) -> SampledForce<'a> {
