@@ -39,6 +39,7 @@ fn main() {
     for (quantity, force_noise) in [
         (ResponseQuantity::Acceleration, 0.01),
         (ResponseQuantity::Displacement, 0.01),
+        (ResponseQuantity::Acceleration, 0.1),
         (ResponseQuantity::Acceleration, 0.2),
     ] {
         for points in [3, 1] {
