@@ -177,7 +177,7 @@ impl ModalSummary {
         let (dof, modes) = (self.degrees_of_freedom, self.modes.len());
         let plural = |count: usize| if count == 1 { "" } else { "s" };
         let freedom = if dof == 1 { "degree" } else { "degrees" };
-        let small = self
+        let linear_part = self
             .nonlinear_terms
             .iter()
             .map(|terms| format!("\nmodes of the linear part; the nonlinear terms are {terms}"));
@@ -185,7 +185,7 @@ impl ModalSummary {
             "{}: {dof} {freedom} of freedom, {modes} mode{}{}\n\n{}{}\n{}",
             self.file,
             plural(modes),
-            small.collect::<String>(),
+            linear_part.collect::<String>(),
             self.mode_table(),
             self.instability(),
             shape_table(&self.modes, |at| self.name(at))

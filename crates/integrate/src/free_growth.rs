@@ -71,7 +71,7 @@ pub fn growth_per_period(
     let table = ForceTable::periodic(&scheme, 1, (&still).into())?;
     let mut shooting = Shooting::new(&scheme, system, table.acting_on(&[0], system.dof()))?;
     let start = scattered_number(shooting.scales.len(), 0);
-    let start = shooting.measure(&start)?.component_div(&shooting.scales);
+    shooting.measure(&start)?;
     let mut space = Arnoldi::new(start, shooting.most_vectors().min(MOST_VECTORS));
     loop {
         let more = space.extend(|begin, end| shooting.free(begin, end))?;
@@ -105,6 +105,9 @@ fn followed(
             shooting.free(begin.as_slice(), motion.as_mut_slice())?;
             *energy += motion.norm_squared();
         }
+    }
+    if !energies[1].is_finite() {
+        return Ok(Some(f64::INFINITY));
     }
     let grown = energies[1] / energies[0];
     Ok((grown > GROWN).then(|| grown.powf(1.0 / FOLLOWED as f64)))
@@ -151,6 +154,8 @@ mod tests {
             (1.0, 0.0, 2000.0, true),
             (1.0, 0.0, 900.0, false),
             (0.6, 0.0, 0.0, false),
+            // A step leaves next to nothing of the motion, a period less than the smallest number.
+            (200.0, 0.0, 900.0, false),
             (0.2, 0.0, 0.0, true),
         ];
         for (damping, at_one, follower, grows) in machines {

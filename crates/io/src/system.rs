@@ -68,7 +68,7 @@ pub fn read_system(path: impl AsRef<Path>) -> Result<SecondOrderSystem, IoError>
 /// Reads the system in a JSON file, as [`read_system`] does, in sparse form and of any size.
 ///
 /// # Errors
-/// As [`read_system`].
+/// Those of [`read_system`].
 pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoError> {
     let (file, described) = json::read::<Described>(path.as_ref())?;
     described.sparse(&file, json::folder(path.as_ref()))
@@ -77,7 +77,7 @@ pub fn read_sparse_system(path: impl AsRef<Path>) -> Result<SparseSystem, IoErro
 /// Reads the system in the text of such a file, as [`read_sparse_system`] does; `file` is its name in messages.
 ///
 /// # Errors
-/// As [`read_system`].
+/// Those of [`read_system`].
 pub fn parse_sparse_system(file: &str, text: &str) -> Result<SparseSystem, IoError> {
     json::parse::<Described>(file, text)?.sparse(file, Path::new(""))
 }

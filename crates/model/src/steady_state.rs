@@ -8,7 +8,7 @@ use crate::{ModelError, Response, SecondOrderSystem};
 /// The response that repeats with a `force` of samples × n (N), which is band-limited between its samples, line by line
 /// X_n = (K − ω²M + iωC)⁻¹ F_n: exact to rounding, no time step involved.
 ///
-/// Of an unstable system it solves the equations, but no run reaches it.
+/// The equations of an unstable system are solved, too, but no run reaches that response.
 ///
 /// Lines without force have no response; that spares DC for a system free to drift.
 ///

@@ -326,7 +326,7 @@ def test_a_large_machine_is_three_sparse_matrices(scheme: str) -> None:
         lines[line] = solve((k - omega**2 * m + 1j * omega * c).tocsc(), load)[[3, 0]]
     truth = np.fft.irfft(lines, samples, axis=0)
     error = np.abs(found.displacement - truth).max() / np.abs(truth).max()
-    assert error < (1e-12 if scheme == "exact" else 2e-2)
+    assert error < (1e-12 if scheme == "exact" else 5e-4)
     with pytest.raises(ValueError, match="sparse matrices"):
         found.machine  # noqa: B018
 

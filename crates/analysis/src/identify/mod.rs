@@ -281,8 +281,8 @@ impl Identified {
         &self.summary
     }
 
-    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part,
-    /// whose modes are those of the linear part. Where equations have no scale
+    /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part.
+    /// Where equations have no scale
     /// ([`IdentificationSummary::unscaled`]), those of one of the systems with the same modes.
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate

@@ -326,8 +326,7 @@ impl IdentificationSummary {
     }
 
     fn mode_table(&self) -> String {
-        let small = self.nonlinear.is_some();
-        let what = if small { "mode of the linear part" } else { "mode" };
+        let what = if self.nonlinear.is_some() { "mode of the linear part" } else { "mode" };
         mode_table(what, &ShapedMode::rows(&self.modes))
     }
 

@@ -47,7 +47,8 @@ pub struct NonlinearEstimate {
 }
 
 impl NonlinearEstimate {
-    /// The linear part: M̂, Ĉ, K̂ with their covariance. Its modes are those of small amplitudes, apart from terms with a slope at rest.
+    /// The linear part: M̂, Ĉ, K̂ with their covariance. Its modes are those of small amplitudes, apart from
+    /// terms with a slope at rest.
     pub fn linear(&self) -> &Estimate {
         &self.linear
     }

@@ -22,7 +22,8 @@ const CLOSED: f64 = 1e-10;
 /// Between the samples the force is band-limited, which a held or linear one is not: of a hardening
 /// spring that drives its own third harmonic the difference is several times the noise of a good
 /// sensor. The steps follow the classical Runge–Kutta rule, twice as many to a sample until the response
-/// settles to 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A hardening spring may have several steady states; the one found is near the start.
+/// settles to 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A hardening
+/// spring may have several steady states; the one found is near the start.
 ///
 /// # Errors
 /// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::TooStiff`] if the fastest

@@ -212,6 +212,20 @@ class Result:
         return settings
 
 
+class Bare(Result):
+    """A result without remarks and settings."""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Nothing: there are no remarks."""
+        return ()
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Nothing: there are no settings."""
+        return {}
+
+
 class _Compiled(Protocol):
     """What every compiled result can do."""
 
@@ -621,7 +635,7 @@ class IdentifiedBearing(Drawn):
 
 
 @final
-class Machine(Drawn):
+class Machine(Bare, Drawn):
     """M, C and K, with the covariance of those of their entries that were identified.
 
     Parameters
@@ -756,16 +770,6 @@ class Machine(Drawn):
         """Return the modes and the system as ``mechid modal --json`` prints them."""
         return self._modal[0]
 
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Nothing: a machine has no remarks."""
-        return ()
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Nothing: a machine has no settings."""
-        return {}
-
     def __str__(self) -> str:
         return self._modal[1]
 
@@ -774,7 +778,7 @@ class Machine(Drawn):
 
 
 @final
-class SelectedModes(Result):
+class SelectedModes(Bare):
     """Some of the modes of a machine of any size."""
 
     _found: tuple[str, str]
@@ -820,16 +824,6 @@ class SelectedModes(Result):
     def to_json(self) -> str:
         """Return the modes as ``mechid modal --modes COUNT --json`` prints them."""
         return self._found[0]
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """Nothing: such modes have no remarks."""
-        return ()
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """Nothing: such modes have no settings."""
-        return {}
 
     def __str__(self) -> str:
         return self._found[1]
