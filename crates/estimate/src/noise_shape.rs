@@ -15,8 +15,8 @@ const MAX_BUMPS: usize = 24;
 /// Complex deviations that a level below those beside it is made of at least: few lines may be quiet by
 /// chance, and would then have all the weight.
 const QUIET_DEVIATIONS: f64 = 12.0;
-/// Largest leverage of a line, over the complex deviations of its sample, with which a polynomial is trusted
-/// to be lower there than one of a lower order: at the ends of the band few lines decide.
+/// Largest leverage of a line, over the complex deviations of its sample and without that of bumps, with which a
+/// polynomial is trusted to be lower there than one of a lower order: at the ends of the band few lines decide.
 const END_LEVERAGE: f64 = 0.25;
 /// Power of a peak over the floor that is tried first.
 const PEAK: f64 = 100.0;
@@ -30,14 +30,17 @@ const PEAK_REACH: f64 = 10.0;
 const BEST_WIDTHS: usize = 6;
 /// Rounds of variations of a bump.
 const VARIATIONS: usize = 12;
-/// Steps of the search for the height of a tent.
+/// Steps of the search for the height of a bump, and the change of the height that ends it.
 const HEIGHT_STEPS: usize = 10;
+const HEIGHT_TOLERANCE: f64 = 1e-4;
 /// Largest height, in the logarithm of the power.
 const HIGHEST: f64 = 30.0;
 /// Steps of the search for the log power.
 const STEPS: usize = 200;
-/// Change of the log power (RMS) below which it is found.
+/// Change of the log power (RMS) below which it is found, and while forms are compared: what that misses of the
+/// likelihood is its square.
 const TOLERANCE: f64 = 1e-9;
+const COMPARED: f64 = 1e-4;
 /// Smallest power, relative to the mean over the lines, at which the search starts.
 const FLOOR: f64 = 1e-9;
 
@@ -305,15 +308,16 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
             + channels * smooth.form.terms() as f64 * per_term
             + 2.0 * smooth.form.bumps.len() as f64 * per_place
     };
+    let compared = |form: Form| fit_within(COMPARED, form, omega, variances, nu);
     let mut best: Option<(f64, Smooth)> = None;
     for order in 0..=MAX_ORDER.min(lines / LINES_PER_ORDER) {
-        let mut smooth = fit(Form { order, bumps: Vec::new() }, omega, variances, nu);
+        let mut smooth = compared(Form { order, bumps: Vec::new() });
         let mut least = cost(&smooth);
         while smooth.form.bumps.len() < MAX_BUMPS && 4 * (smooth.form.terms() + 1) <= lines {
             let Some(bump) = most_conspicuous(variances, &smooth.log_power, nu) else { break };
             let mut form = smooth.form.clone();
             form.bumps.push(bump);
-            let more = fit(form, omega, variances, nu);
+            let more = compared(form);
             let now = cost(&more);
             if now >= least {
                 break;
@@ -324,29 +328,46 @@ fn searched(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
             best = Some((least, smooth));
         }
     }
-    let white = || fit(Form { order: 0, bumps: Vec::new() }, omega, variances, nu);
-    best.map_or_else(white, |(cost, smooth)| Smooth { cost, ..smooth })
+    let white = || (f64::INFINITY, Form { order: 0, bumps: Vec::new() });
+    let (cost, form) = best.map_or_else(white, |(cost, smooth)| (cost, smooth.form));
+    Smooth { cost, ..fit(form, omega, variances, nu) }
 }
 
 /// The spectrum of a given form.
 pub(crate) fn fit(form: Form, omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
+    fit_within(TOLERANCE, form, omega, variances, nu)
+}
+
+/// The same, found within a `tolerance` of the log power (RMS).
+fn fit_within(
+    tolerance: f64,
+    form: Form,
+    omega: &[f64],
+    variances: &DMatrix<f64>,
+    nu: f64,
+) -> Smooth {
     let basis = form.basis(omega);
     let mut log_power = variances.clone();
     let mut misfit = 0.0;
     for (mut column, channel) in log_power.column_iter_mut().zip(variances.column_iter()) {
-        let (mut log_power, least) = most_likely(&basis, &channel.into_owned());
+        let (mut log_power, least) = most_likely(&basis, &channel.into_owned(), tolerance);
         if !form.bumps.is_empty() {
             fill_notches(&mut log_power, (QUIET_DEVIATIONS / nu) as usize);
         }
         column.copy_from(&log_power);
         misfit += least;
     }
-    let ends: Vec<usize> = (0..omega.len())
-        .filter(|line| basis.row(*line).norm_squared() > END_LEVERAGE * nu)
-        .collect();
+    let mut leverage: Vec<f64> = basis.row_iter().map(|row| row.norm_squared()).collect();
+    for bump in &form.bumps {
+        let band = bump.band(omega.len());
+        let of_bump = (band.len() as f64).recip();
+        leverage[band].iter_mut().for_each(|leverage| *leverage -= of_bump);
+    }
+    let ends = leverage.iter().enumerate().filter(|(_, leverage)| **leverage > END_LEVERAGE * nu);
+    let ends: Vec<usize> = ends.map(|(line, _)| line).collect();
     if form.order > 0 && !ends.is_empty() {
         let lower = Form { order: form.order - 1, bumps: form.bumps.clone() };
-        let lower = fit(lower, omega, variances, nu).log_power;
+        let lower = fit_within(tolerance, lower, omega, variances, nu).log_power;
         for line in ends {
             for (own, lower) in log_power.row_mut(line).iter_mut().zip(lower.row(line).iter()) {
                 *own = own.max(*lower);
@@ -397,67 +418,106 @@ fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64)
     let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
     flat.sort_by(|a, b| b.0.total_cmp(&a.0));
     flat.truncate(BEST_WIDTHS);
-    let with_gain = |bump: Bump| (gain_of(&bump, &levels, nu), bump);
-    let best = |of: &mut dyn Iterator<Item = (f64, Bump)>| of.max_by(|a, b| a.0.total_cmp(&b.0));
-    let of_flat = best(&mut flat.iter().map(|(gain, band)| (*gain, Bump::flat(band))))?;
-    let others = flat.iter().flat_map(|(_, band)| Bump::about(band)).map(with_gain);
-    let mut other = best(&mut others.into_iter())?;
+    let best = |of: &mut dyn Iterator<Item = Gained>| of.max_by(|a, b| a.gain.total_cmp(&b.gain));
+    let (of_flat, band) = flat.first()?;
+    let none = vec![0.0; channels];
+    let others = flat.iter().flat_map(|(_, band)| Bump::about(band));
+    let mut other = best(&mut others.map(|bump| Gained::of(bump, &none, &levels, nu)))?;
     for _ in 0..VARIATIONS {
-        let varied = other.1.varied().into_iter();
+        let varied = other.bump.varied().into_iter();
         let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
-        let varied = best(&mut inside.map(with_gain));
-        match varied.filter(|varied| varied.0 > other.0) {
+        let with_gain = |bump: Bump| Gained::of(bump, &other.heights, &levels, nu);
+        match best(&mut inside.map(with_gain)).filter(|varied| varied.gain > other.gain) {
             Some(varied) => other = varied,
             None => break,
         }
     }
-    let best = Some(if of_flat.0 >= other.0 { of_flat } else { other });
-    best.filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
+    let best = if *of_flat >= other.gain {
+        (*of_flat, Bump::flat(band))
+    } else {
+        (other.gain, other.bump)
+    };
+    Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
 }
 
-/// Returns by how much a bump of the best height on the best level lowers Σ log p + v/p, from the levels v/p.
-fn gain_of(bump: &Bump, levels: &DMatrix<f64>, nu: f64) -> f64 {
-    let lines = levels.nrows() as f64;
-    let support = bump.support(levels.nrows());
-    let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
+/// A bump of the best height on the best level.
+struct Gained {
+    bump: Bump,
+    /// Amount by which it lowers Σ log p + v/p.
+    gain: f64,
+    /// Height for each channel, in the logarithm of the power.
+    heights: Vec<f64>,
+}
+
+impl Gained {
+    /// Finds the heights from those of a bump like it, and from the levels v/p.
+    fn of(bump: Bump, start: &[f64], levels: &DMatrix<f64>, nu: f64) -> Self {
+        let support = bump.support(levels.nrows());
+        let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
+        let mut heights = start.to_vec();
+        let gains = heights.iter_mut().zip(levels.column_iter()).map(|(height, all)| {
+            let (before, inside) = all.as_slice().split_at(support.start);
+            let (inside, after) = inside.split_at(parts.len());
+            let outside = before.iter().chain(after).sum();
+            raised(&parts, inside, outside, levels.nrows() as f64, height, nu)
+        });
+        let gain = gains.sum();
+        Self { bump, gain, heights }
+    }
+}
+
+/// Finds the height of a bump whose parts stand over the levels v/p `inside`, and returns by how much it lowers
+/// Σ log p + v/p; the levels of all other lines have the sum `outside`.
+fn raised(
+    parts: &[f64],
+    inside: &[f64],
+    outside: f64,
+    lines: f64,
+    height: &mut f64,
+    nu: f64,
+) -> f64 {
     let area: f64 = parts.iter().sum();
-    let of_channel = |channel: usize| {
-        let all = levels.column(channel);
-        let inside = all.rows_range(support.clone());
-        let (total, outside) = (all.sum(), all.sum() - inside.sum());
-        let (mut height, mut least, mut most) = (0.0, -HIGHEST, HIGHEST);
-        let mut sum = total;
-        for _ in 0..HEIGHT_STEPS {
-            let (mut first, mut second) = (0.0, 0.0);
-            sum = outside;
-            for (part, level) in parts.iter().zip(inside.iter()) {
-                let left = level * f64::exp(-height * part);
-                sum += left;
-                first += part * left;
-                second += part * part * left;
-            }
-            // Derivatives of L log Σ v/p + height Σ part, which is convex.
-            let slope = area - lines * first / sum;
-            let curvature = lines * (second / sum - (first / sum).powi(2));
-            if slope < 0.0 {
-                least = height
-            } else {
-                most = height
-            }
-            let next = height - slope / curvature;
-            height = if next > least && next < most { next } else { 0.5 * (least + most) };
+    let total = outside + inside.iter().sum::<f64>();
+    let (mut least, mut most) = (-HIGHEST, HIGHEST);
+    let mut sum = total;
+    for _ in 0..HEIGHT_STEPS {
+        let (mut first, mut second) = (0.0, 0.0);
+        sum = outside;
+        for (part, level) in parts.iter().zip(inside) {
+            let left = level * f64::exp(-*height * part);
+            sum += left;
+            first += part * left;
+            second += part * part * left;
         }
-        if height <= 0.0 && area * nu < QUIET_DEVIATIONS {
-            return 0.0;
+        // Derivatives of L log Σ v/p + height Σ part, which is convex.
+        let slope = area - lines * first / sum;
+        let curvature = lines * (second / sum - (first / sum).powi(2));
+        if slope < 0.0 {
+            least = *height
+        } else {
+            most = *height
         }
-        lines * (total / sum).ln() - height * area
-    };
-    (0..levels.ncols()).map(of_channel).sum()
+        let next = *height - slope / curvature;
+        let next = if next > least && next < most { next } else { 0.5 * (least + most) };
+        // The sum is that of the height before.
+        if (next - *height).abs() <= HEIGHT_TOLERANCE {
+            break;
+        }
+        *height = next;
+    }
+    if *height <= 0.0 && area * nu < QUIET_DEVIATIONS {
+        return 0.0;
+    }
+    lines * (total / sum).ln() - *height * area
 }
 
 /// The log power within a basis of which the variances of a channel are samples, by maximum likelihood, and
 /// Σ log p + v/p.
-fn most_likely(basis: &DMatrix<f64>, variances: &DVector<f64>) -> (DVector<f64>, f64) {
+fn most_likely(
+    basis: &DMatrix<f64>,
+    variances: &DVector<f64>,
+    tolerance: f64,
+) -> (DVector<f64>, f64) {
     let floor = (FLOOR * variances.mean()).max(f64::MIN_POSITIVE);
     let logarithms = variances.map(|v| v.max(floor).ln());
     let mut log_power = basis * basis.tr_mul(&logarithms);
@@ -466,11 +526,23 @@ fn most_likely(basis: &DMatrix<f64>, variances: &DVector<f64>) -> (DVector<f64>,
     log_power.add_scalar_mut(level.max(f64::MIN_POSITIVE).ln());
     let mut ratio = DVector::zeros(variances.len());
     let mut misfit = deviance(&log_power, variances, &mut ratio);
-    let tolerance = TOLERANCE * (variances.len() as f64).sqrt();
-    let mut next_ratio = ratio.clone();
+    let tolerance = tolerance * (variances.len() as f64).sqrt();
+    let (mut next_ratio, mut weighted) = (ratio.clone(), ratio.clone());
+    let mut information = DMatrix::zeros(basis.ncols(), basis.ncols());
     for _ in 0..STEPS {
-        // The expected information is the identity.
-        let mut step = basis.tr_mul(&ratio.add_scalar(-1.0));
+        let slope = basis.tr_mul(&ratio.add_scalar(-1.0));
+        for j in 0..basis.ncols() {
+            weighted.zip_zip_apply(&basis.column(j), &ratio, |w, own, ratio| *w = own * ratio);
+            for i in 0..=j {
+                let information_of = basis.column(i).dot(&weighted);
+                (information[(i, j)], information[(j, i)]) = (information_of, information_of);
+            }
+        }
+        // Newton's step; that of the expected information, the identity, where there is none.
+        let mut step = match information.clone().cholesky() {
+            Some(factors) => factors.solve(&slope),
+            None => slope,
+        };
         while step.norm() > tolerance {
             let next = &log_power + basis * &step;
             let lower = deviance(&next, variances, &mut next_ratio);
