@@ -3,6 +3,7 @@
 mod average;
 mod cross_spectra;
 mod fit;
+mod own_lines;
 mod scatter;
 mod segments;
 
@@ -13,6 +14,7 @@ use nalgebra::{Complex, DMatrix};
 pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
 pub use self::fit::{ResponseEstimate, output_error_of_responses};
+pub use self::own_lines::{Crosstalk, OwnLines};
 use self::scatter::Scatter;
 pub use self::segments::{Segments, Window};
 use crate::EstimateError;

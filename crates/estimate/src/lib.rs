@@ -54,7 +54,8 @@ pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
 pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
 pub use frf::{
-    Frf, FrfAverage, FrfEstimator, ResponseEstimate, Segments, Window, output_error_of_responses,
+    Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, ResponseEstimate, Segments, Window,
+    output_error_of_responses,
 };
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;

@@ -6,7 +6,7 @@ pub mod table;
 mod whole;
 
 use mechid_estimate::frequency_domain::Lines;
-use mechid_estimate::{Frf, FrfAverage, FrfEstimator, Segments, Window};
+use mechid_estimate::{Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, Segments, Window};
 use mechid_signal::{HitRule, Record, Spectrum, message};
 use serde::{Deserialize, Serialize};
 
@@ -83,9 +83,9 @@ pub fn frf_of_records(
     }
     let records = held_of(measurements, hold)?;
     if let [recorded] = &records[..]
-        && let Some(parts) = interleaved(recorded, how, lines)?
+        && let Some((parts, crosstalk)) = interleaved(recorded, how, lines)?
     {
-        return Ok(FrfTable::interleaved(&records, &parts, how));
+        return Ok(FrfTable::interleaved(&records, &parts, &crosstalk, how));
     }
     let chosen = match records.iter().min_by_key(|recorded| recorded.held.force.len()) {
         Some(shortest) if !period_given && !whole::close(&records) => {
@@ -122,13 +122,13 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
 /// Amplitude of the other forces over that of the one that drives a line, below which they are idle there.
 const IDLE: f64 = 0.1;
 
-/// Frequency responses to each force on the lines that it alone drives; `None` unless several forces have
-/// every line of whole periods to themselves, in turn.
+/// Frequency responses to each force on the lines that it alone drives, and what the others do there; `None` unless
+/// several forces have every line of whole periods to themselves, in turn.
 fn interleaved(
     recorded: &Windowed,
     how: &FrfSettings,
     rule: LineRule<'_>,
-) -> Result<Option<Vec<Responses>>, AnalysisError> {
+) -> Result<Option<(Vec<Responses>, Vec<Crosstalk>)>, AnalysisError> {
     let held = &recorded.held;
     let segments = how.segments.segments(held.period)?;
     let whole = held.force.len() >= held.period;
@@ -152,15 +152,18 @@ fn interleaved(
         return Ok(None);
     }
     let sampling = held.force.sampling().with_len(period)?;
-    let each = held.driven.iter().map(|dof| {
+    let own = held.driven.iter().map(|dof| {
         let of_force = chosen.iter().zip(&drivers).filter(|(_, driver)| *driver == dof);
         let lines = Lines::new(sampling, of_force.map(|(line, _)| *line))?;
-        let average = average_of(recorded, &lines, segments, &[*dof])?;
-        let frf = average.frf(how.estimator.estimator())?;
-        let counts = vec![average.pieces()];
-        Ok(Responses { frf, lines, driven: vec![*dof], idle: Vec::new(), segments, counts })
+        average(recorded, &lines, segments)
     });
-    each.collect::<Result<_, AnalysisError>>().map(Some)
+    let own: Vec<FrfAverage> = own.collect::<Result<_, AnalysisError>>()?;
+    let OwnLines { responses, crosstalk } = OwnLines::of(&own, how.estimator.estimator())?;
+    let parts = responses.into_iter().zip(&own).zip(&held.driven).map(|((frf, own), dof)| {
+        let (lines, counts) = (own.lines().clone(), vec![own.pieces()]);
+        Responses { frf, lines, driven: vec![*dof], idle: Vec::new(), segments, counts }
+    });
+    Ok(Some((parts.collect(), crosstalk)))
 }
 
 /// Frequency response estimator: where the noise is.

@@ -4,7 +4,7 @@ use mechid_model::ResponseQuantity;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
-use mechid_estimate::{Segments, Window};
+use mechid_estimate::{Crosstalk, Segments, Window};
 use mechid_io::{
     ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
 };
@@ -147,6 +147,7 @@ impl FrfTable {
     pub(super) fn interleaved(
         records: &[Windowed],
         parts: &[Responses],
+        crosstalk: &[Crosstalk],
         how: &FrfSettings,
     ) -> Self {
         let n = records[0].held.force.channels();
@@ -177,6 +178,15 @@ impl FrfTable {
             "every force has lines of its own: the responses to it are those on its lines alone"
                 .into(),
         );
+        table.remarks.extend(crosstalk.iter().map(|one| {
+            let name = |force: usize| &table.force_names[parts[force].driven[0]];
+            let [force, driver] = [one.force, one.driver].map(name);
+            format!(
+                "{force} has {} % of {driver} on the lines of that one: its part of the response is taken off, \
+                 with the responses to it interpolated between its own lines",
+                significant(100.0 * one.share, 2)
+            )
+        }));
         table
     }
 

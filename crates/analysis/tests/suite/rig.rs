@@ -2,8 +2,8 @@
 
 use mechid_analysis::identify::{Disturbance, Fit, KnownMass, LeftOut, Method, SampleFit};
 use mechid_analysis::{
-    AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
-    Window, frf, frf_of_records, identify,
+    AnalysisError, FrfSettings, FrfTable, Identified, Identify, Measurement, ResponseQuantity,
+    Segmentation, Window, frf, frf_of_records, identify,
 };
 use mechid_estimate::checks::{Concentration, Finding};
 use mechid_model::{Response, Sdof, SecondOrderSystem};
@@ -293,6 +293,67 @@ fn lines_of_a_disturbance_are_left_out() {
         let found = identify(&records, &Identify::default().without(without)).unwrap();
         assert!(!found.checks().iter().any(|check| check.is_conspicuous()), "{found}");
         assert!(error(&found.system().unwrap()) < 0.01, "{found}");
+    }
+}
+
+/// Two shakers with every second line each, of which a part of the force of each acts at the other too, with noise
+/// of this part of the RMS value in all channels.
+fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSystem, FrfTable) {
+    let period = Sampling::new(0.008, PERIOD).unwrap();
+    let system = chain(2, Support::Held, 0.02, 3);
+    let shaker = |first: usize| {
+        let lines = (first..=70).step_by(2);
+        Multisine::flat(lines, 10.0, Phases::Random { seed: 4 }).unwrap().sample(period).unwrap()
+    };
+    let [one, two] = [shaker(1), shaker(2)];
+    let both = |a: &Record, b: &Record| -> Vec<f64> {
+        a.channel(0).iter().zip(b.channel(0)).map(|(a, b)| a + crosstalk * b).collect()
+    };
+    let force =
+        Record::from_channels(period, &[&both(&one, &two)[..], &both(&two, &one)[..]]).unwrap();
+    let motion = exact_harmonic_periodic(&system, &force).unwrap();
+    let noisy = |record: &Record, seed| {
+        let all = record.repeated(8).unwrap();
+        noise::add_white(&all, NoiseLevel::FractionOfRms(level), seed).unwrap()
+    };
+    let (force, x) = (noisy(&force, 2 * seed), noisy(motion.displacement(), 2 * seed + 1));
+    let responses = [(ResponseQuantity::Displacement, &x)];
+    let measured = Measurement::from_records(&force, &responses).unwrap().period(PERIOD).unwrap();
+    (system, frf(&measured, &FrfSettings::default()).unwrap())
+}
+
+/// Errors of responses on the lines of their own force, over their standard errors: RMS and largest, and the RMS of
+/// what a part of the other force would make of them.
+fn errors_on_own_lines(system: &SecondOrderSystem, table: &FrfTable, part: f64) -> [f64; 3] {
+    let (mut errors, mut parts) = (Vec::new(), Vec::new());
+    for response in &table.responses {
+        let values = response.real.iter().zip(&response.imaginary).zip(&response.standard_error);
+        for (at, ((re, im), error)) in values.enumerate().filter(|(_, ((re, _), _))| re.is_finite())
+        {
+            let omega = std::f64::consts::TAU * table.frequency_hz[at];
+            let row = system.receptance(omega).unwrap().row(response.motion - 1).into_owned();
+            let (own, other) = (row[response.force - 1], row[2 - response.force]);
+            errors.push((re - own.re).hypot(im - own.im) / (2_f64.sqrt() * error));
+            parts.push(part * other.norm() / (2_f64.sqrt() * error));
+        }
+    }
+    let rms = |all: &[f64]| (all.iter().map(|x| x * x).sum::<f64>() / all.len() as f64).sqrt();
+    [rms(&errors), errors.iter().copied().fold(0.0, f64::max), rms(&parts)]
+}
+
+/// Judge: (K − ω²M + iωC)⁻¹. Noise in the channels alone is no crosstalk, and what 2 % of it would do is no longer in
+/// the responses.
+#[test]
+fn crosstalk_between_interleaved_forces_is_told_and_taken_off() {
+    let told = |table: &FrfTable| table.to_string().matches("of that one").count();
+    for seed in 0..10 {
+        let (_, table) = interleaved_shakers(0.0, 0.002, seed);
+        assert_eq!(told(&table), 0, "{seed}: {table}");
+        let (system, table) = interleaved_shakers(0.02, 0.002, seed);
+        assert_eq!(told(&table), 2, "{seed}: {table}");
+        let [error, largest, untold] = errors_on_own_lines(&system, &table, 0.02);
+        assert!((0.7..1.15).contains(&error) && largest < 5.0, "{seed}: {error} {largest}");
+        assert!(untold > 2.0, "{seed}: {untold}");
     }
 }
 

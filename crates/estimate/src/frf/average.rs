@@ -31,14 +31,14 @@ const PEAK: usize = 2;
 #[derive(Debug, Clone)]
 pub struct FrfAverage {
     lines: Lines,
-    inputs: usize,
+    pub(super) inputs: usize,
     outputs: usize,
     measured: ResponseQuantity,
     segments: Segments,
     weights: Option<Vec<f64>>,
-    pieces: usize,
+    pub(super) pieces: usize,
     /// Per line.
-    sums: Vec<CrossSpectra>,
+    pub(super) sums: Vec<CrossSpectra>,
 }
 
 impl FrfAverage {

@@ -69,6 +69,12 @@ impl CrossSpectra {
         self.force[(input, input)].re
     }
 
+    /// Amplitude of a force over that of another one, as far as the two are in common; 0 where that one is.
+    pub(super) fn force_ratio(&self, input: usize, driver: usize) -> Complex<f64> {
+        let power = self.force_power(driver);
+        if power > 0.0 { self.force[(input, driver)] / power } else { Complex::ZERO }
+    }
+
     /// The sums of some of the forces.
     pub(super) fn of_inputs(&self, inputs: &[usize]) -> Self {
         Self {
