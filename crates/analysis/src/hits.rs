@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use mechid_signal::{Hit, HitFault, HitRule, Record, hits, message};
+use mechid_signal::{Hit, HitFault, HitRule, Hits, Record, hits, message};
 use serde::Serialize;
 
 use crate::AnalysisError;
-use crate::measurement::Windowed;
+use crate::measurement::{Block, Windowed};
 use crate::text::significant;
 
 /// Part of the largest force above which a sample belongs to a pulse.
@@ -17,6 +17,10 @@ const RARE: f64 = 0.05;
 
 /// Largest pull of a hammer over its largest push: filters ring, and a hammer does not pull.
 const ONE_SIDED: f64 = 0.2;
+
+/// Power of a channel during the hits over that between them, beyond 1 and in standard deviations of such a ratio of
+/// noise, up to which no force acts there.
+const MOVES: f64 = 6.0;
 
 /// One hit of a record, used or left out.
 #[derive(Debug, Clone, Serialize)]
@@ -97,9 +101,8 @@ pub(crate) fn heading(rows: &[HitRow], sample_rate_hz: &str) -> String {
 pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
     records.iter().find_map(|record| {
         let held = &record.held;
-        let [dof] = held.driven[..] else { return None };
+        let Struck { dof, found, .. } = Struck::of(held, &HitRule::default()).ok()?;
         let force = held.force.channel(dof);
-        let found = hits(force, held.force.sampling().dt(), &HitRule::default()).ok()?;
         let (mut pull, mut push, mut pulses) = (0.0_f64, 0.0_f64, 0);
         let largest = found.all.iter().map(|hit| hit.peak.abs()).fold(0.0, f64::max);
         for f in force.iter().map(|f| f - found.offset) {
@@ -122,11 +125,65 @@ pub(crate) fn uncut(records: &[Windowed]) -> Option<String> {
 }
 
 /// Good hits of records, each a record of its own, and a row for every hit.
+#[derive(Default)]
 pub(crate) struct Cut {
     pub hits: Vec<Windowed>,
     /// Noise of the force of each of these hits.
     pub noise: Vec<HitNoise>,
     pub rows: Vec<HitRow>,
+    pub remarks: Vec<String>,
+}
+
+/// Degree of freedom that is struck in a record, with its hits.
+struct Struck {
+    dof: usize,
+    found: Hits,
+    /// Degrees of freedom whose channels show noise alone, also during the hits.
+    idle: Vec<usize>,
+}
+
+impl Struck {
+    /// # Errors
+    /// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act.
+    fn of(held: &Block, rule: &HitRule) -> Result<Self, AnalysisError> {
+        let wrong = |why| AnalysisError::Setting { setting: "hits", why };
+        let find = |dof: &usize| {
+            let found = hits(held.force.channel(*dof), held.force.sampling().dt(), rule);
+            found.map(|found| (*dof, found)).map_err(|error| wrong(error.to_string()))
+        };
+        let each: Vec<(usize, Hits)> = held.driven.iter().map(find).collect::<Result<_, _>>()?;
+        let (mut with, without): (Vec<_>, Vec<_>) = each
+            .into_iter()
+            .partition(|(_, found)| !found.all.is_empty() || held.driven.len() == 1);
+        let idle: Vec<usize> = without.iter().map(|(dof, _)| *dof).collect();
+        match (with.pop(), with.len()) {
+            (Some((dof, found)), 0) if idle.iter().all(|dof| is_still(held, *dof, &found)) => {
+                Ok(Self { dof, found, idle })
+            }
+            _ => Err(wrong(format!(
+                "a hammer strikes one degree of freedom, and {} forces act in {}: name one column, and 0 \
+                 for the others",
+                held.driven.len(),
+                held.file
+            ))),
+        }
+    }
+}
+
+/// Returns whether the force on a degree of freedom is no larger during the hits on another than between them.
+fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
+    let force = held.force.channel(dof);
+    let mut is_pulse = vec![false; force.len()];
+    found.all.iter().for_each(|hit| is_pulse[hit.pulse.clone()].fill(true));
+    let mean = force.iter().sum::<f64>() / force.len() as f64;
+    let power = |during: bool| {
+        let samples = force.iter().zip(&is_pulse).filter(|(_, is)| **is == during);
+        let (sum, count) = samples
+            .fold((0.0, 0.0), |(sum, count), (f, _)| (sum + (f - mean).powi(2), count + 1.0));
+        (sum / f64::max(count, 1.0), count)
+    };
+    let ((during, samples), (between, _)) = (power(true), power(false));
+    during <= between * (1.0 + MOVES * (2.0 / samples).sqrt())
 }
 
 /// Noise of the force in the window of a hit, which is set to zero away from the pulse.
@@ -151,24 +208,18 @@ impl Cut {
 /// [`AnalysisError::Setting`] for a rule that makes no sense and where several forces act,
 /// [`AnalysisError::NoHit`] if a record has none that is good.
 pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisError> {
-    let mut all = Cut { hits: Vec::new(), noise: Vec::new(), rows: Vec::new() };
+    let mut all = Cut::default();
     for record in records {
         let held = &record.held;
-        let [dof] = held.driven[..] else {
-            let why = format!(
-                "a hammer strikes one degree of freedom, and {} forces act in {}: name one column, and 0 \
-                 for the others",
-                held.driven.len(),
-                held.file
-            );
-            return Err(AnalysisError::Setting { setting: "hits", why });
-        };
+        let Struck { dof, mut found, idle } = Struck::of(held, rule)?;
         let force = held.force.channel(dof);
-        let wrong = |error: mechid_signal::SignalError| AnalysisError::Setting {
-            setting: "hits",
-            why: error.to_string(),
-        };
-        let mut found = hits(force, held.force.sampling().dt(), rule).map_err(wrong)?;
+        all.remarks.extend(idle.iter().map(|dof| {
+            format!(
+                "{}: force {} taken as zero: its channel shows noise alone, also during the hits",
+                held.file,
+                dof + 1
+            )
+        }));
         for (_, response) in held.responses() {
             found.check_response(response)?;
         }
@@ -193,6 +244,7 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
             let pulse = Record::new(held.force.sampling().with_len(hit.window.len())?, pulse)?;
             let mut part = record.part(hit.window.clone(), pulse)?;
             part.held.file = format!("{}, hit {}", held.file, row.number);
+            part.held.driven = vec![dof];
             // Once a record.
             if rows.iter().find(|row| row.used).is_some_and(|first| first.number != row.number) {
                 part.held.unit_remarks.clear();

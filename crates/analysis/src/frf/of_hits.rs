@@ -111,7 +111,7 @@ pub(super) fn of_hits(
     let averaged = average_of_hits(&cut.hits, lines, how.exponential_percent)?;
     let AverageOfHits { average, lines, driven, segments, added_decay, left, before } = averaged;
     let frf = average.frf(how.estimator.estimator())?;
-    let mut remarks = Vec::new();
+    let mut remarks = cut.remarks.clone();
     if left > DIED_OUT {
         remarks.push(format!(
             "at the end of a window the response is still {} % of its largest: leakage makes resonances \

@@ -108,11 +108,11 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     }
     let unknowns = how.structure.apply(how.mass.unknowns(dofs)?)?;
     let period_given = measurements.iter().any(|m| m.window_settings().period.is_some());
-    let (mut hits, mut hit_noise) = (Vec::new(), Vec::new());
+    let (mut hits, mut hit_noise, mut of_hits) = (Vec::new(), Vec::new(), Vec::new());
     if let Some(rule) = &how.hits {
         how.check_hits(period_given)?;
         let cut = hits::cut(&records, rule)?;
-        (records, hits, hit_noise) = (cut.hits, cut.rows, cut.noise);
+        (records, hits, hit_noise, of_hits) = (cut.hits, cut.rows, cut.noise, cut.remarks);
     }
     let excitation = match &how.hits {
         Some(_) => Excitation::Hits(&hit_noise),
@@ -126,6 +126,7 @@ pub fn identify(measurements: &[Measurement], how: &Identify) -> Result<Identifi
     };
     let (fitted, unscaled) = fitted.map_err(|error| explained(error, &records))?;
     let mut summary = IdentificationSummary::new(&records, &fitted, unscaled, hits, how)?;
+    summary.remarks.extend(of_hits);
     if how.hits.is_none() && how.nonlinear.is_none() && !period_given {
         summary.remarks.extend(hits::uncut(&records));
         if matches!(how.fit, Fit::Spectra { .. }) {

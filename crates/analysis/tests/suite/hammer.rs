@@ -62,6 +62,46 @@ fn roving(quantity: ResponseQuantity, seed: u64) -> Identified {
     identify(&[hammer(&rig, 0, seed), hammer(&rig, 1, seed)], &settings()).unwrap()
 }
 
+/// The same test with a column for the force on each mass, that of the mass which is not struck being noise and a part
+/// of the other.
+fn with_both_forces(rig: &HammerTest, dof: usize, noise_n: f64, part: f64) -> Measurement {
+    let record = rig.measure(dof, 2, dof as u64).unwrap();
+    let level = NoiseLevel::StandardDeviation(0.05);
+    let response = noise::add_white(&record.response, level, 7).unwrap();
+    let struck = record.force.channel(0);
+    let channel = noise::white(record.force.sampling(), 1, noise_n, 8).unwrap();
+    let other: Vec<f64> =
+        channel.channel(0).iter().zip(struck).map(|(noise, f)| noise + part * f).collect();
+    let mut forces = [struck, &other];
+    forces.swap(0, dof);
+    let force = Record::from_channels(record.force.sampling(), &forces).unwrap();
+    Measurement::from_records(&force, &[(rig.quantity, &response)]).unwrap()
+}
+
+/// Judge: the same test with zero in the column. A few per cent of the blow in the other column are a force.
+#[test]
+fn a_column_that_shows_noise_alone_is_no_second_hammer() {
+    let rig = rig(ACCELERATION);
+    let both = |noise_n, part| [0, 1].map(|dof| with_both_forces(&rig, dof, noise_n, part));
+    let exact = identify(&both(0.0, 0.0), &settings()).unwrap();
+    let is_told = |remark: &&String| remark.contains("shows noise alone");
+    assert_eq!(exact.summary().remarks.iter().filter(is_told).count(), 0);
+    for noise_n in [0.05, 0.2, 2.0] {
+        let found = identify(&both(noise_n, 0.0), &settings()).unwrap();
+        assert_eq!(found.summary().remarks.iter().filter(is_told).count(), 2, "{found}");
+        for (one, other) in found.estimate().parameters().zip(exact.estimate().parameters()) {
+            assert!((one.value - other.value).abs() < 1e-9 * other.value.abs(), "{found}");
+        }
+        let settings = FrfSettings { hits: Some(HitRule::default()), ..FrfSettings::default() };
+        let table = frf(&both(noise_n, 0.0)[0], &settings).unwrap();
+        assert_eq!((table.responses.len(), table.remarks.iter().filter(is_told).count()), (2, 1));
+    }
+    for noise_n in [0.0, 0.2] {
+        let refused = identify(&both(noise_n, 0.02), &settings()).unwrap_err();
+        assert!(refused.to_string().contains("2 forces act"), "{refused}");
+    }
+}
+
 /// Of 72 and 36 intervals of 95 %, which depend on one another by twelves, fewer than 85 % are not to be expected; damping
 /// ratios scatter by some thousandths.
 #[test]
