@@ -16,6 +16,7 @@ use crate::AnalysisError;
 use crate::identify::left_out::{LeftOut, LineRule};
 use crate::identify::lines::LineChoice;
 use crate::measurement::{Hold, Measurement, Windowed};
+use crate::text::significant;
 
 /// Settings of an estimate of frequency responses.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -161,7 +162,8 @@ fn interleaved(
     let OwnLines { responses, crosstalk } = OwnLines::of(&own, how.estimator.estimator())?;
     let parts = responses.into_iter().zip(&own).zip(&held.driven).map(|((frf, own), dof)| {
         let (lines, counts) = (own.lines().clone(), vec![own.pieces()]);
-        Responses { frf, lines, driven: vec![*dof], idle: Vec::new(), segments, counts }
+        let (idle, following) = (Vec::new(), Vec::new());
+        Responses { frf, lines, driven: vec![*dof], idle, following, segments, counts }
     });
     Ok(Some((parts.collect(), crosstalk)))
 }
@@ -288,6 +290,9 @@ pub(crate) struct Responses {
     pub driven: Vec<usize>,
     /// Degrees of freedom whose force channels show noise only, counted from 0.
     pub idle: Vec<usize>,
+    /// Forces that follow another one, so that nothing tells the responses to them, by degrees of freedom counted
+    /// from 0.
+    pub following: Vec<Crosstalk>,
     pub segments: Segments,
     /// Number of segments of each record.
     pub counts: Vec<usize>,
@@ -327,16 +332,27 @@ impl Responses {
         }
         let noise = average.idle_inputs();
         let acting: Vec<usize> = (0..driven.len()).filter(|at| !noise.contains(at)).collect();
-        let mut average = average.of_inputs(&acting);
+        let average = average.of_inputs(&acting);
+        let following = average.following_inputs();
+        let apart: Vec<usize> =
+            (0..acting.len()).filter(|at| following.iter().all(|one| one.force != *at)).collect();
+        let mut average = average.of_inputs(&apart);
         // Of periods the scatter has told; lines that were asked for stand.
         if !matches!((segments, rule.choice), (Segments::Periods(_), _) | (_, LineChoice::Lines(_)))
         {
             average = average.at(&average.driven())?;
         }
         let (frf, lines) = (average.frf(estimator.estimator())?, average.lines().clone());
-        let [driven, idle] =
-            [acting, noise].map(|all| all.iter().map(|input| driven[*input]).collect());
-        Ok(Self { frf, lines, driven, idle, segments, counts })
+        let dof = |at: usize| driven[acting[at]];
+        let following = following.iter().map(|one| Crosstalk {
+            force: dof(one.force),
+            driver: dof(one.driver),
+            share: one.share,
+        });
+        let following = following.collect();
+        let idle = noise.iter().map(|input| driven[*input]).collect();
+        let driven = apart.iter().map(|at| dof(*at)).collect();
+        Ok(Self { frf, lines, driven, idle, following, segments, counts })
     }
 
     /// Returns the number of averages in words, such as `15 segments of 1024 samples`.
@@ -349,18 +365,29 @@ impl Responses {
         format!("{} of {samples}", message::count(self.counts.iter().sum(), piece))
     }
 
-    /// Returns the remark on force channels that show noise only, of a record that is named or not.
-    pub fn of_idle(&self, record: Option<&str>) -> Option<String> {
+    /// Returns the remarks on force channels that show noise only, or only what another force does, of a record that
+    /// is named or not.
+    pub fn of_channels(&self, record: Option<&str>) -> Vec<String> {
         let listed: Vec<String> = self.idle.iter().map(|dof| (dof + 1).to_string()).collect();
         let of_record = record.map(|record| format!("{record}: ")).unwrap_or_default();
         let forces = if listed.len() == 1 { "force" } else { "forces" };
-        (!listed.is_empty()).then(|| {
+        let idle = (!listed.is_empty()).then(|| {
             format!(
                 "{of_record}{forces} {} taken as noise of the channel: weak, and without coherence with \
                  the other forces and the response",
                 listed.join(", ")
             )
-        })
+        });
+        let following = self.following.iter().map(|one| {
+            let (force, driver) = (one.force + 1, one.driver + 1);
+            format!(
+                "{of_record}force {force} follows force {driver} at {} % of it, and nothing of its own shows in a \
+                 response: the responses to force {driver} contain this part of those to force {force}; a record in \
+                 which force {force} is the stronger one separates them",
+                significant(100.0 * one.share, 2)
+            )
+        });
+        idle.into_iter().chain(following).collect()
     }
 }
 

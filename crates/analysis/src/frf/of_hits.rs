@@ -136,7 +136,8 @@ pub(super) fn of_hits(
         ));
     }
     let counts = records.iter().map(|record| cut.used_of(&record.held.file)).collect();
-    let responses = Responses { frf, lines, driven, idle: Vec::new(), segments, counts };
+    let (idle, following) = (Vec::new(), Vec::new());
+    let responses = Responses { frf, lines, driven, idle, following, segments, counts };
     Ok(OfHits { responses, cut, added_decay, remarks })
 }
 

@@ -232,7 +232,7 @@ impl FrfTable {
             frequency_hz: omega.iter().map(|omega| omega / TAU).collect(),
             responses,
             coherence,
-            remarks: remarks.chain(averaged.of_idle(None)).collect(),
+            remarks: remarks.chain(averaged.of_channels(None)).collect(),
             analysis: how.clone(),
         }
     }

@@ -69,9 +69,9 @@ pub fn fit(
         before.push(checks);
         after.push(looked);
     }
-    let of_idle = records.iter().zip(&responses).filter_map(|(recorded, r)| {
+    let of_channels = records.iter().zip(&responses).flat_map(|(recorded, r)| {
         let file = (records.len() > 1).then_some(recorded.held.file.as_str());
-        r.of_idle(file)
+        r.of_channels(file)
     });
     let segments_of: Vec<String> = responses.iter().map(|r| r.counts[0].to_string()).collect();
     let of_segments = format!(
@@ -81,7 +81,7 @@ pub fn fit(
     );
     let of_segments = (records.len() > 1).then_some(of_segments);
     let of_motion = one_motion_of(&records[0].held).into_iter();
-    let remarks = of_motion.chain(of_segments).chain(of_idle).chain(remark);
+    let remarks = of_motion.chain(of_segments).chain(of_channels).chain(remark);
     let remarks = remarks.chain(chosen.map(|(_, remark)| remark)).collect();
     Ok(Fitted {
         domain: "frequency",

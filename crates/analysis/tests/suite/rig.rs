@@ -296,6 +296,86 @@ fn lines_of_a_disturbance_are_left_out() {
     }
 }
 
+/// One shaker beside a second channel that has a part of its force, with noise of this part of the force in both.
+fn one_shaker_and_its_shadow(periodic: bool, part: f64, level: f64, seed: u64) -> Measurement {
+    let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
+    let system = chain(2, Support::Held, 0.02, 3);
+    let lines: Vec<usize> =
+        if periodic { (32..=2240).step_by(32).collect() } else { (32..=2240).collect() };
+    let one = Multisine::flat(lines, 10.0, Phases::Random { seed }).unwrap();
+    let one = one.sample(sampling).unwrap();
+    let other: Vec<f64> = one.channel(0).iter().map(|f| part * f).collect();
+    let force = Record::from_channels(sampling, &[one.channel(0), &other[..]]).unwrap();
+    let motion = exact_harmonic_periodic(&system, &force).unwrap();
+    let size = NoiseLevel::StandardDeviation(level * one.column(0).variance().sqrt());
+    let force = noise::add_white(&force, size, 2 * seed).unwrap();
+    let x = noise::add_white(motion.displacement(), NoiseLevel::FractionOfRms(level), 2 * seed + 1);
+    let x = x.unwrap();
+    let responses = [(ResponseQuantity::Displacement, &x)];
+    let measured = Measurement::from_records(&force, &responses).unwrap();
+    if periodic { measured.period(PERIOD).unwrap() } else { measured }
+}
+
+/// Judge: (K − ω²M + iωC)⁻¹. Nothing tells what a force does that is nothing but a part of another one and noise: its
+/// responses would be those to the noise, a hundred times those of the machine.
+#[test]
+fn a_force_that_follows_another_has_no_responses_and_is_told() {
+    let system = chain(2, Support::Held, 0.02, 3);
+    for (periodic, level) in [(true, 0.01), (true, 0.001), (false, 0.01), (false, 0.001)] {
+        for seed in 1..6 {
+            let measured = one_shaker_and_its_shadow(periodic, 0.02, level, seed);
+            let how = FrfSettings { segments: Segmentation::of(2048), ..FrfSettings::default() };
+            let how = if periodic { FrfSettings::default() } else { how };
+            let table = frf(&measured, &how).unwrap();
+            let told =
+                table.remarks.iter().find(|remark| remark.contains("force 2 follows force 1"));
+            assert!(
+                told.is_some_and(|told| told.contains(" at 2")),
+                "{periodic} {level} {seed}: {table}"
+            );
+            assert_eq!(table.responses.len(), 2);
+            for response in &table.responses {
+                for (at, magnitude) in response.magnitude.iter().enumerate() {
+                    let omega = std::f64::consts::TAU * table.frequency_hz[at];
+                    let truth = system.receptance(omega).unwrap().row(response.motion - 1).norm();
+                    let error = response.standard_error[at];
+                    assert!(magnitude - 6.0 * error < 1.5 * truth, "{magnitude} {truth} {error}");
+                }
+            }
+        }
+    }
+}
+
+/// A second shaker of a twentieth of the force is one, and so is one that half follows the first.
+#[test]
+fn a_weak_shaker_of_its_own_is_kept() {
+    let sampling = Sampling::new(0.008, 32 * PERIOD).unwrap();
+    let system = chain(2, Support::Held, 0.02, 3);
+    let random = |seed| {
+        let drawn = Multisine::flat(32..=2240, 10.0, Phases::Random { seed }).unwrap();
+        drawn.sample(sampling).unwrap()
+    };
+    for (follows, own) in [(0.0, 0.05), (0.02, 0.05), (0.5, 0.2), (0.9, 0.4)] {
+        for seed in 1..6 {
+            let (one, two) = (random(seed), random(100 + seed));
+            let other =
+                one.channel(0).iter().zip(two.channel(0)).map(|(a, b)| follows * a + own * b);
+            let other: Vec<f64> = other.collect();
+            let force = Record::from_channels(sampling, &[one.channel(0), &other[..]]).unwrap();
+            let motion = exact_harmonic_periodic(&system, &force).unwrap();
+            let noisy = |record: &Record, seed| {
+                noise::add_white(record, NoiseLevel::FractionOfRms(0.001), seed).unwrap()
+            };
+            let (force, x) = (noisy(&force, 2 * seed), noisy(motion.displacement(), 2 * seed + 1));
+            let responses = [(ResponseQuantity::Displacement, &x)];
+            let measured = Measurement::from_records(&force, &responses).unwrap();
+            let how = FrfSettings { segments: Segmentation::of(2048), ..FrfSettings::default() };
+            let table = frf(&measured, &how).unwrap();
+            assert_eq!(table.responses.len(), 4, "{follows} {own} {seed}: {table}");
+        }
+    }
+}
+
 /// Two shakers with every second line each, of which a part of the force of each acts at the other too, with noise
 /// of this part of the RMS value in all channels.
 fn interleaved_shakers(crosstalk: f64, level: f64, seed: u64) -> (SecondOrderSystem, FrfTable) {

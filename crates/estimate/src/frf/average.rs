@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::cross_spectra::CrossSpectra;
 use super::scatter::Scatter;
 use super::segments::{overlap_loss, weigh};
-use super::{ComplexMatrix, Frf, FrfEstimator, Segments};
+use super::{ComplexMatrix, Crosstalk, Frf, FrfEstimator, Segments};
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
 
@@ -140,31 +140,69 @@ impl FrfAverage {
         if self.inputs < 2 || averages <= self.inputs as f64 {
             return Vec::new();
         }
-        let power = |input: usize| self.sums.iter().map(|sum| sum.force_power(input)).sum::<f64>();
-        let powers: Vec<f64> = (0..self.inputs).map(power).collect();
+        let powers: Vec<f64> = (0..self.inputs).map(|input| self.power(input)).collect();
         let strongest = powers.iter().copied().fold(0.0, f64::max);
         let is_weak = |input: &usize| powers[*input] < IDLE * IDLE * strongest;
         (0..self.inputs).filter(is_weak).filter(|input| self.is_idle(*input, averages)).collect()
     }
 
-    /// Whether neither a response nor another force has anything in common with a force, by the mean and
-    /// the largest of −ln p: of no signal an exponential variate each.
-    fn is_idle(&self, input: usize, averages: f64) -> bool {
-        let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
-        for line in &self.sums {
-            let (Some(of_motion), Some(of_forces)) = (
-                line.evidence_of_motion(input, averages),
-                line.evidence_of_forces(input, averages),
-            ) else {
-                return false;
-            };
-            for value in of_motion.into_iter().chain([of_forces]) {
-                sum += value;
-                largest = largest.max(value);
-                count += 1.0;
-            }
+    /// Returns the force channels that follow a stronger one: what they have of their own is weaker than a tenth of
+    /// the strongest force, and no response has anything in common with that. These records cannot tell what they do
+    /// from what the stronger force does; the responses to them would be those to the noise of their channels.
+    ///
+    /// # Source
+    /// That of [`FrfAverage::idle_inputs`].
+    pub fn following_inputs(&self) -> Vec<Crosstalk> {
+        let mut acting: Vec<usize> = (0..self.inputs).collect();
+        let mut following = Vec::new();
+        while acting.len() > 1 && self.averages() > acting.len() as f64 {
+            let average = self.of_inputs(&acting);
+            let Some(weakest) = average.weakest_follower() else { break };
+            let force = acting.remove(weakest);
+            following.push(self.crosstalk(force, &acting));
         }
-        sum <= MEAN_EVIDENCE * count && largest <= LARGEST_EVIDENCE + f64::ln(count)
+        following
+    }
+
+    /// The force of least power of its own, if it is weak and no response has anything in common with that.
+    fn weakest_follower(&self) -> Option<usize> {
+        let (averages, mut own) = (self.averages(), vec![0.0; self.inputs]);
+        for sum in &self.sums {
+            let inverse = sum.inverse_force(0.0).ok()?;
+            own.iter_mut().enumerate().for_each(|(i, own)| *own += inverse[(i, i)].re.recip());
+        }
+        let weakest = (0..self.inputs).min_by(|i, j| own[*i].total_cmp(&own[*j]))?;
+        let strongest = (0..self.inputs).map(|input| self.power(input)).fold(0.0, f64::max);
+        let evidence = |sum: &CrossSpectra| sum.evidence_of_motion(weakest, averages);
+        let is_weak = own[weakest] < IDLE * IDLE * strongest;
+        (is_weak && shows_nothing(self.sums.iter().map(evidence))).then_some(weakest)
+    }
+
+    /// A force beside the one, of some others, that it has most in common with.
+    fn crosstalk(&self, force: usize, others: &[usize]) -> Crosstalk {
+        let shared = |driver: usize| -> f64 {
+            let of_line = |sum: &CrossSpectra| {
+                sum.force_ratio(force, driver).norm_sqr() * sum.force_power(driver)
+            };
+            self.sums.iter().map(of_line).sum()
+        };
+        let most = others.iter().copied().max_by(|i, j| shared(*i).total_cmp(&shared(*j)));
+        let driver = most.unwrap_or(force);
+        Crosstalk { force, driver, share: (shared(driver) / self.power(driver)).sqrt() }
+    }
+
+    fn power(&self, input: usize) -> f64 {
+        self.sums.iter().map(|sum| sum.force_power(input)).sum()
+    }
+
+    /// Whether neither a response nor another force has anything in common with a force.
+    fn is_idle(&self, input: usize, averages: f64) -> bool {
+        shows_nothing(self.sums.iter().map(|sum| {
+            let of_forces = sum.evidence_of_forces(input, averages)?;
+            let mut all = sum.evidence_of_motion(input, averages)?;
+            all.push(of_forces);
+            Some(all)
+        }))
     }
 
     /// Returns the places of the lines, counted from 0, that a force drives.
@@ -304,4 +342,19 @@ impl FrfAverage {
         frf.scatter = Some(Scatter::new(&frf, unexplained, inverse, self.segments));
         Ok(frf)
     }
+}
+
+/// Whether the mean and the largest of −ln p, of no signal an exponential variate each, are those of chance; not where
+/// they are unknown.
+fn shows_nothing(evidence: impl Iterator<Item = Option<Vec<f64>>>) -> bool {
+    let (mut sum, mut largest, mut count) = (0.0, 0.0_f64, 0.0);
+    for of_line in evidence {
+        let Some(of_line) = of_line else { return false };
+        for value in of_line {
+            sum += value;
+            largest = largest.max(value);
+            count += 1.0;
+        }
+    }
+    sum <= MEAN_EVIDENCE * count && largest <= LARGEST_EVIDENCE + f64::ln(count)
 }
