@@ -324,7 +324,7 @@ fn terms(d: &mut Draw) -> Result<(), String> {
     let (chosen, quantity) = (d.lines(force.len()), d.quantity());
     let Some(lines) = passed(Lines::new(force.sampling(), chosen))? else { return Ok(()) };
     let Some(unknowns) = unknowns(d, dof)? else { return Ok(()) };
-    passed(nonlinear::distortion(&lines, &force, &response, quantity, &unknowns))?;
+    passed(nonlinear::distortion(&lines, &[[&force, &response]], quantity, &unknowns))?;
     let mut experiments = SteadyExperiments::new(&lines, d.dof(dof), quantity);
     passed(experiments.push(&force, &response))?;
     let text = d.of(&["k3: x1^3", "k2: x1^2, k3: x1^3", "c2: |v1| v1", "k3: (x1 - x2)^3", ""]);

@@ -179,7 +179,9 @@ pub(super) fn fit(
             return Err(AnalysisError::Setting { setting: "nonlinear", why: why.into() });
         }
     };
-    let seen = distortion(&band, &first.force, first.response().0, kind, unknowns)?;
+    let experiments: Vec<[&Record; 2]> =
+        records.iter().map(|r| [&r.held.force, r.held.response().0]).collect();
+    let seen = distortion(&band, &experiments, kind, unknowns)?;
     let model = Model::Nonlinear { system: estimated.system()?, channels: estimated.channels() };
     let (mut before, mut spectra) = (Vec::new(), None::<FrequencyData>);
     for recorded in records {

@@ -92,14 +92,11 @@ pub(super) fn fit(
         after_spectral_fit(&weighted, &estimate, Extent::WholePeriod)?;
     let scattered = weighted.iter().all(|data| data.noise().is_some()).then(|| joined(&weighted));
     let is_told = |finding: &Finding| finding.verdict() > Verdict::Good;
-    if unknowns.free().len() <= TERM_PARAMETERS {
-        for ((recorded, left), checks) in records.iter().zip(&residuals).zip(&mut after) {
-            let checks: &mut Vec<Finding> = checks;
-            if left.findings().iter().any(is_told) {
-                checks.extend(nonlinear_term(&recorded.held, unknowns, lines)?);
-            }
-        }
-    }
+    let is_left = residuals.iter().any(|left| left.findings().iter().any(is_told));
+    let nonlinear = match is_left && unknowns.free().len() <= TERM_PARAMETERS {
+        true => nonlinear_term(records, unknowns, lines)?,
+        false => None,
+    };
     Ok(Fitted {
         domain: "frequency",
         estimator,
@@ -111,7 +108,7 @@ pub(super) fn fit(
         frequency: Some((spectra.swap_remove(0).1, data)),
         before,
         after,
-        after_all: Vec::from_iter(bias),
+        after_all: bias.into_iter().chain(nonlinear).collect(),
         residuals: residuals.into_iter().map(|left| Residual::Lines(Box::new(left))).collect(),
         prediction: Prediction::Steady,
         misfit,
@@ -150,16 +147,26 @@ fn idle_forces(held: &Block, records: &[FrequencyData]) -> Option<String> {
     })
 }
 
-/// Returns the nonlinear term that explains most of what a linear model leaves of a record.
+/// Returns the nonlinear term that explains most of what a linear model leaves of all records, if their periods are
+/// alike.
 fn nonlinear_term(
-    held: &Block,
+    records: &[Windowed],
     unknowns: &Unknowns,
     rule: LineRule<'_>,
 ) -> Result<Option<Finding>, AnalysisError> {
-    let band = Lines::new(held.force.sampling().with_len(held.period)?, all_lines(held, rule)?)?;
-    let (response, kind) = held.response();
-    // A record alone may not determine the machine, as that of one shaker of several.
-    Ok(distortion_of_periods(&band, &held.force, response, kind, unknowns).unwrap_or(None))
+    let first = &records[0].held;
+    let period = first.force.sampling().with_len(first.period)?;
+    let (mut band, mut experiments) = (Vec::new(), Vec::new());
+    for Windowed { held, .. } in records {
+        if held.force.sampling().with_len(held.period)? != period {
+            return Ok(None);
+        }
+        band.extend(all_lines(held, rule)?);
+        experiments.push([&held.force, held.response().0]);
+    }
+    let band = Lines::new(period, band)?;
+    // What cannot be fitted so is told by the fit itself.
+    Ok(distortion_of_periods(&band, &experiments, first.response().1, unknowns).unwrap_or(None))
 }
 
 /// Returns a remark on a window that was taken as one period and holds a whole number of them: their scatter, which

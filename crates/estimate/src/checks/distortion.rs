@@ -10,7 +10,7 @@ use crate::nonlinear::{Level, distortion};
 use crate::{EstimateError, Unknowns};
 
 /// Looks for the nonlinear term that explains most of what a linear model leaves of whole periods of force (N) and
-/// response on the lines of a band ([`Finding::Distortion`]); `None` unless it explains half of that, and noise does
+/// response of one or several experiments on the lines of a band ([`Finding::Distortion`]); `None` unless it explains half of that, and noise does
 /// not.
 ///
 /// # Errors
@@ -20,12 +20,11 @@ use crate::{EstimateError, Unknowns};
 /// The source of [`distortion`].
 pub fn distortion_of_periods(
     band: &Lines,
-    force: &Record,
-    response: &Record,
+    experiments: &[[&Record; 2]],
     measured: ResponseQuantity,
     unknowns: &Unknowns,
 ) -> Result<Option<Finding>, EstimateError> {
-    let found = distortion(band, force, response, measured, unknowns)?;
+    let found = distortion(band, experiments, measured, unknowns)?;
     let [even_db, odd_db] = [found.even, found.odd]
         .map(|level: Option<Level>| level.map(|level| level.db).filter(|db| db.is_finite()));
     let kind = found.kind().filter(|kind| kind.explained >= DISTORTION_EXPLAINED);

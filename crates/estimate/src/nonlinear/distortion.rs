@@ -9,6 +9,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::equation_error::weighted;
 use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
+use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
 use crate::frequency_domain::{Lines, Pooling, RepeatedPeriods};
 use crate::{EstimateError, LeastSquares, Unknowns};
@@ -75,7 +76,10 @@ const SIGNIFICANT: f64 = 1e-3;
 const PAIRS: usize = 4;
 
 /// Looks for even and odd distortion, and for the one term that explains most of what a linear model
-/// leaves, in whole periods of force (N) and response at the lines of a band.
+/// leaves, in whole periods of force (N) and response of one or several experiments at the lines of a band.
+///
+/// The linear model is one for all experiments, none of which need determine it alone. The levels are those of the
+/// experiment where they are largest.
 ///
 /// What a nonlinear system adds stands on the sums and differences of the driven lines: of odd lines
 /// an even power fills the even ones, an odd power the odd ones. Where all odd lines are driven, odd
@@ -90,26 +94,47 @@ const PAIRS: usize = 4;
 /// Worden, Vakakis & Golinval (2006), Mechanical Systems and Signal Processing 20, 505–592.
 pub fn distortion(
     lines: &Lines,
-    force: &Record,
-    response: &Record,
+    experiments: &[[&Record; 2]],
     measured: ResponseQuantity,
     unknowns: &Unknowns,
 ) -> Result<Distortion, EstimateError> {
-    let period = lines.sampling().len();
-    let driven = Lines::excited(&force.period_mean(period)?, DRIVEN)?.as_slice().to_vec();
     let mut data = SteadyExperiments::new(lines, unknowns.dof(), measured);
-    data.push(force, response)?;
+    for [force, response] in experiments {
+        data.push(force, response)?;
+    }
     let (linear_leaves, kinds) = kinds(&data, unknowns)?;
+    let lines = Lines::new(lines.sampling(), data.lines().iter().copied())?;
+    let [mut even, mut odd] = [None::<Level>; 2];
+    for [force, response] in experiments {
+        let found = levels(&lines, force, response, measured)?;
+        for (most, found) in [&mut even, &mut odd].into_iter().zip(found) {
+            if most.is_none_or(|most| found.is_some_and(|found| found.db > most.db)) {
+                *most = found;
+            }
+        }
+    }
+    Ok(Distortion { even, odd, linear_leaves, kinds })
+}
+
+/// Levels on even lines, and on odd ones that are not driven, where odd lines alone are driven.
+fn levels(
+    lines: &Lines,
+    force: &Record,
+    response: &Record,
+    measured: ResponseQuantity,
+) -> Result<[Option<Level>; 2], EstimateError> {
+    let mean = force.period_mean(lines.sampling().len())?;
+    let driven = Lines::excited(&mean, DRIVEN)?.as_slice().to_vec();
     let odd_only = !driven.is_empty() && driven.iter().all(|line| line % 2 == 1);
     let free = |parity: usize| -> Vec<usize> {
-        let chosen = data.lines().iter().filter(|n| **n % 2 == parity && !driven.contains(n));
+        let chosen = lines.as_slice().iter().filter(|n| **n % 2 == parity && !driven.contains(n));
         chosen.copied().collect()
     };
     let level = |parity: usize| match odd_only {
         true => level(lines, force, response, measured, &driven, &free(parity)),
         false => Ok(None),
     };
-    Ok(Distortion { even: level(0)?, odd: level(1)?, linear_leaves, kinds })
+    Ok([level(0)?, level(1)?])
 }
 
 fn level(
@@ -195,10 +220,16 @@ impl OneByOne {
         let base = Equations::new(data, unknowns, &Terms::none())?;
         let none = Shape::new(&Terms::none(), ShapeConstants::default());
         let fit = weighted(&base, &none, weighting, None)?;
+        let of_rows = match weighting {
+            // Between the equations of motion, too: a term is part of one of them, or of two.
+            Weighting::Response => as_response(&base, &fit.coefficients),
+            _ => None,
+        };
+        let of_rows = of_rows.as_ref().unwrap_or(&fit.weights.of_rows);
         let equations = Equations::new(data, unknowns, terms)?;
         let mut rows = LeastSquares::new(equations.count(), 1);
         for columns in equations.columns(terms, &none.channels()) {
-            equations.push(&mut rows, &columns, &fit.weights.of_rows, &[])?;
+            equations.push(&mut rows, &columns, of_rows, &[])?;
         }
         let linear: Vec<usize> = (0..equations.free.len()).collect();
         let all = rows.triangle().column(equations.count()).norm_squared();

@@ -84,7 +84,7 @@ pub fn equation_error(
 /// Coefficients under weights that follow from what they leave.
 pub(super) struct Fit {
     pub(super) columns: Vec<Columns>,
-    coefficients: Vec<f64>,
+    pub(super) coefficients: Vec<f64>,
     pub(super) weights: Weights,
     nrmse: Vec<f64>,
     condition: f64,

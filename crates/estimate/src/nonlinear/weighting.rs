@@ -78,7 +78,9 @@ impl Weights {
             }
             let (variance, extra) = match (kind, half) {
                 (Weighting::Response, _) => {
-                    let Some(variance) = as_response(equations, coefficients) else { continue };
+                    let Some(variance) = variance_of_response(equations, coefficients) else {
+                        continue;
+                    };
                     (levelled(&power, &variance, first), 0.0)
                 }
                 (_, Some(half)) => {
@@ -108,9 +110,16 @@ fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMat
     scaled
 }
 
+/// Weights of rows by which a residual counts as the response of the linear part to it; `None` as of
+/// [`variance_of_response`].
+pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
+    let variance = variance_of_response(equations, coefficients)?;
+    Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))
+}
+
 /// Variance of a force in each equation whose response is equally large on all rows; `None` if the
 /// coefficients make no system with a response.
-fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
+fn variance_of_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let [m, c, k] = equations.unknowns.assemble(&coefficients[..equations.free.len()]);
     let system = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
     let mut variance = DMatrix::zeros(equations.rows.len(), system.dof());

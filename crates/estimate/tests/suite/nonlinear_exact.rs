@@ -316,8 +316,7 @@ fn the_right_terms_are_chosen_and_named() {
     let lines = Lines::new(sampling(), 1..=250).unwrap();
     let seen = distortion(
         &lines,
-        &force,
-        response.displacement(),
+        &[[&force, response.displacement()]],
         ResponseQuantity::Displacement,
         &unknowns,
     );

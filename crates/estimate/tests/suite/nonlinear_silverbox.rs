@@ -40,7 +40,7 @@ fn two_terms_explain_the_schroeder_record() {
 
     // Before any model: what kind of nonlinearity.
     let unknowns = Unknowns::unknown_mass(1).unwrap();
-    let seen = distortion(&lines, &force, &response, DISPLACEMENT, &unknowns).unwrap();
+    let seen = distortion(&lines, &[[&force, &response]], DISPLACEMENT, &unknowns).unwrap();
     let text = seen.to_string();
     assert!(text.contains("cubic stiffness") && text.contains("(hardening)"), "{text}");
     assert!(seen.even.is_some_and(|level| level.db < -30.0), "{seen:?}");

@@ -192,7 +192,8 @@ fn a_linear_system_is_called_nonlinear_rarely_and_a_cubic_one_always() {
                 let (force, response) = noisy(&clean, 0.01, 20_000 + seed);
                 let lines = Lines::new(sampling(), 1..=201).unwrap();
                 let unknowns = Unknowns::unknown_mass(1).unwrap();
-                let seen = distortion(&lines, &force, &response, DISPLACEMENT, &unknowns).unwrap();
+                let seen =
+                    distortion(&lines, &[[&force, &response]], DISPLACEMENT, &unknowns).unwrap();
                 seen.kind().is_some_and(|kind| !nonlinear || kind.name == "cubic stiffness of x1")
             })
             .collect();
