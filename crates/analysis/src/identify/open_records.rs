@@ -28,10 +28,11 @@ const LEVEL: f64 = 1e-3;
 /// Power of the ends over that of the force below which they are rounding.
 const ROUNDING: f64 = 1e-20;
 
-/// Most lines and unknown parameters for which a record is tried as an open one without being asked to: it takes
-/// seconds.
-const LINES: usize = 1 << 17;
+/// Most lines and unknown parameters for which a record is tried as an open one without being asked to, and most lines
+/// times parameters: half a minute on one processor.
+const LINES: usize = 1 << 19;
 const PARAMETERS: usize = 100;
+const SENSITIVITIES: usize = 100 << 17;
 
 /// Sampling rate over the highest frequency that an anti-aliasing filter passes, and up to which the lines of an
 /// open record are used where no others are asked for.
@@ -68,7 +69,9 @@ pub(super) struct OpenFit {
 pub(super) fn suit(records: &[Windowed], unknowns: &Unknowns) -> bool {
     let whole = records.iter().all(|record| record.held.held_to().is_none());
     let lines: usize = records.iter().map(|record| record.held.force.len() / 2).sum();
-    whole && lines <= LINES && unknowns.free().len() <= PARAMETERS
+    let parameters = unknowns.free().len();
+    let is_short = lines <= LINES && lines.saturating_mul(parameters) <= SENSITIVITIES;
+    whole && is_short && parameters <= PARAMETERS
 }
 
 /// Fits all lines of the band that the forces drive by maximum likelihood, with the loads of the ends of every
