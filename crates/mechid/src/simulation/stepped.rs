@@ -1,0 +1,104 @@
+//! Responses step by step, and what becomes of disturbances of those that repeat.
+
+use mechid_integrate::{
+    AllowUnstable, PeriodicOrbit, SampledForce, Scheme, SelectedDofs, integrate,
+    integrate_periodic, integrate_periodic_selected, integrate_selected, periodic_orbit,
+    periodic_orbit_selected,
+};
+use mechid_io::{Experiment, IoError, ResponseKind};
+use mechid_model::{InitialState, Response};
+use mechid_signal::Record;
+use nalgebra::Complex;
+
+use super::error::SETTLING;
+use super::machine::Described;
+use super::schemes::has_given_start;
+use super::{SimulateError, SimulatedSystem};
+
+/// The factor by which a disturbance of a periodic response is multiplied in each period: a complex number
+/// without unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Multiplier {
+    /// The factor.
+    pub value: Complex<f64>,
+    /// Error to which it is known (pure number).
+    pub error: f64,
+}
+
+/// Excess over 1 of a Floquet multiplier that rounding makes of a double one, such as that of a machine
+/// without damping: about the root of what the multipliers are known to (pure number).
+const MULTIPLIER_ROUNDING: f64 = 1e-4;
+
+/// A response, and of one that repeats of a nonlinear machine what becomes of disturbances.
+pub(super) struct Stepped {
+    pub(super) response: Response,
+    pub(super) multiplier: Option<Multiplier>,
+}
+
+impl From<Response> for Stepped {
+    fn from(response: Response) -> Self {
+        Self { response, multiplier: None }
+    }
+}
+
+/// Steps through one force record, or through the period that repeats.
+pub(super) fn stepped(
+    experiment: &Experiment,
+    scheme: &dyn Scheme,
+    machine: &Described,
+    force: &Record,
+    middle: Option<&Record>,
+) -> Result<Stepped, SimulateError> {
+    let unguarded = AllowUnstable(scheme);
+    let scheme = if experiment.allow_unstable { &unguarded } else { scheme };
+    let force = with_middle(force, middle);
+    let system = machine.with_forces()?;
+    // Of a sparse machine the force has the columns of some degrees of freedom.
+    let sparse = matches!(machine.linear, SimulatedSystem::Sparse(_));
+    let some = sparse.then(|| Ok::<_, IoError>((experiment.forced()?, experiment.outputs()?)));
+    let some = some.transpose()?;
+    let dofs = some.as_ref().map(|(forced, observed)| SelectedDofs { forced, observed });
+    match experiment.response {
+        ResponseKind::Periodic if has_given_start(experiment) => {
+            Err(SimulateError::GivenStartPeriodic)
+        }
+        ResponseKind::Periodic if machine.nonlinear.is_none() => Ok(match dofs {
+            None => integrate_periodic(scheme, &system, force)?.into(),
+            Some(dofs) => integrate_periodic_selected(scheme, &system, dofs, force)?.into(),
+        }),
+        ResponseKind::Periodic => {
+            let rest = InitialState::rest(machine.linear.dof());
+            let orbit = match dofs {
+                None => periodic_orbit(scheme, &system, force, &rest, SETTLING),
+                Some(dofs) => {
+                    periodic_orbit_selected(scheme, &system, dofs, force, &rest, SETTLING)
+                }
+            };
+            stayed_on(&orbit.map_err(SimulateError::of_orbit)?)
+        }
+        ResponseKind::FromRest | ResponseKind::From(_) => {
+            let initial = experiment.initial_state()?;
+            Ok(match dofs {
+                None => integrate(scheme, &system, force, &initial)?.into(),
+                Some(dofs) => integrate_selected(scheme, &system, dofs, force, &initial)?.into(),
+            })
+        }
+    }
+}
+
+/// The response of an orbit, unless its largest multiplier is known to lead away from it.
+fn stayed_on(orbit: &PeriodicOrbit) -> Result<Stepped, SimulateError> {
+    let multiplier = match orbit.multipliers().first() {
+        Some(value) => Multiplier { value: *value, error: orbit.multiplier_error() },
+        // It overflows.
+        None => Multiplier { value: f64::INFINITY.into(), error: 0.0 },
+    };
+    if multiplier.value.norm() > 1.0 + MULTIPLIER_ROUNDING + multiplier.error {
+        return Err(SimulateError::UnstableOrbit { multiplier: multiplier.value });
+    }
+    Ok(Stepped { response: orbit.response().clone(), multiplier: Some(multiplier) })
+}
+
+fn with_middle<'a>(force: &'a Record, middle: Option<&'a Record>) -> SampledForce<'a> {
+    middle.map_or(SampledForce::from(force), |m| SampledForce::with_mid_step(force, m))
+}
