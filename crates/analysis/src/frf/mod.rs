@@ -84,9 +84,9 @@ pub fn frf_of_records(
     }
     let records = held_of(measurements, hold)?;
     if let [recorded] = &records[..]
-        && let Some((parts, crosstalk)) = interleaved(recorded, how, lines)?
+        && let Some(found) = interleaved(recorded, how, lines)?
     {
-        return Ok(FrfTable::interleaved(&records, &parts, &crosstalk, how));
+        return Ok(FrfTable::interleaved(&records, &found, how));
     }
     let chosen = match records.iter().min_by_key(|recorded| recorded.held.force.len()) {
         Some(shortest) if !period_given && !whole::close(&records) => {
@@ -123,13 +123,20 @@ fn held_of(measurements: &[Measurement], hold: Hold) -> Result<Vec<Windowed>, An
 /// Amplitude of the other forces over that of the one that drives a line, below which they are idle there.
 const IDLE: f64 = 0.1;
 
+/// Frequency responses to forces that have lines of their own.
+pub(crate) struct Interleaved {
+    /// Responses to each force, on its lines.
+    parts: Vec<Responses>,
+    crosstalk: Vec<Crosstalk>,
+}
+
 /// Frequency responses to each force on the lines that it alone drives, and what the others do there; `None` unless
 /// several forces have every line of whole periods to themselves, in turn.
 fn interleaved(
     recorded: &Windowed,
     how: &FrfSettings,
     rule: LineRule<'_>,
-) -> Result<Option<(Vec<Responses>, Vec<Crosstalk>)>, AnalysisError> {
+) -> Result<Option<Interleaved>, AnalysisError> {
     let held = &recorded.held;
     let segments = how.segments.segments(held.period)?;
     let whole = held.force.len() >= held.period;
@@ -165,7 +172,7 @@ fn interleaved(
         let (idle, following) = (Vec::new(), Vec::new());
         Responses { frf, lines, driven: vec![*dof], idle, following, segments, counts }
     });
-    Ok(Some((parts.collect(), crosstalk)))
+    Ok(Some(Interleaved { parts: parts.collect(), crosstalk }))
 }
 
 /// Frequency response estimator: where the noise is.

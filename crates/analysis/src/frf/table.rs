@@ -4,7 +4,7 @@ use mechid_model::ResponseQuantity;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
-use mechid_estimate::{Crosstalk, Segments, Window};
+use mechid_estimate::{Segments, Window};
 use mechid_io::{
     ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
 };
@@ -13,7 +13,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::of_hits::OfHits;
-use super::{FrfSettings, Responses};
+use super::{FrfSettings, Interleaved, Responses};
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
 use crate::measurement::{Channels, Windowed};
@@ -146,10 +146,10 @@ impl FrfTable {
     /// Makes the table of forces each of which has lines of its own.
     pub(super) fn interleaved(
         records: &[Windowed],
-        parts: &[Responses],
-        crosstalk: &[Crosstalk],
+        found: &Interleaved,
         how: &FrfSettings,
     ) -> Self {
+        let Interleaved { parts, crosstalk } = found;
         let n = records[0].held.force.channels();
         let all = parts.iter().enumerate().flat_map(|(part, averaged)| {
             averaged.frf.omega().iter().enumerate().map(move |(at, omega)| (*omega, part, at))
