@@ -94,7 +94,7 @@ pub use orbit::{PeriodicOrbit, periodic_orbit, periodic_orbit_selected};
 pub use periodic::{integrate_periodic, integrate_periodic_function, integrate_periodic_selected};
 pub use runge_kutta::{MidStepForce, RungeKutta4};
 pub use scheme::{AllowUnstable, Convention, Instant, Loads, Scheme, StableSteps, Stepper};
-pub use stability::{critical_step, spectral_radius};
+pub use stability::{critical_step, critical_steps, spectral_radius};
 pub use steady_state::sparse_steady_state;
 pub use system::{Matrices, System};
 pub use term::TermForces;

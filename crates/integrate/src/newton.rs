@@ -286,7 +286,12 @@ impl LocalNewton {
         self.jacobian.fill_with_identity();
         for (mut column, tangent) in self.jacobian.column_iter_mut().zip(self.tangent.column_iter())
         {
-            column.gemv(1.0, &self.local, &tangent, 1.0);
+            // Most forces act between few degrees of freedom.
+            for (of_one, slope) in self.local.column_iter().zip(tangent.iter()) {
+                if *slope != 0.0 {
+                    column.axpy(*slope, &of_one, 1.0);
+                }
+            }
         }
         self.step.copy_from(&self.residual);
         self.step.neg_mut();
@@ -306,12 +311,16 @@ fn solve_in_place(a: &mut DMatrix<f64>, b: &mut DVector<f64>) -> bool {
         }
         a.swap_rows(j, pivot);
         b.swap_rows(j, pivot);
-        for i in j + 1..p {
-            let factor = a[(i, j)] / a[(j, j)];
-            for k in j + 1..p {
-                a[(i, k)] -= factor * a[(j, k)];
-            }
-            b[i] -= factor * b[j];
+        // By columns, as they lie in memory.
+        let (before, after) = a.as_mut_slice().split_at_mut((j + 1) * p);
+        let column = &mut before[j * p..];
+        let pivot = column[j];
+        let factors = &mut column[j + 1..];
+        factors.iter_mut().for_each(|factor| *factor /= pivot);
+        let columns = after.chunks_exact_mut(p).chain(std::iter::once(b.as_mut_slice()));
+        for column in columns {
+            let top = column[j];
+            column[j + 1..].iter_mut().zip(&*factors).for_each(|(value, f)| *value -= f * top);
         }
     }
     for j in (0..p).rev() {

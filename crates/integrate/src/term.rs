@@ -62,9 +62,7 @@ impl NonlinearForce for TermForces {
         g.fill(0.0);
         for (term, coefficient, at) in &self.terms {
             let value = coefficient * term.law().value(at.of(x), at.of(v));
-            for (place, g) in g.iter_mut().enumerate() {
-                *g += at.sign(place) * value;
-            }
+            at.signs().for_each(|(place, sign)| g[place] += sign * value);
         }
     }
 
@@ -75,11 +73,10 @@ impl NonlinearForce for TermForces {
             let slopes = term.law().slopes(at.of(x), at.of(v));
             let both = [&mut tangents.stiffness, &mut tangents.damping];
             for (tangent, slope) in both.into_iter().zip(slopes) {
-                for ((row, column), entry) in (0..self.dofs.len())
-                    .flat_map(|c| (0..self.dofs.len()).map(move |r| (r, c)))
-                    .zip(tangent.iter_mut())
-                {
-                    *entry += at.sign(row) * at.sign(column) * coefficient * slope;
+                for (column, of_column) in at.signs() {
+                    for (row, of_row) in at.signs() {
+                        tangent[(row, column)] += of_row * of_column * coefficient * slope;
+                    }
                 }
             }
         }

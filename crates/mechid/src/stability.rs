@@ -5,7 +5,8 @@ use std::fmt;
 
 use mechid_analysis::text::{compact, paged_table, significant};
 use mechid_integrate::{
-    Accuracy, IntegrateError, Matrices, Scheme, accuracy, critical_step, spectral_radius,
+    Accuracy, IntegrateError, Matrices, Scheme, accuracy, critical_step, critical_steps,
+    spectral_radius,
 };
 use mechid_model::Sdof;
 use serde::Serialize;
@@ -114,7 +115,12 @@ pub fn compare_schemes(
     machine: Option<SteppedMachine<'_>>,
 ) -> Result<SchemeComparison, IntegrateError> {
     let oscillator = Sdof::from_modal(1.0, damping_ratio, 1.0)?.system();
-    let compare = |NamedScheme { label, scheme }: &NamedScheme| {
+    let all: Vec<&dyn Scheme> = schemes.iter().map(|named| named.scheme.as_ref()).collect();
+    let limits = match machine {
+        Some(SteppedMachine { system, .. }) => critical_steps(&all, &system)?,
+        None => vec![None; all.len()],
+    };
+    let compare = |(NamedScheme { label, scheme }, limit): (&NamedScheme, Option<f64>)| {
         let scheme = scheme.as_ref();
         let points = steps.iter().map(|step| accuracy(scheme, damping_ratio, *step));
         Ok(SchemeAccuracy {
@@ -122,10 +128,13 @@ pub fn compare_schemes(
             name: scheme.name(),
             chart: points.map(|p| p.map(StepAccuracy::from)).collect::<Result<_, _>>()?,
             stability_limit: critical_step(scheme, &oscillator)?.map(|dt| dt / TAU),
-            machine: machine.map(|machine| MachineStability::of(scheme, machine)).transpose()?,
+            machine: machine
+                .map(|machine| MachineStability::of(scheme, machine, limit))
+                .transpose()?,
         })
     };
-    let schemes = schemes.iter().map(compare).collect::<Result<_, IntegrateError>>()?;
+    let schemes = schemes.iter().zip(limits).map(compare);
+    let schemes = schemes.collect::<Result<_, IntegrateError>>()?;
     Ok(SchemeComparison { damping_ratio, schemes })
 }
 
@@ -152,9 +161,10 @@ impl MachineStability {
     fn of(
         scheme: &dyn Scheme,
         SteppedMachine { system, dt }: SteppedMachine<'_>,
+        critical_step_s: Option<f64>,
     ) -> Result<Self, IntegrateError> {
         Ok(Self {
-            critical_step_s: critical_step(scheme, &system)?,
+            critical_step_s,
             step_s: dt,
             spectral_radius: spectral_radius(scheme, &system, dt)?,
         })

@@ -118,8 +118,8 @@ impl Structure {
     /// Returns the unknowns that are left.
     ///
     /// # Errors
-    /// [`AnalysisError::Estimate`] if there is no such entry, or if statements or known masses contradict
-    /// each other.
+    /// [`AnalysisError::Estimate`] if there is no such entry, and that or [`AnalysisError::Setting`] if statements or
+    /// known masses contradict each other.
     pub fn apply(&self, mut unknowns: Unknowns) -> Result<Unknowns, AnalysisError> {
         let has = |form: Form| self.forms.contains(&form);
         let (chain, proportional) = (has(Form::Chain), has(Form::ProportionalDamping));
@@ -145,6 +145,13 @@ impl Structure {
             if let Form::Entry { name, value } = form {
                 let p =
                     Parameter::named(name, dof).map_err(mechid_estimate::EstimateError::from)?;
+                let before = unknowns.fixed(p.matrix(), p.row(), p.column());
+                if let Some(before) = before.filter(|before| before != value) {
+                    let why = format!(
+                        "{name}={value}: it is {before} already, as stated or by another form"
+                    );
+                    return Err(AnalysisError::Setting { setting: "structure", why });
+                }
                 unknowns = unknowns.fix(p.matrix(), p.row(), p.column(), *value)?;
             }
         }
@@ -186,6 +193,17 @@ mod tests {
         let saved = serde_json::to_value(&structure).unwrap();
         assert_eq!(saved[4], "k13=-2.5");
         assert_eq!(serde_json::from_value::<Structure>(saved).unwrap(), structure);
+    }
+
+    #[test]
+    fn entries_that_are_something_else_already_are_refused() {
+        for text in ["chain k13=2", "k12=5 k12=6", "symmetric k12=5 k21=6", "diagonal-mass m12=1"] {
+            let refused = unknowns(text, 3).unwrap_err().to_string();
+            assert!(refused.contains("already"), "{text}: {refused}");
+        }
+        for text in ["chain k13=0", "symmetric k12=5 k21=5", "k12=5 k21=6"] {
+            assert!(unknowns(text, 3).is_ok(), "{text}");
+        }
     }
 
     #[test]

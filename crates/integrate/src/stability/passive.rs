@@ -19,6 +19,10 @@ const NEGATIVE: f64 = 1e-13;
 /// Largest number of Lanczos steps.
 const LANCZOS_STEPS: usize = 100;
 
+/// Precision to which the largest eigenvalue is enclosed, and the part by which an upper end that is none is raised.
+const ENCLOSED: f64 = 1e-4;
+const RAISED: f64 = 0.01;
+
 /// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
 /// as far as diagonal dominance or factorisations without exchanges can prove it.
 pub(crate) fn is_passive(system: &dyn System) -> bool {
@@ -138,8 +142,29 @@ impl Symmetric {
 /// The vector of norm 1 in the product by M that comes nearest to the largest eigenvalue of M⁻¹A.
 pub(super) struct Top {
     pub(super) vector: DVector<f64>,
-    /// Root of its Rayleigh quotient, as a fraction of the root of the largest eigenvalue.
-    pub(super) share: f64,
+    /// Its Rayleigh quotient, in 1/s² or 1/s: at most the largest eigenvalue.
+    pub(super) value: f64,
+    /// Distance from it within which there is an eigenvalue.
+    residual: f64,
+}
+
+impl Top {
+    /// Upper end of the largest eigenvalue, within a part of 10⁻⁴: by bisection, M σ − A being definite above it.
+    pub(super) fn above(&self, system: &dyn System, which: Matrix) -> f64 {
+        let (mut low, mut high) = (self.value, self.value + self.residual);
+        if high <= 0.0 {
+            return 0.0;
+        }
+        high *= 1.0 + ENCLOSED;
+        while high.is_finite() && !is_below(system, which, high) {
+            (low, high) = (high, high * (1.0 + RAISED));
+        }
+        while high - low > ENCLOSED * low {
+            let middle = 0.5 * (low + high);
+            *(if is_below(system, which, middle) { &mut high } else { &mut low }) = middle;
+        }
+        high
+    }
 }
 
 /// Returns what Lanczos' iteration finds of the largest eigenvalue of M⁻¹A, A being C or K of a
@@ -202,6 +227,5 @@ pub(super) fn top(equations: &Equations, which: Matrix) -> Result<Top, Integrate
     let residual = beside[m - 1] * coordinates[m - 1].abs();
     let mut vector = DVector::zeros(n);
     basis.iter().zip(&coordinates).for_each(|(q, y)| vector.axpy(*y, q, 1.0));
-    let share = if value > 0.0 { (value / (value + residual)).sqrt() } else { 1.0 };
-    Ok(Top { vector, share })
+    Ok(Top { vector, value, residual })
 }

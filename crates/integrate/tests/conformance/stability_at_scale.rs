@@ -1,7 +1,7 @@
 //! What `prepare` refuses of systems too large for their whole amplification matrix.
 
 use mechid_integrate::*;
-use mechid_model::{Sdof, SecondOrderSystem, SparseSystem, band, triplets};
+use mechid_model::{Sdof, SecondOrderSystem, SparseSystem, band, lumped, triplets};
 use nalgebra::DMatrix;
 
 use crate::common::*;
@@ -161,4 +161,46 @@ fn the_spectral_radius_of_a_long_chain_is_that_of_its_fastest_mode() {
     let expected = spectral_radius(&scheme, &fastest, dt).unwrap();
     let found = spectral_radius(&scheme, &chain, dt).unwrap();
     assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+}
+
+/// Judge: the number of eigenvalues of a tridiagonal pencil above a value, by the signs of its pivots (Sturm's
+/// sequence). The fastest motion of unequal masses is that of a few of them, which no iteration finds soon.
+#[test]
+fn a_chain_of_unequal_masses_is_refused_just_beyond_the_limit() {
+    let n = 4000;
+    let mass: Vec<f64> =
+        (0..n).map(|i| 1.0 + 0.2 * (0.618_033_988_75 * (i * i) as f64).fract()).collect();
+    let spring = 3000.0;
+    let diagonal = |i: usize| if i + 1 == n { spring } else { 2.0 * spring };
+    let is_above = |value: f64| {
+        let mut pivot = f64::INFINITY;
+        (0..n).all(|i| {
+            let before = if i == 0 { 0.0 } else { spring * spring / pivot };
+            pivot = value * mass[i] - diagonal(i) - before;
+            pivot > 0.0
+        })
+    };
+    let (mut low, mut high) =
+        (0.0, 4.0 * spring / mass.iter().copied().fold(f64::INFINITY, f64::min));
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *(if is_above(middle) { &mut high } else { &mut low }) = middle;
+    }
+    let limit = 2.0 / high.sqrt();
+    let stiffness = (0..n).flat_map(|i| {
+        let beside = (i + 1 < n).then_some([(i, i + 1, -spring), (i + 1, i, -spring)]);
+        std::iter::once((i, i, diagonal(i))).chain(beside.into_iter().flatten())
+    });
+    let stiffness = triplets(n, stiffness).unwrap();
+    let chain = SparseSystem::new(lumped(&mass), lumped(&vec![0.0; n]), stiffness).unwrap();
+    let scheme = Newmark::CENTRAL_DIFFERENCE;
+    assert!(scheme.prepare(&chain, limit * (1.0 - 1e-6)).is_ok());
+    let refused = scheme.prepare(&chain, limit * (1.0 + 1e-6)).err();
+    let Some(IntegrateError::Unstable { critical_step: Some(said), .. }) = refused else {
+        panic!("{refused:?}")
+    };
+    assert!(said <= limit && said > limit * (1.0 - 1e-4), "{said} {limit}");
+    let found = critical_steps(&[&scheme, &Newmark::LINEAR_ACCELERATION], &chain).unwrap();
+    assert_eq!(found[0], Some(said));
+    assert!((found[1].unwrap() / (said * 3_f64.sqrt()) - 1.0).abs() < 1e-9, "{found:?}");
 }

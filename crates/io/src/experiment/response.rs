@@ -20,8 +20,10 @@ pub enum ResponseKind {
 #[serde(default, deny_unknown_fields)]
 pub struct InitialMotion {
     /// x(0), in m; zero where it is left out.
+    #[serde(skip_serializing_if = "PerDof::is_zero")]
     pub displacement: PerDof,
     /// ẋ(0), in m/s; zero where it is left out.
+    #[serde(skip_serializing_if = "PerDof::is_zero")]
     pub velocity: PerDof,
 }
 
@@ -40,6 +42,10 @@ pub enum PerDof {
 }
 
 impl PerDof {
+    fn is_zero(&self) -> bool {
+        *self == Self::Zero
+    }
+
     /// The numbers for `dof` degrees of freedom, or the number of entries if it differs.
     pub(super) fn values(&self, dof: usize) -> Result<Vec<f64>, usize> {
         match self {

@@ -40,7 +40,7 @@ impl Coordinate {
     }
 
     /// The degrees of freedom with a factor other than 0, each with it.
-    pub(crate) fn signs(self) -> impl Iterator<Item = (usize, f64)> {
+    pub fn signs(self) -> impl Iterator<Item = (usize, f64)> {
         let (first, second) = match self {
             Self::Dof(i) => (i, None),
             Self::Difference(i, j) => (i, Some(j)),
