@@ -98,6 +98,9 @@ pub fn frf_of_records(
     let responses = Responses::of(&records, segments, how.estimator, lines)?;
     let mut table = FrfTable::new(&records, &responses, how);
     table.remarks.extend(chosen.map(|(_, remark)| remark));
+    if matches!(responses.segments, Segments::Windowed { .. }) {
+        table.remarks.extend(table.blunt());
+    }
     Ok(table)
 }
 

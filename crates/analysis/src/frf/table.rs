@@ -120,6 +120,12 @@ pub struct Coherence {
     pub values: Vec<f64>,
 }
 
+/// Part of a peak at which its width is taken: half its power.
+const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// Lines within that width from which a peak is resolved: under Hann's window a single line has one or two.
+const RESOLVED: usize = 4;
+
 impl FrfTable {
     pub(super) fn new(records: &[Windowed], averaged: &Responses, how: &FrfSettings) -> Self {
         let n = records[0].held.force.channels();
@@ -235,6 +241,27 @@ impl FrfTable {
             remarks: remarks.chain(averaged.of_channels(None)).collect(),
             analysis: how.clone(),
         }
+    }
+
+    /// Returns a remark on the largest peak of a response that is narrower than the window shows.
+    pub(super) fn blunt(&self) -> Option<String> {
+        let width = |response: &Response| {
+            let (at, peak) = response.peak();
+            let is_high = |place: &usize| response.magnitude[*place] > HALF_POWER * peak;
+            let lines = (0..at).rev().take_while(is_high).count()
+                + (at..response.magnitude.len()).take_while(is_high).count();
+            let inside = at > 0 && at + 1 < response.magnitude.len();
+            (inside && lines < RESOLVED).then_some((lines, at))
+        };
+        let widths = self.responses.iter().filter_map(|one| width(one).map(|found| (found, one)));
+        let ((lines, at), response) = widths.min_by_key(|(found, _)| found.0)?;
+        Some(format!(
+            "the peak of {} at {} Hz is {} wide, as narrow as the window shows any: it is blunt, and a damping ratio \
+             read from it too large; a longer `segment` shows more of it",
+            self.pair(response),
+            significant(self.frequency_hz[at], 5),
+            message::count(lines, "line")
+        ))
     }
 
     /// Returns the name of a response and that of the force that it belongs to: `a1 / force`.

@@ -43,13 +43,22 @@ pub enum When {
     After,
 }
 
+/// What was fitted, as far as checks differ by it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Scope {
+    /// `false` where some equations of motion are known up to factors only.
+    pub scaled: bool,
+    /// `true` of hits of a hammer: one that meets a machine in motion may take power out of it.
+    pub hits: bool,
+}
+
 /// All findings before and after a fit, with one error rate for the statistical tests among them; `modes` are
-/// those of the estimate, `scaled` is false where some equations of motion are known up to factors only.
+/// those of the estimate.
 pub(crate) fn rows(
     fitted: &Fitted,
     modes: &[IdentifiedMode],
     records: &[&Block],
-    scaled: bool,
+    Scope { scaled, hits }: Scope,
 ) -> Result<Vec<CheckRow>, AnalysisError> {
     let mut all: Vec<(When, Option<usize>, Finding)> = Vec::new();
     let mut add = |when, at: Option<usize>, findings: &[Finding]| {
@@ -58,7 +67,9 @@ pub(crate) fn rows(
     add(When::Before, None, &fitted.before_all);
     for (at, (record, checks)) in records.iter().zip(&fitted.before).enumerate() {
         add(When::Before, Some(at), checks);
-        add(When::Before, Some(at), &of_channels(record)?);
+        let mut channels = of_channels(record)?;
+        channels.retain(|finding| !(hits && finding.subject() == Subject::Power));
+        add(When::Before, Some(at), &channels);
     }
     for (at, checks) in fitted.after.iter().enumerate() {
         add(When::After, Some(at), checks);
@@ -74,6 +85,10 @@ pub(crate) fn rows(
             Residual::Lines(residual) => residual.findings(),
         };
         add(When::After, Some(at), &checks);
+    }
+    // The lines that a nonlinearity disturbs most are those of the resonances, and no disturbance.
+    if all.iter().any(|(_, _, finding)| matches!(finding, Finding::Distortion { .. })) {
+        all.iter_mut().for_each(|(_, _, finding)| finding.forget_lines());
     }
     adjust_p_values(all.iter_mut().map(|(_, _, finding)| finding));
     let name = |at: usize| (records.len() > 1).then(|| records[at].file.clone());

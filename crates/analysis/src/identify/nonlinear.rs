@@ -1,7 +1,7 @@
 //! Fits of whole periods with nonlinear terms beside M, C and K.
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::checks::{before_spectral_fit, steady_periods};
+use mechid_estimate::checks::{Verdict, before_spectral_fit, steady_periods};
 use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
@@ -163,7 +163,9 @@ pub(super) fn fit(
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     let selection = select(&data, unknowns, how)?;
     let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
-    let start = equation_error(&data, unknowns, terms, &options)?;
+    let start = equation_error(&data, unknowns, terms, &options)
+        .and_then(|found| found.system().map(|_| found))
+        .map_err(|error| no_period(records).unwrap_or(AnalysisError::Estimate(error)))?;
     let (estimator, estimated) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
@@ -236,6 +238,23 @@ pub(super) fn fit(
             restoring,
             selection: selection.map(|selection| SelectionSummary::of(selection, how)),
         }),
+    })
+}
+
+/// The reason why a fit fails whose window is one period, and does not look like one.
+fn no_period(records: &[Windowed]) -> Option<AnalysisError> {
+    records.iter().find_map(|Windowed { held, .. }| {
+        let looked = steady_periods(&held.force, held.response().0, held.period).ok()?;
+        let is_none = held.period == held.force.len()
+            && looked.iter().any(|finding| finding.verdict() > Verdict::Good);
+        is_none.then(|| AnalysisError::Setting {
+            setting: "nonlinear",
+            why: format!(
+                "nonlinear terms are fitted to whole periods, and {} is none: its end does not \
+                          meet its beginning",
+                held.file
+            ),
+        })
     })
 }
 

@@ -176,7 +176,10 @@ impl IdentificationSummary {
             channels: Channels::together(&records.iter().map(|r| &*r.names).collect::<Vec<_>>()),
             records: records.iter().map(row).collect(),
             hits,
-            checks: checks::rows(fitted, &modes, &records, unscaled.is_none())?,
+            checks: {
+                let scope = checks::Scope { scaled: unscaled.is_none(), hits: how.hits.is_some() };
+                checks::rows(fitted, &modes, &records, scope)?
+            },
             fitted_lines: None,
             validation: None,
             remarks: Vec::new(),

@@ -70,8 +70,19 @@ impl ToSi {
     pub fn of_table(table: &Table, roles: &[Role<'_>]) -> Result<Self, AnalysisError> {
         let places = roles.iter().map(|role| table.find(role.column));
         let places: Vec<usize> = places.collect::<Result<_, _>>()?;
-        let columns = places.into_iter().map(|at| (table.label(at), table.unit(at)));
-        Self::new(table.file(), columns, roles)
+        let columns = places.iter().map(|at| (table.label(*at), table.unit(*at)));
+        let mut all = Self::new(table.file(), columns, roles)?;
+        all.remarks.extend(places.iter().zip(roles).filter_map(|(at, role)| {
+            let unit = table.unknown_unit(*at)?;
+            Some(format!(
+                "{}: the unit {} of {} is not known: its numbers are taken as {}",
+                table.file(),
+                escaped(unit),
+                table.label(*at),
+                role.quantity.si()
+            ))
+        }));
+        Ok(all)
     }
 
     /// Returns the factor of a column; 1 where there is no such column.

@@ -5,7 +5,8 @@ use mechid_analysis::identify::{Fit, KnownMass, Method, SampleFit, ValidationWin
 use mechid_analysis::reconstruct::reconstruct_in_chunks;
 use mechid_analysis::{
     AnalysisError, Channels, FrfSettings, Identify, Machine, Measurement, Reading, Reconstruct,
-    RecordPlan, ResponseQuantity, SweepSettings, Window, frf, identify, reconstruct, sweep_record,
+    RecordPlan, ResponseQuantity, Segmentation, SweepSettings, Window, frf, identify, reconstruct,
+    sweep_record,
 };
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
@@ -291,4 +292,28 @@ fn the_covariance_of_very_many_parameters_is_there_for_those_who_ask() {
     for (at, parameter) in parameters.enumerate() {
         assert!((matrix[(at, at)].sqrt() / parameter.standard_error - 1.0).abs() < 1e-9);
     }
+}
+
+/// A spreadsheet of Windows writes names in Latin-1: `µ` and `²` are one byte each.
+#[test]
+fn units_are_read_in_names_that_are_not_utf8() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |unit: &[u8]| {
+        let mut text = [b"t [s];Force [N];Disp [", unit, b"]\n"].concat();
+        for k in 0..64 {
+            let t = 0.01 * f64::from(k);
+            let row = format!("{t};{};{}\n", (40.0 * t).sin(), 250.0 * (40.0 * t + 0.3).sin());
+            text.extend(row.into_bytes());
+        }
+        let path = folder.path().join("a.csv");
+        std::fs::write(&path, text).unwrap();
+        let channels = Channels::new("Force", ResponseQuantity::Displacement, "Disp");
+        let measured = Measurement::open(&path, &channels).unwrap();
+        let how = FrfSettings { segments: Segmentation::of(16), ..FrfSettings::default() };
+        frf(&measured, &how).unwrap().remarks.join("; ")
+    };
+    assert_eq!(read(b"\xb5m"), read("µm".as_bytes()));
+    assert!(read(b"\xb5m").contains("converted to SI units: "), "{}", read(b"\xb5m"));
+    assert!(read(b"\xb5in").contains("the unit µin of "), "{}", read(b"\xb5in"));
+    assert!(!read(b"m").contains("unit"), "{}", read(b"m"));
 }

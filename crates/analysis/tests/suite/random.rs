@@ -318,6 +318,19 @@ fn resonances_narrower_than_a_line_warn() {
     assert!(!wide.iter().any(leaks));
 }
 
+/// Judge: the half-power width 2ζf, under a line of 1 % damping in segments of 256 samples and five of 5 % in those of
+/// 1,024.
+#[test]
+fn frequency_responses_tell_of_a_peak_that_the_window_blunts() {
+    let told = |rig: RandomTest, samples: usize| {
+        let how = FrfSettings { segments: Segmentation::of(samples), ..FrfSettings::default() };
+        let table = frf(&measured(rig.measure(1).unwrap(), 1), &how).unwrap();
+        table.remarks.iter().any(|remark| remark.contains("it is blunt"))
+    };
+    assert!(told(rig(), 256));
+    assert!(!told(damped(), 1024));
+}
+
 #[test]
 fn the_length_of_segments_is_chosen() {
     let table = frf(&random_test(0), &FrfSettings::default()).unwrap();

@@ -166,3 +166,21 @@ fn the_description_in_the_reference_is_one() {
         assert!(description.contains(&format!("| `{name}`")), "{name}");
     }
 }
+
+/// A start that says nothing of the velocity, and one that says nothing of the displacement.
+#[test]
+fn a_start_needs_no_more_than_it_says() {
+    let folder = tempfile::tempdir().unwrap();
+    for (given, other) in [("displacement", "velocity"), ("velocity", "displacement")] {
+        let json = format!(
+            r#"{{ "system": {{ "mass": 1, "damping": 0, "stiffness": 100 }},
+                 "sampling": {{ "samples": 64, "rate_hz": 100 }}, "excitation": [],
+                 "scheme": {{ "name": "newmark" }}, "response": {{ "from": {{ "{given}": 1 }} }} }}"#
+        );
+        fs::write(folder.path().join("a.json"), json).unwrap();
+        let report = mechid(folder.path(), "simulate a.json --json");
+        let report: Value = serde_json::from_str(&report).unwrap();
+        assert_eq!(report["response"]["from"][given], 1.0);
+        assert!(report["response"]["from"].get(other).is_none());
+    }
+}

@@ -504,6 +504,13 @@ impl CorrelationTest {
 }
 
 impl Finding {
+    /// Leaves out the lines that hold a misfit ([`Concentration`]), where something else explains them.
+    pub fn forget_lines(&mut self) {
+        if let Self::Misfit { concentration, .. } = self {
+            *concentration = None;
+        }
+    }
+
     /// Subject of the check.
     pub fn subject(&self) -> Subject {
         match self {

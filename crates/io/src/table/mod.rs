@@ -233,6 +233,15 @@ impl Table {
         Unit::of(&self.names[column], self.about(column))
     }
 
+    /// The text of a unit that a column, by its index counted from 0, states in square brackets or in the line of
+    /// units, if it is none that is known, such as `V`: then its numbers are taken as they are.
+    ///
+    /// # Panics
+    /// If there is no such column.
+    pub fn unknown_unit(&self, column: usize) -> Option<&str> {
+        Unit::unknown(&self.names[column], self.about(column))
+    }
+
     /// Factor that takes a column, by its index counted from 0, to the SI unit of `wanted` (N, m, m/s,
     /// m/s²): 1 where it says no unit.
     ///

@@ -175,7 +175,7 @@ impl Rows {
         self.has_header = fields.iter().any(is_name);
         if self.has_header {
             for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
-                column.name = String::from_utf8_lossy(field).into_owned();
+                column.name = text_of(field);
                 column.filled = !field.is_empty();
             }
         }
@@ -188,7 +188,7 @@ impl Rows {
             self.has_header && !fields.iter().any(|field| is_number(field, self.layout.delimiter));
         if self.has_units {
             for (column, field) in self.columns.iter_mut().zip(fields.iter()) {
-                column.about = String::from_utf8_lossy(field).into_owned();
+                column.about = text_of(field);
             }
         }
         self.has_units
@@ -298,5 +298,13 @@ impl Rows {
             return Err(IoError::TooLarge { file: self.file.clone(), at, limit });
         }
         Ok(())
+    }
+}
+
+/// Text of a field: UTF-8, or otherwise Latin-1, in which spreadsheets of Windows write `µm` and `m/s²`.
+fn text_of(field: &[u8]) -> String {
+    match std::str::from_utf8(field) {
+        Ok(text) => text.to_owned(),
+        Err(_) => field.iter().map(|byte| char::from(*byte)).collect(),
     }
 }

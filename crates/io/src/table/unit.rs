@@ -110,12 +110,27 @@ const UNITS: [Unit; 32] = {
 /// Units that a name may end with after `_` or a blank: those that no other word ends with.
 const BARE: [&str; 6] = ["kN", "mm", "µm", "um", "mm/s", "m/s²"];
 
+/// Characters of a unit, at most.
+const MOST_OF_A_UNIT: usize = 8;
+
 impl Unit {
     /// The unit that a column states: at the end of its `name`, in brackets (`Force [kN]`, `x (mm)`)
     /// or after a stroke (`F / kN`), without them where no word is like it (`x_mm`), or as the
     /// whole of what the line of units has for it, `about`.
     pub fn of(name: &str, about: &str) -> Option<Self> {
         Self::at_end(name.trim()).or_else(|| Self::known(about))
+    }
+
+    /// The text of a unit that a column states in square brackets or in the line of units, if it is none that is
+    /// known.
+    pub(super) fn unknown<'a>(name: &'a str, about: &'a str) -> Option<&'a str> {
+        let bracketed = name.trim().strip_suffix(']').and_then(|inner| inner.rsplit_once('['));
+        let stated = bracketed.map_or(about, |(_, stated)| stated).trim();
+        let is_part = |c: char| c.is_alphabetic() || "/^2²·*".contains(c);
+        let is_unit = stated.starts_with(char::is_alphabetic)
+            && stated.chars().all(is_part)
+            && stated.chars().count() <= MOST_OF_A_UNIT;
+        (is_unit && Self::of(name, about).is_none()).then_some(stated)
     }
 
     /// Name of a column without the unit at its end (`Fx` of `Fx [N]`): brackets whatever they hold, or
@@ -198,6 +213,22 @@ mod tests {
             let unit = Unit::of(name, about).unwrap_or_else(|| panic!("{name} {about}"));
             assert_eq!(unit.quantity, quantity, "{name} {about}");
             assert!((unit.in_si / in_si - 1.0).abs() < 1e-15, "{name} {about}: {}", unit.in_si);
+        }
+    }
+
+    #[test]
+    fn units_that_are_not_known_are_told() {
+        for (name, about, unknown) in [
+            ("Disp [µin]", "", Some("µin")),
+            ("Force", "mV", Some("mV")),
+            ("x [V]", "mm", None),
+            ("Force [kN]", "", None),
+            ("Force [shaker 1]", "", None),
+            ("Force [1]", "", None),
+            ("Force (left)", "", None),
+            ("x", "", None),
+        ] {
+            assert_eq!(Unit::unknown(name, about), unknown, "{name} {about}");
         }
     }
 
