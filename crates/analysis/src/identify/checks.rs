@@ -6,6 +6,7 @@ use mechid_estimate::checks::{
     constant_channels, instability, kinematics, mass_symmetry, power, quantised_channels,
     spiked_channels,
 };
+use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_model::ResponseQuantity;
 use serde::Serialize;
 
@@ -50,6 +51,8 @@ pub(crate) struct Scope {
     pub scaled: bool,
     /// `true` of hits of a hammer: one that meets a machine in motion may take power out of it.
     pub hits: bool,
+    /// Part of the motion that is left unexplained, where that is known.
+    pub unexplained: Option<f64>,
 }
 
 /// All findings before and after a fit, with one error rate for the statistical tests among them; `modes` are
@@ -58,7 +61,7 @@ pub(crate) fn rows(
     fitted: &Fitted,
     modes: &[IdentifiedMode],
     records: &[&Block],
-    Scope { scaled, hits }: Scope,
+    Scope { scaled, hits, unexplained }: Scope,
 ) -> Result<Vec<CheckRow>, AnalysisError> {
     let mut all: Vec<(When, Option<usize>, Finding)> = Vec::new();
     let mut add = |when, at: Option<usize>, findings: &[Finding]| {
@@ -76,6 +79,7 @@ pub(crate) fn rows(
     }
     add(When::After, None, &fitted.after_all);
     add(When::After, None, instability(modes).as_slice());
+    add(When::After, None, unmeasured_force(fitted, unexplained).as_slice());
     if scaled {
         add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
     }
@@ -97,6 +101,13 @@ pub(crate) fn rows(
         CheckRow::new(*when, at.and_then(name), finding, names)
     };
     Ok(all.iter().map(row).collect())
+}
+
+/// What a fit takes for the response to unmeasured forces where nothing but its residual shows that.
+fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
+    let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+    let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);
+    unexplained.filter(|_| is_seen).map(|fraction| Finding::UnmeasuredForce { fraction })
 }
 
 /// Faults of the channels themselves, whatever is fitted to them.

@@ -177,7 +177,11 @@ impl IdentificationSummary {
             records: records.iter().map(row).collect(),
             hits,
             checks: {
-                let scope = checks::Scope { scaled: unscaled.is_none(), hits: how.hits.is_some() };
+                let scope = checks::Scope {
+                    scaled: unscaled.is_none(),
+                    hits: how.hits.is_some(),
+                    unexplained: unexplained_motion,
+                };
                 checks::rows(fitted, &modes, &records, scope)?
             },
             fitted_lines: None,

@@ -407,3 +407,45 @@ fn a_spring_that_hardens_is_found_with_one_shaker_at_a_time() {
         assert_eq!(warned, 0, "{seed}: {right}");
     }
 }
+
+/// A window of 2,048 samples out of a random motion eight times as long, of 1 to 8 Hz, and the force that it takes of
+/// 10 kg at 3.6 Hz with a cubic spring; noise of 0.5 % on the displacement.
+fn random_motion(cubic: f64, seed: u64) -> Measurement {
+    let sampling = Sampling::new(0.01, 8 * 2048).unwrap();
+    let draw = noise::white(Sampling::new(1.0, sampling.lines()).unwrap(), 2, 1.0, seed).unwrap();
+    let record = |order: i32| {
+        let mut lines = DMatrix::zeros(sampling.lines(), 1);
+        for n in 164..1311 {
+            let omega = n as f64 * sampling.omega0();
+            let z = Complex::new(draw.channel(0)[n], draw.channel(1)[n]);
+            lines[(n, 0)] = z * 2e-4 * Complex::new(0.0, omega).powi(order);
+        }
+        Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap()
+    };
+    let [x, v, a] = [0, 1, 2].map(record);
+    let force = DMatrix::from_fn(sampling.len(), 1, |k, _| {
+        let [x, v, a] = [&x, &v, &a].map(|record| record.channel(0)[k]);
+        10.0 * a + 40.0 * v + 5000.0 * x + cubic * x.powi(3)
+    });
+    let force = Record::new(sampling, force).unwrap().window(300, 2048).unwrap();
+    let x = x.window(300, 2048).unwrap();
+    let level = noise::NoiseLevel::FractionOfRms(0.005);
+    test_of(&force, &noise::add_white(&x, level, seed + 1000).unwrap())
+}
+
+/// Judge: the force by the equation of motion. What a cubic spring leaves of a random motion looks like the response
+/// to a force that was not measured, and is not passed for it.
+#[test]
+fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
+    let warned = |cubic: f64, seed: u64| {
+        let found = identify(&[random_motion(cubic, seed)], &Identify::default()).unwrap();
+        let unexplained = found.summary().fit.unexplained_motion.unwrap();
+        (found.checks().iter().any(|check| check.is_conspicuous()), unexplained)
+    };
+    for seed in 0..6 {
+        let (right, left) = warned(0.0, seed);
+        assert!(!right && left < 0.02, "{seed}: {left}");
+        let (wrong, left) = warned(3e7, seed);
+        assert!(wrong && left > 0.1, "{seed}: {left}");
+    }
+}

@@ -236,6 +236,11 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
         concentration: Option<Concentration>,
     },
+    /// Motion that a fit leaves and takes for the response to forces that were not measured.
+    UnmeasuredForce {
+        /// Part of the motion (ratio of RMS values).
+        fraction: f64,
+    },
     /// Correlation of a residual with the square or the cube of a displacement as a force.
     Linearity {
         /// The power that correlates most.
@@ -535,7 +540,7 @@ impl Finding {
             Finding::Bias { .. } => Subject::Bias,
             Finding::Instability { .. } => Subject::Instability,
             Finding::MassSymmetry { .. } => Subject::Symmetry,
-            Finding::Misfit { .. } => Subject::Misfit,
+            Finding::Misfit { .. } | Finding::UnmeasuredForce { .. } => Subject::Misfit,
             Finding::Linearity { .. } | Finding::Distortion { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
             Finding::CrossCorrelation { .. } => Subject::CrossCorrelation,
@@ -562,6 +567,9 @@ impl Finding {
                 Verdict::Doubtful
             }
             Finding::Seam { ratio } => grade(ratio, SEAM_DOUBTFUL, SEAM_BAD),
+            Finding::UnmeasuredForce { fraction } if fraction >= UNMEASURED_FORCE => {
+                Verdict::Doubtful
+            }
             Finding::PeriodScatter { fraction } => {
                 grade(fraction, PERIOD_SCATTER_DOUBTFUL, PERIOD_SCATTER_BAD)
             }
@@ -598,6 +606,7 @@ impl Finding {
             Finding::Seam { ratio } | Finding::Misfit { ratio, .. } => ratio,
             Finding::PeriodScatter { fraction }
             | Finding::UnequalPeriods { fraction }
+            | Finding::UnmeasuredForce { fraction }
             | Finding::PowerFlow { fraction } => fraction,
             Finding::WrongPeriod { claimed, fault } => match fault {
                 PeriodFault::Neighbour { period, .. } | PeriodFault::Other { period, .. } => {

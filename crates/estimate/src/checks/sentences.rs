@@ -255,6 +255,20 @@ impl Display for Sentence<'_> {
                     )
                 }
             }
+            Finding::UnmeasuredForce { fraction } => {
+                let percent = three_digits(100.0 * fraction);
+                write!(
+                    f,
+                    "{percent} % of the motion is taken for the response to forces that were not measured"
+                )?;
+                f.write_str(match self.finding.verdict() {
+                    Verdict::Good => "",
+                    _ => {
+                        ": a nonlinearity under a random force looks like that, and so does a degree of freedom that \
+                         is missing; repeat the test at another level of the force, or with periods that repeat"
+                    }
+                })
+            }
             Finding::Misfit { ratio, p_value, source, concentration } => misfit(
                 f,
                 *ratio,
