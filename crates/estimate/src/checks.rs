@@ -49,7 +49,7 @@ pub use regressors::noise_on_response;
 pub use response_residual::after_response_fit;
 pub use spectral::{before_spectral_fit, coherence, fitted_band, fitted_step, steady_periods};
 pub use spectral_residual::SpectralResidual;
-pub use symmetry::mass_symmetry;
+pub use symmetry::{gain_symmetry, mass_symmetry};
 pub use weighted_fit::{AfterSpectralFit, after_spectral_fit};
 
 /// Maximum number of samples used by a check that takes much time or memory per sample.

@@ -3,8 +3,8 @@
 use mechid_estimate::IdentifiedMode;
 use mechid_estimate::checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
-    constant_channels, instability, kinematics, mass_symmetry, power, quantised_channels,
-    spiked_channels,
+    constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, power,
+    quantised_channels, spiked_channels,
 };
 use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_model::ResponseQuantity;
@@ -82,6 +82,7 @@ pub(crate) fn rows(
     add(When::After, None, unmeasured_force(fitted, unexplained).as_slice());
     if scaled {
         add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
+        add(When::After, None, gain_symmetry(&fitted.estimate).as_slice());
     }
     for (at, residual) in fitted.residuals.iter().enumerate() {
         let checks = match residual {

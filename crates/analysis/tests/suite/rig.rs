@@ -479,3 +479,49 @@ fn responses_to_interleaved_forces_are_those_on_their_own_lines() {
     assert!(table.csv().lines().nth(1).unwrap().contains(",,,"));
     assert!(table.to_responses(&[]).is_err());
 }
+
+/// Judge: the machine, and the factor. One sensor in mm beside one in m, or 20 % off, leaves nothing in the residual and
+/// M diagonal; a bearing, whose C and K are not symmetric either, is no such case, nor is a right record.
+#[test]
+fn a_sensor_with_another_gain_is_told_by_damping_and_stiffness() {
+    let period = Sampling::new(0.002, 1024).unwrap();
+    let measured = |system: &SecondOrderSystem, gain: f64, seed: u64| {
+        let shaker = |first: usize, seed| {
+            let lines = (first..=180).step_by(2);
+            let drawn = Multisine::flat(lines, 100.0, Phases::Random { seed }).unwrap();
+            drawn.sample(period).unwrap()
+        };
+        let [one, two] = [shaker(10, seed), shaker(11, seed + 50)];
+        let force = Record::from_channels(period, &[one.channel(0), two.channel(0)]).unwrap();
+        let motion = exact_harmonic_periodic(system, &force).unwrap();
+        let mut x = motion.displacement().repeated(8).unwrap().into_data();
+        x.column_mut(0).scale_mut(gain);
+        let x = Record::new(force.repeated(8).unwrap().sampling(), x).unwrap();
+        let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.005), seed).unwrap();
+        let responses = [(ResponseQuantity::Displacement, &x)];
+        let force = force.repeated(8).unwrap();
+        Measurement::from_records(&force, &responses).unwrap().period(1024).unwrap()
+    };
+    let system = |c: [f64; 4], k: [f64; 4]| {
+        let [m, c, k] =
+            [[10.0, 0.0, 0.0, 8.0], c, k].map(|all| DMatrix::from_row_slice(2, 2, &all));
+        SecondOrderSystem::new(m, c, k).unwrap()
+    };
+    let frame = system([120.0, -60.0, -60.0, 110.0], [5.5e5, -2.5e5, -2.5e5, 4.5e5]);
+    let bearing = system([400.0, -60.0, -60.0, 500.0], [5.5e5, 1.5e5, -2.5e5, 7.5e5]);
+    let told = |system: &SecondOrderSystem, gain: f64, seed: u64| {
+        let found = identify(&[measured(system, gain, seed)], &Identify::default()).unwrap();
+        found.checks().iter().find_map(|check| match check.finding {
+            Finding::Gain { row, ratio, .. } => Some((row, ratio)),
+            _ => None,
+        })
+    };
+    for seed in 0..8 {
+        for gain in [1000.0, 1.2] {
+            let (row, ratio) = told(&frame, gain, seed).expect("a gain");
+            assert!(row == 0 && (ratio / gain - 1.0).abs() < 0.02, "{gain} {seed}: {row} {ratio}");
+        }
+        assert_eq!(told(&frame, 1.0, seed), None);
+        assert_eq!(told(&bearing, 1.0, seed), None);
+    }
+}

@@ -222,6 +222,19 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
     },
+    /// Damping and stiffness that are symmetric but for one factor between two degrees of freedom, as gains make them.
+    Gain {
+        /// Degree of freedom whose responses (or forces) are so much larger.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        row: usize,
+        /// The other degree of freedom.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        column: usize,
+        /// The factor (pure number).
+        ratio: f64,
+        /// Standard error of its logarithm (pure number).
+        standard_error: f64,
+    },
     /// Residual power against the power of the noise.
     Misfit {
         /// Residual power over its expectation for noise alone (pure number).
@@ -539,7 +552,7 @@ impl Finding {
             Finding::Delay { .. } => Subject::Delay,
             Finding::Bias { .. } => Subject::Bias,
             Finding::Instability { .. } => Subject::Instability,
-            Finding::MassSymmetry { .. } => Subject::Symmetry,
+            Finding::MassSymmetry { .. } | Finding::Gain { .. } => Subject::Symmetry,
             Finding::Misfit { .. } | Finding::UnmeasuredForce { .. } => Subject::Misfit,
             Finding::Linearity { .. } | Finding::Distortion { .. } => Subject::Linearity,
             Finding::Whiteness { .. } => Subject::Whiteness,
@@ -567,6 +580,7 @@ impl Finding {
                 Verdict::Doubtful
             }
             Finding::Seam { ratio } => grade(ratio, SEAM_DOUBTFUL, SEAM_BAD),
+            Finding::Gain { .. } => Verdict::Doubtful,
             Finding::UnmeasuredForce { fraction } if fraction >= UNMEASURED_FORCE => {
                 Verdict::Doubtful
             }
@@ -603,7 +617,9 @@ impl Finding {
             Finding::PersistentExcitation { order, .. } => order as f64,
             Finding::ExcitedLines { lines, .. } => lines as f64,
             Finding::Conditioning { condition_number, .. } => condition_number,
-            Finding::Seam { ratio } | Finding::Misfit { ratio, .. } => ratio,
+            Finding::Seam { ratio }
+            | Finding::Misfit { ratio, .. }
+            | Finding::Gain { ratio, .. } => ratio,
             Finding::PeriodScatter { fraction }
             | Finding::UnequalPeriods { fraction }
             | Finding::UnmeasuredForce { fraction }

@@ -255,6 +255,15 @@ impl Display for Sentence<'_> {
                     )
                 }
             }
+            Finding::Gain { row, column, ratio, .. } => {
+                let (i, j, ratio) = (row + 1, column + 1, three_digits(*ratio));
+                write!(
+                    f,
+                    "C and K are symmetric but for one factor: c{i}{j} over c{j}{i} and k{i}{j} over k{j}{i} are both \
+                     {ratio}, as where response {i} or force {i} is read {ratio} times too large beside number {j}: \
+                     look at their units and gains"
+                )
+            }
             Finding::UnmeasuredForce { fraction } => {
                 let percent = three_digits(100.0 * fraction);
                 write!(

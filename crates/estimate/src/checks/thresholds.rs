@@ -103,3 +103,9 @@ pub const ASYMMETRY: f64 = 1e-6;
 /// Part of the motion from which it is doubtful that forces which were not measured account for it: few tests are as
 /// disturbed, and nonlinear machines leave more.
 pub(super) const UNMEASURED_FORCE: f64 = 0.1;
+
+/// Standard errors by which a ratio of entries differs from 1 in damping and in stiffness where a gain makes it, and up
+/// to which both agree, or the part of the logarithm.
+pub(super) const GAIN_SHOWS: f64 = 5.0;
+pub(super) const GAIN_AGREES: f64 = 2.5;
+pub(super) const GAIN_NEAR: f64 = 0.05;

@@ -162,7 +162,7 @@ pub fn simulate(experiment: &Experiment) -> Result<Simulation, SimulateError> {
 /// [`Experiment::forced`] tells, in N) in the place of its excitation, by its scheme and from its start; noise and number of periods do not count.
 ///
 /// # Errors
-/// As [`simulate`]; [`IntegrateError::MidStepMissing`] if the scheme asks for the exact force between
+/// As [`simulate`]; [`MidStepMissing`](mechid_integrate::IntegrateError::MidStepMissing) if the scheme asks for the exact force between
 /// the samples.
 pub fn respond(experiment: &Experiment, force: &Record) -> Result<Response, SimulateError> {
     let machine = Described::of(experiment)?;
