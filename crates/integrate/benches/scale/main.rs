@@ -65,7 +65,9 @@ fn chain(n: usize) -> SparseSystem {
     damped(band(n, &[(-1, -900.0), (0, 2000.0), (1, -900.0)]))
 }
 
-fn grid(side: usize) -> SparseSystem {
+/// A grid with stiffness across it that is not symmetric, as that of seals, where it is `skew`.
+fn grid(side: usize, skew: bool) -> SparseSystem {
+    let across = if skew { 90.0 } else { 0.0 };
     let at = |i: usize, j: usize| i * side + j;
     let mut entries = vec![];
     for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
@@ -73,7 +75,7 @@ fn grid(side: usize) -> SparseSystem {
         let neighbours =
             [(i + 1 < side).then(|| at(i + 1, j)), (j + 1 < side).then(|| at(i, j + 1))];
         for next in neighbours.into_iter().flatten() {
-            entries.extend([(at(i, j), next, -900.0), (next, at(i, j), -900.0)]);
+            entries.extend([(at(i, j), next, -900.0 - across), (next, at(i, j), -900.0 + across)]);
         }
     }
     damped(triplets(side * side, entries).expect("inside"))
@@ -174,9 +176,13 @@ fn sparse(ratios: &mut Vec<Ratio>) {
         ("chain", 10_000, 500),
         ("chain", 100_000, 60),
         ("grid", 100, 100),
+        ("skew-grid", 100, 100),
     ] {
         let (size, steps) = ((size / scale).max(10), (steps / scale).max(3));
-        let system = if kind == "chain" { chain(size) } else { grid(size) };
+        let system = match kind {
+            "chain" => chain(size),
+            _ => grid(size, kind == "skew-grid"),
+        };
         let n = system.dof();
         let dofs = SelectedDofs { forced: &[0], observed: &[0, n - 1] };
         let scheme = Newmark::AVERAGE_ACCELERATION;

@@ -1,6 +1,6 @@
 """Seconds per step of Newmark's average acceleration with SciPy: splu and CSR products.
 
-Reads lines "kind size steps" (chain or grid, the grid being size × size), answers each with a line
+Reads lines "kind size steps" (chain, grid or skew-grid, the grids being size × size), answers each with a line
 "seconds of the factorisation, seconds per step".
 """
 
@@ -13,8 +13,10 @@ from scipy.sparse.linalg import splu
 
 
 def stiffness(kind, size):
-    """K of 2000 N/m on the diagonal of a chain, 3800 N/m of a grid, -900 N/m to each neighbour."""
-    side = sparse.diags([-900.0, -900.0], [-1, 1], shape=(size, size))
+    """K of 2000 N/m on the diagonal of a chain, 3800 N/m of a grid, -900 N/m to each neighbour, 90 more or less
+    upwards and downwards of a skew one."""
+    across = 90.0 if kind == "skew-grid" else 0.0
+    side = sparse.diags([-900.0 + across, -900.0 - across], [-1, 1], shape=(size, size))
     if kind == "chain":
         return side + 2000.0 * sparse.identity(size)
     one = sparse.identity(size)

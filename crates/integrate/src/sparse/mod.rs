@@ -1,5 +1,6 @@
 //! Sparse matrices: products, and factorisations by band or, where that is wide, by `faer`: of Cholesky for
-//! matrices that are found to be symmetric and positive definite, LU for any others.
+//! matrices that are found to be symmetric and positive definite, LU for any others, without exchanges of rows where
+//! the pattern is nearly symmetric and the pivots allow it.
 
 mod banded;
 mod fill;
@@ -9,6 +10,7 @@ mod panels;
 mod product;
 mod symmetric;
 mod tridiagonal;
+mod unsymmetric;
 
 use nalgebra_sparse::csc::CscMatrix;
 use nalgebra_sparse::csr::CsrMatrix;
@@ -19,6 +21,7 @@ pub(crate) use general::GeneralLu;
 use ordering::Ordering;
 pub(crate) use product::Product;
 use symmetric::{CholeskyFactors, Plan};
+use unsymmetric::{UnsymmetricFactors, UnsymmetricPlan};
 
 /// Most diagonals of a matrix that is factored by band: about where solutions with a grid in two dimensions
 /// take as long either way, 0.4 GB for 100,000 degrees of freedom.
@@ -66,6 +69,8 @@ pub(crate) enum SparseLu {
     },
     /// Of a matrix that is symmetric and positive definite.
     Symmetric(Box<CholeskyFactors>),
+    /// Of a matrix with a pattern that is nearly symmetric, and pivots that need no exchanges.
+    Unsymmetric(Box<UnsymmetricFactors>),
     /// Of any pattern.
     General(Box<GeneralLu<f64>>),
 }
@@ -88,6 +93,15 @@ impl SparseLu {
         {
             return Ok(Self::Symmetric(Box::new(factors)));
         }
+        let is_sized = sizes.iter().all(|size| *size > 0.0 && size.is_finite());
+        if diagonals > NARROW_BAND
+            && is_sized
+            && let Some(plan) = UnsymmetricPlan::of(matrix)
+            && (diagonals > WIDEST_BAND || 2 * plan.work() < diagonals * matrix.nrows())
+            && let Some(factors) = plan.factor(matrix, sizes, limit)?
+        {
+            return Ok(Self::Unsymmetric(Box::new(factors)));
+        }
         if diagonals > WIDEST_BAND {
             let factors = GeneralLu::new(CscMatrix::from(matrix), sizes, limit)?;
             return Ok(Self::General(Box::new(factors)));
@@ -100,6 +114,7 @@ impl SparseLu {
     pub(crate) fn solve(&mut self, b: &mut [f64]) {
         match self {
             Self::Symmetric(factors) => factors.solve(b),
+            Self::Unsymmetric(factors) => factors.solve(b),
             Self::General(factors) => factors.solve(b),
             Self::Banded { ordering, factors, .. } if ordering.is_natural() => factors.solve(b),
             Self::Banded { ordering, factors, scratch } => {
@@ -116,6 +131,7 @@ impl std::fmt::Debug for SparseLu {
         match self {
             Self::Banded { factors, .. } => factors.fmt(f),
             Self::Symmetric(factors) => factors.fmt(f),
+            Self::Unsymmetric(factors) => factors.fmt(f),
             Self::General(_) => f.write_str("GeneralLu"),
         }
     }

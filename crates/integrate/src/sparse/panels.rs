@@ -7,7 +7,7 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 /// Widths of panels, the widest first.
 const WIDTHS: [usize; 4] = [8, 4, 2, 1];
 
-/// A lower triangular factor L of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is looked up
+/// A lower triangular factor L, such as that of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is looked up
 /// for a row serves all columns of the panel, whose entries stand side by side.
 ///
 /// # Source
@@ -136,6 +136,12 @@ impl Panels {
 
     /// Solves L Lᵀ x = `b`, in place.
     pub(super) fn solve(&self, b: &mut [f64]) {
+        self.down(b);
+        self.up(b);
+    }
+
+    /// Solves L x = `b`, in place.
+    pub(super) fn down(&self, b: &mut [f64]) {
         let (mut rows, mut values) = (self.rows.as_slice(), self.values.as_slice());
         for panel in &self.panels {
             let (below, of_panel);
@@ -149,6 +155,10 @@ impl Panels {
             };
             down(panel.first as usize, below, of_panel, b);
         }
+    }
+
+    /// Solves Lᵀ x = `b`, in place.
+    pub(super) fn up(&self, b: &mut [f64]) {
         let (mut rows, mut values) = (self.rows.as_slice(), self.values.as_slice());
         for panel in self.panels.iter().rev() {
             let (below, of_panel);

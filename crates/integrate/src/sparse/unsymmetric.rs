@@ -1,0 +1,305 @@
+//! LU factors without exchanges of matrices whose pattern is symmetric or nearly so, as that of gyroscopic forces and
+//! bearings.
+
+use faer::Side;
+use faer::sparse::linalg::SupernodalThreshold;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use nalgebra_sparse::csc::CscMatrix;
+use nalgebra_sparse::csr::CsrMatrix;
+
+use super::general::{pattern, reciprocal_condition};
+use super::panels::{Columns, Panels};
+use super::{NotFactored, combination, scattered};
+
+/// Largest number of operations of a factorisation column by column; more are for blocks of columns.
+const MOST_OPERATIONS: f64 = 4e9;
+
+/// Largest error of a solution put back into the matrix, relative to the sizes of the terms of its rows, with which
+/// factors without exchanges stand.
+const BACKWARD_ERROR: f64 = 1e-13;
+
+/// Factors L U of a matrix in the order of minimum degree of its pattern and that of its transpose, rows and columns
+/// scaled by the sizes of their terms. Both have the pattern of a Cholesky factor, a fraction of the entries of a band,
+/// and of factors with exchanges of rows.
+///
+/// # Source
+/// George & Liu, *Computer Solution of Large Sparse Positive Definite Systems* (1981), chapter 5 (the columns that
+/// change the next one in lists); Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.3.4, on LU without
+/// exchanges where the symmetric part is definite.
+#[derive(Debug)]
+pub(crate) struct UnsymmetricFactors {
+    /// L with the pivots, and Uᵀ of diagonal 1.
+    lower: Panels,
+    upper: Panels,
+    /// Row of the matrix for each row of the factors, and 1 / the root of the size of its terms.
+    order: Vec<(u32, f64)>,
+    /// The right-hand side in that order.
+    scratch: Vec<f64>,
+}
+
+/// The order of a matrix by its pattern, before it is factored.
+pub(crate) struct UnsymmetricPlan {
+    symbolic: SymbolicCholesky<usize>,
+}
+
+impl UnsymmetricPlan {
+    /// The order of `matrix`; `None` where a factorisation column by column takes too long.
+    pub(crate) fn of(matrix: &CsrMatrix<f64>) -> Option<Self> {
+        let both = combination(&[(1.0, matrix), (1.0, &matrix.transpose())]).0;
+        let columns = CscMatrix::from(&both);
+        let one_by_one = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SIMPLICIAL,
+            ..Default::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(
+            pattern(&columns),
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            one_by_one,
+        )
+        .ok()?;
+        let plan = Self { symbolic };
+        let (starts, _) = plan.columns()?;
+        let operations =
+            starts.windows(2).map(|ends| 2.0 * ((ends[1] - ends[0]) as f64).powi(2)).sum::<f64>();
+        (operations < MOST_OPERATIONS).then_some(plan)
+    }
+
+    /// Number of entries that a solution goes through.
+    pub(crate) fn work(&self) -> usize {
+        2 * self.symbolic.len_val()
+    }
+
+    /// First entry of each column of the factors, and the rows of all.
+    fn columns(&self) -> Option<(&[usize], &[usize])> {
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(symbolic) => {
+                Some((symbolic.col_ptr(), symbolic.row_idx()))
+            }
+            SymbolicCholeskyRaw::Supernodal(_) => None,
+        }
+    }
+
+    /// Factors `matrix`, the rows of which are sums of terms of the given `sizes`, unless the factors take more than
+    /// `limit` bytes; nothing if it needs exchanges of rows.
+    pub(crate) fn factor(
+        self,
+        matrix: &CsrMatrix<f64>,
+        sizes: &[f64],
+        limit: u64,
+    ) -> Result<Option<UnsymmetricFactors>, NotFactored> {
+        let entries = self.symbolic.len_val();
+        let bytes = (2 * entries as u64).saturating_mul(size_of::<f64>() as u64);
+        if bytes > limit {
+            return Err(NotFactored::TooLarge { bytes, limit });
+        }
+        let n = matrix.nrows();
+        let scales: Vec<f64> = sizes.iter().map(|size| size.sqrt().recip()).collect();
+        let order: Vec<usize> = match self.symbolic.perm() {
+            Some(order) => order.arrays().0.to_vec(),
+            None => (0..n).collect(),
+        };
+        let mut place = vec![0; n];
+        order.iter().enumerate().for_each(|(at, row)| place[*row] = at);
+        let scaled = Scaled {
+            matrix,
+            columns: CscMatrix::from(matrix),
+            scales: &scales,
+            order: &order,
+            place: &place,
+        };
+        let Some([lower, upper]) = self.eliminated(&scaled) else { return Ok(None) };
+        let [lower, upper] =
+            [lower, upper].map(|values| Panels::of(&Columns::of(&self.symbolic, &values)));
+        let order = order.iter().map(|row| (*row as u32, scales[*row])).collect();
+        let mut factors = UnsymmetricFactors { lower, upper, order, scratch: vec![0.0; n] };
+        let solve = |vector: &mut [f64]| {
+            factors.lower.down(vector);
+            factors.upper.up(vector);
+        };
+        let reciprocal = reciprocal_condition(n, solve);
+        if reciprocal <= f64::EPSILON {
+            // With exchanges of rows it may be regular.
+            return Ok(None);
+        }
+        Ok((factors.backward_error(matrix, sizes) < BACKWARD_ERROR).then_some(factors))
+    }
+
+    /// Entries of L and Uᵀ, column by column; `None` where a pivot is none.
+    fn eliminated(&self, matrix: &Scaled<'_>) -> Option<[Vec<f64>; 2]> {
+        const NONE: usize = usize::MAX;
+        let (starts, rows) = self.columns()?;
+        let n = starts.len() - 1;
+        let [mut lower, mut upper] = [(); 2].map(|()| vec![0.0; rows.len()]);
+        let [mut column, mut row] = [(); 2].map(|()| vec![0.0; n]);
+        // The columns that change column k next, as a list, and where the rows from k on begin in each.
+        let [mut first, mut next, mut at] = [vec![NONE; n], vec![NONE; n], vec![0; n]];
+        for k in 0..n {
+            let own = starts[k]..starts[k + 1];
+            for i in &rows[own.clone()] {
+                (column[*i], row[*i]) = (0.0, 0.0);
+            }
+            matrix.scatter(k, &mut column, &mut row);
+            let mut j = first[k];
+            while j != NONE {
+                let after = next[j];
+                let from = at[j]..starts[j + 1];
+                let (of_row, of_column) = (lower[from.start], upper[from.start]);
+                let both = lower[from.clone()].iter().zip(&upper[from.clone()]);
+                for (i, (l, u)) in rows[from.clone()].iter().zip(both) {
+                    column[*i] -= l * of_column;
+                    row[*i] -= u * of_row;
+                }
+                at[j] = from.start + 1;
+                if at[j] < from.end {
+                    let i = rows[at[j]];
+                    (next[j], first[i]) = (first[i], j);
+                }
+                j = after;
+            }
+            let pivot = column[k];
+            if !(pivot.abs() > 0.0 && pivot.is_finite()) {
+                return None;
+            }
+            for p in own.clone() {
+                lower[p] = column[rows[p]];
+                upper[p] = row[rows[p]] / pivot;
+            }
+            upper[own.start] = 1.0;
+            at[k] = own.start + 1;
+            if at[k] < own.end {
+                let i = rows[at[k]];
+                (next[k], first[i]) = (first[i], k);
+            }
+        }
+        Some([lower, upper])
+    }
+}
+
+/// A matrix in the order of its factors, its rows and columns scaled.
+struct Scaled<'a> {
+    matrix: &'a CsrMatrix<f64>,
+    columns: CscMatrix<f64>,
+    scales: &'a [f64],
+    order: &'a [usize],
+    place: &'a [usize],
+}
+
+impl Scaled<'_> {
+    /// Writes the entries of column and row `k` from the diagonal on.
+    fn scatter(&self, k: usize, column: &mut [f64], row: &mut [f64]) {
+        let own = self.order[k];
+        let (below, beside) = (self.columns.col(own), self.matrix.row(own));
+        let lanes = [
+            (below.row_indices(), below.values(), column),
+            (beside.col_indices(), beside.values(), row),
+        ];
+        for (others, values, into) in lanes {
+            for (other, value) in others.iter().zip(values) {
+                let at = self.place[*other];
+                if at >= k {
+                    into[at] = value * self.scales[own] * self.scales[*other];
+                }
+            }
+        }
+    }
+}
+
+impl UnsymmetricFactors {
+    /// Solves for `b`, in place.
+    pub(crate) fn solve(&mut self, b: &mut [f64]) {
+        for (scaled, (row, scale)) in self.scratch.iter_mut().zip(&self.order) {
+            *scaled = b[*row as usize] * scale;
+        }
+        self.lower.down(&mut self.scratch);
+        self.upper.up(&mut self.scratch);
+        for (solved, (row, scale)) in self.scratch.iter().zip(&self.order) {
+            b[*row as usize] = solved * scale;
+        }
+    }
+
+    /// Largest error of one solution put back into the matrix, over the size of its row and the largest entry.
+    fn backward_error(&mut self, matrix: &CsrMatrix<f64>, sizes: &[f64]) -> f64 {
+        let b: Vec<f64> = scattered(1)
+            .zip(sizes)
+            .take(matrix.nrows())
+            .map(|(number, size)| number * size)
+            .collect();
+        let mut x = b.clone();
+        self.solve(&mut x);
+        let largest = x.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        let mut error = 0.0_f64;
+        for ((row, b), size) in matrix.row_iter().zip(&b).zip(sizes) {
+            let product: f64 =
+                row.col_indices().iter().zip(row.values()).map(|(j, value)| value * x[*j]).sum();
+            let missed = (product - b).abs() / (size * largest.max(1.0));
+            error = if missed <= error { error } else { missed };
+        }
+        error
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_model::triplets;
+    use nalgebra::DVector;
+
+    use super::super::SparseLu;
+    use super::*;
+
+    /// A grid of `side` × `side` with forces that are not symmetric, and with weak `diagonal` entries if it says so.
+    fn grid(side: usize, diagonal: f64) -> CsrMatrix<f64> {
+        let at = |i: usize, j: usize| i * side + j;
+        let mut entries = vec![];
+        for (i, j) in (0..side).flat_map(|i| (0..side).map(move |j| (i, j))) {
+            entries.push((at(i, j), at(i, j), diagonal + 0.01 * i as f64));
+            for (i2, j2) in [(i + 1, j), (i, j + 1)] {
+                if i2 < side && j2 < side {
+                    entries.push((at(i, j), at(i2, j2), -1.0 - 0.1 * j as f64 / side as f64));
+                    entries.push((at(i2, j2), at(i, j), -0.7));
+                }
+            }
+        }
+        // One way only.
+        entries.push((0, side * side - 1, 0.3));
+        triplets(side * side, entries).unwrap()
+    }
+
+    fn sizes(matrix: &CsrMatrix<f64>) -> Vec<f64> {
+        matrix.row_iter().map(|row| row.values().iter().map(|v| v.abs()).sum()).collect()
+    }
+
+    #[test]
+    fn grids_that_are_not_symmetric_are_solved_without_exchanges() {
+        for side in [24, 60] {
+            let matrix = grid(side, 4.2);
+            let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
+            assert!(matches!(factors, SparseLu::Unsymmetric(_)), "{side}");
+            let x = DVector::from_fn(side * side, |i, _| (i as f64).sin());
+            let mut found = &matrix * &x;
+            factors.solve(found.as_mut_slice());
+            assert!((found - x).amax() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn what_needs_exchanges_is_factored_otherwise() {
+        let matrix = grid(24, 1e-9);
+        let mut factors = SparseLu::new(&matrix, &sizes(&matrix), u64::MAX).unwrap();
+        assert!(!matches!(factors, SparseLu::Unsymmetric(_)));
+        let x = DVector::from_fn(24 * 24, |i, _| (i as f64).cos());
+        let mut found = &matrix * &x;
+        factors.solve(found.as_mut_slice());
+        assert!((found - x).amax() < 1e-8);
+    }
+
+    #[test]
+    fn factors_beyond_the_limit_are_refused_before_they_are_computed() {
+        let matrix = grid(60, 4.2);
+        let refused = SparseLu::new(&matrix, &sizes(&matrix), 1000).err();
+        assert!(matches!(refused, Some(NotFactored::TooLarge { limit: 1000, .. })), "{refused:?}");
+    }
+}
