@@ -115,8 +115,8 @@ pub fn critical_step(
     limit_of(scheme, &Fastest::of(system))
 }
 
-/// The steps of [`critical_step`] of several schemes, in s, in their order; what they need to know of the system is
-/// found once.
+/// The steps of [`critical_step`], in s, of several schemes, one for each in their order; what they need to know of the
+/// system is found once.
 ///
 /// # Errors
 /// Those of [`critical_step`].

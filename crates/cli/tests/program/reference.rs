@@ -178,7 +178,7 @@ fn a_start_needs_no_more_than_it_says() {
                  "scheme": {{ "name": "newmark" }}, "response": {{ "from": {{ "{given}": 1 }} }} }}"#
         );
         fs::write(folder.path().join("a.json"), json).unwrap();
-        let report = mechid(folder.path(), "simulate a.json --json");
+        let report = mechid(folder.path(), "simulate a.json --output a.csv --json");
         let report: Value = serde_json::from_str(&report).unwrap();
         assert_eq!(report["response"]["from"][given], 1.0);
         assert!(report["response"]["from"].get(other).is_none());

@@ -1,4 +1,4 @@
-//! Why a simulation cannot be run.
+//! Errors of simulations that cannot be run.
 
 use mechid_integrate::IntegrateError;
 use mechid_io::IoError;
