@@ -38,7 +38,7 @@ VARIANTS = re.compile(
 def failures() -> dict[str, str]:
     """Codes of all failures of the library and what they are, from its sources."""
     found: dict[str, str] = {}
-    for path in [*ROOT.glob("crates/*/src/error.rs"), ROOT / "crates/mechid/src/simulation/mod.rs"]:
+    for path in [*ROOT.glob("crates/*/src/error.rs"), ROOT / "crates/mechid/src/simulation/error.rs"]:
         for kind, body in ENUMS.findall(path.read_text(encoding="utf-8")):
             # The package calls nothing that fails so.
             if kind in ("Bearing", "Cli", "Problem"):
