@@ -26,6 +26,7 @@ mod spectral;
 mod spectral_residual;
 mod symmetry;
 pub mod thresholds;
+mod verdict;
 mod weighted_fit;
 
 pub use after::after_fit;

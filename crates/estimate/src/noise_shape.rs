@@ -1,8 +1,13 @@
 //! The spectrum of noise of which few periods are known: smooth, with bumps.
 
+mod bump;
+
 use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
+
+pub(crate) use self::bump::Bump;
+use self::bump::{most_conspicuous, widths};
 
 /// Highest order of log power in log frequency.
 const MAX_ORDER: usize = 6;
@@ -18,23 +23,6 @@ const QUIET_DEVIATIONS: f64 = 12.0;
 /// Largest leverage of a line, over the complex deviations of its sample and without that of bumps, with which a
 /// polynomial is trusted to be lower there than one of a lower order: at the ends of the band few lines decide.
 const END_LEVERAGE: f64 = 0.25;
-/// Power of a peak over the floor that is tried first.
-const PEAK: f64 = 100.0;
-/// Factor by which the width of a peak is varied.
-const WIDER: f64 = 1.3;
-/// Factor by which the power of a peak over the floor is varied, its flanks being kept.
-const HIGHER: f64 = 3.0;
-/// Distance at which a peak ends, over that at which it is as high as the floor.
-const PEAK_REACH: f64 = 10.0;
-/// Number of flat bands, of different widths, about which others are tried.
-const BEST_WIDTHS: usize = 6;
-/// Rounds of variations of a bump.
-const VARIATIONS: usize = 12;
-/// Steps of the search for the height of a bump, and the change of the height that ends it.
-const HEIGHT_STEPS: usize = 10;
-const HEIGHT_TOLERANCE: f64 = 1e-4;
-/// Largest height, in the logarithm of the power.
-const HIGHEST: f64 = 30.0;
 /// Steps of the search for the log power.
 const STEPS: usize = 200;
 /// Change of the log power (RMS) below which it is found, and while forms are compared: what that misses of the
@@ -52,123 +40,6 @@ pub(crate) struct Form {
     pub(crate) order: usize,
     /// Bumps, by places of lines by rising frequency; they may overlap.
     pub(crate) bumps: Vec<Bump>,
-}
-
-/// Shape that is added to the log powers about a line, times an unknown.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Bump {
-    shape: Shape,
-    /// Middle, in places of lines.
-    middle: f64,
-    /// Lines to either side within which it is not zero.
-    reach: f64,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Shape {
-    /// Equal on all lines.
-    Flat,
-    /// Straight from the middle to both ends.
-    Tent,
-    /// ln(1 + A/(1 + x²)), x = 1 at a distance of `half_width` lines: a resonance over a floor.
-    Peak { above_floor: f64, half_width: f64 },
-}
-
-impl Bump {
-    fn flat(band: &Range<usize>) -> Self {
-        let middle = 0.5 * (band.start + band.end - 1) as f64;
-        Self { shape: Shape::Flat, middle, reach: 0.5 * band.len() as f64 }
-    }
-
-    fn tent(middle: f64, reach: f64) -> Self {
-        Self { shape: Shape::Tent, middle, reach }
-    }
-
-    fn peak(middle: f64, half_width: f64, above_floor: f64) -> Self {
-        let reach = PEAK_REACH * half_width * above_floor.sqrt();
-        Self { shape: Shape::Peak { above_floor, half_width }, middle, reach }
-    }
-
-    /// The same bump where there are `times` as many lines.
-    fn finer(&self, times: f64) -> Self {
-        let shape = match self.shape {
-            Shape::Peak { above_floor, half_width } => {
-                Shape::Peak { above_floor, half_width: times * half_width }
-            }
-            other => other,
-        };
-        let middle = times * (self.middle + 0.5) - 0.5;
-        Self { shape, middle, reach: times * self.reach }
-    }
-
-    /// Others that might do better than the flat one of a band.
-    fn about(band: &Range<usize>) -> [Self; 3] {
-        let Self { middle, reach, .. } = Self::flat(band);
-        [
-            Self::tent(middle, 2.0 * reach),
-            Self::peak(middle, 0.5 * reach, PEAK),
-            Self::peak(middle, reach, PEAK),
-        ]
-    }
-
-    /// The same a little moved, wider, narrower, higher or lower; none of a flat one, whose places are all
-    /// looked at.
-    fn varied(&self) -> Vec<Self> {
-        let middle = self.middle;
-        match self.shape {
-            Shape::Flat => Vec::new(),
-            Shape::Tent => {
-                let by = 0.25 * self.reach;
-                vec![
-                    Self::tent(middle - by, self.reach),
-                    Self::tent(middle + by, self.reach),
-                    Self::tent(middle, self.reach - by),
-                    Self::tent(middle, self.reach + by),
-                ]
-            }
-            Shape::Peak { above_floor, half_width } => vec![
-                Self::peak(middle - 0.5 * half_width, half_width, above_floor),
-                Self::peak(middle + 0.5 * half_width, half_width, above_floor),
-                Self::peak(middle, half_width / WIDER, above_floor),
-                Self::peak(middle, half_width * WIDER, above_floor),
-                Self::peak(middle, half_width * HIGHER.sqrt(), above_floor / HIGHER),
-                Self::peak(middle, half_width / HIGHER.sqrt(), above_floor * HIGHER),
-            ],
-        }
-    }
-
-    fn at(&self, line: usize) -> f64 {
-        let away = (line as f64 - self.middle).abs();
-        match self.shape {
-            Shape::Flat => f64::from(u8::from(away < self.reach)),
-            Shape::Tent => (1.0 - away / self.reach).max(0.0),
-            Shape::Peak { .. } if away > self.reach => 0.0,
-            Shape::Peak { above_floor, half_width } => {
-                (above_floor / (1.0 + (away / half_width).powi(2))).ln_1p() / above_floor.ln_1p()
-            }
-        }
-    }
-
-    /// Lines within which it is half its height or more.
-    fn band(&self, lines: usize) -> Range<usize> {
-        let half = match self.shape {
-            Shape::Flat => self.reach - 0.5,
-            Shape::Tent => 0.5 * self.reach,
-            // Half of the logarithm of the peak.
-            Shape::Peak { above_floor, half_width } => half_width * above_floor.powf(0.25),
-        };
-        // The line nearest to the middle, at least.
-        let nearest = (self.middle.round().max(0.0) as usize).min(lines.saturating_sub(1));
-        let first = (self.middle - half).ceil().max(0.0) as usize;
-        let last = (self.middle + half).floor().max(0.0) as usize;
-        first.min(nearest)..(last.max(nearest) + 1).min(lines)
-    }
-
-    /// Lines within which it is not zero.
-    fn support(&self, lines: usize) -> Range<usize> {
-        let first = (self.middle - self.reach).ceil().max(0.0) as usize;
-        first..((self.middle + self.reach).floor() as usize + 1).min(lines)
-    }
 }
 
 impl Form {
@@ -375,140 +246,6 @@ fn fit_within(
         }
     }
     Smooth { form, basis, log_power, misfit, cost: f64::INFINITY }
-}
-
-/// Widths of the bands that are looked at: 1, 2, 3, 4, 6, 8, 12 …, to a third of the lines.
-fn widths(lines: usize) -> impl Iterator<Item = usize> {
-    let powers = (0..usize::BITS).map(|power| 1usize << power);
-    let all = powers.flat_map(|p| if p == 1 { vec![1] } else { vec![p, p + p / 2] });
-    all.take_while(move |width| *width <= (lines / 3).max(1))
-}
-
-/// The bump that makes the variances most likely, of all flat ones and of tents about the best of them.
-fn most_conspicuous(variances: &DMatrix<f64>, log_power: &DMatrix<f64>, nu: f64) -> Option<Bump> {
-    let (lines, channels) = variances.shape();
-    let levels = variances.zip_map(log_power, |v, log| v * (-log).exp());
-    // Sums of the levels below each line.
-    let mut below = DMatrix::<f64>::zeros(lines + 1, channels);
-    for channel in 0..channels {
-        for line in 0..lines {
-            below[(line + 1, channel)] = below[(line, channel)] + levels[(line, channel)];
-        }
-    }
-    let gain_of_flat = |start: usize, width: usize| {
-        let (count, others) = (width as f64, (lines - width) as f64);
-        let of_channel = |channel: usize| {
-            let inside = below[(start + width, channel)] - below[(start, channel)];
-            let all = below[(lines, channel)];
-            let [mean, inside, other] =
-                [all / (count + others), inside / count, (all - inside) / others]
-                    .map(|level: f64| level.max(FLOOR));
-            match inside > other || count * nu >= QUIET_DEVIATIONS {
-                true => count * (mean / inside).ln() + others * (mean / other).ln(),
-                false => 0.0,
-            }
-        };
-        (0..channels).map(of_channel).sum::<f64>()
-    };
-    let of_width = |width: usize| {
-        let starts = 0..=lines - width;
-        let best = starts.map(|start| (gain_of_flat(start, width), start));
-        best.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(gain, at)| (gain, at..at + width))
-    };
-    let mut flat: Vec<(f64, Range<usize>)> = widths(lines).filter_map(of_width).collect();
-    flat.sort_by(|a, b| b.0.total_cmp(&a.0));
-    flat.truncate(BEST_WIDTHS);
-    let best = |of: &mut dyn Iterator<Item = Gained>| of.max_by(|a, b| a.gain.total_cmp(&b.gain));
-    let (of_flat, band) = flat.first()?;
-    let none = vec![0.0; channels];
-    let others = flat.iter().flat_map(|(_, band)| Bump::about(band));
-    let mut other = best(&mut others.map(|bump| Gained::of(bump, &none, &levels, nu)))?;
-    for _ in 0..VARIATIONS {
-        let varied = other.bump.varied().into_iter();
-        let inside = varied.filter(|bump| (0.0..lines as f64).contains(&bump.middle));
-        let with_gain = |bump: Bump| Gained::of(bump, &other.heights, &levels, nu);
-        match best(&mut inside.map(with_gain)).filter(|varied| varied.gain > other.gain) {
-            Some(varied) => other = varied,
-            None => break,
-        }
-    }
-    let best = if *of_flat >= other.gain {
-        (*of_flat, Bump::flat(band))
-    } else {
-        (other.gain, other.bump)
-    };
-    Some(best).filter(|(gain, _)| *gain > 0.0).map(|(_, bump)| bump)
-}
-
-/// A bump of the best height on the best level.
-struct Gained {
-    bump: Bump,
-    /// Amount by which it lowers Σ log p + v/p.
-    gain: f64,
-    /// Height for each channel, in the logarithm of the power.
-    heights: Vec<f64>,
-}
-
-impl Gained {
-    /// Finds the heights from those of a bump like it, and from the levels v/p.
-    fn of(bump: Bump, start: &[f64], levels: &DMatrix<f64>, nu: f64) -> Self {
-        let support = bump.support(levels.nrows());
-        let parts: Vec<f64> = support.clone().map(|line| bump.at(line)).collect();
-        let mut heights = start.to_vec();
-        let gains = heights.iter_mut().zip(levels.column_iter()).map(|(height, all)| {
-            let (before, inside) = all.as_slice().split_at(support.start);
-            let (inside, after) = inside.split_at(parts.len());
-            let outside = before.iter().chain(after).sum();
-            raised(&parts, inside, outside, levels.nrows() as f64, height, nu)
-        });
-        let gain = gains.sum();
-        Self { bump, gain, heights }
-    }
-}
-
-/// Finds the height of a bump whose parts stand over the levels v/p `inside`, and returns by how much it lowers
-/// Σ log p + v/p; the levels of all other lines have the sum `outside`.
-fn raised(
-    parts: &[f64],
-    inside: &[f64],
-    outside: f64,
-    lines: f64,
-    height: &mut f64,
-    nu: f64,
-) -> f64 {
-    let area: f64 = parts.iter().sum();
-    let total = outside + inside.iter().sum::<f64>();
-    let (mut least, mut most) = (-HIGHEST, HIGHEST);
-    let mut sum = total;
-    for _ in 0..HEIGHT_STEPS {
-        let (mut first, mut second) = (0.0, 0.0);
-        sum = outside;
-        for (part, level) in parts.iter().zip(inside) {
-            let left = level * f64::exp(-*height * part);
-            sum += left;
-            first += part * left;
-            second += part * part * left;
-        }
-        // Derivatives of L log Σ v/p + height Σ part, which is convex.
-        let slope = area - lines * first / sum;
-        let curvature = lines * (second / sum - (first / sum).powi(2));
-        if slope < 0.0 {
-            least = *height
-        } else {
-            most = *height
-        }
-        let next = *height - slope / curvature;
-        let next = if next > least && next < most { next } else { 0.5 * (least + most) };
-        // The sum is that of the height before.
-        if (next - *height).abs() <= HEIGHT_TOLERANCE {
-            break;
-        }
-        *height = next;
-    }
-    if *height <= 0.0 && area * nu < QUIET_DEVIATIONS {
-        return 0.0;
-    }
-    lines * (total / sum).ln() - *height * area
 }
 
 /// The log power within a basis of which the variances of a channel are samples, by maximum likelihood, and

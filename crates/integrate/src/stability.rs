@@ -4,16 +4,16 @@
 //! does the integrating. There is no second set of formulas that could be right while the code is
 //! wrong.
 
+mod fastest;
 pub(crate) mod krylov;
 pub(crate) mod passive;
 
-use std::cell::OnceCell;
-
 use mechid_model::{Matrix, RealSchur, SecondOrderSystem};
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DVector};
 
 use crate::effective::Equations;
 use crate::{IntegrateError, Loads, Matrices, Scheme, StableSteps, Stepper, System, Transition};
+use fastest::{Fastest, fastest, reduced, reduced_to};
 use krylov::{dominant, scattered};
 
 /// Number of degrees of freedom up to which the whole amplification matrix is looked at.
@@ -140,48 +140,6 @@ fn limit_of(scheme: &dyn Scheme, fastest: &Fastest<'_>) -> Result<Option<f64>, I
     examined.limit(fastest)
 }
 
-/// The fastest motions of a system, found when they are asked for.
-struct Fastest<'a> {
-    system: &'a dyn System,
-    rate: OnceCell<f64>,
-    /// The stiffest and the most damped motion of a passive system; `None` of others.
-    passive: OnceCell<Option<[SecondOrderSystem; 2]>>,
-}
-
-impl<'a> Fastest<'a> {
-    fn of(system: &'a dyn System) -> Self {
-        Self { system, rate: OnceCell::new(), passive: OnceCell::new() }
-    }
-
-    /// The largest modulus among the eigenvalues, in 1/s, as far as Arnoldi's iteration finds it.
-    fn rate(&self) -> Result<f64, IntegrateError> {
-        if let Some(rate) = self.rate.get() {
-            return Ok(*rate);
-        }
-        let rate = fastest(&Equations::of(self.system))?;
-        Ok(*self.rate.get_or_init(|| rate))
-    }
-
-    /// A single degree of freedom for each of these motions, not slower than it.
-    fn motions(&self) -> Result<Option<&[SecondOrderSystem; 2]>, IntegrateError> {
-        if let Some(found) = self.passive.get() {
-            return Ok(found.as_ref());
-        }
-        let found = match passive::is_passive(self.system) {
-            false => None,
-            true => {
-                let equations = Equations::of(self.system);
-                let motion = |which| {
-                    let top = passive::top(&equations, which)?;
-                    reduced_to(&equations, &top, which, top.above(self.system, which))
-                };
-                Some([motion(Matrix::Stiffness)?, motion(Matrix::Damping)?])
-            }
-        };
-        Ok(self.passive.get_or_init(|| found).as_ref())
-    }
-}
-
 /// A scheme whose stability is examined.
 pub(crate) struct Examined<'a> {
     pub(crate) name: &'a dyn Fn() -> String,
@@ -265,8 +223,8 @@ impl Examined<'_> {
         Ok(radius)
     }
 
-    /// What the largest eigenvalue of M⁻¹A, A being one of the matrices of a passive system, exceeds: the limit of the
-    /// scheme, where it is not proven to lie below that.
+    /// Returns a value that the largest eigenvalue of M⁻¹A exceeds, A being one of the matrices of a passive system: the
+    /// limit of the scheme, where the eigenvalue is not proven to lie below that.
     fn exceeded(&self, system: &dyn System, which: Matrix, dt: f64) -> Option<f64> {
         let limit = match (self.stable_steps, which) {
             (
@@ -444,68 +402,6 @@ fn small_growth(
 /// The largest growth rate among the eigenvalues of a system, in 1/s.
 fn own_growth(eigenvalues: &[Complex<f64>]) -> f64 {
     eigenvalues.iter().map(|l| l.re).fold(0.0, f64::max)
-}
-
-/// The system that moves along `shape` alone, of mass x*Mx, damping x*Cx and stiffness x*Kx; its
-/// two degrees of freedom are the real and imaginary parts of one.
-///
-/// Where `shape` belongs to an eigenvector of the amplification, its eigenvalue is one for this
-/// system, too.
-fn reduced(
-    equations: &Equations,
-    shape: &DVector<Complex<f64>>,
-) -> Result<SecondOrderSystem, IntegrateError> {
-    let (re, im) = (shape.map(|v| v.re), shape.map(|v| v.im));
-    let form = |which| {
-        let (a_re, a_im) = (equations.times(which, &re), equations.times(which, &im));
-        let (real, imaginary) = (re.dot(&a_re) + im.dot(&a_im), re.dot(&a_im) - im.dot(&a_re));
-        DMatrix::from_row_slice(2, 2, &[real, -imaginary, imaginary, real])
-    };
-    let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(form);
-    Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
-}
-
-/// The system along the fastest motion found of a passive system, its eigenvalue of M⁻¹A, A being one of the matrices,
-/// raised to a `value`.
-fn reduced_to(
-    equations: &Equations,
-    top: &passive::Top,
-    which: Matrix,
-    value: f64,
-) -> Result<SecondOrderSystem, IntegrateError> {
-    let along = reduced(equations, &top.vector.map(Complex::from))?;
-    let raise = if top.value > 0.0 { (value / top.value).max(1.0) } else { 1.0 };
-    let part = |matrix: Matrix| along.matrix(matrix) * if matrix == which { raise } else { 1.0 };
-    let [mass, damping, stiffness] = [Matrix::Mass, Matrix::Damping, Matrix::Stiffness].map(part);
-    Ok(SecondOrderSystem::new(mass, damping, stiffness)?)
-}
-
-/// The largest modulus among the eigenvalues of a system, in 1/s, as far as Arnoldi's iteration finds
-/// it.
-fn fastest(equations: &Equations) -> Result<f64, IntegrateError> {
-    let n = equations.dof();
-    let mut mass = equations.mass_only("Arnoldi", 0.0)?;
-    // The unit of time that makes the two halves of the state comparable is found on the way.
-    let mut unit = 1.0;
-    for _ in 0..4 {
-        let largest = dominant(scattered(2 * n), |state, rate| {
-            let (x, v) = state.split_at(n);
-            let (dx, dv) = rate.split_at_mut(n);
-            dx.copy_from_slice(v);
-            let v: Vec<f64> = v.iter().map(|v| v / unit).collect();
-            dv.fill(0.0);
-            // Of a linear system no solve fails.
-            let _ = mass.solve(0.0, &v, x, dv);
-            dv.iter_mut().for_each(|a| *a *= unit * unit);
-        });
-        let Some(largest) = largest else { break };
-        let rate = largest.value.norm();
-        if rate == 0.0 || (0.5..2.0).contains(&rate) {
-            return Ok(rate / unit);
-        }
-        unit /= rate;
-    }
-    Ok(1.0 / unit)
 }
 
 /// ln ρ(A), or any bound of it from above that is not greater than `enough`.

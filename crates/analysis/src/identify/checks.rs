@@ -44,7 +44,7 @@ pub enum When {
     After,
 }
 
-/// What was fitted, as far as checks differ by it.
+/// Circumstances of a fit by which its checks differ.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Scope {
     /// `false` where some equations of motion are known up to factors only.
@@ -104,7 +104,7 @@ pub(crate) fn rows(
     Ok(all.iter().map(row).collect())
 }
 
-/// What a fit takes for the response to unmeasured forces where nothing but its residual shows that.
+/// Returns the motion that a fit takes for the response to unmeasured forces where nothing but its residual shows it.
 fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding> {
     let is_of_forces = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
     let is_seen = fitted.misfit.is_none() && fitted.noise.iter().any(is_of_forces);

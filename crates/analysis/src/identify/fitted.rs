@@ -27,8 +27,8 @@ pub struct Fitted {
     pub estimator: &'static str,
     /// The checks after the fit see the bias of least squares, which another method does not have.
     pub least_squares: bool,
-    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. Where equations have no scale
-    /// ([`Unscaled`](super::Unscaled)), of one of the systems with the same modes.
+    /// Estimate with its uncertainty; with nonlinear terms, of the linear part. It is that of one of the
+    /// systems with the same modes where equations have no scale ([`Unscaled`](super::Unscaled)).
     pub estimate: Estimate,
     /// Estimate with nonlinear terms, if there are any.
     pub nonlinear: Option<WithTerms>,

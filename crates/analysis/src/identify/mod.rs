@@ -283,8 +283,8 @@ impl Identified {
     }
 
     /// Returns the estimate of M, C and K with its covariance; with nonlinear terms, of the linear part.
-    /// Where equations have no scale
-    /// ([`IdentificationSummary::unscaled`]), those of one of the systems with the same modes.
+    /// They are those of one of the systems with the same modes where equations have no scale
+    /// ([`IdentificationSummary::unscaled`]).
     pub fn estimate(&self) -> &Estimate {
         &self.fitted.estimate
     }

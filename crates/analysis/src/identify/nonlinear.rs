@@ -153,6 +153,19 @@ pub(super) fn fit(
     method: Option<Method>,
     how: &Nonlinear,
 ) -> Result<Fitted, AnalysisError> {
+    fitted(records, unknowns, rule, method, how).map_err(|error| match error {
+        AnalysisError::Setting { .. } => error,
+        other => no_period(records).unwrap_or(other),
+    })
+}
+
+fn fitted(
+    records: &[Windowed],
+    unknowns: &Unknowns,
+    rule: LineRule<'_>,
+    method: Option<Method>,
+    how: &Nonlinear,
+) -> Result<Fitted, AnalysisError> {
     let first = &records[0].held;
     let (kind, dofs) = (first.response().1, first.force.channels());
     let band = Lines::new(first.force.sampling().with_len(first.period)?, all_lines(first, rule)?)?;
@@ -163,9 +176,7 @@ pub(super) fn fit(
     let options = EquationErrorOptions { weighting: how.weighting, shape: how.search };
     let selection = select(&data, unknowns, how)?;
     let terms = selection.as_ref().map_or(&how.terms, |selection| &selection.terms);
-    let start = equation_error(&data, unknowns, terms, &options)
-        .and_then(|found| found.system().map(|_| found))
-        .map_err(|error| no_period(records).unwrap_or(AnalysisError::Estimate(error)))?;
+    let start = equation_error(&data, unknowns, terms, &options)?;
     let (estimator, estimated) = match method.unwrap_or(Method::LeastSquares) {
         Method::LeastSquares => {
             ("least squares on the equation of motion, in the frequency domain", start)
@@ -241,7 +252,7 @@ pub(super) fn fit(
     })
 }
 
-/// The reason why a fit fails whose window is one period, and does not look like one.
+/// Returns the reason why a fit fails whose window is taken for one period and does not look like one.
 fn no_period(records: &[Windowed]) -> Option<AnalysisError> {
     records.iter().find_map(|Windowed { held, .. }| {
         let looked = steady_periods(&held.force, held.response().0, held.period).ok()?;
@@ -250,8 +261,7 @@ fn no_period(records: &[Windowed]) -> Option<AnalysisError> {
         is_none.then(|| AnalysisError::Setting {
             setting: "nonlinear",
             why: format!(
-                "nonlinear terms are fitted to whole periods, and {} is none: its end does not \
-                          meet its beginning",
+                "nonlinear terms are fitted to whole periods, and {} is none: its end does not meet its beginning",
                 held.file
             ),
         })

@@ -29,7 +29,7 @@ const LEVEL: f64 = 1e-3;
 const ROUNDING: f64 = 1e-20;
 
 /// Most lines and unknown parameters for which a record is tried as an open one without being asked to, and most lines
-/// times parameters: half a minute on one processor.
+/// times parameters: an eighth of that, of two forces, takes ten seconds of one processor.
 const LINES: usize = 1 << 19;
 const PARAMETERS: usize = 100;
 const SENSITIVITIES: usize = 100 << 17;

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use mechid_estimate::checks::Subject;
+use mechid_estimate::checks::{Finding, Subject};
 use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::ResponseQuantity;
@@ -216,7 +216,8 @@ impl IdentificationSummary {
     /// Returns what in the numbers themselves speaks against them.
     pub fn doubts(&self) -> Vec<String> {
         let mut doubts = Vec::new();
-        let mut misfits = self.checks.iter().filter(|check| check.subject == Subject::Misfit);
+        let is_misfit = |check: &&CheckRow| matches!(check.finding, Finding::Misfit { .. });
+        let mut misfits = self.checks.iter().filter(is_misfit);
         // A growth within its standard errors is no warning of the checks.
         let growing = self.checks.iter().filter(|check| check.subject == Subject::Instability);
         doubts.extend(growing.filter(|check| !check.is_conspicuous()).map(CheckRow::sentence));

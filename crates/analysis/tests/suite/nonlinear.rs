@@ -449,3 +449,25 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
         assert!(wrong && left > 0.1, "{seed}: {left}");
     }
 }
+
+/// Of a window that is no period the terms may be found all the same, with a warning of its ends.
+#[test]
+fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
+    let how = Identify::default().nonlinear("k3: x1^3".parse().unwrap());
+    let mut refused = 0;
+    for seed in 0..6 {
+        match identify(&[random_motion(3e7, seed)], &how) {
+            Ok(found) => {
+                let warned = found.checks().iter().any(|check| check.is_conspicuous());
+                assert!(warned, "{seed}: {found}");
+            }
+            Err(error) => {
+                let is_named = error.to_string().contains("its end does not meet its beginning");
+                // By chance the ends of some windows meet.
+                assert!(is_named || matches!(error, AnalysisError::Diverges { .. }), "{error}");
+                refused += usize::from(is_named);
+            }
+        }
+    }
+    assert!(refused > 0);
+}

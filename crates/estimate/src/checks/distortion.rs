@@ -10,8 +10,8 @@ use crate::nonlinear::{Level, distortion};
 use crate::{EstimateError, Unknowns};
 
 /// Looks for the nonlinear term that explains most of what a linear model leaves of whole periods of force (N) and
-/// response of one or several experiments on the lines of a band ([`Finding::Distortion`]); `None` unless it explains half of that, and noise does
-/// not.
+/// response of one or several experiments on the lines of a band ([`Finding::Distortion`]); `None` unless it explains
+/// half of that, and noise does not.
 ///
 /// # Errors
 /// The errors of [`distortion`].

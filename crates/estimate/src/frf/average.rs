@@ -151,7 +151,7 @@ impl FrfAverage {
     /// from what the stronger force does; the responses to them would be those to the noise of their channels.
     ///
     /// # Source
-    /// That of [`FrfAverage::idle_inputs`].
+    /// The source of [`FrfAverage::idle_inputs`].
     pub fn following_inputs(&self) -> Vec<Crosstalk> {
         let mut acting: Vec<usize> = (0..self.inputs).collect();
         let mut following = Vec::new();

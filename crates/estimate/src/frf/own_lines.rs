@@ -36,9 +36,9 @@ pub struct Crosstalk {
 impl OwnLines {
     /// Responses from averages of all forces, one average over the lines of each force in turn.
     ///
-    /// What another force has in common with the driver of a line, beyond what noise of its channel might, acts on
-    /// the machine: its part of the response is taken off, with the responses to it interpolated between its own
-    /// lines. What the interpolation may miss is added to the variance.
+    /// Another force that has more in common with the driver of a line than noise of its channel might acts on the
+    /// machine there: its part of the response is taken off, with the responses to it interpolated between its own
+    /// lines. The error that the interpolation may have is added to the variance.
     ///
     /// # Errors
     /// [`EstimateError::Size`] unless there is an average of all forces for each of them, and as [`FrfAverage::frf`].

@@ -110,8 +110,8 @@ fn levelled(power: &DMatrix<f64>, variance: &DMatrix<f64>, first: usize) -> DMat
     scaled
 }
 
-/// Weights of rows by which a residual counts as the response of the linear part to it; `None` as of
-/// [`variance_of_response`].
+/// Weights of rows by which a residual counts as the response of the linear part to it; `None` if the coefficients make
+/// no system with a response.
 pub(super) fn as_response(equations: &Equations<'_>, coefficients: &[f64]) -> Option<DMatrix<f64>> {
     let variance = variance_of_response(equations, coefficients)?;
     Some(equations.unit.zip_map(&variance, |unit, v| unit / v.sqrt()))

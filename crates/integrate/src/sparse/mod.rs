@@ -58,7 +58,7 @@ impl NotFactored {
 
 /// A sparse matrix factored once for many solves.
 pub(crate) enum SparseLu {
-    /// After reordering to a narrow band.
+    /// Factors after reordering to a narrow band.
     Banded {
         /// The order of that band.
         ordering: Ordering,
@@ -67,11 +67,11 @@ pub(crate) enum SparseLu {
         /// The right-hand side in that order.
         scratch: Vec<f64>,
     },
-    /// Of a matrix that is symmetric and positive definite.
+    /// Factors of a matrix that is symmetric and positive definite.
     Symmetric(Box<CholeskyFactors>),
-    /// Of a matrix with a pattern that is nearly symmetric, and pivots that need no exchanges.
+    /// Factors of a matrix with a pattern that is nearly symmetric, and pivots that need no exchanges.
     Unsymmetric(Box<UnsymmetricFactors>),
-    /// Of any pattern.
+    /// Factors of a matrix of any pattern.
     General(Box<GeneralLu<f64>>),
 }
 

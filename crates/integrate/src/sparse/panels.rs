@@ -7,8 +7,8 @@ use faer::sparse::linalg::cholesky::{SymbolicCholesky, SymbolicCholeskyRaw};
 /// Widths of panels, the widest first.
 const WIDTHS: [usize; 4] = [8, 4, 2, 1];
 
-/// A lower triangular factor L, such as that of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is looked up
-/// for a row serves all columns of the panel, whose entries stand side by side.
+/// A lower triangular factor L, such as that of L Lᵀ, cut into panels of columns whose rows are nearly the same: what is
+/// looked up for a row serves all columns of the panel, whose entries stand side by side.
 ///
 /// # Source
 /// Ng and Peyton (1993), SIAM Journal on Scientific Computing 14, 1034–1056; Ashcraft and Grimes (1989), ACM

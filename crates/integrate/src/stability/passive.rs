@@ -19,9 +19,11 @@ const NEGATIVE: f64 = 1e-13;
 /// Largest number of Lanczos steps.
 const LANCZOS_STEPS: usize = 100;
 
-/// Precision to which the largest eigenvalue is enclosed, and the part by which an upper end that is none is raised.
+/// Precision to which the largest eigenvalue is enclosed, the part by which an upper end that is none is raised first,
+/// and the most times that it is raised, by twice as much each time, and that an interval is halved.
 const ENCLOSED: f64 = 1e-4;
 const RAISED: f64 = 0.01;
+const MOST_TIMES: usize = 64;
 
 /// Returns whether M is symmetric and positive definite, C and K symmetric and positive semidefinite,
 /// as far as diagonal dominance or factorisations without exchanges can prove it.
@@ -156,10 +158,18 @@ impl Top {
             return 0.0;
         }
         high *= 1.0 + ENCLOSED;
-        while high.is_finite() && !is_below(system, which, high) {
-            (low, high) = (high, high * (1.0 + RAISED));
+        let mut raised = RAISED;
+        for _ in 0..MOST_TIMES {
+            if is_below(system, which, high) {
+                break;
+            }
+            (low, high) = (high, high * (1.0 + raised));
+            raised *= 2.0;
         }
-        while high - low > ENCLOSED * low {
+        for _ in 0..MOST_TIMES {
+            if high - low <= ENCLOSED * low {
+                break;
+            }
             let middle = 0.5 * (low + high);
             *(if is_below(system, which, middle) { &mut high } else { &mut low }) = middle;
         }
