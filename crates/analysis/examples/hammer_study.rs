@@ -4,7 +4,8 @@
 //! ```text
 //! cargo run --release -p mechid-analysis --example hammer_study -- 1000 100
 //! ```
-//! counts the hits of 1,000 tests and fits 100 of them.
+//! counts the hits of 1,000 tests and fits 100 of them; a third argument is the noise on the force, in N, of the rows
+//! that are made.
 #![allow(clippy::print_stdout, reason = "a study prints its table")]
 
 use mechid_analysis::identify::{Band, LineChoice};
@@ -26,6 +27,7 @@ const PEAK: f64 = 200.0;
 fn main() {
     let count = |at: usize| std::env::args().nth(at).and_then(|count| count.parse().ok());
     let (tests, fits) = (count(1).unwrap_or(200), count(2).unwrap_or(20));
+    let wanted: Option<f64> = std::env::args().nth(3).and_then(|level| level.parse().ok());
     println!(
         "{tests} tests of 15 hits, 6 of them bad, {} % of noise on the response; {fits} fitted, and as many \
          with hits on the first mass alone",
@@ -42,6 +44,9 @@ fn main() {
         (ResponseQuantity::Acceleration, 0.1),
         (ResponseQuantity::Acceleration, 0.2),
     ] {
+        if wanted.is_some_and(|level| level != force_noise) {
+            continue;
+        }
         for points in [3, 1] {
             study(quantity, force_noise, points, tests, fits);
         }

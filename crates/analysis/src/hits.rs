@@ -1,6 +1,7 @@
 //! Records of a hammer test, cut into their hits.
 
 use std::fmt;
+use std::ops::Range;
 
 use mechid_signal::{Hit, HitFault, HitRule, Hits, Record, hits, message};
 use serde::Serialize;
@@ -187,12 +188,12 @@ fn is_still(held: &Block, dof: usize, found: &Hits) -> bool {
 }
 
 /// Noise of the force in the window of a hit, which is set to zero away from the pulse.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct HitNoise {
     /// Standard deviation between the hits, in N.
     pub deviation: f64,
-    /// Part of the samples of the window that belong to the pulse, a ratio.
-    pub share: f64,
+    /// Samples of the window that belong to the pulse, counted from 0.
+    pub pulse: Range<usize>,
 }
 
 impl Cut {
@@ -237,9 +238,9 @@ pub(crate) fn cut(records: &[Windowed], rule: &HitRule) -> Result<Cut, AnalysisE
             let mut pulse = held.force.window(hit.window.start, hit.window.len())?.into_data();
             pulse.fill(0.0);
             let alone = found.pulse_alone(force, hit);
-            let samples = alone.iter().filter(|f| **f != 0.0).count() as f64;
-            all.noise
-                .push(HitNoise { deviation: found.noise, share: samples / alone.len() as f64 });
+            let first = alone.iter().position(|f| *f != 0.0).unwrap_or(0);
+            let last = alone.iter().rposition(|f| *f != 0.0).unwrap_or(first);
+            all.noise.push(HitNoise { deviation: found.noise, pulse: first..last + 1 });
             pulse.column_mut(dof).copy_from_slice(&alone);
             let pulse = Record::new(held.force.sampling().with_len(hit.window.len())?, pulse)?;
             let mut part = record.part(hit.window.clone(), pulse)?;

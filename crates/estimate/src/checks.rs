@@ -16,6 +16,7 @@ mod instability;
 mod kinematics;
 mod leakage;
 mod linearity;
+mod mass;
 mod period;
 mod power;
 mod range;
@@ -43,6 +44,7 @@ pub use instability::instability;
 pub use kinematics::kinematics;
 pub use leakage::leakage;
 pub use linearity::linearity;
+pub use mass::negative_mass;
 pub use period::claimed_period;
 pub use power::power;
 pub use range::{clipped_channels, constant_channels, quantised_channels, spiked_channels};
@@ -97,6 +99,8 @@ pub enum Subject {
     Bias,
     /// Free responses of the identified system that grow.
     Instability,
+    /// Sign of the masses.
+    Mass,
     /// Symmetry of the mass matrix.
     Symmetry,
     /// Residual power against the noise.

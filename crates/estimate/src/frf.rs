@@ -16,7 +16,7 @@ use self::cross_spectra::CrossSpectra;
 pub use self::fit::{ResponseEstimate, output_error_of_responses};
 pub use self::own_lines::{Crosstalk, OwnLines};
 use self::scatter::Scatter;
-pub use self::segments::{Segments, Window};
+pub use self::segments::Segments;
 use crate::EstimateError;
 use crate::frequency_domain::{FrequencyData, Lines};
 
@@ -145,6 +145,61 @@ impl Frf {
             averages,
             scatter: None,
         })
+    }
+
+    /// Measured elsewhere, as averages over so many segments: as [`Frf::new`], with the lines of a segment, and
+    /// the standard errors of real and imaginary part alike (motions × forces, in the unit of the responses) where
+    /// they are known. Forces, and what they leave of the motions, are taken as uncorrelated.
+    ///
+    /// # Errors
+    /// As [`Frf::new`], and [`EstimateError::Hop`].
+    ///
+    /// # Source
+    /// Welch (1967); Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9.
+    pub fn of_segments(
+        lines: &Lines,
+        response: Vec<ComplexMatrix>,
+        coherence: DMatrix<f64>,
+        standard_error: Option<&[DMatrix<f64>]>,
+        (segments, count): (Segments, usize),
+        measured: ResponseQuantity,
+    ) -> Result<Self, EstimateError> {
+        let averages = segments.averages(count)?;
+        let coherence = match standard_error {
+            // No error follows from it.
+            Some(_) => coherence.map(|c| c.max(f64::MIN_POSITIVE)),
+            None => coherence,
+        };
+        let mut frf = Self::new(lines.omega(), response, coherence, averages, measured)?;
+        let size = crate::least_squares::size;
+        size("samples of a segment", segments.samples(), lines.sampling().len())?;
+        frf.lines = lines.as_slice().to_vec();
+        frf.line_correlation = segments.line_correlation(count);
+        if let Some(errors) = standard_error {
+            size("matrices of standard errors", frf.omega.len(), errors.len())?;
+            for (variance, errors) in frf.variance.iter_mut().zip(errors) {
+                size("rows of a matrix of standard errors", variance.nrows(), errors.nrows())?;
+                size("columns of a matrix of standard errors", variance.ncols(), errors.ncols())?;
+                *variance = errors.map(|error| 2.0 * error * error);
+            }
+        }
+        let diagonal = |values: &mut dyn Iterator<Item = f64>| {
+            let values: Vec<Complex<f64>> = values.map(Complex::from).collect();
+            ComplexMatrix::from_diagonal(&values.into())
+        };
+        let left = |v: &DMatrix<f64>| diagonal(&mut v.column(0).iter().map(|v| v * averages));
+        let of_force = |v: &DMatrix<f64>| {
+            let power = v.column(0).norm_squared();
+            let share = |input: usize| match power > 0.0 {
+                true => v.column(input).dot(&v.column(0)) / power,
+                false => 1.0,
+            };
+            diagonal(&mut (0..v.ncols()).map(share))
+        };
+        let unexplained = frf.variance.iter().map(left).collect();
+        let inverse_force = frf.variance.iter().map(of_force).collect();
+        frf.scatter = Some(Scatter::new(&frf, unexplained, inverse_force, segments));
+        Ok(frf)
     }
 
     /// Adds a line; returns the covariance of what the forces leave of the motions, and S_FF⁻¹.

@@ -54,11 +54,12 @@ pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
 pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
 pub use frf::{
-    Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, ResponseEstimate, Segments, Window,
+    Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, ResponseEstimate, Segments,
     output_error_of_responses,
 };
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
+pub use mechid_signal::Window;
 pub use modal::{IdentifiedMode, Uncertain, identified_modes};
 pub use prediction::{
     StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,

@@ -126,6 +126,26 @@ impl NoiseSpectrum {
         })
     }
 
+    /// The same noise and beside it white noise of these variances on the samples of each channel, 2n: motions in
+    /// the square of the unit measured, forces in N².
+    pub(crate) fn with_more(
+        mut self,
+        variance: &[f64],
+        measured: ResponseQuantity,
+        samples: usize,
+    ) -> Self {
+        let n = self.dof();
+        for (c, omega) in self.covariance.iter_mut().zip(&self.omega) {
+            let per_displacement = measured.per_displacement(*omega).norm_sqr();
+            for (channel, variance) in variance.iter().enumerate() {
+                let unit = if channel < n { per_displacement } else { 1.0 };
+                let on_lines = variance_on_lines(variance.sqrt(), samples);
+                c[(channel, channel)] += Complex::from(on_lines / unit);
+            }
+        }
+        self
+    }
+
     /// The same noise with the force taken as known exactly.
     pub fn with_exact_force(mut self) -> Self {
         let n = self.dof();

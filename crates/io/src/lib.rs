@@ -63,7 +63,8 @@ pub use parquet::{
     parquet_bytes, read_parquet_metadata, read_parquet_rows, write_parquet,
 };
 pub use responses::{
-    ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
+    ADDED_DECAY, AveragedSegments, CoherenceFunction, DERIVATIVE, FrequencyResponses,
+    ResponseFunction, derivative,
 };
 pub use standard::{input_name, is_standard_output, output_name};
 pub use system::{

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use mechid_model::ResponseQuantity;
+use mechid_signal::Window;
 use nalgebra::Complex;
 
 use crate::limits::ReadOptions;
@@ -16,9 +17,10 @@ use crate::{IoError, Table, uff};
 /// `h_i_j_imaginary`, or `h_i_j_magnitude` with `h_i_j_phase_deg` or `h_i_j_phase_rad`; beside it may
 /// stand `h_i_j_standard_error` and the coherence, `coherence_i` (of the response to all forces) or
 /// `coherence_i_j`. A text with one response may leave `h_i_j_` and `_i` out. This is what
-/// `mechid frf --output` writes. Two further columns have one number in all rows: `time_derivative` says what was
+/// `mechid frf --output` writes. Further columns have one number in all rows: `time_derivative` says what was
 /// measured (0 displacement, 1 velocity, 2 acceleration), `added_decay` what an exponential window adds to the decay
-/// of every mode, in 1/s.
+/// of every mode, in 1/s, and `segment_samples`, `segment_hop`, `segments`, `segment_window` (0 whole periods,
+/// 1 Hann, 2 Hamming, 3 Blackman, 4 rectangular) and `sample_rate_hz` what the responses are averages over.
 ///
 /// A universal file has a dataset 58 or 58b per response (function type 4) and coherence (6); its
 /// points are nodes with a direction, such as `12+Z`. Units stated in dataset 164 become SI units.
@@ -46,9 +48,60 @@ pub struct FrequencyResponses {
     /// Rate, in 1/s, that an exponential window on force and response adds to the decay of every mode; `None`
     /// without one, or if the file does not state it.
     pub added_decay: Option<f64>,
+    /// Segments of a record that the responses are averages over; `None` if the file does not state them.
+    pub segments: Option<AveragedSegments>,
     /// Remarks on what was left out or converted.
     pub remarks: Vec<String>,
 }
+
+/// Segments of a record that frequency responses are averages over.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AveragedSegments {
+    /// Number of samples in a segment.
+    pub samples: usize,
+    /// Number of samples from the start of one to that of the next.
+    pub hop: usize,
+    /// Number of segments.
+    pub count: usize,
+    /// Window that weights their samples; `None` for whole periods.
+    pub window: Option<Window>,
+    /// Sampling rate, in Hz.
+    pub sample_rate_hz: f64,
+}
+
+impl AveragedSegments {
+    /// Names of the columns that state them, in the order of [`AveragedSegments::numbers`].
+    pub const COLUMNS: [&str; 5] =
+        ["segment_samples", "segment_hop", "segments", "segment_window", "sample_rate_hz"];
+
+    /// Numbers as the columns have them: samples, hop, number, code of the window, and rate in Hz.
+    pub fn numbers(&self) -> [f64; 5] {
+        let code = self.window.and_then(|window| Window::ALL.iter().position(|one| *one == window));
+        let code = code.map_or(0, |at| at + 1);
+        let [samples, hop, count, window] =
+            [self.samples, self.hop, self.count, code].map(|number| number as f64);
+        [samples, hop, count, window, self.sample_rate_hz]
+    }
+
+    /// Returns the segments that such numbers state; `None` if they state none that are possible.
+    pub fn of_numbers(numbers: [f64; 5]) -> Option<Self> {
+        let [samples, hop, count, window, sample_rate_hz] = numbers;
+        let whole = |value: f64, least: f64| {
+            let is_whole = value.fract() == 0.0 && (least..=MOST_SAMPLES).contains(&value);
+            is_whole.then_some(value as usize)
+        };
+        let window = match whole(window, 0.0)? {
+            0 => None,
+            code => Some(*Window::ALL.get(code - 1)?),
+        };
+        let (samples, hop, count) = (whole(samples, 2.0)?, whole(hop, 1.0)?, whole(count, 1.0)?);
+        let possible = hop <= samples && sample_rate_hz.is_finite() && sample_rate_hz > 0.0;
+        possible.then_some(Self { samples, hop, count, window, sample_rate_hz })
+    }
+}
+
+/// Largest number of samples that a file is believed to state.
+const MOST_SAMPLES: f64 = 9e15;
 
 /// Response at one point per unit force at another, frequency by frequency.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,6 +185,11 @@ impl FrequencyResponses {
         });
         responses.functions.iter_mut().for_each(|function| function.quantity = quantity);
         responses.added_decay = constant(table, ADDED_DECAY)?.filter(|rate| *rate > 0.0);
+        let mut numbers = [f64::NAN; 5];
+        for (number, name) in numbers.iter_mut().zip(AveragedSegments::COLUMNS) {
+            *number = constant(table, name)?.unwrap_or(f64::NAN);
+        }
+        responses.segments = AveragedSegments::of_numbers(numbers);
         Ok(responses)
     }
 

@@ -73,6 +73,7 @@ impl ResponseTable {
             coherence: points.iter().enumerate().filter_map(of_point).collect(),
             functions,
             added_decay: None,
+            segments: None,
             remarks: Vec::new(),
         }))
     }

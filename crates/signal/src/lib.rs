@@ -36,10 +36,12 @@
 //! | mean, level and extremes of samples that are not all held | [`RunningStatistics`] |
 //! | the period of a record that repeats | [`repetition()`] |
 //! | the level at which a channel is clipped | [`clipping()`] |
+//! | the steps of the values of a channel | [`quantisation_step()`] |
 //! | the hits of a hammer, good and bad | [`hits()`] |
 //! | disturbances at a stated level | [`noise`] |
 //! | values between samples | [`resample`] |
 //! | transforms planned once for many records | [`transform`] |
+//! | weights of the samples of a piece | [`Window`] |
 //! | numbers and counts in sentences | [`message`] |
 
 mod clipping;
@@ -57,6 +59,7 @@ pub mod multi_input;
 mod multisine;
 pub mod noise;
 pub mod phases;
+mod quantisation;
 mod record;
 mod repetition;
 pub mod resample;
@@ -64,6 +67,7 @@ mod sampling;
 pub mod spectrum;
 mod statistics;
 pub mod transform;
+mod window;
 
 pub use clipping::{Clipping, clipping};
 pub use crest::CrestSearch;
@@ -75,9 +79,11 @@ pub use hits::{Hit, HitFault, HitRule, Hits, hits};
 pub use multisine::Multisine;
 pub use noise::NoiseLevel;
 pub use phases::Phases;
+pub use quantisation::quantisation_step;
 pub use record::Record;
 pub use repetition::{Repetition, repetition};
 pub use resample::{Interpolation, Interpolator};
 pub use sampling::Sampling;
 pub use spectrum::Spectrum;
 pub use statistics::RunningStatistics;
+pub use window::Window;

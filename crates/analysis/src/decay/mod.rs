@@ -1,6 +1,7 @@
 //! Modes of a free response: a record in which no force acts.
 
 mod release;
+mod steps;
 pub mod summary;
 
 use std::fmt;
@@ -12,10 +13,12 @@ use mechid_signal::Record;
 use serde::{Deserialize, Serialize, Serializer};
 
 use self::release::release;
+use self::steps::last_shown;
 pub use self::summary::DecaySummary;
 use crate::AnalysisError;
 use crate::identify::prediction::Compared;
 use crate::measurement::{Block, Measurement, Window};
+use crate::text::significant;
 
 /// Settings of an analysis of a free decay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -23,7 +26,8 @@ use crate::measurement::{Block, Measurement, Window};
 pub struct DecaySettings {
     /// Beginning of the decay, in s from the first sample of the window; `None`: found in the record.
     pub from_s: Option<f64>,
-    /// End of what is used, in s from the first sample of the window; `None`: the end of the window.
+    /// End of what is used, in s from the first sample of the window; `None`: the end of the window, or where rounding
+    /// takes over.
     pub to_s: Option<f64>,
     /// Number of modes; `None`: as many as the record shows.
     pub modes: Option<usize>,
@@ -56,7 +60,8 @@ pub struct Decayed {
 ///
 /// The record needs no force column, and one that is named is not read. All channels are of one kind of
 /// response. Unless its beginning is given, the decay begins with the last sample at which the sum of the
-/// squares of all channels, each over its own power, is at least 80 % of the largest.
+/// squares of all channels, each over its own power, is at least 80 % of the largest. Unless its end is given, it ends
+/// where a channel falls to twelve of the steps in which its values come, if they do.
 ///
 /// ```
 /// use mechid_analysis::{Channels, DecaySettings, Measurement, ResponseQuantity, decay};
@@ -82,9 +87,23 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
         None => release(record),
     };
     let record = record.window(release, record.len() - release)?;
+    let last = if how.to_s.is_none() { last_shown(&record) } else { None };
+    let record = match last {
+        Some(last) => record.window(0, last.samples)?,
+        None => record,
+    };
     let estimate = free_decay(&record, &how.fit())?;
     let first_sample = whole.first_sample + release;
-    let summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
+    let mut summary = DecaySummary::new(measurement, &whole, kind, first_sample, &estimate, how)?;
+    summary.remarks.extend(last.map(|last| {
+        let (column, unit) = (&summary.channels[last.channel].column, summary.unit);
+        format!(
+            "the first {} s of the decay are used: then {column} falls to a few steps of {} {unit}, in which its values come, and \
+             what rounding leaves of it is no longer its motion (`to` sets another end)",
+            significant(last.samples as f64 * record.sampling().dt(), 4),
+            significant(last.step, 3)
+        )
+    }));
     let predicted = estimate.fitted().clone();
     let names = summary.channels.iter().map(|channel| channel.column.clone()).collect();
     let compared = Compared { kind, names, measured: record, predicted };

@@ -1,6 +1,7 @@
 //! Frequency responses of a record: response per unit force, frequency by frequency.
 
 mod of_hits;
+mod peak;
 mod segment_length;
 pub mod table;
 mod whole;
@@ -99,7 +100,7 @@ pub fn frf_of_records(
     let mut table = FrfTable::new(&records, &responses, how);
     table.remarks.extend(chosen.map(|(_, remark)| remark));
     if matches!(responses.segments, Segments::Windowed { .. }) {
-        table.remarks.extend(table.blunt());
+        table.remarks.extend(table.blunt(&responses));
     }
     Ok(table)
 }

@@ -3,6 +3,7 @@
 use mechid_estimate::FrfEstimator;
 use mechid_estimate::frequency_domain::Lines;
 
+use super::peak::Peak;
 use super::{Segmentation, average_of};
 use crate::AnalysisError;
 use crate::identify::left_out::LineRule;
@@ -14,6 +15,9 @@ const SHORTEST: usize = 64;
 /// Independent averages beyond the number of forces at least.
 const AVERAGES: f64 = 5.0;
 
+/// Number of lines within half the power of a peak from which it is more than the window makes of any.
+const TOLD: usize = 3;
+
 /// Part of the most information that is enough: of segments that say nearly as much the shorter ones have more
 /// averages.
 const ENOUGH: f64 = 0.9;
@@ -24,7 +28,8 @@ impl Segmentation {
     ///
     /// The length is the shortest of the powers of two, as far as they leave averages enough, whose responses say at
     /// least nine tenths of what the best say, by their coherence, averages and number of lines
-    /// ([`Frf::information`](mechid_estimate::Frf::information)). The samples held in memory are looked at.
+    /// ([`Frf::information`](mechid_estimate::Frf::information)); or a longer one in which the narrowest of the largest
+    /// peaks is three lines wide, if there is one. The samples held in memory are looked at.
     ///
     /// # Errors
     /// The errors of an average over segments.
@@ -37,7 +42,7 @@ impl Segmentation {
         if self.segment.is_some() {
             return Ok(None);
         }
-        let mut tried: Vec<(usize, f64)> = Vec::new();
+        let mut tried: Vec<(usize, f64, bool)> = Vec::new();
         let mut len = SHORTEST;
         while 2 * len <= held.force.len() {
             let how = Self { segment: Some(len), ..self.clone() };
@@ -50,18 +55,26 @@ impl Segmentation {
                 if frf.averages() < AVERAGES + held.driven.len() as f64 {
                     break;
                 }
-                tried.push((len, frf.information()));
+                let is_told = Peak::narrowest(&frf).is_none_or(|peak| peak.lines >= TOLD);
+                tried.push((len, frf.information(), is_told));
             }
             len *= 2;
         }
-        let most = tried.iter().map(|(_, information)| *information).fold(0.0, f64::max);
-        let enough = tried.iter().find(|(_, information)| *information >= ENOUGH * most);
-        Ok(enough.map(|(len, _)| {
-            let remark = format!(
-                "segments of {len} samples were chosen: the shortest whose coherence, averages and lines say nine \
-                 tenths of what those of any length say"
-            );
-            (Self { segment: Some(*len), ..self.clone() }, remark)
-        }))
+        let most = tried.iter().map(|(_, information, _)| *information).fold(0.0, f64::max);
+        let Some(enough) =
+            tried.iter().position(|(_, information, _)| *information >= ENOUGH * most)
+        else {
+            return Ok(None);
+        };
+        let told = tried[enough..].iter().find(|(.., is_told)| *is_told);
+        let (len, ..) = *told.unwrap_or(&tried[enough]);
+        let why = match len > tried[enough].0 {
+            false => {
+                "whose coherence, averages and lines say nine tenths of what those of any length say"
+            }
+            true => "in which the narrowest peak is wider than the window makes any",
+        };
+        let remark = format!("segments of {len} samples were chosen: the shortest {why}");
+        Ok(Some((Self { segment: Some(len), ..self.clone() }, remark)))
     }
 }

@@ -6,13 +6,15 @@ use std::fmt::{self, Write as _};
 
 use mechid_estimate::{Segments, Window};
 use mechid_io::{
-    ADDED_DECAY, CoherenceFunction, DERIVATIVE, FrequencyResponses, ResponseFunction, derivative,
+    ADDED_DECAY, AveragedSegments, CoherenceFunction, DERIVATIVE, FrequencyResponses,
+    ResponseFunction, derivative,
 };
 use mechid_signal::message;
 use nalgebra::Complex;
 use serde::Serialize;
 
 use super::of_hits::OfHits;
+use super::peak::Peak;
 use super::{FrfSettings, Interleaved, Responses};
 use crate::AnalysisError;
 use crate::hits::{HitRow, heading};
@@ -83,7 +85,7 @@ pub struct SegmentRow {
     /// Number of samples from the start of one to that of the next.
     pub hop: usize,
     /// `None` for whole periods.
-    pub window: Option<&'static str>,
+    pub window: Option<Window>,
     /// Number of segments, of all records together.
     pub count: usize,
     /// Equivalent number of independent averages, a pure number.
@@ -120,11 +122,8 @@ pub struct Coherence {
     pub values: Vec<f64>,
 }
 
-/// Part of a peak at which its width is taken: half its power.
-const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;
-
-/// Lines within that width from which a peak is resolved: under Hann's window a single line has one or two.
-const RESOLVED: usize = 4;
+/// Number of lines within half the power of a peak from which a window hardly widens it.
+const WIDE: usize = 4;
 
 impl FrfTable {
     pub(super) fn new(records: &[Windowed], averaged: &Responses, how: &FrfSettings) -> Self {
@@ -243,24 +242,18 @@ impl FrfTable {
         }
     }
 
-    /// Returns a remark on the largest peak of a response that is narrower than the window shows.
-    pub(super) fn blunt(&self) -> Option<String> {
-        let width = |response: &Response| {
-            let (at, peak) = response.peak();
-            let is_high = |place: &usize| response.magnitude[*place] > HALF_POWER * peak;
-            let lines = (0..at).rev().take_while(is_high).count()
-                + (at..response.magnitude.len()).take_while(is_high).count();
-            let inside = at > 0 && at + 1 < response.magnitude.len();
-            (inside && lines < RESOLVED).then_some((lines, at))
-        };
-        let widths = self.responses.iter().filter_map(|one| width(one).map(|found| (found, one)));
-        let ((lines, at), response) = widths.min_by_key(|(found, _)| found.0)?;
+    /// Returns a remark on a peak that the window widens; `averaged` are the responses of the table.
+    pub(super) fn blunt(&self, averaged: &Responses) -> Option<String> {
+        let peak = Peak::narrowest(&averaged.frf).filter(|peak| peak.lines < WIDE)?;
+        let force = averaged.driven[peak.input] + 1;
+        let response =
+            self.responses.iter().find(|r| (r.motion, r.force) == (peak.motion + 1, force))?;
         Some(format!(
-            "the peak of {} at {} Hz is {} wide, as narrow as the window shows any: it is blunt, and a damping ratio \
-             read from it too large; a longer `segment` shows more of it",
+            "the peak of {} at {} Hz is {} wide: the window makes it blunt, and a damping ratio read from it is too \
+             large; a longer `segment` shows more of it",
             self.pair(response),
-            significant(self.frequency_hz[at], 5),
-            message::count(lines, "line")
+            significant(self.frequency_hz[peak.at], 5),
+            message::count(peak.lines, "line")
         ))
     }
 
@@ -347,7 +340,7 @@ impl FrfTable {
     /// lines of its own.
     pub fn to_responses(&self, points: &[String]) -> Result<FrequencyResponses, AnalysisError> {
         let dofs = self.coherence.len();
-        if self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan()) {
+        if self.is_interleaved() {
             let why = "every force has lines of its own, and this format has the same frequencies for all \
                        functions: write a .csv file";
             return Err(AnalysisError::Setting { setting: "output", why: why.into() });
@@ -383,14 +376,26 @@ impl FrfTable {
             file: self.file.clone(),
             frequency_hz: self.frequency_hz.clone(),
             added_decay: self.added_decay,
+            segments: Some(self.averaged()),
             functions: functions.collect(),
             coherence: coherence.collect(),
             remarks: Vec::new(),
         })
     }
 
-    /// One row per frequency; fields are empty where another force has the line to itself. What was measured, and
-    /// the decay that an exponential window adds, are the same number in every row.
+    /// Returns whether every force has lines of its own.
+    fn is_interleaved(&self) -> bool {
+        self.responses.iter().flat_map(|r| &r.real).any(|value| value.is_nan())
+    }
+
+    /// Returns the segments as files state them.
+    fn averaged(&self) -> AveragedSegments {
+        let SegmentRow { samples, hop, window, count, .. } = self.segments;
+        AveragedSegments { samples, hop, count, window, sample_rate_hz: self.sample_rate_hz }
+    }
+
+    /// One row per frequency; fields are empty where another force has the line to itself. What was measured,
+    /// the decay that an exponential window adds, and the segments are the same numbers in every row.
     pub fn csv(&self) -> String {
         let mut text = String::from("frequency_hz");
         for r in &self.responses {
@@ -403,6 +408,8 @@ impl FrfTable {
         let order = self.quantity.parse().ok().map(derivative);
         let alike = [(DERIVATIVE, order), (ADDED_DECAY, self.added_decay)];
         let alike = alike.into_iter().filter_map(|(name, value)| Some((name, value?)));
+        let alike =
+            alike.chain(AveragedSegments::COLUMNS.into_iter().zip(self.averaged().numbers()));
         let mut ending = String::new();
         for (name, value) in alike {
             let _ = write!(text, ",{name}");
@@ -487,13 +494,7 @@ impl SegmentRow {
                 Self { samples, hop: samples, window: None, count, averages }
             }
             Segments::Windowed { len, hop, window } => {
-                let name = match window {
-                    Window::Hann => "hann",
-                    Window::Hamming => "hamming",
-                    Window::Blackman => "blackman",
-                    Window::Rectangular => "rectangular",
-                };
-                Self { samples: len, hop, window: Some(name), count, averages }
+                Self { samples: len, hop, window: Some(window), count, averages }
             }
         }
     }

@@ -3,7 +3,7 @@
 use mechid_estimate::IdentifiedMode;
 use mechid_estimate::checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
-    constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, power,
+    constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, negative_mass, power,
     quantised_channels, spiked_channels,
 };
 use mechid_estimate::frequency_domain::NoiseModel;
@@ -81,6 +81,7 @@ pub(crate) fn rows(
     add(When::After, None, instability(modes).as_slice());
     add(When::After, None, unmeasured_force(fitted, unexplained).as_slice());
     if scaled {
+        add(When::After, None, negative_mass(&fitted.estimate).as_slice());
         add(When::After, None, mass_symmetry(&fitted.estimate).as_slice());
         add(When::After, None, gain_symmetry(&fitted.estimate).as_slice());
     }

@@ -1,5 +1,7 @@
 //! Noise of the forces of a record that does not show it by its scatter.
 
+use std::ops::Range;
+
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_signal::noise_above_band;
 use serde::Serialize;
@@ -20,9 +22,9 @@ pub struct ForceNoise {
     pub levels_n: Vec<Option<f64>>,
     /// Source of the levels.
     pub source: ForceNoiseSource,
-    /// Part of the samples that have the noise, a ratio: those of the pulse of a hit, otherwise all.
+    /// Samples of the pulse of a hit, counted from 0, which alone have the noise.
     #[serde(skip)]
-    share: f64,
+    pulse: Option<Range<usize>>,
 }
 
 /// Source of the noise level of a force.
@@ -47,17 +49,17 @@ impl ForceNoise {
         stated: Option<&[f64]>,
         hit: Option<&HitNoise>,
     ) -> Result<Self, AnalysisError> {
-        let share = hit.map_or(1.0, |hit| hit.share);
+        let pulse = hit.map(|hit| hit.pulse.clone());
         let dofs = held.force.channels();
         if let Some(stated) = stated {
             let levels_n = Self::stated(held, stated)?;
-            return Ok(Self { levels_n, source: ForceNoiseSource::Stated, share });
+            return Ok(Self { levels_n, source: ForceNoiseSource::Stated, pulse });
         }
         let driven = |dof: &usize| held.driven.contains(dof);
         if let Some(hit) = hit {
             let level = |dof: usize| Some(if driven(&dof) { hit.deviation } else { 0.0 });
             let levels_n = (0..dofs).map(level).collect();
-            return Ok(Self { levels_n, source: ForceNoiseSource::BetweenHits, share });
+            return Ok(Self { levels_n, source: ForceNoiseSource::BetweenHits, pulse });
         }
         let mut levels_n = noise_above_band(&held.force)?;
         for (dof, level) in levels_n.iter_mut().enumerate() {
@@ -65,7 +67,7 @@ impl ForceNoise {
                 *level = Some(0.0);
             }
         }
-        Ok(Self { levels_n, source: ForceNoiseSource::AboveBand, share })
+        Ok(Self { levels_n, source: ForceNoiseSource::AboveBand, pulse })
     }
 
     fn stated(held: &Block, stated: &[f64]) -> Result<Vec<Option<f64>>, AnalysisError> {
@@ -87,14 +89,20 @@ impl ForceNoise {
         Ok((0..dofs).map(|dof| Some(level(dof))).collect())
     }
 
-    /// Returns the data with this noise of the forces, of a record of so many samples.
+    /// Returns the data of a record with this noise of its forces.
     pub(super) fn known_to(
         &self,
         data: FrequencyData,
-        samples: usize,
+        held: &Block,
     ) -> Result<FrequencyData, AnalysisError> {
-        let levels = self.levels_n.iter().map(|level| level.unwrap_or(0.0) * self.share.sqrt());
-        Ok(data.with_force_noise(&levels.collect::<Vec<f64>>(), samples)?)
+        let levels: Vec<f64> = self.levels_n.iter().map(|level| level.unwrap_or(0.0)).collect();
+        let sampling = held.force.sampling();
+        Ok(match (&self.pulse, &held.driven[..]) {
+            (Some(pulse), [struck]) => {
+                data.with_pulse_noise(*struck, levels[*struck], pulse.clone(), sampling)?
+            }
+            _ => data.with_force_noise(&levels, sampling.len())?,
+        })
     }
 
     /// Returns the remark on the noise of all records.

@@ -94,7 +94,7 @@ pub(super) fn fit(
         let force_noise = ForceNoise::of(held, noise.force, hit)?;
         let data = FrequencyData::read(&lines, &held.force, motion, kind)?
             .of_open_record(held.force.sampling());
-        let data = force_noise.known_to(data, held.force.len())?;
+        let data = force_noise.known_to(data, held)?;
         of_force.push(force_noise);
         spectra.push((data, lines));
     }

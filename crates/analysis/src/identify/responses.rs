@@ -152,23 +152,28 @@ fn estimated(
             let name = "maximum likelihood on frequency responses, weighted by their coherence";
             let records: Vec<_> =
                 responses.iter().map(|r| (r.frf.clone(), r.driven.clone())).collect();
-            let ResponseEstimate { fit, responses: fitted, blunted, settled } =
-                output_error_of_responses(&records, unknowns)?;
+            let found = output_error_of_responses(&records, unknowns)?;
+            let remark = blunted(&found);
+            let ResponseEstimate { fit, responses: fitted, settled, .. } = found;
             for (response, frf) in responses.iter_mut().zip(fitted) {
                 response.frf = frf;
             }
             let misfit =
                 Misfit { ratio: fit.misfit_ratio, noise: "that follows from the coherence" };
-            let remark = (blunted > BLUNTED).then(|| {
-                format!(
-                    "the window of the segments blunts the responses: that was taken off them, by which a \
-                     parameter moves by {} standard errors",
-                    significant(blunted, 2)
-                )
-            });
             Ok(Outcome { name, estimate: fit.estimate, misfit: Some(misfit), remark, settled })
         }
     }
+}
+
+/// Returns a remark on what a window of segments does to the parameters, where it does.
+pub(super) fn blunted(found: &ResponseEstimate) -> Option<String> {
+    (found.blunted > BLUNTED).then(|| {
+        format!(
+            "the window of the segments blunts the responses: that was taken off them, by which a parameter moves \
+             by {} standard errors",
+            significant(found.blunted, 2)
+        )
+    })
 }
 
 /// Returns the findings after the fit of one record; `rows` are those of all records together.

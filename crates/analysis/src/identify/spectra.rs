@@ -10,7 +10,7 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
-use mechid_signal::{Extent, Repetition, repetition};
+use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
@@ -350,7 +350,22 @@ pub fn periods(recorded: &Windowed, lines: &Lines) -> Result<RepeatedPeriods, An
     let samples = period * recorded.at_once().div_ceil(*period);
     recorded
         .chunks(samples, samples, &mut |chunk| Ok(all.push(&chunk.force, chunk.response().0)?))?;
-    Ok(all)
+    Ok(all.with_quantisation(steps(&recorded.held))?)
+}
+
+/// Step over the RMS of a channel, below which its rounding moves no parameter.
+const FINE: f64 = 3e-5;
+
+/// Steps in which the values of the motions and of the forces come; zero where they do not, or where they are fine.
+fn steps(held: &Block) -> Vec<f64> {
+    let of = |record: &Record| -> Vec<f64> {
+        let channels = (0..record.channels()).map(|channel| {
+            let rms = record.column(channel).variance().sqrt();
+            quantisation_step(record.channel(channel)).filter(|step| *step > FINE * rms)
+        });
+        channels.map(|step| step.unwrap_or(0.0)).collect()
+    };
+    [of(held.response().0), of(&held.force)].concat()
 }
 
 /// The mean of the periods, with their noise if they show more than rounding, which may be the response of a

@@ -3,11 +3,14 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use mechid_estimate::checks::{Finding, adjust_p_values, before_spectral_fit};
+use mechid_estimate::checks::{
+    Finding, adjust_p_values, before_spectral_fit, gain_symmetry, instability, mass_symmetry,
+    negative_mass,
+};
 use mechid_estimate::frequency_domain::{
     FrequencyData, NoiseModel, Pooling, equation_error, output_error_pooling,
 };
-use mechid_estimate::{Estimate, Unknowns};
+use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
 use mechid_io::{FrequencyResponses, ParameterCovariance, SystemMatrices};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use serde::{Deserialize, Serialize};
@@ -15,6 +18,7 @@ use serde::{Deserialize, Serialize};
 use super::added_decay;
 use super::checks::{CheckRow, When};
 use super::fitted::{Misfit, unexplained_motion};
+use super::responses::blunted;
 use super::rows::{
     CONFIDENCE, ParameterRow, ProportionalDamping, carries_covariance, covariance, mode_table,
     of_covariance, parameter_table, parameters,
@@ -69,12 +73,8 @@ pub fn identify_responses(
 ) -> Result<IdentifiedResponses, AnalysisError> {
     let added_decay = added_decay::of_tables(tables)?;
     let measured = tables.iter().map(|table| Tabulated::of(table, how));
-    let measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
-    let first = measured.first().ok_or(AnalysisError::NoRecord)?;
-    let mut data = first.data.clone();
-    for other in &measured[1..] {
-        data = data.and(&other.data)?;
-    }
+    let mut measured: Vec<Tabulated> = measured.collect::<Result<_, _>>()?;
+    let mut data = joined(&measured)?;
     let driven: Vec<usize> = measured.iter().flat_map(|m| m.driven.iter().copied()).collect();
     let fit = |unknowns: &Unknowns| {
         let windowed = match added_decay {
@@ -92,12 +92,26 @@ pub fn identify_responses(
     let ((fit, of_machine, before), unscaled) = Unscaled::or_fitted(&unknowns, &driven, fit)?;
     let mut findings: Vec<(When, Option<String>, Finding)> =
         before.into_iter().map(|finding| (When::Before, None, finding)).collect();
+    if let Some(of_segments) = &fit.averaged {
+        let mut responses = of_segments.responses.iter().cloned();
+        measured.iter_mut().try_for_each(|one| one.replace(&mut responses))?;
+        data = joined(&measured)?;
+    }
+    let first = measured.first().ok_or(AnalysisError::NoRecord)?;
+    let settled = fit.averaged.as_ref().is_none_or(|averaged| averaged.settled);
     for (table, measured) in tables.iter().zip(&measured) {
         let name = (tables.len() > 1).then(|| table.file.clone());
-        for (when, finding) in measured.findings(&fit.estimate, data.len())? {
+        for (when, finding) in measured.findings(&fit.estimate, data.len(), settled)? {
             findings.push((when, name.clone(), finding));
         }
     }
+    let mut of_matrices = Vec::from_iter(instability(&of_machine.modes()?));
+    if unscaled.is_none() {
+        of_matrices.extend(negative_mass(&of_machine));
+        of_matrices.extend(mass_symmetry(&of_machine));
+        of_matrices.extend(gain_symmetry(&of_machine));
+    }
+    findings.extend(of_matrices.into_iter().map(|finding| (When::After, None, finding)));
     adjust_p_values(findings.iter_mut().map(|(_, _, finding)| finding));
     let row = |(when, name, finding): (When, Option<String>, Finding)| {
         CheckRow::new(when, name, &finding, &Channels::default())
@@ -152,6 +166,7 @@ pub fn identify_responses(
                 )
             }))
             .chain(fit.misfit.map(|misfit| misfit.to_string()))
+            .chain(fit.averaged.as_ref().and_then(blunted))
             .chain(of_covariance(estimate))
             .collect(),
         system: unscaled.is_none().then(|| SystemMatrices::from(&system)),
@@ -337,6 +352,14 @@ struct Fit {
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
+    /// Where all tables state the segments that they are averages over.
+    averaged: Option<ResponseEstimate>,
+}
+
+/// Returns the data of all tables, one after the other.
+fn joined(measured: &[Tabulated]) -> Result<FrequencyData, AnalysisError> {
+    let first = measured.first().ok_or(AnalysisError::NoRecord)?;
+    measured[1..].iter().try_fold(first.data.clone(), |data, next| Ok(data.and(&next.data)?))
 }
 
 impl Fit {
@@ -352,9 +375,20 @@ impl Fit {
         if method == Some(Method::LeastSquares) {
             let name = "least squares on frequency responses, all alike";
             let estimate = equation_error(data, unknowns)?;
-            return Ok(Self { name, estimate, misfit: None, noise: Vec::new() });
+            return Ok(Self { name, estimate, misfit: None, noise: Vec::new(), averaged: None });
         }
-        let fit = output_error_pooling(data, unknowns, Pooling::AllLines)?;
+        let averaged: Option<Vec<_>> = measured.iter().map(Tabulated::averaged).collect();
+        let averaged = match averaged {
+            Some(each) => {
+                let records: Vec<_> = each.into_iter().flatten().cloned().collect();
+                Some(output_error_of_responses(&records, unknowns)?)
+            }
+            None => None,
+        };
+        let fit = match &averaged {
+            Some(of_segments) => of_segments.fit.clone(),
+            None => output_error_pooling(data, unknowns, Pooling::AllLines)?,
+        };
         let noise = measured[0].noise;
         let name = match noise {
             Noise::Stated => {
@@ -368,6 +402,6 @@ impl Fit {
             }
         };
         let misfit = noise.source().map(|noise| Misfit { ratio: fit.misfit_ratio, noise });
-        Ok(Self { name, estimate: fit.estimate, misfit, noise: fit.noise })
+        Ok(Self { name, estimate: fit.estimate, misfit, noise: fit.noise, averaged })
     }
 }

@@ -3,11 +3,12 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use mechid_estimate::checks::{Finding, after_response_fit, coherence};
-use mechid_estimate::frequency_domain::FrequencyData;
-use mechid_estimate::{Estimate, Frf};
+use mechid_estimate::checks::{Finding, after_response_fit, coherence, leakage};
+use mechid_estimate::frequency_domain::{FrequencyData, Lines};
+use mechid_estimate::{Estimate, Frf, Segments};
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
+use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
 use super::checks::When;
@@ -43,6 +44,8 @@ pub(super) struct Tabulated {
     pub(super) data: FrequencyData,
     /// Responses with their coherence, to be checked, and the degrees of freedom of their forces.
     coherent: Coherent,
+    /// Whether these are averages over segments of which window and number are known.
+    is_averaged: bool,
 }
 
 impl Tabulated {
@@ -92,46 +95,70 @@ impl Tabulated {
         let response: Vec<_> =
             rows.iter().map(|row| matrix(&|function| function.values[*row])).collect();
         let from_responses = FrequencyData::from_responses;
-        let all = functions.iter().flatten();
-        if all.clone().all(|f| f.standard_error.is_some()) {
-            let error = |f: &ResponseFunction, row: usize| match &f.standard_error {
-                Some(errors) => Complex::from(2.0 * errors[row] * errors[row]),
-                None => Complex::default(),
-            };
-            let variance: Vec<_> =
-                rows.iter().map(|row| matrix(&|f| error(f, *row)).map(|z| z.re)).collect();
-            let data = from_responses(&omega, &response, Some(&variance), measured, &driven)?;
-            return Ok(Self { points, driven, noise: Noise::Stated, data, coherent: Vec::new() });
-        }
-        let Some(coherent) = coherent(table, how, &points, &forces, &rows, &response)? else {
-            let data = from_responses(&omega, &response, None, measured, &driven)?;
-            return Ok(Self { points, driven, noise: Noise::Unknown, data, coherent: Vec::new() });
+        let stated = functions.iter().flatten().all(|f| f.standard_error.is_some());
+        let error = |f: &ResponseFunction, row: usize| match &f.standard_error {
+            Some(errors) => Complex::from(errors[row]),
+            None => Complex::default(),
         };
-        let mut data: Option<FrequencyData> = None;
-        for (frf, dofs) in &coherent {
-            let one = frf.data(dofs)?;
-            data = Some(match data {
-                None => one,
-                Some(before) => before.and(&one)?,
-            });
+        let errors = || -> Vec<DMatrix<f64>> {
+            rows.iter().map(|row| matrix(&|f| error(f, *row)).map(|z| z.re)).collect()
+        };
+        let averaged = match how.averages {
+            None => Averaged::of(table, &rows)?,
+            Some(_) => None,
+        };
+        let (errors, is_averaged) = (stated.then(errors), averaged.is_some());
+        if is_averaged || !stated {
+            let tables = Columns { points: &points, forces: &forces, rows: &rows, measured };
+            let coherent = tables.coherent(table, how, &response, averaged, errors.as_deref())?;
+            if let Some(coherent) = coherent {
+                let data = joined(&coherent)?;
+                let noise = if stated { Noise::Stated } else { Noise::Coherence };
+                return Ok(Self { points, driven, noise, data, coherent, is_averaged });
+            }
         }
-        let data = data.ok_or(AnalysisError::NoRecord)?;
-        Ok(Self { points, driven, noise: Noise::Coherence, data, coherent })
+        let noise = if stated { Noise::Stated } else { Noise::Unknown };
+        let variance: Option<Vec<_>> =
+            errors.map(|errors| errors.iter().map(|e| e.map(|e| 2.0 * e * e)).collect());
+        let data = from_responses(&omega, &response, variance.as_deref(), measured, &driven)?;
+        let coherent = Vec::new();
+        Ok(Self { points, driven, noise, data, coherent, is_averaged: false })
     }
 
-    /// Returns the findings before and after the fit; `all` is the number of rows of all tables.
+    /// Returns the responses as averages over segments of which window and number are known, with the degrees of
+    /// freedom of their forces; `None` if the table does not state them.
+    pub(super) fn averaged(&self) -> Option<&Coherent> {
+        self.is_averaged.then_some(&self.coherent)
+    }
+
+    /// Puts other responses in the place of the averaged ones: less what their window blunts.
+    pub(super) fn replace(
+        &mut self,
+        responses: &mut dyn Iterator<Item = Frf>,
+    ) -> Result<(), AnalysisError> {
+        for ((frf, _), other) in self.coherent.iter_mut().zip(responses) {
+            *frf = other;
+        }
+        self.data = joined(&self.coherent)?;
+        Ok(())
+    }
+
+    /// Returns the findings before and after the fit; `all` is the number of rows of all tables, `settled` whether
+    /// what a window blunts was told from the machine.
     pub(super) fn findings(
         &self,
         estimate: &Estimate,
         all: usize,
+        settled: bool,
     ) -> Result<Vec<(When, Finding)>, AnalysisError> {
-        let mut findings = Vec::new();
+        let (mut findings, modes) = (Vec::new(), estimate.modes()?);
         for (frf, driven) in &self.coherent {
             let share = (driven.len() * frf.omega().len()) as f64 / all as f64;
             let fitted = share * estimate.parameters().len() as f64;
             let after = after_response_fit(frf, driven, estimate, fitted)?;
             findings.extend(coherence(frf).map(|finding| (When::Before, finding)));
-            findings.extend(after.into_iter().map(|finding| (When::After, finding)));
+            let blunt = leakage(frf, &modes, settled);
+            findings.extend(after.into_iter().chain(blunt).map(|finding| (When::After, finding)));
         }
         Ok(findings)
     }
@@ -191,57 +218,127 @@ fn rows(table: &FrequencyResponses, band: Option<Band>) -> Result<Vec<usize>, An
 }
 
 /// Frequency responses with their coherence, and the degrees of freedom of their forces.
-type Coherent = Vec<(Frf, Vec<usize>)>;
+pub(super) type Coherent = Vec<(Frf, Vec<usize>)>;
 
-/// Returns the responses with the coherence of the table: of all forces together where it is multiple,
-/// otherwise of each by itself; `None` if the table has none.
-fn coherent(
-    table: &FrequencyResponses,
-    how: &IdentifyResponses,
-    points: &[String],
-    forces: &[String],
-    rows: &[usize],
-    response: &[DMatrix<Complex<f64>>],
-) -> Result<Option<Coherent>, AnalysisError> {
-    let measured = quantity(table, how)?;
-    let omega: Vec<f64> = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
-    let of = |point: &String, force: Option<&String>| {
-        let fits = |c: &&mechid_io::CoherenceFunction| {
-            c.response == *point && c.reference.as_ref() == force
-        };
-        table.coherence.iter().find(fits).map(|c| &c.values)
-    };
-    let columns = |force: Option<&String>| -> Option<DMatrix<f64>> {
-        let each: Option<Vec<&Vec<f64>>> = points.iter().map(|point| of(point, force)).collect();
-        each.map(|each| DMatrix::from_fn(rows.len(), points.len(), |row, at| each[at][rows[row]]))
-    };
-    let together = columns(None);
-    let apart: Option<Vec<_>> = forces.iter().map(|force| columns(Some(force))).collect();
-    if together.is_none() && apart.is_none() {
-        return Ok(None);
-    }
-    let Some(averages) = how.averages else {
-        let why = format!(
-            "{} has coherences: from how many independent averages? (The standard errors follow from both)",
-            table.file
-        );
-        return Err(AnalysisError::Setting { setting: "averages", why });
-    };
-    let dof = |force: &String| points.iter().position(|point| point == force);
-    let driven: Vec<usize> = forces.iter().filter_map(dof).collect();
-    let frf = |response: Vec<DMatrix<Complex<f64>>>, coherence: DMatrix<f64>| {
-        Frf::new(omega.clone(), response, coherence, averages, measured)
-    };
-    if let Some(apart) = apart {
-        let each = apart.into_iter().enumerate().map(|(force, coherence)| {
-            let column = response.iter().map(|h| h.columns(force, 1).into_owned()).collect();
-            Ok((frf(column, coherence)?, vec![driven[force]]))
+/// Returns responses, one after the other, as data of one fit.
+fn joined(coherent: &Coherent) -> Result<FrequencyData, AnalysisError> {
+    let mut data: Option<FrequencyData> = None;
+    for (frf, dofs) in coherent {
+        let one = frf.data(dofs)?;
+        data = Some(match data {
+            None => one,
+            Some(before) => before.and(&one)?,
         });
-        return Ok(Some(each.collect::<Result<_, AnalysisError>>()?));
     }
-    match together {
-        Some(coherence) => Ok(Some(vec![(frf(response.to_vec(), coherence)?, driven)])),
-        None => Ok(None),
+    data.ok_or(AnalysisError::NoRecord)
+}
+
+/// Segments that the responses of a table are averages over.
+struct Averaged {
+    lines: Lines,
+    segments: Segments,
+    count: usize,
+}
+
+/// Deviation of a frequency from a line, in lines, up to which it is one in spite of the digits of a file.
+const OF_LINE: f64 = 1e-3;
+
+impl Averaged {
+    /// The segments that a table states; `None` if it states none, or has other frequencies than their lines.
+    fn of(table: &FrequencyResponses, rows: &[usize]) -> Result<Option<Self>, AnalysisError> {
+        let Some(stated) = table.segments else { return Ok(None) };
+        let per_line_hz = stated.sample_rate_hz / stated.samples as f64;
+        let lines = rows.iter().map(|row| table.frequency_hz[*row] / per_line_hz);
+        if lines.clone().any(|line| (line - line.round()).abs() > OF_LINE || line.round() < 1.0) {
+            return Ok(None);
+        }
+        let sampling = Sampling::from_rate_hz(stated.sample_rate_hz, stated.samples)?;
+        let lines = Lines::new(sampling, lines.map(|line| line.round() as usize))?;
+        let segments = match stated.window {
+            None => Segments::Periods(stated.samples),
+            Some(window) => Segments::Windowed { len: stated.samples, hop: stated.hop, window },
+        };
+        Ok(Some(Self { lines, segments, count: stated.count }))
+    }
+}
+
+/// Part of a table that is used.
+struct Columns<'a> {
+    points: &'a [String],
+    forces: &'a [String],
+    rows: &'a [usize],
+    measured: ResponseQuantity,
+}
+
+impl Columns<'_> {
+    /// Returns the responses with the coherence of the table: of all forces together where it is multiple,
+    /// otherwise of each by itself; `None` if the table has none.
+    fn coherent(
+        &self,
+        table: &FrequencyResponses,
+        how: &IdentifyResponses,
+        response: &[DMatrix<Complex<f64>>],
+        averaged: Option<Averaged>,
+        errors: Option<&[DMatrix<f64>]>,
+    ) -> Result<Option<Coherent>, AnalysisError> {
+        let Self { points, forces, rows, measured } = *self;
+        let of = |point: &String, force: Option<&String>| {
+            let fits = |c: &&mechid_io::CoherenceFunction| {
+                c.response == *point && c.reference.as_ref() == force
+            };
+            table.coherence.iter().find(fits).map(|c| &c.values)
+        };
+        let columns = |force: Option<&String>| -> Option<DMatrix<f64>> {
+            let each: Option<Vec<&Vec<f64>>> =
+                points.iter().map(|point| of(point, force)).collect();
+            each.map(|each| {
+                DMatrix::from_fn(rows.len(), points.len(), |row, at| each[at][rows[row]])
+            })
+        };
+        let together = columns(None);
+        let apart: Option<Vec<_>> = forces.iter().map(|force| columns(Some(force))).collect();
+        if together.is_none() && apart.is_none() {
+            return Ok(None);
+        }
+        let frf = |response,
+                   coherence,
+                   errors: Option<&[DMatrix<f64>]>|
+         -> Result<Frf, AnalysisError> {
+            match &averaged {
+                Some(Averaged { lines, segments, count }) => {
+                    let over = (*segments, *count);
+                    Ok(Frf::of_segments(lines, response, coherence, errors, over, measured)?)
+                }
+                None => {
+                    let omega = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
+                    let averages = how.averages.ok_or_else(|| {
+                    let why = format!(
+                        "{} has coherences: from how many independent averages? (The standard errors follow \
+                         from both)",
+                        table.file
+                    );
+                    AnalysisError::Setting { setting: "averages", why }
+                })?;
+                    Ok(Frf::new(omega, response, coherence, averages, measured)?)
+                }
+            }
+        };
+        let dof = |force: &String| points.iter().position(|point| point == force);
+        let driven: Vec<usize> = forces.iter().filter_map(dof).collect();
+        if let Some(apart) = apart {
+            let each = apart.into_iter().enumerate().map(|(force, coherence)| {
+                let column = response.iter().map(|h| h.columns(force, 1).into_owned()).collect();
+                let errors: Option<Vec<_>> = errors.map(|errors| {
+                    errors.iter().map(|e| e.columns(force, 1).into_owned()).collect()
+                });
+                Ok((frf(column, coherence, errors.as_deref())?, vec![driven[force]]))
+            });
+            return Ok(Some(each.collect::<Result<_, AnalysisError>>()?));
+        }
+        match together {
+            Some(coherence) => Ok(Some(vec![(frf(response.to_vec(), coherence, errors)?, driven)])),
+            None => Ok(None),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use mechid_analysis::{
 use mechid_io::FrequencyResponses;
 use mechid_model::Sdof;
 use mechid_problems::{HammerRecord, HammerTest, exact_harmonic_periodic};
-use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, Window, noise};
 use nalgebra::{Complex, dmatrix};
 use rayon::prelude::*;
 
@@ -266,7 +266,7 @@ fn several_random_records_are_not_averaged_whole() {
         (table.segments.window, table.segments.count, table.remarks.len())
     };
     let (of_random, count, remarks) = window(&[0, 1, 2].map(|seed| of(seed, false)));
-    assert!(of_random == Some("hann") && count > 3 && remarks == 1, "{count} {remarks}");
+    assert!(of_random == Some(Window::Hann) && count > 3 && remarks == 1, "{count} {remarks}");
     assert_eq!(window(&[0, 1, 2].map(|seed| of(seed, true))), (None, 3, 0));
     assert_eq!(window(&[0, 0, 0].map(|seed| of(seed, false))).0, None);
 }

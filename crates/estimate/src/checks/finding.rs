@@ -222,6 +222,19 @@ pub enum Finding {
         #[cfg_attr(feature = "serde", serde(flatten))]
         p_value: PValue,
     },
+    /// Mass that is negative.
+    NegativeMass {
+        /// Degree of freedom.
+        #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
+        row: usize,
+        /// Entry of the diagonal of M, in kg.
+        mass: f64,
+        /// Standard error of it, in kg.
+        standard_error: f64,
+        /// Probability that noise alone makes any such mass of zero as negative.
+        #[cfg_attr(feature = "serde", serde(flatten))]
+        p_value: PValue,
+    },
     /// Damping and stiffness that are symmetric but for one factor between two degrees of freedom, as gains make them.
     Gain {
         /// Degree of freedom whose responses (or forces) are so much larger.
@@ -552,6 +565,7 @@ impl Finding {
             Finding::Delay { .. } => Subject::Delay,
             Finding::Bias { .. } => Subject::Bias,
             Finding::Instability { .. } => Subject::Instability,
+            Finding::NegativeMass { .. } => Subject::Mass,
             Finding::MassSymmetry { .. } | Finding::Gain { .. } => Subject::Symmetry,
             Finding::Misfit { .. } | Finding::UnmeasuredForce { .. } => Subject::Misfit,
             Finding::Linearity { .. } | Finding::Distortion { .. } => Subject::Linearity,

@@ -255,6 +255,24 @@ impl Display for Sentence<'_> {
                     )
                 }
             }
+            Finding::NegativeMass { row, mass, standard_error, p_value } => {
+                let (i, errors) = (row + 1, three_digits(mass.abs() / standard_error));
+                let mass = three_digits(*mass);
+                if self.finding.verdict() == Verdict::Good {
+                    write!(
+                        f,
+                        "m{i}{i} is {mass} kg, negative by no more than noise makes it: {errors} standard errors \
+                         ({p_value})"
+                    )
+                } else {
+                    write!(
+                        f,
+                        "m{i}{i} is {mass} kg, {errors} standard errors below zero ({p_value}): no machine has a \
+                         negative mass. Possible causes: a force or a response of the wrong sign, channels in the \
+                         wrong order, a quantity taken for another one (acceleration for displacement)"
+                    )
+                }
+            }
             Finding::Gain { row, column, ratio, .. } => {
                 let (i, j, ratio) = (row + 1, column + 1, three_digits(*ratio));
                 write!(
@@ -652,6 +670,7 @@ impl Display for Subject {
             Subject::Delay => "delay",
             Subject::Bias => "bias",
             Subject::Instability => "instability",
+            Subject::Mass => "mass",
             Subject::Symmetry => "symmetry",
             Subject::Misfit => "misfit",
             Subject::Linearity => "linearity",

@@ -88,6 +88,7 @@ impl Finding {
             Finding::Delay { samples, .. } => samples,
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::NegativeMass { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
             | Finding::Linearity { p_value, .. }
             | Finding::Distortion { p_value, .. } => p_value.adjusted,
@@ -102,6 +103,7 @@ impl Finding {
         match self {
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::NegativeMass { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. }
@@ -118,6 +120,7 @@ impl Finding {
         match self {
             Finding::Bias { p_value, .. }
             | Finding::Instability { p_value, .. }
+            | Finding::NegativeMass { p_value, .. }
             | Finding::MassSymmetry { p_value, .. }
             | Finding::Misfit { p_value, .. }
             | Finding::Linearity { p_value, .. }

@@ -1,10 +1,13 @@
 //! Forces and displacements at chosen frequencies: what every estimator of this module takes.
 
+use std::ops::Range;
+
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use super::ends::Ends;
+use super::pulse_noise::PulseNoise;
 use super::sinusoids::OpenRecord;
 use super::{Lines, NoiseSpectrum};
 use crate::EstimateError;
@@ -31,6 +34,8 @@ pub struct FrequencyData {
     ends: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
+    /// Noise of forces that act for a few samples only.
+    pulses: Vec<PulseNoise>,
 }
 
 impl FrequencyData {
@@ -105,9 +110,17 @@ impl FrequencyData {
         }
         let ends = DMatrix::zeros(omega.len(), 0);
         let force_variance = DMatrix::zeros(omega.len(), force.ncols());
-        let displacement = motion;
-        let open = Vec::new();
-        Ok(Self { omega, force, displacement, measured, noise: None, force_variance, ends, open })
+        Ok(Self {
+            omega,
+            force,
+            displacement: motion,
+            measured,
+            noise: None,
+            force_variance,
+            ends,
+            open: Vec::new(),
+            pulses: Vec::new(),
+        })
     }
 
     /// Takes frequency responses measured as `measured` per unit force, one matrix responses × forces
@@ -187,8 +200,6 @@ impl FrequencyData {
     /// from the residual, and the force is no longer taken as exact. What [`FrequencyData::with_noise`] states
     /// comes first.
     ///
-    /// Noise on a part of the samples only counts with the root of their share.
-    ///
     /// # Errors
     /// [`EstimateError::Size`] unless there is one deviation per degree of freedom,
     /// [`EstimateError::NoiseVariance`] if one is negative or not finite.
@@ -211,6 +222,43 @@ impl FrequencyData {
             self.force_variance.column_mut(channel).fill(variance);
         }
         Ok(self)
+    }
+
+    /// The same data of one record with white noise of known standard deviation (N) on some samples of one force channel,
+    /// counted from 0, and none on the others: those of the pulse of a hit. The lines of such noise err together.
+    ///
+    /// # Errors
+    /// The errors of [`FrequencyData::with_force_noise`]; [`EstimateError::Size`] if there is no such channel or sample.
+    ///
+    /// # Source
+    /// The source of [`FrequencyData::with_force_noise`].
+    pub fn with_pulse_noise(
+        mut self,
+        channel: usize,
+        deviation: f64,
+        samples: Range<usize>,
+        sampling: Sampling,
+    ) -> Result<Self, EstimateError> {
+        let share = samples.len() as f64 / sampling.len() as f64;
+        let mut levels = vec![0.0; self.dof()];
+        for (what, expected, got) in [
+            ("force channel with noise, below", self.dof(), channel),
+            ("sample with noise, below", sampling.len(), samples.end.saturating_sub(1)),
+        ] {
+            if got >= expected {
+                return Err(EstimateError::Size { what, expected, got });
+            }
+        }
+        levels[channel] = deviation * share.sqrt();
+        self = self.with_force_noise(&levels, sampling.len())?;
+        self.pulses =
+            vec![PulseNoise { rows: 0..self.len(), sampling, channel, deviation, samples }];
+        Ok(self)
+    }
+
+    /// Noise of forces that act for a few samples only.
+    pub(super) fn pulses(&self) -> &[PulseNoise] {
+        &self.pulses
     }
 
     /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
@@ -338,6 +386,16 @@ impl FrequencyData {
         }
     }
 
+    /// A force of 1 N on degree of freedom `dof` at every line, without a motion.
+    pub(super) fn of_force(&self, dof: usize) -> Self {
+        let force = |_, column: usize| Complex::from(if column == dof { 1.0 } else { 0.0 });
+        Self {
+            force: DMatrix::from_fn(self.len(), self.dof(), force),
+            displacement: DMatrix::zeros(self.len(), self.dof()),
+            ..self.clone()
+        }
+    }
+
     /// Second differences of neighbouring lines of the same spacing, in which the ends of a record count little:
     /// the spectra under a Hann window. Rows at the ends of a band stay as they are.
     ///
@@ -398,7 +456,16 @@ impl FrequencyData {
             noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
             ends: self.ends_of_both(other),
             open: [&self.open[..], &other.open].concat(),
+            pulses: self.pulses_of_both(other),
         })
+    }
+
+    fn pulses_of_both(&self, other: &Self) -> Vec<PulseNoise> {
+        let below = |pulse: &PulseNoise| PulseNoise {
+            rows: pulse.rows.start + self.len()..pulse.rows.end + self.len(),
+            ..pulse.clone()
+        };
+        self.pulses.iter().cloned().chain(other.pulses.iter().map(below)).collect()
     }
 
     fn ends_of_both(&self, other: &Self) -> DMatrix<Complex<f64>> {

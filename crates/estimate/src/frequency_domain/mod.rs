@@ -58,6 +58,7 @@ mod normal_equations;
 mod output_error;
 mod output_error_fit;
 mod periods;
+mod pulse_noise;
 mod residual_noise;
 mod search;
 mod sinusoids;

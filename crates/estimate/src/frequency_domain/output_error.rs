@@ -116,6 +116,7 @@ fn with_known_noise(
         level: 1.0,
         inflation,
         weights: uncertain_weights(data, unknowns, &best.minimum.theta, noise),
+        pulses: None,
         degrees_of_freedom: noise.total_degrees_of_freedom(),
         misfit_ratio: best.minimum.cost / expected,
         deviance: Some(best.minimum.cost / inflation),

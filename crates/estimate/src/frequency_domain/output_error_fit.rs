@@ -147,6 +147,8 @@ pub(super) struct Scale {
     /// Factor by which the covariance is larger for weights that are uncertain, where nothing better is known.
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
+    /// What lines that err together add to the inverse of the Fisher information.
+    pub(super) pulses: Option<DMatrix<f64>>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,
     pub(super) deviance: Option<f64>,
@@ -173,6 +175,10 @@ pub(super) fn finish(
             let fewest = weights.degrees_of_freedom.min(scale.degrees_of_freedom as f64);
             (covariance + weights.excess, fewest.max(1.0) as usize)
         }
+    };
+    let covariance = match scale.pulses {
+        Some(excess) => covariance + excess,
+        None => covariance,
     };
     let (entries, covariance) = match Relations::of(unknowns) {
         None => (independent.to_vec(), covariance),

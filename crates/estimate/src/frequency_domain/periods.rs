@@ -1,5 +1,7 @@
 //! Repeated periods of one experiment: their mean, their scatter, and independent halves.
 
+use std::f64::consts::PI;
+
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
@@ -35,6 +37,8 @@ pub struct RepeatedPeriods {
     together: BetweenLines,
     /// Their sum.
     together_sum: DMatrix<Complex<f64>>,
+    /// Steps in which the values of each channel come, 2n; zero where they do not.
+    steps: Vec<f64>,
 }
 
 /// A force whose periods differ from their mean by this part of it, in the RMS, repeats to rounding.
@@ -79,8 +83,41 @@ impl RepeatedPeriods {
             scatter: vec![DMatrix::zeros(2 * dof, 2 * dof); zero.nrows()],
             together: Self::together(lines, dof, periods),
             together_sum: zero.clone(),
+            steps: vec![0.0; zero.ncols()],
             sum: zero,
         }
+    }
+
+    /// States the steps that the values of the channels come in, motions (in the unit measured) before forces (N),
+    /// zero where they are not rounded: an error of step/√12, which is the same in all periods of a channel
+    /// without other noise and so not part of their scatter.
+    ///
+    /// # Errors
+    /// [`EstimateError::Size`] unless there is one step per channel.
+    ///
+    /// # Source
+    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: noise of the standard deviation s leaves
+    /// exp(−4π²s²/step²) of the error alike from period to period.
+    pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, EstimateError> {
+        crate::least_squares::size("quantisation steps", 2 * self.dof, steps.len())?;
+        self.steps = steps;
+        Ok(self)
+    }
+
+    /// Variance on the samples of each channel, 2n, of the rounding that is alike in all periods.
+    fn rounding(&self) -> Vec<f64> {
+        let (samples, count) = (self.lines.sampling().len() as f64, self.count as f64);
+        let of_channel = |(channel, step): (usize, &f64)| {
+            let scatter = self.scatter.iter().map(|s| s[(channel, channel)].re).sum::<f64>();
+            let of_noise = scatter / self.scatter.len().max(1) as f64 / (count - 1.0).max(1.0);
+            let noise = of_noise * samples / 4.0;
+            let alike = match *step > 0.0 {
+                true => (-4.0 * PI * PI * noise / (step * step)).exp(),
+                false => 0.0,
+            };
+            alike * step * step / 12.0
+        };
+        self.steps.iter().enumerate().map(of_channel).collect()
     }
 
     /// No periods yet of those that are taken as one next, where `remaining` are to come.
@@ -182,7 +219,9 @@ impl RepeatedPeriods {
     /// period.
     pub fn mean(&self) -> Result<FrequencyData, EstimateError> {
         self.at_least(1)?;
-        self.data(self.sum.unscale(self.count as f64))
+        let deviations: Vec<f64> = self.rounding()[self.dof..].iter().map(|v| v.sqrt()).collect();
+        let mean = self.data(self.sum.unscale(self.count as f64))?;
+        mean.with_force_noise(&deviations, self.lines.sampling().len())
     }
 
     /// The mean over all periods with the noise that their scatter shows.
@@ -272,14 +311,19 @@ impl RepeatedPeriods {
             }
             covariance
         };
-        NoiseSpectrum::of_measured(
+        let noise = NoiseSpectrum::of_measured(
             &self.lines.omega(),
             self.scatter.iter().map(of_mean).collect(),
             self.measured,
             count - 1,
             pooling,
             relative,
-        )
+        )?;
+        let rounding = self.rounding();
+        Ok(match rounding.iter().all(|variance| *variance == 0.0) {
+            true => noise,
+            false => noise.with_more(&rounding, self.measured, self.lines.sampling().len()),
+        })
     }
 
     /// Returns whether the force is the same in every period, to rounding: a computed one, not measured.

@@ -12,6 +12,7 @@ use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
 };
+use super::pulse_noise;
 use super::search::SumOfSquares;
 use super::sinusoids::{self, Sinusoid};
 use super::starts::Starts;
@@ -82,6 +83,7 @@ pub(super) fn with_residual_noise(
         level,
         inflation,
         weights: uncertain_weights(data, unknowns, &fit.minimum.theta, &noise),
+        pulses: pulse_noise::excess(data, unknowns, &fit.minimum.theta, &noise),
         degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,

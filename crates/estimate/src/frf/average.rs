@@ -6,7 +6,7 @@ use nalgebra::DMatrix;
 
 use super::cross_spectra::CrossSpectra;
 use super::scatter::Scatter;
-use super::segments::{overlap_loss, weigh};
+use super::segments::weigh;
 use super::{ComplexMatrix, Crosstalk, Frf, FrfEstimator, Segments};
 use crate::EstimateError;
 use crate::frequency_domain::Lines;
@@ -300,9 +300,7 @@ impl FrfAverage {
 
     /// Equivalent number of independent segments.
     fn averages(&self) -> f64 {
-        let hop = self.segments.hop();
-        let loss = self.weights.as_deref().map(|weights| overlap_loss(weights, hop, self.pieces));
-        self.pieces as f64 / loss.unwrap_or(1.0)
+        self.segments.averages_under(self.weights.as_deref(), self.pieces)
     }
 
     /// The frequency responses from all segments so far.

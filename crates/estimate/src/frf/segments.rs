@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use mechid_signal::Window;
 use nalgebra::{Complex, DVectorView};
 
 use crate::EstimateError;
@@ -37,41 +38,27 @@ pub enum Segments {
     },
 }
 
-/// Window that the samples of a segment are weighted with.
-///
-/// # Source
-/// Harris (1978), Proceedings of the IEEE 66, 51–83.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
-pub enum Window {
-    /// ½ − ½ cos: the usual choice for a random excitation.
-    Hann,
-    /// 0.54 − 0.46 cos: a narrower peak, more leakage from far away.
-    Hamming,
-    /// 0.42 − 0.5 cos + 0.08 cos 2: the least leakage, a wider peak.
-    Blackman,
-    /// All samples alike: for pieces that begin and end at rest, such as bursts.
-    Rectangular,
-}
-
-impl Window {
-    /// Weight of sample `k` of `len`.
-    fn weight(self, k: usize, len: usize) -> f64 {
-        let turn = TAU * k as f64 / len as f64;
-        match self {
-            Window::Hann => 0.5 - 0.5 * turn.cos(),
-            Window::Hamming => 0.54 - 0.46 * turn.cos(),
-            Window::Blackman => 0.42 - 0.5 * turn.cos() + 0.08 * (2.0 * turn).cos(),
-            Window::Rectangular => 1.0,
-        }
-    }
-}
-
 impl Segments {
     /// Half overlapping pieces of `len` samples under Hann's window.
     pub fn hann(len: usize) -> Self {
         Segments::Windowed { len, hop: len.div_ceil(2), window: Window::Hann }
+    }
+
+    /// Equivalent number of independent pieces among so many, a pure number: those that overlap share samples.
+    ///
+    /// # Errors
+    /// [`EstimateError::Hop`].
+    ///
+    /// # Source
+    /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
+    pub fn averages(self, pieces: usize) -> Result<f64, EstimateError> {
+        Ok(self.averages_under(self.weights()?.as_deref(), pieces))
+    }
+
+    /// The same with the weights of the window at hand.
+    pub(super) fn averages_under(self, weights: Option<&[f64]>, pieces: usize) -> f64 {
+        let loss = weights.map(|weights| overlap_loss(weights, self.hop(), pieces));
+        pieces as f64 / loss.unwrap_or(1.0)
     }
 
     /// Samples of a piece.
@@ -166,7 +153,7 @@ pub(super) fn weigh(piece: &[f64], window: Option<&[f64]>, weighed: &mut [f64]) 
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
-pub(super) fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
+fn overlap_loss(window: &[f64], hop: usize, count: usize) -> f64 {
     let power: f64 = window.iter().map(|w| w * w).sum();
     let common = |apart: usize| {
         let shared = window.iter().zip(&window[apart * hop..]).map(|(a, b)| a * b).sum::<f64>();

@@ -2,9 +2,14 @@
 
 use super::lines::{Line, Lines, number};
 use crate::contents::Fault;
+use crate::responses::AveragedSegments;
 
 /// Beginning of a second line of description that states the decay that a window adds, in 1/s.
 pub(super) const ADDED_DECAY: &str = "ADDED DECAY 1/S ";
+
+/// Beginning of a third line of description that states what the responses are averages over, by the numbers of
+/// [`AveragedSegments`].
+pub(super) const SEGMENTS: &str = "SEGMENTS ";
 
 /// Description of the function in a dataset 58.
 #[derive(Debug)]
@@ -13,6 +18,8 @@ pub(crate) struct Header {
     pub title: String,
     /// Rate, in 1/s, that an exponential window adds to every decay, as the second line states it.
     pub added_decay: Option<f64>,
+    /// Segments that it is an average over, as the third line states them.
+    pub segments: Option<AveragedSegments>,
     /// 1 is a response in time, 4 a frequency response function.
     pub function: u32,
     /// Node and direction at which it was measured.
@@ -43,7 +50,8 @@ impl Header {
             || lines.required("a dataset 58 ends within its eleven lines of description");
         let title = label(next()?.text);
         let added_decay = next()?.text.strip_prefix(ADDED_DECAY.as_bytes()).and_then(number);
-        for _ in 3..=5 {
+        let segments = next()?.text.strip_prefix(SEGMENTS.as_bytes()).and_then(segments_of);
+        for _ in 4..=5 {
             next()?;
         }
         let (what, form, abscissa, ordinate) = (next()?, next()?, next()?, next()?);
@@ -65,6 +73,7 @@ impl Header {
         Ok(Self {
             title,
             added_decay,
+            segments,
             function: whole(&what, 0, 5)?,
             response: degree_of_freedom(response, &what)?,
             reference: (reference.0 != 0)
@@ -106,6 +115,13 @@ impl Header {
             other => format!("a function of type {other}"),
         }
     }
+}
+
+/// Segments that numbers with spaces between them state.
+fn segments_of(text: &[u8]) -> Option<AveragedSegments> {
+    let fields = text.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
+    let numbers: Option<Vec<f64>> = fields.map(number).collect();
+    AveragedSegments::of_numbers(numbers?.try_into().ok()?)
 }
 
 /// A field of a line; blank beyond the end.

@@ -111,6 +111,7 @@ fn add(
     same_frequencies(responses, id, frequency_hz)?;
     responses.added_decay =
         responses.added_decay.or(header.added_decay.filter(|rate| rate.is_finite() && *rate > 0.0));
+    responses.segments = responses.segments.or(header.segments);
     let response = header.response.clone();
     if header.function == 6 {
         let values = numbers.iter().map(|z| z.re).collect();

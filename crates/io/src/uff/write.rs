@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use mechid_model::ResponseQuantity;
 
-use super::header::ADDED_DECAY;
+use super::header::{ADDED_DECAY, SEGMENTS};
 use crate::responses::{FrequencyResponses, ResponseFunction};
 
 /// Relative deviation of evenly spaced frequencies from a constant step.
@@ -30,11 +30,18 @@ pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, 
         Some(rate) => format!("{ADDED_DECAY}{rate:e}"),
         None => "NONE".into(),
     };
+    let averaged = match responses.segments {
+        Some(segments) => {
+            let numbers = segments.numbers().map(|number| format!("{number:?}"));
+            format!("{SEGMENTS}{}", numbers.join(" "))
+        }
+        None => "NONE".into(),
+    };
     for function in &responses.functions {
         let numbers = function.values.iter().flat_map(|z| [z.re, z.im]).collect();
         let of = Dataset {
             title: &title,
-            about: &about,
+            about: [&about, &averaged],
             function: 4,
             response: point(&function.response)?,
             reference: point(&function.reference)?,
@@ -48,7 +55,7 @@ pub(crate) fn write_responses(responses: &FrequencyResponses) -> Result<String, 
     for coherence in &responses.coherence {
         let of = Dataset {
             title: &title,
-            about: &about,
+            about: [&about, &averaged],
             function: 6,
             response: point(&coherence.response)?,
             reference: match &coherence.reference {
@@ -81,8 +88,8 @@ fn ordinate(function: &ResponseFunction) -> [Ordinate; 2] {
 
 struct Dataset<'a> {
     title: &'a str,
-    /// Second line of description.
-    about: &'a str,
+    /// Second and third line of description.
+    about: [&'a str; 2],
     /// 4 is a frequency response function, 6 a coherence.
     function: u32,
     /// Node and direction.
@@ -98,7 +105,8 @@ struct Dataset<'a> {
 impl Dataset<'_> {
     fn write(&self, text: &mut String) {
         let _ = writeln!(text, "    -1\n    58");
-        for line in [self.title, self.about, "NONE", "NONE", "NONE"] {
+        let [about, averaged] = self.about;
+        for line in [self.title, about, averaged, "NONE", "NONE"] {
             let _ = writeln!(text, "{line}");
         }
         let ((node, direction), (from, along)) = (self.response, self.reference);

@@ -1,8 +1,11 @@
 //! Frequency responses in and out of files. Judge of universal files: pyuff wrote `printed.unv` and
 //! `binary.unv` (`data/make.py`).
 
-use mechid_io::{CoherenceFunction, FrequencyResponses, IoError, ResponseFunction};
+use mechid_io::{
+    AveragedSegments, CoherenceFunction, FrequencyResponses, IoError, ResponseFunction,
+};
 use mechid_model::ResponseQuantity;
+use mechid_signal::Window;
 use nalgebra::Complex;
 
 const PRINTED: &[u8] = include_bytes!("../data/printed.unv");
@@ -47,6 +50,13 @@ fn two_by_one(frequency_hz: Vec<f64>) -> FrequencyResponses {
         coherence: vec![coherence("1+X", 0.3), coherence("2-RY", 0.5)],
         frequency_hz,
         added_decay: Some(4.964_321),
+        segments: Some(AveragedSegments {
+            samples: 1024,
+            hop: 512,
+            count: 155,
+            window: Some(Window::Hann),
+            sample_rate_hz: 1000.0 / 3.0,
+        }),
         remarks: Vec::new(),
     }
 }
@@ -69,6 +79,7 @@ fn universal_files_are_read_back() {
         let read = FrequencyResponses::parse("b.unv", text.as_bytes()).unwrap();
         assert!(read.remarks.is_empty(), "{:?}", read.remarks);
         assert_eq!(read.added_decay, written.added_decay);
+        assert_eq!(read.segments, written.segments);
         let near = |a: f64, b: f64, by: f64| (a - b).abs() <= by * a.abs();
         let pairs = written.frequency_hz.iter().zip(&read.frequency_hz);
         assert!(pairs.into_iter().all(|(a, b)| near(*a, *b, 1e-7)), "{:?}", read.frequency_hz);

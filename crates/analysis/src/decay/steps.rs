@@ -1,0 +1,87 @@
+//! The part of a free decay that its converter shows.
+
+use mechid_signal::{Record, quantisation_step};
+
+/// Number of stretches of a record in which its range is looked at, and least samples of one.
+const STRETCHES: usize = 64;
+const SHORTEST: usize = 32;
+/// Range of a channel in a stretch, in steps of its values, below which rounding makes its own motion of the rest.
+const STEPS: f64 = 12.0;
+/// Range at its largest, in steps, from which a channel is looked at.
+const LARGE: f64 = 8.0 * STEPS;
+
+/// End of the part of a decay that its converter shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct LastShown {
+    /// Number of samples up to it.
+    pub samples: usize,
+    /// Channel that falls to a few steps first, counted from 0.
+    pub channel: usize,
+    /// Step of its values, in its unit.
+    pub step: f64,
+}
+
+/// Returns where the first channel of a decay falls to a few of the steps in which its values come; `None` where none
+/// does.
+///
+/// Beyond, rounding is no noise: what is left of a sinusoid of a few steps is a square wave that stops.
+///
+/// # Source
+/// Widrow & Kollár, *Quantization Noise* (2008), for where the error of rounding is as white noise; the limits are
+/// ours.
+pub(super) fn last_shown(record: &Record) -> Option<LastShown> {
+    let stretch = record.len().div_ceil(STRETCHES).max(SHORTEST);
+    let of_channel = |channel: usize| {
+        let samples = record.channel(channel);
+        let step = quantisation_step(samples)?;
+        let range = |part: &[f64]| {
+            let (low, high) =
+                part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                    (low.min(*x), high.max(*x))
+                });
+            (high - low) / step
+        };
+        let ranges: Vec<f64> = samples.chunks(stretch).map(range).collect();
+        let largest = ranges.iter().copied().fold(0.0, f64::max);
+        let shown = ranges.iter().rposition(|range| *range >= STEPS)? + 1;
+        let samples = (shown * stretch).min(record.len());
+        (largest >= LARGE && samples < record.len()).then_some(LastShown { samples, channel, step })
+    };
+    (0..record.channels()).filter_map(of_channel).min_by_key(|last| last.samples)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use mechid_signal::{NoiseLevel, Sampling, noise};
+
+    use super::*;
+
+    /// A decay from 1, of 20 Hz and 1 %, in so many steps.
+    fn decay(steps: f64, noise_steps: f64) -> Record {
+        let sampling = Sampling::new(1.0 / 512.0, 4096).unwrap();
+        let exact = |t: f64| (-0.01 * TAU * 20.0 * t).exp() * (TAU * 20.0 * t).cos();
+        let exact = Record::from_fn(sampling, exact).unwrap();
+        let level = NoiseLevel::StandardDeviation((noise_steps / steps).max(1e-12));
+        let noisy = noise::add_white(&exact, level, 1).unwrap();
+        Record::new(sampling, noisy.data().map(|x| (x * steps).round() / steps)).unwrap()
+    }
+
+    #[test]
+    fn a_decay_ends_where_a_few_steps_are_left() {
+        for steps in [128.0, 1024.0, 8192.0] {
+            let found = last_shown(&decay(steps, 0.0)).unwrap();
+            assert!((found.step * steps - 1.0).abs() < 1e-6);
+            // Twice the amplitude is the range.
+            let end = (2.0 * steps / STEPS).ln() / (0.01 * TAU * 20.0);
+            let found = found.samples as f64 / 512.0;
+            assert!((found - end).abs() < 0.2, "{steps}: {found} {end}");
+        }
+        // Noise of a few steps keeps all of it.
+        assert_eq!(last_shown(&decay(1024.0, 4.0)), None);
+        let sampling = Sampling::new(0.01, 500).unwrap();
+        let smooth = Record::from_fn(sampling, |t| (-t).exp() * (9.0 * t).cos()).unwrap();
+        assert_eq!(last_shown(&smooth), None);
+    }
+}

@@ -1,0 +1,57 @@
+//! Windows: weights of the samples of a piece of a record.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+/// Window that the samples of a piece of a record are weighted with.
+///
+/// # Source
+/// Harris (1978), Proceedings of the IEEE 66, 51–83.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Window {
+    /// ½ − ½ cos: the usual choice for a random excitation.
+    Hann,
+    /// 0.54 − 0.46 cos: a narrower peak, more leakage from far away.
+    Hamming,
+    /// 0.42 − 0.5 cos + 0.08 cos 2: the least leakage, a wider peak.
+    Blackman,
+    /// All samples alike: for pieces that begin and end at rest, such as bursts.
+    Rectangular,
+}
+
+impl Window {
+    /// Every window.
+    pub const ALL: [Self; 4] = [Self::Hann, Self::Hamming, Self::Blackman, Self::Rectangular];
+
+    /// Returns the name in lower case, such as `hann`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Window::Hann => "hann",
+            Window::Hamming => "hamming",
+            Window::Blackman => "blackman",
+            Window::Rectangular => "rectangular",
+        }
+    }
+
+    /// Returns the weight of sample `k` of `len`, a pure number.
+    ///
+    /// # Source
+    /// That of [`Window`].
+    pub fn weight(self, k: usize, len: usize) -> f64 {
+        let turn = TAU * k as f64 / len as f64;
+        match self {
+            Window::Hann => 0.5 - 0.5 * turn.cos(),
+            Window::Hamming => 0.54 - 0.46 * turn.cos(),
+            Window::Blackman => 0.42 - 0.5 * turn.cos() + 0.08 * (2.0 * turn).cos(),
+            Window::Rectangular => 1.0,
+        }
+    }
+}
+
+impl fmt::Display for Window {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
