@@ -66,6 +66,16 @@ pub enum Fault {
         /// Samples of a gap.
         samples: usize,
     },
+    /// The gain is another one, or its sign.
+    Gain {
+        /// Values over those without the fault (pure number).
+        factor: f64,
+    },
+    /// A converter gives values in steps, of a range to either side half as large again as the largest magnitude.
+    Steps {
+        /// Number of bits.
+        bits: u8,
+    },
 }
 
 impl Fault {
@@ -138,6 +148,14 @@ impl Fault {
                     }
                 }
             }
+            Self::Gain { factor } => data *= *factor,
+            Self::Steps { bits } => {
+                for mut column in data.column_iter_mut() {
+                    let step =
+                        3.0 * column.amax().max(f64::MIN_POSITIVE) / 2_f64.powi(i32::from(*bits));
+                    column.apply(|value| *value = (*value / step).round() * step);
+                }
+            }
         }
         Ok(Record::new(sampling, data)?)
     }
@@ -194,6 +212,16 @@ mod tests {
         let held = Fault::Held { gaps: 1, samples: 4 }.of(&clean, 1).unwrap();
         let other = (0..1000).filter(|k| held.data().row(*k) != clean.data().row(*k)).count();
         assert_eq!(other, 4);
+
+        let turned = Fault::Gain { factor: -2.0 }.of(&clean, 1).unwrap();
+        assert_eq!(turned.data(), &(clean.data() * -2.0));
+
+        let stepped = Fault::Steps { bits: 6 }.of(&clean, 1).unwrap();
+        let step = 3.0 * clean.column(0).amax() / 64.0;
+        let off = |k: usize| stepped.channel(0)[k] - clean.channel(0)[k];
+        assert!((0..1000).all(|k| off(k).abs() <= 0.5 * step * (1.0 + 1e-12)));
+        let steps = |k: usize| stepped.channel(0)[k] / step;
+        assert!((0..1000).all(|k| near(steps(k), steps(k).round())));
 
         let noise = Fault::Noise { level: 0.1, colour: Colour::White }.of(&clean, 1).unwrap();
         let added = (noise.data() - clean.data()).column(0).norm() / 1000.0_f64.sqrt();

@@ -51,7 +51,7 @@ fn modes_and_their_release_are_found() {
     assert_eq!(summary.modes.len(), 2);
     let begins = (summary.first_sample - 1) as f64 / summary.sample_rate_hz;
     assert!((RELEASE..RELEASE + 0.2).contains(&begins), "{begins}");
-    for (row, (hz, zeta)) in summary.modes.iter().zip([(6.0, 0.01), (30.0, 0.02)]) {
+    for (row, (hz, zeta)) in summary.modes.iter().zip([(6.0_f64, 0.01_f64), (30.0, 0.02)]) {
         let [frequency, damping] = [row.mode.row.natural_frequency_hz, row.mode.row.damping_ratio];
         assert!((frequency.value - hz).abs() < 4.0 * frequency.standard_error.unwrap());
         assert!((damping.value - zeta).abs() < 4.0 * damping.standard_error.unwrap());
@@ -128,4 +128,42 @@ fn what_cannot_be_analysed_is_refused() {
     assert!(matches!(mixed, Err(AnalysisError::Setting { setting: "response", .. })));
     let none = Measurement::from_columns(sampling, &columns, &Channels::default()).unwrap();
     assert!(matches!(decay(&none, &default), Err(AnalysisError::NoMotion)));
+}
+
+/// The same record without noise in steps of a converter, which leave a square wave of the last cycles.
+#[test]
+fn a_decay_in_steps_shows_no_modes_of_its_rounding() {
+    for bits in [8, 10, 12] {
+        let step = 2e-3 / f64::from(1 << bits);
+        let sampling = Sampling::from_rate_hz(500.0, 16_000).unwrap();
+        let exact = |at: usize, t: f64| {
+            let t = (t - RELEASE).max(0.0);
+            let mode = |hz: f64, zeta: f64| (-zeta * TAU * hz * t).exp() * (TAU * hz * t).cos();
+            let [low, high] = [[4e-4, 1e-4], [-2e-4, 1.5e-4]][at];
+            low * mode(6.0, 0.01) + high * mode(30.0, 0.02)
+        };
+        let rounded = [0, 1].map(|at| -> Vec<f64> {
+            sampling.times().map(|t| (exact(at, t) / step).round() * step).collect()
+        });
+        let columns = [("x", rounded[0].as_slice()), ("y", rounded[1].as_slice())];
+        let channels = Channels::of_responses(ResponseQuantity::Displacement, "x,y");
+        let test = Measurement::from_columns(sampling, &columns, &channels).unwrap();
+        let found = decay(&test, &DecaySettings::default()).unwrap();
+        assert_eq!(found.summary().modes.len(), 2, "{bits}: {found}");
+        assert!(found.summary().remarks.iter().any(|remark| remark.contains("few steps")));
+        for (row, (hz, zeta)) in
+            found.summary().modes.iter().zip([(6.0_f64, 0.01_f64), (30.0, 0.02)])
+        {
+            let [frequency, damping] =
+                [row.mode.row.natural_frequency_hz, row.mode.row.damping_ratio];
+            let hz = hz * (1.0 + zeta * zeta).sqrt();
+            let off = (frequency.value - hz).abs() / frequency.standard_error.unwrap();
+            assert!(off < 4.0, "{bits}: {frequency:?} {hz}");
+            let off = (damping.value - zeta / (1.0 + zeta * zeta).sqrt()).abs();
+            assert!(off < 4.0 * damping.standard_error.unwrap(), "{bits}: {damping:?}");
+        }
+        // The whole of it shows more modes than there are.
+        let whole = DecaySettings { to_s: Some(sampling.duration()), ..DecaySettings::default() };
+        assert!(decay(&test, &whole).unwrap().summary().modes.len() > 2, "{bits}");
+    }
 }

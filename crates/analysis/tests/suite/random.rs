@@ -3,11 +3,13 @@
 use mechid_analysis::frf::{Estimator, frf};
 use mechid_analysis::identify::{Fit, Method};
 use mechid_analysis::{
-    AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
-    identify,
+    AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Measurement,
+    ResponseQuantity, Segmentation, identify, identify_responses,
 };
+use mechid_estimate::Estimate;
 use mechid_estimate::checks::Subject;
 use mechid_estimate::frequency_domain::Pooling;
+use mechid_io::FrequencyResponses;
 use mechid_model::Sdof;
 use mechid_problems::{Fault, RandomTest};
 use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
@@ -343,4 +345,40 @@ fn the_length_of_segments_is_chosen() {
     assert_eq!(frf(&period, &FrfSettings::default()).unwrap().segments.window, None);
     let how = Identify::responses(Estimator::H1, Segmentation::default());
     assert!(identify(&[random_test(0)], &how).unwrap().to_string().contains("were chosen"));
+}
+
+/// What a file of averaged responses states of its segments is enough to take off what their window blunts.
+#[test]
+fn a_table_of_segments_is_fitted_as_its_record() {
+    let test = random_test(3);
+    let segments = Segmentation::of(256);
+    let how = Identify::responses(Estimator::H1, segments.clone());
+    let own = identify(std::slice::from_ref(&test), &how).unwrap();
+    let table = frf(&test, &FrfSettings { segments, ..FrfSettings::default() }).unwrap();
+    let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
+    let universal = table.to_responses(&[]).unwrap().to_universal_file().unwrap();
+    let universal = FrequencyResponses::parse("a.unv", universal.as_bytes()).unwrap();
+    for read in [&text, &universal] {
+        let found =
+            identify_responses(std::slice::from_ref(read), &IdentifyResponses::default()).unwrap();
+        for (p, own) in found.estimate().parameters().zip(own.estimate().parameters()) {
+            let apart = (p.value - own.value).abs() / own.standard_error;
+            // A file has no spectrum of the force, over which neighbouring lines would be averaged for their weights.
+            assert!(apart < 0.1, "{p} {own}");
+            assert!((p.standard_error / own.standard_error - 1.0).abs() < 0.1, "{p} {own}");
+        }
+        let told = |subject: Subject| {
+            let mut checks = found.summary().checks.iter();
+            checks.any(|check| check.subject == subject && check.is_conspicuous())
+        };
+        assert!(told(Subject::Leakage), "a resonance of a quarter of a line");
+        let remarks = &found.summary().remarks;
+        assert!(remarks.iter().any(|remark| remark.contains("blunts")), "{found}");
+    }
+    // A file that does not say what it is an average over shows the damping of the window.
+    let silent = FrequencyResponses { segments: None, ..text };
+    let found = identify_responses(&[silent], &IdentifyResponses::default()).unwrap();
+    let damping = |found: &Estimate| found.parameter("c").unwrap().value;
+    let [found, own] = [damping(found.estimate()), damping(own.estimate())];
+    assert!(found > 1.3 * own, "{found} {own}");
 }

@@ -2,7 +2,10 @@
 
 use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{Lines, equation_error, output_error};
-use mechid_estimate::{EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window};
+use mechid_estimate::{
+    EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window,
+    output_error_of_responses,
+};
 use mechid_model::ResponseQuantity;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
@@ -474,5 +477,42 @@ fn a_channel_of_noise_is_idle_and_a_weak_force_is_not() {
         let crosstalk = cell(20 * seed).into_data() + force.data().columns(0, 1) * 0.02;
         let motion = noisy(of_first, seed);
         assert!(idle(&with_second(crosstalk), &motion).is_empty(), "{periods} periods");
+    }
+}
+
+/// A table of averages, with standard errors or without, is what the averages themselves are.
+#[test]
+fn averages_measured_elsewhere_are_fitted_as_their_record() {
+    let sampling = Sampling::new(0.02, 4096).unwrap();
+    let force = noise::white(sampling, 1, 100.0, 5).unwrap();
+    let exact = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    let motion =
+        noise::add_white(exact.displacement(), NoiseLevel::FractionOfRms(0.01), 6).unwrap();
+    let segments = Segments::hann(256);
+    let quantity = ResponseQuantity::Displacement;
+    let frf = Frf::estimate(&force, &motion, quantity, segments, 3..=60, FrfEstimator::H1).unwrap();
+    let unknowns = Unknowns::unknown_mass(1).unwrap();
+    let own = output_error_of_responses(&[(frf.clone(), vec![0])], &unknowns).unwrap();
+    assert!(own.blunted > 1.0, "{}", own.blunted);
+    let lines = Lines::new(force.sampling().with_len(256).unwrap(), 3..=60).unwrap();
+    let response = (0..58).map(|at| frf.response(at).clone()).collect::<Vec<_>>();
+    let errors: Vec<_> = (0..58).map(|at| frf.variance(at).map(|v| (0.5 * v).sqrt())).collect();
+    let count = (force.len() - 256) / 128 + 1;
+    for errors in [Some(&errors[..]), None] {
+        let read = Frf::of_segments(
+            &lines,
+            response.clone(),
+            frf.coherence().clone(),
+            errors,
+            (segments, count),
+            quantity,
+        );
+        let read = read.unwrap();
+        assert!((read.averages() / frf.averages() - 1.0).abs() < 1e-12);
+        let fit = output_error_of_responses(&[(read, vec![0])], &unknowns).unwrap();
+        for (p, own) in fit.fit.estimate.parameters().zip(own.fit.estimate.parameters()) {
+            assert!((p.value / own.value - 1.0).abs() < 1e-9, "{p} {own}");
+            assert!((p.standard_error / own.standard_error - 1.0).abs() < 1e-9, "{p} {own}");
+        }
     }
 }

@@ -22,6 +22,7 @@ mod nonlinear_exact;
 mod nonlinear_silverbox;
 mod nonlinear_study;
 mod open_record;
+mod pulse_noise;
 mod refined;
 mod related;
 mod response_checks;
