@@ -91,6 +91,10 @@ fn faults() -> Vec<(String, On, Option<Fault>)> {
         let fault = Fault::Held { gaps, samples: 5 };
         add(format!("last value held for 5 samples, {gaps} times"), On::Response, fault);
     }
+    for bits in [8, 10, 12] {
+        add(format!("steps of {bits} bits, all channels"), On::Both, Fault::Steps { bits });
+    }
+    add("wrong sign of the responses".into(), On::Response, Fault::Gain { factor: -1.0 });
     all
 }
 

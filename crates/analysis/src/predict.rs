@@ -13,7 +13,7 @@ use crate::identify::prediction::{channels, shown, steady_state};
 use crate::machine::{Machine, NonlinearPart};
 use crate::measurement::channels::ABSENT;
 use crate::measurement::{Block, Measurement};
-use crate::text::{significant, text_table};
+use crate::text::{paragraph, significant, text_table};
 
 /// Settings of a prediction.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +48,8 @@ pub struct PredictionSummary {
     pub steady: bool,
     /// Errors of the channels measured.
     pub channels: Vec<PredictionError>,
+    /// Remarks to read before using the numbers.
+    pub remarks: Vec<String>,
     /// The settings, which repeat the analysis.
     pub analysis: Predict,
 }
@@ -101,13 +103,19 @@ pub fn predict(
         true => steady_state(system, phase, &block)?,
         false => open(system, phase, &block, settle)?,
     };
-    let mut errors = Vec::new();
+    let (mut errors, mut remarks) = (Vec::new(), block.unit_remarks.clone());
     for (kind, seen) in block.responses() {
         let columns = measured.channels().response(kind);
         for dof in (0..dofs).filter(|dof| columns.get(*dof).is_some_and(|c| c != ABSENT)) {
             let (x, p) = (seen.channel(dof), channels(&response, kind).channel(dof));
             let name = block.names.response_name(kind, dof);
             let (x, p) = (&x[settle..], &p[settle..]);
+            if !steady && settle == 0 && is_in_motion(x, p) {
+                remarks.push(format!(
+                    "the error of {name} is largest at the beginning and dies away: the machine was in motion before \
+                     the first sample, and not at rest; `settle` fits the state in which it begins"
+                ));
+            }
             errors.push(PredictionError::of((name, kind, dof), x, p, steady));
         }
     }
@@ -119,9 +127,27 @@ pub fn predict(
         first_judged: block.first_sample + settle,
         steady,
         channels: errors,
+        remarks,
         analysis: how.clone(),
     };
     Ok(Predicted { summary, response })
+}
+
+/// Parts of a record of which the first and the last are compared, and their ratio from which a start is to blame.
+const PARTS: usize = 8;
+const DIES_AWAY: f64 = 3.0;
+/// Samples in such a part at least.
+const SHORTEST: usize = 16;
+
+/// Returns whether the error of a channel dies away from the beginning of a record on, as a free motion does.
+fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
+    let error: Vec<f64> = measured.iter().zip(predicted).map(|(x, p)| x - p).collect();
+    let part = error.len() / PARTS;
+    if part < SHORTEST {
+        return false;
+    }
+    let [first, last] = [&error[..part], &error[error.len() - part..]].map(measures::rms);
+    first > DIES_AWAY * last
 }
 
 /// Number of samples that the start is fitted to; 0 for a start at rest.
@@ -250,8 +276,9 @@ impl fmt::Display for Predicted {
             f,
             "{kind} of {machine} under the force of {file}, samples {first_sample} to {last_sample}"
         )?;
+        let remarks = self.summary.remarks.iter().map(|remark| format!("note: {remark}"));
         if self.summary.channels.is_empty() {
-            return Ok(());
+            return f.write_str(&paragraph(remarks));
         }
         let from = self.summary.first_judged;
         let header = [&format!("error from sample {from} on"), "RMSE", "unit", "NRMSE"];
@@ -264,7 +291,8 @@ impl fmt::Display for Predicted {
                 format!("{} %", significant(100.0 * channel.nrmse, 3)),
             ]);
         }
-        write!(f, "\n{}", text_table(&rows))
+        write!(f, "\n{}", text_table(&rows))?;
+        f.write_str(&paragraph(remarks))
     }
 }
 

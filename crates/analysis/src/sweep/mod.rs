@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use mechid_estimate::checks::{Verdict, periodicity};
 use mechid_estimate::{Sweep, SweepPoint, Unknowns, sweep};
 use mechid_io::Experiment;
 use mechid_model::{Response, SecondOrderSystem};
@@ -150,6 +151,17 @@ pub fn sweep_record(
     let mut summary =
         how.summary(file, samples, &swept, reference, (natural_frequency_hz, &rate_hz))?;
     summary.remarks.extend(measured.unit_remarks.clone());
+    if how.estimator.is_of_spectra() && measured.held_to().is_none() {
+        let motion = measured.response().0;
+        let seam = periodicity(motion);
+        summary.remarks.extend((seam.verdict() > Verdict::Good).then(|| {
+            format!(
+                "the spectra are those of whole periods, and {} samples of {} are none: {seam}; give `period`, or sweep \
+                 an estimator in time",
+                measured.period, measured.file
+            )
+        }));
+    }
     if let (true, Some(last)) = (how.estimator.is_of_spectra(), measured.held_to()) {
         let (first, file) = (measured.first_sample, &measured.file);
         summary.remarks.push(format!(
