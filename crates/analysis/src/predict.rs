@@ -5,7 +5,7 @@ use std::fmt;
 use mechid_estimate::EstimateError;
 use mechid_estimate::nonlinear::{self, ChannelPhase};
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
-use mechid_signal::{Extent, measures};
+use mechid_signal::{Extent, measures, message};
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::AnalysisError;
@@ -103,7 +103,7 @@ pub fn predict(
         true => steady_state(system, phase, &block)?,
         false => open(system, phase, &block, settle)?,
     };
-    let (mut errors, mut remarks) = (Vec::new(), block.unit_remarks.clone());
+    let (mut errors, mut in_motion) = (Vec::new(), Vec::new());
     for (kind, seen) in block.responses() {
         let columns = measured.channels().response(kind);
         for dof in (0..dofs).filter(|dof| columns.get(*dof).is_some_and(|c| c != ABSENT)) {
@@ -111,13 +111,18 @@ pub fn predict(
             let name = block.names.response_name(kind, dof);
             let (x, p) = (&x[settle..], &p[settle..]);
             if !steady && settle == 0 && is_in_motion(x, p) {
-                remarks.push(format!(
-                    "the error of {name} is largest at the beginning and dies away: the machine was in motion before \
-                     the first sample, and not at rest; `settle` fits the state in which it begins"
-                ));
+                in_motion.push(name.clone());
             }
             errors.push(PredictionError::of((name, kind, dof), x, p, steady));
         }
+    }
+    let mut remarks = block.unit_remarks.clone();
+    if !in_motion.is_empty() {
+        remarks.push(format!(
+            "the error of {} is largest at the beginning and dies away: the machine was in motion before the first \
+             sample, and not at rest; `settle` fits the state in which it begins",
+            message::list(in_motion.iter(), ", ", 6)
+        ));
     }
     let summary = PredictionSummary {
         file: block.file.clone(),

@@ -235,13 +235,10 @@ impl IdentificationSummary {
             ));
         }
         // Of a mass the checks tell.
-        let told = self.checks.iter().find_map(|check| match check.finding {
-            Finding::NegativeMass { row, .. } => Some(row + 1),
-            _ => None,
-        });
-        let is_told = |p: &ParameterRow| p.matrix == "mass" && told == Some(p.row);
+        let is_told = self.checks.iter().any(|check| check.subject == Subject::Mass);
         let negative = |p: &&ParameterRow| p.row == p.column && p.estimate.value < 0.0;
-        for p in self.parameters.iter().filter(negative).filter(|p| !is_told(p)) {
+        for p in self.parameters.iter().filter(negative).filter(|p| !is_told || p.matrix != "mass")
+        {
             doubts.push(format!("{} is negative: no passive machine has that", p.name));
         }
         let extrapolated = self.nonlinear.iter().flat_map(|nonlinear| &nonlinear.extrapolation);

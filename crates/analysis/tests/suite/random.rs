@@ -7,7 +7,7 @@ use mechid_analysis::{
     ResponseQuantity, Segmentation, identify, identify_responses,
 };
 use mechid_estimate::Estimate;
-use mechid_estimate::checks::Subject;
+use mechid_estimate::checks::{Finding, Power, Subject};
 use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::FrequencyResponses;
 use mechid_model::Sdof;
@@ -381,4 +381,56 @@ fn a_table_of_segments_is_fitted_as_its_record() {
     let damping = |found: &Estimate| found.parameter("c").unwrap().value;
     let [found, own] = [damping(found.estimate()), damping(own.estimate())];
     assert!(found > 1.3 * own, "{found} {own}");
+}
+
+/// Displacement of the machine of [`rig`] with dry friction, by Runge–Kutta steps of a sixteenth of a sample between
+/// which the force is linear.
+fn with_friction(force: &Record, friction: f64) -> Record {
+    const FINER: usize = 16;
+    let [m, c, k] = [rig().system.mass(), rig().system.damping(), rig().system.stiffness()]
+        .map(|matrix| matrix[(0, 0)]);
+    let rate =
+        |[x, v]: [f64; 2], f: f64| [v, (f - c * v - k * x - friction * (v / 1e-4).tanh()) / m];
+    let (h, f) = (force.sampling().dt() / FINER as f64, force.channel(0));
+    let (mut z, mut out) = ([0.0, 0.0], Vec::with_capacity(f.len()));
+    for pair in f.windows(2) {
+        out.push(z[0]);
+        for step in 0..FINER {
+            let at =
+                |part: f64| pair[0] + (pair[1] - pair[0]) * (step as f64 + part) / FINER as f64;
+            let next = |d: [f64; 2], part: f64| [z[0] + part * h * d[0], z[1] + part * h * d[1]];
+            let a = rate(z, at(0.0));
+            let b = rate(next(a, 0.5), at(0.5));
+            let c = rate(next(b, 0.5), at(0.5));
+            let d = rate(next(c, 1.0), at(1.0));
+            let sum = |i: usize| (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]) / 6.0;
+            z = [z[0] + h * sum(0), z[1] + h * sum(1)];
+        }
+    }
+    out.push(z[0]);
+    Record::from_channel(force.sampling(), out).unwrap()
+}
+
+/// The linear fit takes friction of 3 % of the RMS force for damping, and leaves a few per cent of the motion; what it
+/// leaves has the sign of the velocity. The same records without friction have nothing of it.
+#[test]
+fn dry_friction_under_a_random_force_is_named() {
+    let long = RandomTest { sampling: Sampling::new(0.002, 4 * SAMPLES).unwrap(), ..rig() };
+    let told = |seed: &u64, friction: f64| -> Option<Power> {
+        let [force, _] = long.measure(*seed).unwrap();
+        let found = identify(
+            &[measured([force.clone(), with_friction(&force, friction)], *seed)],
+            &Identify::default(),
+        );
+        let found = found.unwrap();
+        let mut told = found.checks().iter().filter(|check| check.is_conspicuous());
+        told.find_map(|check| match check.finding {
+            Finding::Linearity { power, .. } => Some(power),
+            _ => None,
+        })
+    };
+    let named =
+        (0..8_u64).into_par_iter().filter(|seed| told(seed, 3.0) == Some(Power::VelocitySign));
+    assert!(named.count() >= 7);
+    assert_eq!((0..8_u64).into_par_iter().filter(|seed| told(seed, 0.0).is_some()).count(), 0);
 }

@@ -271,7 +271,7 @@ pub enum Finding {
     Linearity {
         /// The power that correlates most.
         power: Power,
-        /// Degree of freedom of the displacement.
+        /// Degree of freedom of the motion.
         #[cfg_attr(feature = "serde", serde(serialize_with = "from_one"))]
         dof: usize,
         /// Probability that the noise of a linear machine correlates as much.
@@ -443,7 +443,7 @@ pub enum Reference {
     MaximumLikelihood,
 }
 
-/// Power of the displacement.
+/// Power of a motion that a force is looked for in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Power {
@@ -451,6 +451,10 @@ pub enum Power {
     Square,
     /// x³.
     Cube,
+    /// ẋ³.
+    VelocityCube,
+    /// Sign of ẋ: dry friction.
+    VelocitySign,
 }
 
 /// A residual that is tested for whiteness.

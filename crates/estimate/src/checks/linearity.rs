@@ -1,6 +1,6 @@
-//! Correlation of a residual with powers of the displacement.
+//! Correlation of a residual with powers of displacement and velocity.
 
-use mechid_model::ResponseQuantity;
+use mechid_model::{Response, ResponseQuantity};
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -8,17 +8,16 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use super::finding::{Finding, PValue, Power};
 use crate::{Estimate, EstimateError, predict_periodic};
 
-/// Powers of the displacement that are tested.
-const POWERS: [Power; 2] = [Power::Square, Power::Cube];
+/// Powers of a motion that are tested.
+const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Power::VelocitySign];
 
 /// Tests whether the response (samples × degrees of freedom) that a machine does not explain under a
-/// random force (N) is correlated with the square or the cube of its displacement, between two
-/// frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
+/// random force (N) is correlated with the square or the cube of its displacement, or with the cube or the
+/// sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
 ///
 /// Frequency responses do not show that: under a random force a hardening spring looks like a stiffer
-/// one with more noise. So the displacement is predicted over the whole record, and its square and its
-/// cube, less their linear parts, are applied as forces at each degree of freedom in turn. The
-/// responses to them must be uncorrelated with the residual, as they are with the noise of a linear
+/// one with more noise, and dry friction like damping. So the motion is predicted over the whole record, and those powers
+/// of it, less their linear parts, are applied as forces at each degree of freedom in turn. The responses to them must be uncorrelated with the residual, as they are with the noise of a linear
 /// machine; a Gaussian force keeps errors of the linear model out, too.
 ///
 /// # Errors
@@ -28,7 +27,7 @@ const POWERS: [Power; 2] = [Power::Square, Power::Cube];
 ///
 /// # Source
 /// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers less their linear
-/// part; Adams & Allemang (2000), Mechanical Systems and Signal Processing 14, 637–656, for the
+/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and Signal Processing 14, 637–656, for the
 /// nonlinearity as a force.
 pub fn linearity(
     estimate: &Estimate,
@@ -65,7 +64,7 @@ pub fn linearity(
     let mut least = (1.0, POWERS[0], 0);
     for dof in 0..n {
         for power in POWERS {
-            let forces = without_linear_part(predicted.displacement(), dof, power)?;
+            let forces = without_linear_part(&predicted, dof, power)?;
             let forces = Spectrum::of(&forces);
             let response = |at: usize| receptances[at].column(dof) * forces.line(lines[at], 0);
             let responses: Vec<_> = (0..lines.len()).map(response).collect();
@@ -81,35 +80,38 @@ pub fn linearity(
     Ok(Finding::Linearity { power, dof, p_value })
 }
 
-/// A power of a channel less its mean and its linear part.
+/// A power of the motion of a degree of freedom less its mean and its linear part.
 fn without_linear_part(
-    displacement: &Record,
+    predicted: &Response,
     dof: usize,
     power: Power,
 ) -> Result<Record, EstimateError> {
-    let power = match power {
-        Power::Square => 2,
-        Power::Cube => 3,
+    let (motion, of): (&Record, fn(f64) -> f64) = match power {
+        Power::Square => (predicted.displacement(), |x| x * x),
+        Power::Cube => (predicted.displacement(), |x| x.powi(3)),
+        Power::VelocityCube => (predicted.velocity(), |x| x.powi(3)),
+        Power::VelocitySign => (predicted.velocity(), f64::signum),
     };
-    let x = displacement.without_mean().channel(dof).to_vec();
+    let x = motion.without_mean().channel(dof).to_vec();
     let size = (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
     let x: Vec<f64> = x.iter().map(|x| if size > 0.0 { x / size } else { 0.0 }).collect();
-    let linear = x.iter().map(|x| x.powi(power + 1)).sum::<f64>() / x.len() as f64;
-    let values = x.iter().map(|x| x.powi(power) - linear * x).collect();
-    Ok(Record::from_channel(displacement.sampling(), values)?.without_mean())
+    let linear = x.iter().map(|x| of(*x) * x).sum::<f64>() / x.len() as f64;
+    let values = x.iter().map(|x| of(*x) - linear * x).collect();
+    Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
 }
 
+/// Lines to either side over which the spectrum of a residual is averaged.
+const NEIGHBOURS: usize = 10;
+
 /// Probability that noise with the spectrum of the residual (channels × lines) is correlated as much
-/// with the responses, each channel relative to its size.
+/// with the responses, each line relative to the size of the residual around it.
 fn p_value(residual: &DMatrix<Complex<f64>>, responses: &DMatrix<Complex<f64>>) -> f64 {
     let (mut product, mut variance) = (0.0, 0.0);
     for (e, g) in residual.row_iter().zip(responses.row_iter()) {
-        let size = e.norm_squared();
-        if size > 0.0 {
-            product += e.dotc(&g).re / size;
-            let lines = e.iter().zip(g.iter());
-            let squares = lines.map(|(e, g)| 0.5 * e.norm_sqr() * g.norm_sqr());
-            variance += squares.sum::<f64>() / (size * size);
+        let sizes = around(&e.iter().map(|e| e.norm_sqr()).collect::<Vec<_>>());
+        for ((e, g), size) in e.iter().zip(g.iter()).zip(sizes).filter(|(_, size)| *size > 0.0) {
+            product += (e.conj() * g).re / size;
+            variance += 0.5 * e.norm_sqr() * g.norm_sqr() / (size * size);
         }
     }
     if variance > 0.0 {
@@ -118,4 +120,20 @@ fn p_value(residual: &DMatrix<Complex<f64>>, responses: &DMatrix<Complex<f64>>) 
     } else {
         1.0
     }
+}
+
+/// Mean of the values around each.
+fn around(values: &[f64]) -> Vec<f64> {
+    let count = values.len();
+    let window = |at: usize| at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(count);
+    let mut sum = 0.0;
+    let sums: Vec<f64> = std::iter::once(0.0)
+        .chain(values.iter().map(|value| {
+            sum += value;
+            sum
+        }))
+        .collect();
+    let mean =
+        |range: std::ops::Range<usize>| (sums[range.end] - sums[range.start]) / range.len() as f64;
+    (0..count).map(|at| mean(window(at))).collect()
 }

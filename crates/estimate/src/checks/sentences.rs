@@ -512,12 +512,12 @@ fn linearity(
     match verdict {
         Verdict::Good => write!(
             f,
-            "the residual is uncorrelated with the square and the cube of the displacement as forces \
-             ({p_value})"
+            "the residual is uncorrelated with the square and the cube of the displacement and with the cube \
+             and the sign of the velocity as forces ({p_value})"
         ),
         _ => write!(
             f,
-            "the residual is correlated with the {power} of {displacement} as a force ({p_value}): \
+            "the residual is correlated with the {power} {displacement} as a force ({p_value}): \
              the machine is nonlinear at this level of the force, to which its parameters belong"
         ),
     }
@@ -624,8 +624,10 @@ impl Display for Reference {
 impl Display for Power {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Power::Square => "square",
-            Power::Cube => "cube",
+            Power::Square => "square of",
+            Power::Cube => "cube of",
+            Power::VelocityCube => "cube of the velocity of",
+            Power::VelocitySign => "sign (dry friction) of the velocity of",
         })
     }
 }
