@@ -83,7 +83,8 @@ impl AveragedSegments {
         [samples, hop, count, window, self.sample_rate_hz]
     }
 
-    /// Returns the segments that such numbers state; `None` if they state none that are possible.
+    /// Returns the segments that such numbers state, pure numbers and a rate in Hz as of [`AveragedSegments::numbers`];
+    /// `None` if they state none that are possible.
     pub fn of_numbers(numbers: [f64; 5]) -> Option<Self> {
         let [samples, hop, count, window, sample_rate_hz] = numbers;
         let whole = |value: f64, least: f64| {
