@@ -43,7 +43,7 @@ pub use finding::{
 pub use instability::instability;
 pub use kinematics::kinematics;
 pub use leakage::leakage;
-pub use linearity::linearity;
+pub use linearity::{linearity, linearity_of_open_record};
 pub use mass::negative_mass;
 pub use period::claimed_period;
 pub use power::power;

@@ -198,7 +198,7 @@ fn looked_at(
 
 /// Judges the lines between the first and the last one fitted; `None` for a free machine, which has no
 /// displacement to take powers of.
-pub(super) fn of_linearity(
+fn of_linearity(
     measured: &Block,
     lines: &Lines,
     estimate: &Estimate,
