@@ -141,8 +141,10 @@ pub fn predict(
 /// Parts of a record of which the first and the last are compared, and their ratio from which a start is to blame.
 const PARTS: usize = 8;
 const DIES_AWAY: f64 = 3.0;
-/// Samples in such a part at least.
+/// Samples in such a part at least, and those in which the error has to show at once: that of a machine which is not
+/// quite the right one grows with its motion.
 const SHORTEST: usize = 16;
+const AT_ONCE: f64 = 0.5;
 
 /// Returns whether the error of a channel dies away from the beginning of a record on, as a free motion does.
 fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
@@ -152,7 +154,8 @@ fn is_in_motion(measured: &[f64], predicted: &[f64]) -> bool {
         return false;
     }
     let [first, last] = [&error[..part], &error[error.len() - part..]].map(measures::rms);
-    first > DIES_AWAY * last
+    let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, e| most.max(e.abs()));
+    first > DIES_AWAY * last && largest(&error[..SHORTEST]) > AT_ONCE * largest(&error)
 }
 
 /// Number of samples that the start is fitted to; 0 for a start at rest.

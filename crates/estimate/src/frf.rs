@@ -198,7 +198,7 @@ impl Frf {
         };
         let unexplained = frf.variance.iter().map(left).collect();
         let inverse_force = frf.variance.iter().map(of_force).collect();
-        frf.scatter = Some(Scatter::new(&frf, unexplained, inverse_force, segments));
+        frf.scatter = Some(Scatter::of_table(&frf, unexplained, inverse_force, segments));
         Ok(frf)
     }
 

@@ -102,7 +102,7 @@ impl AveragedSegments {
 }
 
 /// Largest number of samples that a file is believed to state.
-const MOST_SAMPLES: f64 = 9e15;
+const MOST_SAMPLES: f64 = (1_u64 << 26) as f64;
 
 /// Response at one point per unit force at another, frequency by frequency.
 #[derive(Debug, Clone, PartialEq)]
@@ -191,6 +191,14 @@ impl FrequencyResponses {
             *number = constant(table, name)?.unwrap_or(f64::NAN);
         }
         responses.segments = AveragedSegments::of_numbers(numbers);
+        let any = AveragedSegments::COLUMNS[..4].iter().any(|name| table.find(name).is_ok());
+        if any && responses.segments.is_none() {
+            responses.remarks.push(format!(
+                "the columns {} state no segments that are possible, the same in every row: what a window blunts stays \
+                 in the responses",
+                AveragedSegments::COLUMNS.join(", ")
+            ));
+        }
         Ok(responses)
     }
 

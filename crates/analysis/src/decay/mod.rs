@@ -13,7 +13,7 @@ use mechid_signal::Record;
 use serde::{Deserialize, Serialize, Serializer};
 
 use self::release::release;
-use self::steps::last_shown;
+use self::steps::{coarse, last_shown};
 pub use self::summary::DecaySummary;
 use crate::AnalysisError;
 use crate::identify::prediction::Compared;
@@ -87,6 +87,7 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
         None => release(record),
     };
     let record = record.window(release, record.len() - release)?;
+    let coarse = coarse(&record);
     let last = if how.to_s.is_none() { last_shown(&record) } else { None };
     let record = match last {
         Some(last) => record.window(0, last.samples)?,
@@ -102,6 +103,13 @@ pub fn decay(measurement: &Measurement, how: &DecaySettings) -> Result<Decayed, 
              what rounding leaves of it is no longer its motion (`to` sets another end)",
             significant(last.samples as f64 * record.sampling().dt(), 4),
             significant(last.step, 3)
+        )
+    }));
+    summary.remarks.extend(coarse.into_iter().map(|(channel, steps)| {
+        format!(
+            "the values of {} span {steps} steps of its converter: rounding is no noise of so few, and may show as modes; \
+             leave the column out, or measure with a higher gain",
+            summary.channels[channel].column
         )
     }));
     let predicted = estimate.fitted().clone();

@@ -50,6 +50,32 @@ pub(super) fn last_shown(record: &Record) -> Option<LastShown> {
     (0..record.channels()).filter_map(of_channel).min_by_key(|last| last.samples)
 }
 
+/// Returns the channels, counted from 0, that come in so few steps that rounding is no noise of theirs anywhere, with the
+/// number of steps that they span.
+///
+/// # Source
+/// The source of [`last_shown`].
+pub(super) fn coarse(record: &Record) -> Vec<(usize, usize)> {
+    let span = |channel: usize| {
+        let samples = record.channel(channel);
+        let [low, high] = [f64::min, f64::max].map(|of| samples.iter().copied().reduce(of));
+        let steps = ((high? - low?) / smallest_step(samples)?).round();
+        (steps < LARGE).then_some((channel, steps as usize))
+    };
+    (0..record.channels()).filter_map(span).collect()
+}
+
+/// Distance of neighbouring values, in their unit, of a channel that takes few; `None` of one that takes many without
+/// steps.
+fn smallest_step(samples: &[f64]) -> Option<f64> {
+    let mut values = samples.to_vec();
+    values.sort_unstable_by(f64::total_cmp);
+    values.dedup();
+    let few = values.len() > 1 && (values.len() as f64) < LARGE;
+    let distances = values.windows(2).map(|pair| pair[1] - pair[0]);
+    distances.reduce(f64::min).filter(|_| few)
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;
@@ -78,6 +104,8 @@ mod tests {
             let found = found.samples as f64 / 512.0;
             assert!((found - end).abs() < 0.2, "{steps}: {found} {end}");
         }
+        assert_eq!(coarse(&decay(20.0, 0.0)), [(0, 39)]);
+        assert_eq!(coarse(&decay(1024.0, 0.0)), []);
         // Noise of a few steps keeps all of it.
         assert_eq!(last_shown(&decay(1024.0, 4.0)), None);
         let sampling = Sampling::new(0.01, 500).unwrap();

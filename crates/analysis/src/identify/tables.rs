@@ -158,6 +158,7 @@ pub fn identify_responses(
             .iter()
             .map(Unscaled::to_string)
             .chain(tables.iter().flat_map(|table| table.remarks.iter().cloned()))
+            .chain(measured.iter().flat_map(|measured| measured.remarks.iter().cloned()))
             .chain(added_decay.map(|rate| {
                 format!(
                     "an exponential window adds {} 1/s to the decay of every mode of the table: it was taken off \

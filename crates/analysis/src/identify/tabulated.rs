@@ -46,6 +46,8 @@ pub(super) struct Tabulated {
     coherent: Coherent,
     /// Whether these are averages over segments of which window and number are known.
     is_averaged: bool,
+    /// Remarks on what the table states and was not used.
+    pub(super) remarks: Vec<String>,
 }
 
 impl Tabulated {
@@ -103,10 +105,20 @@ impl Tabulated {
         let errors = || -> Vec<DMatrix<f64>> {
             rows.iter().map(|row| matrix(&|f| error(f, *row)).map(|z| z.re)).collect()
         };
-        let averaged = match how.averages {
-            None => Averaged::of(table, &rows)?,
-            Some(_) => None,
+        let averaged = Averaged::of(table, &rows)?;
+        let unused = |why: &str| {
+            format!("{}: {why}: what a window blunts stays in the responses", table.file)
         };
+        let mut remarks = Vec::new();
+        if table.segments.is_some() && averaged.is_none() {
+            remarks.push(unused("its frequencies are not those of the segments that it states"));
+        }
+        if averaged.is_some() && how.averages.is_some() {
+            remarks.push(format!(
+                "{}: it states its segments, from which the number of averages follows; `averages` was not used",
+                table.file
+            ));
+        }
         let (errors, is_averaged) = (stated.then(errors), averaged.is_some());
         if is_averaged || !stated {
             let tables = Columns { points: &points, forces: &forces, rows: &rows, measured };
@@ -114,15 +126,18 @@ impl Tabulated {
             if let Some(coherent) = coherent {
                 let data = joined(&coherent)?;
                 let noise = if stated { Noise::Stated } else { Noise::Coherence };
-                return Ok(Self { points, driven, noise, data, coherent, is_averaged });
+                return Ok(Self { points, driven, noise, data, coherent, is_averaged, remarks });
             }
+        }
+        if is_averaged {
+            remarks.push(unused("segments are stated, but no coherence"));
         }
         let noise = if stated { Noise::Stated } else { Noise::Unknown };
         let variance: Option<Vec<_>> =
             errors.map(|errors| errors.iter().map(|e| e.map(|e| 2.0 * e * e)).collect());
         let data = from_responses(&omega, &response, variance.as_deref(), measured, &driven)?;
         let coherent = Vec::new();
-        Ok(Self { points, driven, noise, data, coherent, is_averaged: false })
+        Ok(Self { points, driven, noise, data, coherent, is_averaged: false, remarks })
     }
 
     /// Returns the responses as averages over segments of which window and number are known, with the degrees of

@@ -151,6 +151,7 @@ impl Measurement {
         let survey = file.survey(&time, &channels.used())?;
         let doubt = units::doubtful_time(file.head(), &time, survey.sampling);
         let doubt = doubt.or(units::contradicted_rate(file.head(), reading));
+        let doubt = doubt.or(units::coarse_time(file.head(), &time, survey.sampling));
         file.forget_head();
         let mut units = units;
         units.remarks.extend(doubt.into_iter().chain(survey.remarks));

@@ -1,11 +1,11 @@
 //! Conversion of columns to SI units, and time axes in a doubtful unit.
 
 use mechid_io::{Quantity, Table, TimeAxis, Unit, escaped};
-use mechid_signal::{Sampling, message};
+use mechid_signal::{Sampling, message, quantisation_step};
 
 use super::Reading;
 use crate::AnalysisError;
-use crate::text::compact;
+use crate::text::{compact, significant};
 
 /// Use of a column: its name or number, the quantity that it must hold, and the setting that names it.
 #[derive(Debug, Clone, Copy)]
@@ -154,3 +154,36 @@ pub(crate) fn doubtful_time(
         compact(1000.0 * rate_hz, 8),
     ))
 }
+
+/// Error of a sampling rate by the digits of its time column, relative to the rate, from which frequencies may be known
+/// less well for it than for the noise.
+const RATE_ERROR: f64 = 1e-5;
+
+/// Returns a remark if the digits of a time column leave the sampling rate so uncertain that frequencies suffer.
+pub(crate) fn coarse_time(
+    table: &Table,
+    time: &TimeAxis<'_>,
+    sampling: Sampling,
+) -> Option<String> {
+    let TimeAxis::Column(name) = time else { return None };
+    let instants = table.column(name).ok()?;
+    let (first, last) = (instants.first()?, instants.last()?);
+    let per_sample = (last - first) / (instants.len() - 1) as f64;
+    // Even instants are multiples of their own step.
+    let rounding = quantisation_step(instants)? / per_sample;
+    let error = rounding / sampling.len() as f64;
+    (rounding < EVEN && error > RATE_ERROR).then(|| {
+        format!(
+            "{}: the instants of {} are rounded to {} s, which leaves the sampling rate, {} Hz, uncertain by up to {} % \
+             and all frequencies with it: give `sample_rate`",
+            table.file(),
+            table.label(table.find(name).unwrap_or_default()),
+            significant(rounding * sampling.dt(), 2),
+            compact(sampling.rate_hz(), 6),
+            significant(100.0 * error, 2)
+        )
+    })
+}
+
+/// Rounding over the time step, below which instants are rounded ones.
+const EVEN: f64 = 0.99;

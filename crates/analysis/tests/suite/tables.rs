@@ -167,6 +167,30 @@ fn a_record_and_its_table_agree() {
     assert!(!checks.is_empty() && checks.iter().all(|check| !check.is_conspicuous()));
 }
 
+/// Three periods weigh a line by two deviations, which neighbouring lines have to share: the mean square of 180 errors over
+/// their standard errors, of which those of one record are not independent, is known to some 0.15.
+#[test]
+fn tables_of_three_periods_know_their_noise() {
+    let period = Sampling::from_rate_hz(128.0, 128).unwrap();
+    let force = Multisine::flat(lines::band(period, 3.0, 40.0), 2.0, Phases::Schroeder).unwrap();
+    let force = force.sample(period).unwrap();
+    let exact = exact_harmonic_periodic(&oscillator(), &force).unwrap();
+    let (force, x) = (force.repeated(3).unwrap(), exact.displacement().repeated(3).unwrap());
+    let squares = |seed: u64| -> Vec<f64> {
+        let x = noise::add_white(&x, NoiseLevel::FractionOfRms(0.02), seed).unwrap();
+        let responses = [(ResponseQuantity::Displacement, &x)];
+        let test = Measurement::from_records(&force, &responses).unwrap().period(128).unwrap();
+        let table = frf(&test, &FrfSettings::default()).unwrap();
+        let text = FrequencyResponses::parse("a.csv", table.csv().as_bytes()).unwrap();
+        let found = identify_responses(&[text], &IdentifyResponses::default()).unwrap();
+        let each = found.estimate().parameters().zip(entries(&oscillator()));
+        each.map(|(p, exact)| ((p.value - exact) / p.standard_error).powi(2)).collect()
+    };
+    let all: Vec<f64> = (0..60).flat_map(squares).collect();
+    let mean = all.iter().sum::<f64>() / all.len() as f64;
+    assert!((0.55..1.5).contains(&mean), "{mean}");
+}
+
 /// Numbers of a complex normal distribution with E|z|² = 1.
 fn normal(count: usize, seed: u64) -> Vec<Complex<f64>> {
     let both = noise::white(Sampling::new(1.0, count).unwrap(), 2, 0.5_f64.sqrt(), seed).unwrap();

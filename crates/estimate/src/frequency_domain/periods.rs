@@ -96,8 +96,8 @@ impl RepeatedPeriods {
     /// [`EstimateError::Size`] unless there is one step per channel.
     ///
     /// # Source
-    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: noise of the standard deviation s leaves
-    /// exp(−4π²s²/step²) of the error alike from period to period.
+    /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: beside noise of the standard deviation s steps q
+    /// leave Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the error alike from period to period.
     pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, EstimateError> {
         crate::least_squares::size("quantisation steps", 2 * self.dof, steps.len())?;
         self.steps = steps;
@@ -108,14 +108,11 @@ impl RepeatedPeriods {
     fn rounding(&self) -> Vec<f64> {
         let (samples, count) = (self.lines.sampling().len() as f64, self.count as f64);
         let of_channel = |(channel, step): (usize, &f64)| {
-            let scatter = self.scatter.iter().map(|s| s[(channel, channel)].re).sum::<f64>();
-            let of_noise = scatter / self.scatter.len().max(1) as f64 / (count - 1.0).max(1.0);
-            let noise = of_noise * samples / 4.0;
-            let alike = match *step > 0.0 {
-                true => (-4.0 * PI * PI * noise / (step * step)).exp(),
-                false => 0.0,
-            };
-            alike * step * step / 12.0
+            let powers = self.scatter.iter().map(|s| s[(channel, channel)].re);
+            let of_noise =
+                powers.sum::<f64>() / self.scatter.len().max(1) as f64 / (count - 1.0).max(1.0);
+            let scatter = of_noise * samples / 4.0;
+            if *step > 0.0 { step * step * alike(scatter / (step * step)) } else { 0.0 }
         };
         self.steps.iter().enumerate().map(of_channel).collect()
     }
@@ -345,5 +342,66 @@ impl RepeatedPeriods {
         let n = self.dof;
         let (motion, force) = (mean.columns(0, n).into_owned(), mean.columns(n, n).into_owned());
         FrequencyData::from_amplitudes(self.lines.omega(), force, motion, self.measured)
+    }
+}
+
+/// Terms of the series of a sawtooth that count.
+const TERMS: i32 = 64;
+/// Halvings by which noise is found.
+const HALVINGS: usize = 50;
+
+/// Variance of rounding to steps of 1 that is alike in all periods, beside noise of which values in steps scatter so much
+/// (variances, in squares of a step).
+///
+/// With a uniform place between two steps the error of rounding and noise together has the variance s² + 1/12, of
+/// which the scatter has what is not alike.
+fn alike(scatter: f64) -> f64 {
+    let beside = |variance: f64| -> f64 {
+        let term = |k: i32| {
+            let k2 = f64::from(k * k);
+            (-4.0 * PI * PI * k2 * variance).exp() / (2.0 * PI * PI * k2)
+        };
+        (1..=TERMS).map(term).sum()
+    };
+    let (mut low, mut high) = (0.0, scatter.max(0.0));
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match middle + 1.0 / 12.0 - beside(middle) < scatter {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    beside(high)
+}
+
+#[cfg(test)]
+mod tests {
+    use mechid_signal::{Sampling, noise};
+
+    use super::*;
+
+    /// Judge: rounded samples themselves.
+    #[test]
+    fn rounding_alike_is_found_from_the_scatter() {
+        const SAMPLES: usize = 4000;
+        const PERIODS: usize = 50;
+        let drawn = noise::white(Sampling::new(1.0, SAMPLES).unwrap(), PERIODS, 1.0, 3).unwrap();
+        for deviation in [0.0, 0.01, 0.03, 0.1, 0.2, 0.3, 0.5] {
+            let (mut scatter, mut together) = (0.0, 0.0);
+            for k in 0..SAMPLES {
+                let exact = 100.0 * (0.618_034 * k as f64).fract();
+                let rounded =
+                    |period: usize| (exact + deviation * drawn.channel(period)[k]).round();
+                let all: Vec<f64> = (0..PERIODS).map(rounded).collect();
+                let mean = all.iter().sum::<f64>() / PERIODS as f64;
+                let own =
+                    all.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (PERIODS - 1) as f64;
+                scatter += own / SAMPLES as f64;
+                // The mean has the scatter of a period over their number beside what is alike.
+                together += ((mean - exact).powi(2) - own / PERIODS as f64) / SAMPLES as f64;
+            }
+            let found = alike(scatter);
+            assert!((found - together).abs() < 0.004, "{deviation}: {found} {together}");
+        }
     }
 }

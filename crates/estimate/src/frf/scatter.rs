@@ -11,6 +11,8 @@ use super::{COHERENCE_ROUNDING, ComplexMatrix, Frf, Segments};
 /// Complex deviations that a variance is made of at least where neighbouring lines can lend theirs: weights of
 /// fewer cost more than a tenth of the scatter.
 const DEVIATIONS: f64 = 20.0;
+/// Deviations of a line of periods below which it is not weighted by itself: of a table nothing else would tell.
+const FEW: f64 = 8.0;
 
 /// What averages over segments tell of the errors of their responses.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,14 +39,44 @@ impl Scatter {
         inverse_force: Vec<ComplexMatrix>,
         segments: Segments,
     ) -> Self {
-        let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
-        let own = frf.averages - inputs as f64;
         let lines = unexplained.len();
         // The lines of periods are each measured by themselves, however far apart they are.
         let widest = match segments {
             Segments::Periods(_) => 0,
             Segments::Windowed { .. } => lines.saturating_sub(1) / 2,
         };
+        Self::pooled(frf, unexplained, inverse_force, segments, widest)
+    }
+
+    /// The same of responses measured elsewhere: those of few periods have neighbouring lines in common, too.
+    pub(super) fn of_table(
+        frf: &Frf,
+        unexplained: Vec<ComplexMatrix>,
+        inverse_force: Vec<ComplexMatrix>,
+        segments: Segments,
+    ) -> Self {
+        let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
+        let few = frf.averages - (inputs as f64) < FEW;
+        match segments {
+            Segments::Periods(_) if few => {
+                let widest = unexplained.len().saturating_sub(1) / 2;
+                Self::pooled(frf, unexplained, inverse_force, segments, widest)
+            }
+            _ => Self::new(frf, unexplained, inverse_force, segments),
+        }
+    }
+
+    /// Variances are means over up to `widest` lines to either side.
+    fn pooled(
+        frf: &Frf,
+        unexplained: Vec<ComplexMatrix>,
+        inverse_force: Vec<ComplexMatrix>,
+        segments: Segments,
+        widest: usize,
+    ) -> Self {
+        let inputs = inverse_force.first().map_or(0, |inverse| inverse.nrows());
+        let own = frf.averages - inputs as f64;
+        let lines = unexplained.len();
         let freedom = |half: usize| own * independent(2 * half + 1, &frf.line_correlation);
         let half = (0..=widest).find(|half| freedom(*half) >= DEVIATIONS).unwrap_or(widest);
         let pooled = (0..lines).map(|line| {
