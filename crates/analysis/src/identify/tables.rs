@@ -353,7 +353,7 @@ struct Fit {
     estimate: Estimate,
     misfit: Option<Misfit>,
     noise: Vec<NoiseModel>,
-    /// Where all tables state the segments that they are averages over.
+    /// Fit of the averages, if all tables state the segments that they are made of.
     averaged: Option<ResponseEstimate>,
 }
 

@@ -159,6 +159,9 @@ pub(crate) fn doubtful_time(
 /// less well for it than for the noise.
 const RATE_ERROR: f64 = 1e-5;
 
+/// Rounding over the time step, below which instants are rounded ones.
+const EVEN: f64 = 0.99;
+
 /// Returns a remark if the digits of a time column leave the sampling rate so uncertain that frequencies suffer.
 pub(crate) fn coarse_time(
     table: &Table,
@@ -185,5 +188,28 @@ pub(crate) fn coarse_time(
     })
 }
 
-/// Rounding over the time step, below which instants are rounded ones.
-const EVEN: f64 = 0.99;
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn told(rate_hz: f64, samples: usize, decimals: usize) -> Option<String> {
+        let row = |k: usize| format!("{:.decimals$},0\n", k as f64 / rate_hz);
+        let text: String = (0..samples).map(row).collect();
+        let table = Table::parse("a.csv", format!("time,x\n{text}").as_bytes()).unwrap();
+        let time = TimeAxis::Column("time");
+        let sampling = table.sampling(&time, &["x"]).unwrap();
+        coarse_time(&table, &time, sampling)
+    }
+
+    /// Judge: half a unit of the last digit at either end, over the duration of the record.
+    #[test]
+    fn instants_that_leave_the_rate_open_are_told() {
+        // A millisecond in 7.8125 s.
+        let coarse = told(512.0, 4000, 3).unwrap();
+        assert!(coarse.contains("0.013 %"), "{coarse}");
+        assert_eq!(told(512.0, 4096, 7), None);
+        // Steps of a millisecond are no rounding.
+        assert_eq!(told(1000.0, 4096, 3), None);
+        assert_eq!(told(25_600.0, 40_000, 6), None);
+    }
+}

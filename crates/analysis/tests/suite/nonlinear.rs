@@ -450,7 +450,7 @@ fn a_nonlinear_machine_under_a_random_force_is_no_disturbed_linear_one() {
     }
 }
 
-/// Of a window that is no period the terms may be found all the same, with a warning of its ends.
+/// The terms may be found in a window that is no period all the same, with a warning of its ends.
 #[test]
 fn a_window_that_is_no_period_is_named_where_nonlinear_terms_do_not_fit_it() {
     let how = Identify::default().nonlinear("k3: x1^3".parse().unwrap());

@@ -2,15 +2,17 @@
 
 use mechid_analysis::frf::{Estimator, frf};
 use mechid_analysis::identify::{Fit, Method};
+use mechid_analysis::sweep::{self, Kind};
 use mechid_analysis::{
-    AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Measurement,
-    ResponseQuantity, Segmentation, identify, identify_responses,
+    AnalysisError, FrfSettings, Identified, Identify, IdentifyResponses, Machine, Measurement,
+    Predict, ResponseQuantity, Segmentation, SweepSettings, identify, identify_responses, predict,
+    sweep_record,
 };
 use mechid_estimate::Estimate;
 use mechid_estimate::checks::{Finding, Power, Subject};
 use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::FrequencyResponses;
-use mechid_model::Sdof;
+use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};
 use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
 use rayon::prelude::*;
@@ -347,7 +349,7 @@ fn the_length_of_segments_is_chosen() {
     assert!(identify(&[random_test(0)], &how).unwrap().to_string().contains("were chosen"));
 }
 
-/// What a file of averaged responses states of its segments is enough to take off what their window blunts.
+/// A file of averaged responses states enough of its segments to take off what their window blunts.
 #[test]
 fn a_table_of_segments_is_fitted_as_its_record() {
     let test = random_test(3);
@@ -433,4 +435,48 @@ fn dry_friction_under_a_random_force_is_named() {
         (0..8_u64).into_par_iter().filter(|seed| told(seed, 3.0) == Some(Power::VelocitySign));
     assert!(named.count() >= 3);
     assert_eq!((0..4_u64).into_par_iter().filter(|seed| told(seed, 0.0).is_some()).count(), 0);
+}
+
+/// Judge: the generator. A window cut out of a steady state begins in motion; a machine at rest does not, even where the
+/// model is not quite the right one and the force acts at the beginning alone.
+#[test]
+fn a_record_that_begins_in_motion_is_told_by_its_prediction() {
+    let machine = |stiffer: f64| {
+        let system = rig().system;
+        let [m, c, k] = [system.mass(), system.damping(), system.stiffness()];
+        Machine::known(SecondOrderSystem::new(m.clone(), c.clone(), k * stiffer).unwrap())
+    };
+    let told = |test: &Measurement, stiffer: f64| {
+        let found = predict(test, &machine(stiffer), &Predict::default()).unwrap();
+        found.summary().remarks.iter().any(|remark| remark.contains("in motion"))
+    };
+    assert!((0..8).all(|seed| told(&random_test(seed), 1.0)));
+    let settled = predict(&random_test(0), &machine(1.0), &Predict { settle: Some(500) }).unwrap();
+    assert!(settled.summary().remarks.is_empty());
+    let sampling = rig().sampling;
+    for stiffer in [1.0, 1.02] {
+        let hit = |k: usize| if (40..48).contains(&k) { 100.0 } else { 0.0 };
+        let force = Record::from_channel(sampling, (0..SAMPLES).map(hit).collect()).unwrap();
+        let at_rest = measured([force.clone(), with_friction(&force, 0.0)], 1);
+        assert!(!told(&at_rest, stiffer), "{stiffer}");
+    }
+}
+
+#[test]
+fn a_sweep_of_spectra_tells_of_a_window_that_is_no_period() {
+    let how = SweepSettings {
+        kind: Kind::Decimation,
+        settings: "1".parse().unwrap(),
+        estimator: sweep::Estimator::LeastSquares,
+        ..SweepSettings::default()
+    };
+    let told = |force: Record, response: Record| {
+        let test = measured([force, response], 3);
+        let swept = sweep_record(&test, &how, None, &|| ()).unwrap();
+        swept.remarks.iter().any(|remark| remark.contains("whole periods"))
+    };
+    let [force, response] = rig().measure(3).unwrap();
+    assert!(told(force, response));
+    let [force, response] = rig().period(3).unwrap();
+    assert!(!told(force, response));
 }

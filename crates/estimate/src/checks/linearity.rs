@@ -17,9 +17,9 @@ const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Pow
 /// sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
 ///
 /// Frequency responses do not show that: under a random force a hardening spring looks like a stiffer
-/// one with more noise, and dry friction like damping. So the motion is predicted over the whole record, and those powers
-/// of it, less their linear parts, are applied as forces at each degree of freedom in turn. The responses
-/// to them must be uncorrelated with the residual, as they are with the noise of a linear
+/// one with more noise, and dry friction like damping. So the motion is predicted over the whole record, and those
+/// powers of it, less their linear parts, are applied as forces at each degree of freedom in turn. The responses to
+/// them must be uncorrelated with the residual, as they are with the noise of a linear
 /// machine; a Gaussian force keeps errors of the linear model out, too. The residual is weighted by Hann's window: at
 /// its ends it has the motion that the force before the record left.
 ///
@@ -30,8 +30,8 @@ const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Pow
 ///
 /// # Source
 /// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers less their linear
-/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and Signal Processing 14, 637–656, for the
-/// nonlinearity as a force.
+/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and Signal Processing
+/// 14, 637–656, for the nonlinearity as a force.
 pub fn linearity(
     estimate: &Estimate,
     force: &Record,
@@ -54,8 +54,8 @@ pub fn linearity(
     tested.under_hann_window().finding(estimate, force, &lines.as_slice()[1..count - 1], &HANN)
 }
 
-/// The same of an open record whose ends were fitted: of its `data` on some lines, with the loads of the ends taken off,
-/// and the force (N) as it was measured.
+/// The same of an open record whose ends were fitted: of its `data` on some lines, with the loads of the ends taken
+/// off, and the force (N) as it was measured.
 ///
 /// # Errors
 /// The errors of [`linearity`]; [`EstimateError::Size`] if the data are not those of the lines.
@@ -292,14 +292,6 @@ fn p_value(
 fn around(values: &[f64]) -> Vec<f64> {
     let count = values.len();
     let window = |at: usize| at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(count);
-    let mut sum = 0.0;
-    let sums: Vec<f64> = std::iter::once(0.0)
-        .chain(values.iter().map(|value| {
-            sum += value;
-            sum
-        }))
-        .collect();
-    let mean =
-        |range: std::ops::Range<usize>| (sums[range.end] - sums[range.start]) / range.len() as f64;
-    (0..count).map(|at| mean(window(at))).collect()
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    (0..count).map(|at| mean(&values[window(at)])).collect()
 }

@@ -100,19 +100,7 @@ impl Finding {
 
     /// The p-value of a statistical test; `None` for other checks, and where only rounding is left.
     pub fn p_value(&self) -> Option<PValue> {
-        match self {
-            Finding::Bias { p_value, .. }
-            | Finding::Instability { p_value, .. }
-            | Finding::NegativeMass { p_value, .. }
-            | Finding::MassSymmetry { p_value, .. }
-            | Finding::Misfit { p_value, .. }
-            | Finding::Linearity { p_value, .. }
-            | Finding::Distortion { p_value, .. } => Some(*p_value),
-            Finding::Whiteness { test, .. } | Finding::CrossCorrelation { test, .. } => {
-                (!test.rounding).then_some(test.p_value)
-            }
-            _ => None,
-        }
+        self.clone().p_value_mut().copied()
     }
 
     /// The p-value of [`Finding::p_value`], to adjust it.

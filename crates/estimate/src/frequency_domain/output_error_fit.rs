@@ -147,7 +147,7 @@ pub(super) struct Scale {
     /// Factor by which the covariance is larger for weights that are uncertain, where nothing better is known.
     pub(super) inflation: f64,
     pub(super) weights: Option<WeightUncertainty>,
-    /// What lines that err together add to the inverse of the Fisher information.
+    /// Matrix that lines which err together add to the inverse of the Fisher information.
     pub(super) pulses: Option<DMatrix<f64>>,
     pub(super) degrees_of_freedom: usize,
     pub(super) misfit_ratio: f64,

@@ -34,11 +34,11 @@ impl PulseNoise {
     }
 }
 
-/// What the noise of pulses adds to the inverse of the Fisher information, which takes the lines to err one by one;
-/// `None` without such noise and for large fits.
+/// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the lines to err one by
+/// one; `None` without such noise and for large fits.
 ///
-/// Of weighted residuals r with sensitivities J, those of the loads of the ends taken off, the estimate errs by
-/// (JᵀJ)⁻¹ Jᵀ r; r is the response to each sample of a pulse in turn.
+/// The estimate errs by (JᵀJ)⁻¹ Jᵀ r, with sensitivities J less what the loads of the ends explain, and the weighted
+/// response r to each sample of a pulse in turn.
 ///
 /// # Source
 /// White (1980), Econometrica 48, 817–838, for the covariance of a weighted fit whose errors have another one.

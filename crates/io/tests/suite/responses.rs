@@ -167,3 +167,29 @@ fn broken_tables_are_refused() {
         }
     }
 }
+
+/// Segments that cannot be are not used, and told.
+#[test]
+fn impossible_segments_are_told() {
+    let table = |segments: [&str; 5]| {
+        let names = AveragedSegments::COLUMNS.join(",");
+        let row = |hz: u32| format!("\n{hz},1,0,{}", segments.join(","));
+        let text = format!("frequency_hz,h_1_1_real,h_1_1_imaginary,{names}{}{}", row(1), row(2));
+        FrequencyResponses::parse("a.csv", text.as_bytes()).unwrap()
+    };
+    let good = table(["1024", "512", "10", "1", "512"]);
+    assert_eq!(good.segments.unwrap().window, Some(Window::Hann));
+    assert!(good.remarks.is_empty());
+    for wrong in [
+        ["1024", "512", "10", "9", "512"],
+        ["1024", "2048", "10", "1", "512"],
+        ["1024", "512", "0", "1", "512"],
+        ["1024.5", "512", "10", "1", "512"],
+        ["1e12", "512", "10", "1", "512"],
+        ["1024", "512", "10", "1", "-1"],
+    ] {
+        let read = table(wrong);
+        assert_eq!(read.segments, None, "{wrong:?}");
+        assert!(read.remarks[0].contains("segment_samples"), "{:?}", read.remarks);
+    }
+}
