@@ -1,0 +1,209 @@
+//! Inputs and outputs line by line, of one record or of several.
+
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+use mechid_signal::{Record, Spectrum};
+use nalgebra::{Complex, DMatrix};
+
+use crate::SpectraError;
+
+/// Effect of the two ends of a record on its lines.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Transient {
+    /// The lines hold the steady state alone: whole periods, or a table of frequency responses.
+    None,
+    /// The record is open: its lines also hold the response to the difference between the initial and
+    /// the final state.
+    Open {
+        /// Time between two samples, in s.
+        sample_interval: f64,
+    },
+}
+
+/// Complex amplitudes of inputs and outputs, one row per spectral line; the lines of several records
+/// stand one below the other.
+///
+/// Amplitudes of records are unitary: Σ |X|² over all lines of both signs is Σ x² over all samples, so
+/// that white noise of variance σ² has E|X|² = σ² on every line, whatever the length of the record.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012),
+/// sections 2.3 and 6.3 (lines of open records and their transient).
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineData {
+    omega: Vec<f64>,
+    inputs: DMatrix<Complex<f64>>,
+    outputs: DMatrix<Complex<f64>>,
+    records: Vec<(Range<usize>, Transient)>,
+}
+
+impl LineData {
+    /// Takes amplitudes of one record at `omega` (rad/s): `inputs` is lines × q (q may be 0), `outputs`
+    /// lines × p.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] if the shapes differ, [`SpectraError::NotFinite`] for a frequency that
+    /// is not positive or an amplitude that is not finite.
+    pub fn new(
+        omega: Vec<f64>,
+        inputs: DMatrix<Complex<f64>>,
+        outputs: DMatrix<Complex<f64>>,
+        transient: Transient,
+    ) -> Result<Self, SpectraError> {
+        let (rows, expected) = ([inputs.nrows(), outputs.nrows()], omega.len());
+        for (what, got) in ["rows of inputs", "rows of outputs"].into_iter().zip(rows) {
+            if got != expected {
+                return Err(SpectraError::Size { what, expected, got });
+            }
+        }
+        for (row, &value) in omega.iter().enumerate() {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(SpectraError::NotFinite { row, value });
+            }
+            let (inputs, outputs) = (inputs.row(row), outputs.row(row));
+            let sums = inputs.iter().chain(outputs.iter()).map(|z| z.re + z.im);
+            if let Some(value) = sums.into_iter().find(|sum| !sum.is_finite()) {
+                return Err(SpectraError::NotFinite { row, value });
+            }
+        }
+        let records = vec![(0..omega.len(), transient)];
+        Ok(Self { omega, inputs, outputs, records })
+    }
+
+    /// Takes the lines of an open record that lie in `band_hz` (Hz), without a window; the lines at zero
+    /// and at half the sampling rate are left out.
+    ///
+    /// `inputs` is samples × q, or `None` for a record without measured inputs; `outputs` is samples × p.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] if the records differ in length, [`SpectraError::NoLine`] if the band
+    /// has no line.
+    pub fn from_open_record(
+        inputs: Option<&Record>,
+        outputs: &Record,
+        band_hz: [f64; 2],
+    ) -> Result<Self, SpectraError> {
+        let (sampling, expected) = (outputs.sampling(), outputs.len());
+        if let Some(got) = inputs.map(Record::len).filter(|len| *len != expected) {
+            return Err(SpectraError::Size { what: "samples of the inputs", expected, got });
+        }
+        let spacing_hz = 1.0 / (expected as f64 * sampling.dt());
+        let highest = expected.saturating_sub(1) / 2;
+        let [from_hz, to_hz] = band_hz;
+        let first = ((from_hz / spacing_hz).ceil().max(1.0)) as usize;
+        let last = ((to_hz / spacing_hz).floor().min(highest as f64)) as usize;
+        if first > last {
+            let highest_hz = highest as f64 * spacing_hz;
+            return Err(SpectraError::NoLine { from_hz, to_hz, spacing_hz, highest_hz });
+        }
+        let lines = last - first + 1;
+        // A spectrum holds amplitudes, 2/N times the transform; unitary is 1/√N.
+        let scale = Complex::from((expected as f64).sqrt() / 2.0);
+        let read = |record: &Record| Spectrum::of(record).lines().rows(first, lines) * scale;
+        let omega = (first..=last).map(|line| TAU * line as f64 * spacing_hz).collect();
+        let inputs = inputs.map_or_else(|| DMatrix::zeros(lines, 0), read);
+        let transient = Transient::Open { sample_interval: sampling.dt() };
+        Self::new(omega, inputs, read(outputs), transient)
+    }
+
+    /// Returns these lines followed by those of further records.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] if the number of inputs or outputs differs.
+    pub fn followed_by(mut self, other: &Self) -> Result<Self, SpectraError> {
+        let sizes = [
+            ("inputs", self.inputs.ncols(), other.inputs.ncols()),
+            ("outputs", self.outputs.ncols(), other.outputs.ncols()),
+        ];
+        for (what, expected, got) in sizes {
+            if expected != got {
+                return Err(SpectraError::Size { what, expected, got });
+            }
+        }
+        let before = self.omega.len();
+        let all = before + other.omega.len();
+        self.omega.extend_from_slice(&other.omega);
+        for (to, from) in [(&mut self.inputs, &other.inputs), (&mut self.outputs, &other.outputs)] {
+            *to = std::mem::take(to).resize_vertically(all, Complex::default());
+            to.rows_mut(before, from.nrows()).copy_from(from);
+        }
+        let moved = |(rows, transient): &(Range<usize>, Transient)| {
+            (rows.start + before..rows.end + before, *transient)
+        };
+        self.records.extend(other.records.iter().map(moved));
+        Ok(self)
+    }
+
+    /// Returns the number of lines of all records.
+    pub fn len(&self) -> usize {
+        self.omega.len()
+    }
+
+    /// Returns whether there is no line.
+    pub fn is_empty(&self) -> bool {
+        self.omega.is_empty()
+    }
+
+    /// Returns the angular frequency of each line, in rad/s.
+    pub fn omega(&self) -> &[f64] {
+        &self.omega
+    }
+
+    /// Returns the inputs, lines × q.
+    pub fn inputs(&self) -> &DMatrix<Complex<f64>> {
+        &self.inputs
+    }
+
+    /// Returns the outputs, lines × p.
+    pub fn outputs(&self) -> &DMatrix<Complex<f64>> {
+        &self.outputs
+    }
+
+    /// Returns the rows of each record and the effect of its ends.
+    pub fn records(&self) -> &[(Range<usize>, Transient)] {
+        &self.records
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use mechid_signal::{NoiseLevel, Sampling, noise};
+
+    #[test]
+    fn white_noise_has_its_variance_on_every_line() {
+        let sampling = Sampling::new(0.01, 4096).unwrap();
+        let quiet = Record::new(sampling, DMatrix::zeros(4096, 2)).unwrap();
+        let noisy = noise::add_white(&quiet, NoiseLevel::StandardDeviation(3.0), 5).unwrap();
+        let data = LineData::from_open_record(None, &noisy, [1.0, 49.0]).unwrap();
+        let power = data.outputs().iter().map(|z| z.norm_sqr()).sum::<f64>();
+        let mean = power / (2 * data.len()) as f64;
+        assert!((mean / 9.0 - 1.0).abs() < 4.0 / (2.0 * data.len() as f64).sqrt(), "{mean}");
+    }
+
+    #[test]
+    fn amplitudes_are_those_of_a_direct_sum() {
+        let sampling = Sampling::new(0.1, 31).unwrap();
+        let samples: Vec<f64> = (0..31).map(|k| ((k * k) % 7) as f64).collect();
+        let record = Record::from_channel(sampling, samples.clone()).unwrap();
+        let data = LineData::from_open_record(Some(&record), &record, [0.0, 5.0]).unwrap();
+        assert_eq!(data.len(), 15);
+        for (row, omega) in data.omega().iter().enumerate() {
+            let term = |k: usize| samples[k] * Complex::cis(-omega * 0.1 * k as f64);
+            let direct = (0..31).map(term).sum::<Complex<f64>>() / 31f64.sqrt();
+            assert!((data.inputs()[(row, 0)] - direct).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn records_stand_one_below_the_other() {
+        let sampling = Sampling::new(0.1, 40).unwrap();
+        let record = Record::new(sampling, DMatrix::from_fn(40, 2, |k, c| (k * (c + 1)) as f64));
+        let one = LineData::from_open_record(None, &record.unwrap(), [1.0, 3.0]).unwrap();
+        let two = one.clone().followed_by(&one).unwrap();
+        assert_eq!(two.len(), 2 * one.len());
+        assert_eq!(two.records()[1].0, one.len()..2 * one.len());
+        assert_eq!(two.outputs().rows(one.len(), one.len()), one.outputs().rows(0, one.len()));
+    }
+}
