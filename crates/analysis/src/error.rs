@@ -430,6 +430,9 @@ pub enum AnalysisError {
     /// The identification failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// A numerical method fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
     /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),

@@ -122,7 +122,7 @@ impl Machine {
                 points => points?,
             };
             for point in points {
-                let frequency = mechid_estimate::Uncertain {
+                let frequency = mechid_numerics::Uncertain {
                     value: point.omega / TAU,
                     standard_error: point.standard_error / TAU,
                     degrees_of_freedom: self.degrees_of_freedom,

@@ -308,12 +308,6 @@ pub enum EstimateError {
         /// Rows of the matrix.
         size: usize,
     },
-    /// A confidence level outside (0, 1).
-    #[error("a confidence level lies between 0 and 1, got {level}")]
-    Level {
-        /// The level given, a probability.
-        level: f64,
-    },
     /// No spectral line was chosen, or none of them carries force.
     #[error("no spectral line carries force: choose lines the excitation drives")]
     NoExcitedLine,
@@ -416,6 +410,9 @@ pub enum EstimateError {
         /// Frequency, in Hz.
         frequency_hz: f64,
     },
+    /// A numerical method fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
     /// The identified matrices do not make a system.
     #[error(transparent)]
     Model(#[from] mechid_model::ModelError),

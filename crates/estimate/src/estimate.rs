@@ -3,14 +3,14 @@
 use std::fmt;
 
 use mechid_model::{Matrix, Parameter, SecondOrderSystem, UncertainSystem};
+use mechid_numerics::{NumericsError, Uncertain, student_interval};
 use mechid_signal::message;
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use crate::covariance::Covariance;
 use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::relations::Relations;
-use crate::{EstimateError, Uncertain, Unknowns};
+use crate::{EstimateError, Unknowns};
 
 /// M̂, Ĉ, K̂ with the covariance of what was estimated.
 ///
@@ -345,29 +345,10 @@ impl Estimated {
     /// The confidence interval [low, high] at `level` (0.95 for 95 %), by Student's t.
     ///
     /// # Errors
-    /// [`EstimateError::Level`] unless 0 < level < 1.
-    pub fn interval(&self, level: f64) -> Result<[f64; 2], EstimateError> {
+    /// [`NumericsError::Level`] unless 0 < level < 1.
+    pub fn interval(&self, level: f64) -> Result<[f64; 2], NumericsError> {
         student_interval(self.value, self.standard_error, self.degrees_of_freedom, level)
     }
-}
-
-/// The interval [low, high] around a value of known standard error, by Student's t.
-pub(crate) fn student_interval(
-    value: f64,
-    standard_error: f64,
-    degrees_of_freedom: usize,
-    level: f64,
-) -> Result<[f64; 2], EstimateError> {
-    if !(level > 0.0 && level < 1.0) {
-        return Err(EstimateError::Level { level });
-    }
-    if !standard_error.is_finite() || degrees_of_freedom == 0 {
-        return Ok([f64::NEG_INFINITY, f64::INFINITY]);
-    }
-    let t = StudentsT::new(0.0, 1.0, degrees_of_freedom as f64)
-        .expect("positive degrees of freedom")
-        .inverse_cdf(0.5 + 0.5 * level);
-    Ok([value - t * standard_error, value + t * standard_error])
 }
 
 impl fmt::Display for Estimated {

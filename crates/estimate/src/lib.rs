@@ -60,7 +60,7 @@ pub use frf::{
 pub use least_squares::{Direction, LeastSquares, Solution};
 pub use logarithm::logarithm;
 pub use mechid_signal::Window;
-pub use modal::{IdentifiedMode, Uncertain, identified_modes};
+pub use modal::{IdentifiedMode, identified_modes};
 pub use prediction::{
     StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,
 };

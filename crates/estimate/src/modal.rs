@@ -4,33 +4,11 @@
 use mechid_model::{
     EIGENVALUE_ROUNDING, Matrix, Mode, Parameter, SecondOrderSystem, UncertainSystem,
 };
+use mechid_numerics::{NumericsError, Uncertain};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::covariance::Covariance;
-use crate::estimate::student_interval;
 use crate::{Estimate, EstimateError};
-
-/// A value with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertain {
-    /// The value, in the unit its owner gives.
-    pub value: f64,
-    /// Standard error, in the same unit; infinite where it has no derivative with
-    /// respect to the matrices (repeated eigenvalues).
-    pub standard_error: f64,
-    /// Degrees of freedom of the variance behind the standard error.
-    pub degrees_of_freedom: usize,
-}
-
-impl Uncertain {
-    /// The confidence interval [low, high] at `level` (0.95 for 95 %), by Student's t.
-    ///
-    /// # Errors
-    /// [`EstimateError::Level`] unless 0 < level < 1.
-    pub fn interval(&self, level: f64) -> Result<[f64; 2], EstimateError> {
-        student_interval(self.value, self.standard_error, self.degrees_of_freedom, level)
-    }
-}
 
 /// A mode of an identified machine.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,8 +43,8 @@ impl IdentifiedMode {
     /// mode from zero to the square root of the upper limit of the squared frequency.
     ///
     /// # Errors
-    /// [`EstimateError::Level`] unless 0 < level < 1.
-    pub fn natural_frequency_interval_hz(&self, level: f64) -> Result<[f64; 2], EstimateError> {
+    /// [`NumericsError::Level`] unless 0 < level < 1.
+    pub fn natural_frequency_interval_hz(&self, level: f64) -> Result<[f64; 2], NumericsError> {
         match self.is_rigid_body {
             true => {
                 let [_, high] = self.squared_frequency.interval(level)?;

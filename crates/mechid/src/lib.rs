@@ -22,6 +22,7 @@
 //! | Module | What is in it |
 //! |---|---|
 //! | [`signal`] | time axes, records, spectra, multisines and other excitations |
+//! | [`numerics`] | values with intervals, least squares, Gauss-Newton steps, decompositions that end |
 //! | [`model`] | M, C, K; modes and receptance |
 //! | [`bearing`] | journal bearings from their geometry: film force, coefficients, threshold of instability |
 //! | [`integrate`] | the response by time-stepping schemes, linear and nonlinear |
@@ -78,6 +79,7 @@ pub use mechid_force as force;
 pub use mechid_integrate as integrate;
 pub use mechid_io as io;
 pub use mechid_model as model;
+pub use mechid_numerics as numerics;
 pub use mechid_model::ResponseQuantity::{self, Acceleration, Displacement, Velocity};
 pub use mechid_model::exact_periodic;
 #[cfg(feature = "report")]

@@ -121,7 +121,7 @@ impl BearingSummary {
         let uncertain = |value: f64, variance: f64| {
             let standard_error = variance.max(0.0).sqrt();
             let degrees_of_freedom = film.degrees_of_freedom;
-            let uncertain = estimate::Uncertain { value, standard_error, degrees_of_freedom };
+            let uncertain = mechid_numerics::Uncertain { value, standard_error, degrees_of_freedom };
             Uncertain::of(&uncertain)
         };
         let count = film.values().len();

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
-use mechid_estimate::Uncertain;
+use mechid_numerics::Uncertain;
 use mechid_signal::message;
 use serde::Serialize;
 

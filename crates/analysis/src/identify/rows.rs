@@ -131,7 +131,7 @@ impl ModeRow {
 
     /// Growth rates up to `rounding` (1/s) are those of rounding.
     fn of(mode: &IdentifiedMode, known: bool, rounding: f64) -> Result<Self, AnalysisError> {
-        let uncertain = |value: &estimate::Uncertain| match known {
+        let uncertain = |value: &mechid_numerics::Uncertain| match known {
             true => Ok(Uncertain::known(value.value)),
             false => Uncertain::of(value),
         };
@@ -211,7 +211,7 @@ impl Uncertain {
     }
 
     /// Returns a value derived from the estimate.
-    pub(crate) fn of(uncertain: &estimate::Uncertain) -> Result<Self, AnalysisError> {
+    pub(crate) fn of(uncertain: &mechid_numerics::Uncertain) -> Result<Self, AnalysisError> {
         Ok(Self::new(uncertain.value, uncertain.standard_error, uncertain.interval(CONFIDENCE)?))
     }
 

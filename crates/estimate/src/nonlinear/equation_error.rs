@@ -1,6 +1,7 @@
 //! Least squares on the equation of motion with nonlinear columns.
 
 use mechid_model::{Term, Terms};
+use mechid_numerics::Uncertain;
 use mechid_signal::message;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -14,7 +15,7 @@ use super::shape::{Shape, ShapeConstants, fit_shape};
 use super::weighting::{Weighting, Weights};
 use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::estimate::Findings;
-use crate::{Direction, Estimate, EstimateError, LeastSquares, Uncertain, Unknowns};
+use crate::{Direction, Estimate, EstimateError, LeastSquares, Unknowns};
 
 /// Settings of [`equation_error`]: weighting of the rows, and constants to search for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -3,11 +3,12 @@
 use std::fmt;
 
 use mechid_model::{Matrix, NonlinearParameter, NonlinearSystem, Terms, UncertainNonlinearSystem};
+use mechid_numerics::Uncertain;
 use nalgebra::{DMatrix, DVector};
 
 use super::{ChannelPhase, Weighting};
 use crate::least_squares::size;
-use crate::{Estimate, EstimateError, Uncertain};
+use crate::{Estimate, EstimateError};
 
 /// A parameter with its name and unit.
 #[derive(Debug, Clone, PartialEq)]

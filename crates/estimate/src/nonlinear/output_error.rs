@@ -1,6 +1,7 @@
 //! The simulated response fitted to the measured one.
 
 use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
+use mechid_numerics::Uncertain;
 use mechid_signal::{Extent, Record, message};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
 use crate::least_squares::size;
 use crate::triangular::TriangularFactor;
-use crate::{Estimate, EstimateError, LeastSquares, Uncertain, Unknowns};
+use crate::{Estimate, EstimateError, LeastSquares, Unknowns};
 
 /// A record for [`output_error`].
 #[derive(Debug, Clone)]

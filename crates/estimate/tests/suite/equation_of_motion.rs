@@ -2,6 +2,7 @@
 
 use mechid_estimate::{EquationOfMotion, EstimateError, LeastSquares, Unknowns};
 use mechid_model::Matrix;
+use mechid_numerics::NumericsError;
 use nalgebra::{DMatrix, dmatrix};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -151,7 +152,7 @@ fn intervals_follow_students_t() {
     // Student's t, ten degrees of freedom, 97.5 % quantile: 2.228139 (any statistics table).
     let [low, high] = k.interval(0.95).unwrap();
     assert!(((high - low) / (2.0 * k.standard_error) - 2.228139).abs() < 1e-6);
-    assert_eq!(k.interval(1.0), Err(EstimateError::Level { level: 1.0 }));
+    assert_eq!(k.interval(1.0), Err(NumericsError::Level { level: 1.0 }));
     assert!(matches!(found.parameter("k11"), Err(EstimateError::NoSuchParameter { .. })));
     let exact = Data::new([&dmatrix![1.0], &dmatrix![2.0], &dmatrix![3.0]], 2, 0.0, 6);
     let found = exact.rows().solve(&Unknowns::known_mass(&dmatrix![1.0]).unwrap()).unwrap();

@@ -154,7 +154,7 @@ fn poles_and_damping_ratio_are_those_of_the_closed_form_above_critical_damping_t
         let ratio_error =
             ratio.abs() * (0.25 * ((em / m).powi(2) + (ek / k).powi(2)) + (ec / c).powi(2)).sqrt();
         let omega_error = 0.5 * omega * ((em / m).powi(2) + (ek / k).powi(2)).sqrt();
-        let near = |found: mechid_estimate::Uncertain, value: f64, error: f64| {
+        let near = |found: mechid_numerics::Uncertain, value: f64, error: f64| {
             assert!((found.value - value).abs() < 1e-9 * value.abs(), "{c}: {found:?} {value}");
             assert!((found.standard_error / error - 1.0).abs() < 1e-7, "{c}: {found:?} {error}");
         };
@@ -279,7 +279,7 @@ fn intervals_of_frequency_and_damping_hold() {
             let periods = experiment.measure(10_000 + seed);
             let modes =
                 experiment.estimate(&periods, Estimator::MaximumLikelihood).modes().unwrap();
-            let within = |found: mechid_estimate::Uncertain, truth: f64| {
+            let within = |found: mechid_numerics::Uncertain, truth: f64| {
                 let [low, high] = found.interval(0.95).unwrap();
                 low <= truth && truth <= high
             };

@@ -135,7 +135,7 @@ fn standard_errors_are_those_of_the_six_realisations() {
     let terms = "k2: x^2, k3: x^3, c3: v^3/(1 + (v/20)^2)";
     let each: Vec<_> = (1..=6).map(|q| fit(&realised(&record, &[q]), terms, options)).collect();
     for (at, parameter) in each[0].parameters().iter().enumerate() {
-        let of = |f: &dyn Fn(&mechid_estimate::Uncertain) -> f64| {
+        let of = |f: &dyn Fn(&mechid_numerics::Uncertain) -> f64| {
             each.iter().map(|e| f(&e.parameters()[at].estimate)).sum::<f64>() / 6.0
         };
         let mean = of(&|found| found.value);

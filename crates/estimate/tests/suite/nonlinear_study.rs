@@ -91,7 +91,7 @@ fn judge(found: &[NonlinearEstimate], truth: &[(&str, f64)]) -> Vec<(String, f64
             let mean = all.iter().map(|p| p.value).sum::<f64>() / runs;
             let square = all.iter().map(|p| (p.value - mean).powi(2)).sum::<f64>();
             let deviation = (square / (runs - 1.0)).sqrt();
-            let inside = |p: &&mechid_estimate::Uncertain| {
+            let inside = |p: &&mechid_numerics::Uncertain| {
                 let [low, high] = p.interval(0.95).unwrap();
                 low <= *truth && *truth <= high
             };
