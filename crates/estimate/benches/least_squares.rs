@@ -6,7 +6,8 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use mechid_estimate::{EquationOfMotion, LeastSquares, Unknowns};
+use mechid_estimate::{EquationOfMotion, Unknowns};
+use mechid_numerics::least_squares::LeastSquares;
 use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,15 +1,16 @@
 //! M ẍ + C ẋ + K x = F fitted row by row: the common core of the linear estimators.
 
 use mechid_model::{Matrix, Parameter};
+use mechid_numerics::least_squares::{Solution, solve_compressed};
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, check_finite, check_size};
 use mechid_signal::message;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::covariance::{Covariance, Product};
 use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
-use crate::least_squares::{Solution, finite, size, solve_compressed};
 use crate::related_equations::RelatedEquations;
-use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// Rows of M ẍ + C ẋ + K x = F, gathered block by block from any number of records.
@@ -64,7 +65,7 @@ impl EquationOfMotion {
     /// each rows × degrees of freedom.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::NotFinite`] and [`EstimateError::Overflow`]; then
+    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; then
     /// nothing is added.
     pub fn push_rows(
         &mut self,
@@ -80,12 +81,12 @@ impl EquationOfMotion {
             ("channels of the force", "force", force),
         ];
         for (channels, _, part) in parts {
-            size(channels, self.dof, part.ncols())?;
-            size("rows", displacement.nrows(), part.nrows())?;
+            check_size(channels, self.dof, part.ncols())?;
+            check_size("rows", displacement.nrows(), part.nrows())?;
         }
         if !self.factor.push(&[acceleration, velocity, displacement, force]) {
-            parts.into_iter().try_for_each(|(_, what, part)| finite(what, part))?;
-            return Err(EstimateError::Overflow);
+            parts.into_iter().try_for_each(|(_, what, part)| check_finite(what, part))?;
+            return Err(NumericsError::Overflow.into());
         }
         Ok(())
     }
@@ -93,11 +94,11 @@ impl EquationOfMotion {
     /// Adds everything `other` has seen, as from another record.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if it has another number of degrees of freedom,
-    /// [`EstimateError::Overflow`].
+    /// [`NumericsError::Size`] if it has another number of degrees of freedom,
+    /// [`NumericsError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
-        size("degrees of freedom", self.dof, other.dof)?;
-        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
+        check_size("degrees of freedom", self.dof, other.dof)?;
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow.into()) }
     }
 
     /// Least squares for the free entries of M, C and K: one equation of motion after another, or all of
@@ -107,9 +108,9 @@ impl EquationOfMotion {
     /// the others are as they should be.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if `unknowns` has another number of degrees of freedom,
-    /// [`EstimateError::NothingUnknown`], [`EstimateError::TooFewRows`],
-    /// [`EstimateError::Underflow`], [`EstimateError::OnlyRatios`] if an equation has neither force
+    /// [`NumericsError::Size`] if `unknowns` has another number of degrees of freedom,
+    /// [`NumericsError::NothingUnknown`], [`NumericsError::TooFewRows`],
+    /// [`NumericsError::Underflow`], [`EstimateError::OnlyRatios`] if an equation has neither force
     /// nor known entry; [`EstimateError::NotConverged`] if no proportional damping is found.
     ///
     /// # Source
@@ -157,16 +158,16 @@ impl EquationOfMotion {
     }
 
     fn check(&self, unknowns: &Unknowns, free: &[Parameter]) -> Result<(), EstimateError> {
-        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        check_size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         if free.is_empty() {
-            return Err(EstimateError::NothingUnknown);
+            return Err(NumericsError::NothingUnknown.into());
         }
         if self.rows() == 0 {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() });
+            return Err(NumericsError::TooFewRows { rows: 0, unknowns: free.len() }.into());
         }
         if let Some((at, norm)) = self.factor.too_small() {
             let what = ["acceleration", "velocity", "displacement", "force"][at / self.dof];
-            return Err(EstimateError::Underflow { what, column: at % self.dof, norm });
+            return Err(NumericsError::Underflow { what, column: at % self.dof, norm }.into());
         }
         Ok(())
     }

@@ -36,9 +36,6 @@ pub enum EstimateError {
     /// A problem needs at least one degree of freedom.
     #[error("an identification needs at least one degree of freedom")]
     NoDof,
-    /// Every entry is already known.
-    #[error("there is nothing to estimate: every entry of M, C and K is known")]
-    NothingUnknown,
     /// No parameter has that name.
     #[error("no unknown parameter is called \"{name}\"; the unknowns are {known}")]
     NoSuchParameter {
@@ -46,58 +43,6 @@ pub enum EstimateError {
         name: String,
         /// The names there are.
         known: String,
-    },
-    /// Fewer equations than unknowns.
-    #[error(
-        "{} {} not determine {}: use a longer record or fewer unknowns",
-        message::count(*rows, "equation"),
-        if *rows == 1 { "does" } else { "do" },
-        message::count(*unknowns, "unknown")
-    )]
-    TooFewRows {
-        /// Equations (rows) given.
-        rows: usize,
-        /// Unknowns per right-hand side.
-        unknowns: usize,
-    },
-    /// A block of data has the wrong number of channels, lines or samples.
-    #[error("{what}: expected {expected}, got {got}")]
-    Size {
-        /// Name of the items counted, such as `"channels of the force"`.
-        what: &'static str,
-        /// Number expected.
-        expected: usize,
-        /// Number found.
-        got: usize,
-    },
-    /// A value among the data is NaN or infinite.
-    #[error("row {row}, column {column} of the {what} is {value}, not a finite number")]
-    NotFinite {
-        /// Name of the data.
-        what: &'static str,
-        /// Row, counted from 0.
-        row: usize,
-        /// Column, counted from 0.
-        column: usize,
-        /// The value found, in the unit of the data.
-        value: f64,
-    },
-    /// Squares of the data are beyond the largest number.
-    #[error("the squares of the data overflow: use other units, values below 1e150")]
-    Overflow,
-    /// Squares of the data are below the least number.
-    #[error(
-        "all values of the {what} {} are so small that their squares vanish (their root sum of \
-         squares is about {norm:.0e}): use other units",
-        column.saturating_add(1)
-    )]
-    Underflow {
-        /// Name of the data.
-        what: &'static str,
-        /// Column, counted from 0.
-        column: usize,
-        /// Root sum of squares of the column, in its unit; 0 where all squares vanish.
-        norm: f64,
     },
     /// An equation of motion without force and without known entry fixes ratios only.
     #[error(
@@ -291,22 +236,6 @@ pub enum EstimateError {
     Diverged {
         /// Samples of the record.
         len: usize,
-    },
-    /// The motion from sample to sample belongs to no continuous machine.
-    #[error(
-        "the motion from one sample to the next has the real eigenvalue {eigenvalue:.3e}, so its matrix \
-         has no logarithm and no continuous machine moves like that: either a mode oscillates near or \
-         above half the sampling rate (sample faster), or one dies out within a sample, or noise drowns it"
-    )]
-    NoLogarithm {
-        /// The offending eigenvalue of Φ, a pure number, zero or negative.
-        eigenvalue: f64,
-    },
-    /// The eigenvalues of a matrix could not be computed.
-    #[error("the eigenvalues of a {size}×{size} matrix could not be computed")]
-    Eigenvalues {
-        /// Rows of the matrix.
-        size: usize,
     },
     /// No spectral line was chosen, or none of them carries force.
     #[error("no spectral line carries force: choose lines the excitation drives")]

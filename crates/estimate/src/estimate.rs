@@ -3,7 +3,7 @@
 use std::fmt;
 
 use mechid_model::{Matrix, Parameter, SecondOrderSystem, UncertainSystem};
-use mechid_numerics::{NumericsError, Uncertain, student_interval};
+use mechid_numerics::{NumericsError, Uncertain, check_size, student_interval};
 use mechid_signal::message;
 use nalgebra::{DMatrix, DVector};
 
@@ -150,7 +150,7 @@ impl Estimate {
     /// `rate` is σ, in 1/s; `unknowns` has the known entries of the machine itself, and the same ones free.
     ///
     /// # Errors
-    /// [`EstimateError::Undetermined`] if the data leave an entry open, [`EstimateError::Size`] if others are free.
+    /// [`EstimateError::Undetermined`] if the data leave an entry open, [`NumericsError::Size`] if others are free.
     ///
     /// # Source
     /// Ewins, *Modal Testing*, 2nd ed. (2000), the section on transient excitation (exponential window).
@@ -160,7 +160,7 @@ impl Estimate {
         unknowns: Unknowns,
     ) -> Result<Self, EstimateError> {
         self.check_determined()?;
-        crate::least_squares::size("free entries", self.parameters.len(), unknowns.free().len())?;
+        check_size("free entries", self.parameters.len(), unknowns.free().len())?;
         let count = self.parameters.len();
         let mut change = DMatrix::identity(count, count);
         for (at, p) in self.parameters.iter().enumerate() {

@@ -8,6 +8,7 @@ mod scatter;
 mod segments;
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix};
 
@@ -65,7 +66,7 @@ impl Frf {
     /// # Errors
     /// [`EstimateError::TooFewAverages`] unless there are more segments than forces,
     /// [`EstimateError::Hop`], [`EstimateError::DependentForces`] at a line where the forces are zero or
-    /// proportional to one another in all segments, [`EstimateError::Size`] for H2 with
+    /// proportional to one another in all segments, [`NumericsError::Size`] for H2 with
     /// several forces and another number of motions, and what [`Lines::new`] refuses.
     ///
     /// # Source
@@ -92,7 +93,7 @@ impl Frf {
     /// uncorrelated and equally large.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::Coherence`] outside (0, 1\],
+    /// [`NumericsError::Size`], [`EstimateError::Coherence`] outside (0, 1\],
     /// [`EstimateError::TooFewAverages`] unless there are more averages than forces.
     ///
     /// # Source
@@ -105,9 +106,7 @@ impl Frf {
         averages: f64,
         measured: ResponseQuantity,
     ) -> Result<Self, EstimateError> {
-        let size = |what, expected, got| {
-            if expected == got { Ok(()) } else { Err(EstimateError::Size { what, expected, got }) }
-        };
+        let size = check_size;
         size("frequency response matrices", omega.len(), response.len())?;
         size("rows of the coherence", omega.len(), coherence.nrows())?;
         let inputs = response.first().map_or(0, |h| h.ncols());
@@ -171,7 +170,7 @@ impl Frf {
             None => coherence,
         };
         let mut frf = Self::new(lines.omega(), response, coherence, averages, measured)?;
-        let size = crate::least_squares::size;
+        let size = check_size;
         size("samples of a segment", segments.samples(), lines.sampling().len())?;
         frf.lines = lines.as_slice().to_vec();
         frf.line_correlation = segments.line_correlation(count);
@@ -251,13 +250,15 @@ impl Frf {
     /// the coherence gives the noise of the motion, from few averages its mean over neighbouring lines.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if there is not one degree of freedom per force or one of
+    /// [`NumericsError::Size`] if there is not one degree of freedom per force or one of
     /// them does not exist.
     pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, EstimateError> {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         if force_dof.len() != inputs {
             let (expected, got) = (inputs, force_dof.len());
-            return Err(EstimateError::Size { what: "driven degrees of freedom", expected, got });
+            return Err(
+                NumericsError::Size { what: "driven degrees of freedom", expected, got }.into()
+            );
         }
         let variance = match &self.scatter {
             Some(scatter) => &scatter.pooled,

@@ -33,20 +33,16 @@ mod estimate;
 mod free_decay;
 pub mod frequency_domain;
 mod frf;
-mod least_squares;
-mod logarithm;
 mod modal;
 mod noise_shape;
 mod noise_spectrum;
 pub mod nonlinear;
 mod pooling;
 mod prediction;
-mod quasi_triangular;
 mod related_equations;
 mod relations;
 mod sweep;
 pub mod time_domain;
-mod triangular;
 mod unknowns;
 
 pub use equation_of_motion::EquationOfMotion;
@@ -57,8 +53,6 @@ pub use frf::{
     Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, ResponseEstimate, Segments,
     output_error_of_responses,
 };
-pub use least_squares::{Direction, LeastSquares, Solution};
-pub use logarithm::logarithm;
 pub use mechid_signal::Window;
 pub use modal::{IdentifiedMode, identified_modes};
 pub use prediction::{

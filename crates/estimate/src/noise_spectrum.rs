@@ -1,6 +1,7 @@
 //! The covariance of measurement noise, frequency by frequency.
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::NumericsError;
 use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
@@ -36,8 +37,8 @@ impl NoiseSpectrum {
     /// A known covariance per row, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if there is not one matrix per frequency,
-    /// [`EstimateError::Size`] if they are not square of one even size,
+    /// [`NumericsError::Size`] if there is not one matrix per frequency,
+    /// [`NumericsError::Size`] if they are not square of one even size,
     /// [`EstimateError::NoiseVariance`] if a variance is negative or not finite.
     pub fn new(
         omega: Vec<f64>,
@@ -45,17 +46,18 @@ impl NoiseSpectrum {
     ) -> Result<Self, EstimateError> {
         if covariance.len() != omega.len() || omega.is_empty() {
             let (got, expected) = (covariance.len(), omega.len().max(1));
-            return Err(EstimateError::Size { what: "noise covariances", got, expected });
+            return Err(NumericsError::Size { what: "noise covariances", got, expected }.into());
         }
         let size = covariance[0].nrows();
         let expected = 2 * size.div_ceil(2).max(1);
         for (row, c) in covariance.iter().enumerate() {
             if let Some(&got) = [c.nrows(), c.ncols()].iter().find(|s| **s != expected) {
-                return Err(EstimateError::Size {
+                return Err(NumericsError::Size {
                     what: "rows or columns of a noise covariance",
                     got,
                     expected,
-                });
+                }
+                .into());
             }
             let bad = |v: &Complex<f64>| !(v.re >= 0.0 && v.re.is_finite());
             if let Some(column) = c.diagonal().iter().position(bad) {

@@ -8,25 +8,25 @@ pub use self::ahead::missing_force;
 pub use self::periodic::predict_periodic;
 pub use self::start::{StartFit, fitted_start};
 
-use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem, StateTransition};
+use mechid_numerics::check_size;
+use mechid_numerics::linear_algebra::singular_values;
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use crate::EstimateError;
-use crate::least_squares::size;
 
 /// Returns the part of the variation of each channel that a prediction explains, in per cent:
 /// 100 (1 − ‖y − ŷ‖ / ‖y − ȳ‖). 100 is perfect, 0 no better than the mean, negative worse.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 16 (fit).
 pub fn fit_percent(measured: &Record, predicted: &Record) -> Result<Vec<f64>, EstimateError> {
     measured.check_same_sampling(predicted)?;
-    size("channels of the prediction", measured.channels(), predicted.channels())?;
+    check_size("channels of the prediction", measured.channels(), predicted.channels())?;
     let around_mean = measured.without_mean();
     let gap = measured.data() - predicted.data();
     let norms = gap.column_iter().zip(around_mean.data().column_iter());
@@ -40,7 +40,7 @@ pub fn fit_percent(measured: &Record, predicted: &Record) -> Result<Vec<f64>, Es
 /// acceleration is the one of the equation of motion.
 ///
 /// # Errors
-/// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::NoSteadyState`] if
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::NoSteadyState`] if
 /// the machine has none with this period, [`EstimateError::Signal`] if an unstable motion
 /// overflows.
 ///
@@ -54,8 +54,8 @@ pub fn predict(
     extent: Extent,
     start: &InitialState,
 ) -> Result<Response, EstimateError> {
-    size("channels of the force", system.dof(), force.channels())?;
-    size("degrees of freedom of the initial state", system.dof(), start.dof())?;
+    check_size("channels of the force", system.dof(), force.channels())?;
+    check_size("degrees of freedom of the initial state", system.dof(), start.dof())?;
     let step = Step::new(system, force.sampling().dt(), discretisation)?;
     let n = system.dof();
     let mut state = DVector::zeros(2 * n);

@@ -1,14 +1,15 @@
 //! Least squares on all equations of motion together, where their entries are related.
 
 use mechid_model::{Matrix, Parameter};
+use mechid_numerics::NumericsError;
+use mechid_numerics::least_squares::{Solution, solve_compressed};
+use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::Covariance;
 use crate::equation_of_motion::only_ratios;
 use crate::estimate::Findings;
-use crate::least_squares::{Solution, solve_compressed};
 use crate::relations::Relations;
-use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
 /// Steps of the search for proportional damping, the only relation that is not linear.
@@ -133,11 +134,11 @@ impl RelatedEquations<'_> {
             }
             let right = residuals.columns(equation, 1);
             if !factor.push(&[block.as_view(), right.into_owned().as_view()]) {
-                return Err(EstimateError::Overflow);
+                return Err(NumericsError::Overflow.into());
             }
         }
         let (regressors, targets) = factor.r().columns_range_pair(..count, count..);
-        solve_compressed(regressors, targets, n * self.rows)
+        Ok(solve_compressed(regressors, targets, n * self.rows)?)
     }
 
     /// What the equations leave of the force, rows × equations.

@@ -1,6 +1,6 @@
 //! Parameters as likely as the best ones.
 
-use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::DMatrix;
 
 use crate::ForceError;

@@ -2,14 +2,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_model::linear_algebra::exponential;
 use mechid_model::{ResponseQuantity, SecondOrderSystem, StateTransition};
+use mechid_numerics::linear_algebra::exponential;
+use mechid_numerics::nelder_mead::minimise;
 use mechid_signal::Sampling;
 use nalgebra::DMatrix;
 
 use crate::alike::alike;
 use crate::force_model::{LowPass, step_noise};
-use crate::nelder_mead::minimise;
 use crate::seen::Seen;
 use crate::smoother::StateSpace;
 use crate::state_space::Machine;

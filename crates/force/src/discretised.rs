@@ -1,7 +1,7 @@
 //! The discretised equation of motion, solved for the force of each step.
 
-use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Discretisation, Response, SecondOrderSystem, StateTransition};
+use mechid_numerics::linear_algebra::singular_values;
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, Dyn, LU};
 

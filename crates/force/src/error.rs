@@ -268,4 +268,7 @@ pub enum ForceError {
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] SignalError),
+    /// A decomposition fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
 }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use mechid_model::linear_algebra::exponential;
+use mechid_numerics::linear_algebra::exponential;
 use nalgebra::DMatrix;
 
 use crate::ForceError;

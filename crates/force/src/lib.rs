@@ -66,7 +66,6 @@ mod lines;
 mod measurement;
 mod measures;
 mod motion_noise;
-mod nelder_mead;
 mod noise;
 mod nonlinear;
 mod open_operator;

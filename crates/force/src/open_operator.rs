@@ -1,7 +1,7 @@
 //! An open record: the impulse responses as one dense matrix.
 
 use mechid_model::SecondOrderSystem;
-use mechid_model::linear_algebra::svd;
+use mechid_numerics::linear_algebra::svd;
 use mechid_signal::{Extent, Sampling};
 use nalgebra::{DMatrix, DVector};
 

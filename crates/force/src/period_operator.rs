@@ -1,7 +1,7 @@
 //! A whole period: one small problem per line.
 
 use mechid_model::SecondOrderSystem;
-use mechid_model::linear_algebra::svd;
+use mechid_numerics::linear_algebra::svd;
 use mechid_signal::{Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 

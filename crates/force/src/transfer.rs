@@ -1,7 +1,7 @@
 //! Receptance from unknown forces to measured channels, and its inverse, at one angular frequency.
 
 use mechid_model::SecondOrderSystem;
-use mechid_model::linear_algebra::svd;
+use mechid_numerics::linear_algebra::svd;
 use nalgebra::{Complex, DMatrix};
 
 use crate::{Channel, ForceError};

@@ -1,8 +1,9 @@
 //! Krylov spaces of operators that are known by their products alone: systems of equations solved and the
 //! largest eigenvalues found in them.
 
-use mechid_model::linear_algebra::singular_values;
-use mechid_model::{ModelError, RealSchur};
+use mechid_model::ModelError;
+use mechid_numerics::RealSchur;
+use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::stability::krylov::eigenvector;
@@ -165,7 +166,7 @@ pub(crate) fn solve<E: From<ModelError>>(
         }
         let products = j + 1;
         let triangle = triangle.view((0, 0), (products, products));
-        let sizes = singular_values(triangle.into_owned())?;
+        let sizes = singular_values(triangle.into_owned()).map_err(ModelError::from)?;
         let right = DVector::from_column_slice(&rotated[..products]);
         let solved = triangle.solve_upper_triangular(&right);
         let found = solved.filter(|y| y.iter().all(|value| value.is_finite()));

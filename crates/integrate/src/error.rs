@@ -297,6 +297,9 @@ pub enum IntegrateError {
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+    /// A decomposition fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
 }
 
 fn limit_text(critical_step: Option<f64>) -> String {

@@ -1,7 +1,8 @@
 //! Exact steps by the matrix exponential.
 
-use mechid_model::linear_algebra::exponential;
-use mechid_model::{InitialState, Matrix, ModelError, SecondOrderSystem, StateTransition};
+use mechid_model::{InitialState, Matrix, SecondOrderSystem, StateTransition};
+use mechid_numerics::NumericsError;
+use mechid_numerics::linear_algebra::exponential;
 use nalgebra::{DMatrix, DVectorView, DVectorViewMut};
 
 use crate::effective::{Effective, Equations};
@@ -109,7 +110,7 @@ fn exponentials(
     // In balanced units the norm is that of ωΔt and not of its square: fewer squarings.
     let norm = generator.norm();
     let scales =
-        Transition::balance(&mut generator).ok_or(ModelError::ExponentialOverflow { norm })?;
+        Transition::balance(&mut generator).ok_or(NumericsError::ExponentialOverflow { norm })?;
     let unit = |i: usize| if (n..2 * n).contains(&i) { dt } else { 1.0 };
     let mut change = exponential(&generator)? - DMatrix::identity(4 * n, 4 * n);
     for (i, j) in (0..2 * n).flat_map(|i| (0..4 * n).map(move |j| (i, j))) {

@@ -1,6 +1,7 @@
 //! Periodic responses of nonlinear systems, and their stability.
 
-use mechid_model::{InitialState, RealSchur, Response};
+use mechid_model::{InitialState, Response};
+use mechid_numerics::RealSchur;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::arnoldi::{self, Arnoldi, Dominant};

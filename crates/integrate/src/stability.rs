@@ -8,7 +8,8 @@ mod fastest;
 pub(crate) mod krylov;
 pub(crate) mod passive;
 
-use mechid_model::{Matrix, RealSchur, SecondOrderSystem};
+use mechid_model::{Matrix, SecondOrderSystem};
+use mechid_numerics::RealSchur;
 use nalgebra::{Complex, DVector};
 
 use crate::effective::Equations;

@@ -127,39 +127,6 @@ pub enum ModelError {
         /// Degrees of freedom.
         dof: usize,
     },
-    /// The eigenvalue or singular value iteration of a matrix did not converge.
-    #[error("the eigenvalues or singular values of a {rows}×{columns} matrix did not converge")]
-    NotConverged {
-        /// Number of rows of the matrix.
-        rows: usize,
-        /// Number of its columns.
-        columns: usize,
-    },
-    /// A matrix that must be square is not.
-    #[error("a {rows}×{columns} matrix was given where a square one is needed")]
-    NotSquare {
-        /// Number of rows of the matrix.
-        rows: usize,
-        /// Number of its columns.
-        columns: usize,
-    },
-    /// An entry of a matrix to be decomposed is NaN or infinite.
-    #[error("entry ({}, {}) of a matrix to be decomposed is not a finite number", row.saturating_add(1), column.saturating_add(1))]
-    EntryNotFinite {
-        /// Row, counted from 0.
-        row: usize,
-        /// Column, counted from 0.
-        column: usize,
-    },
-    /// A matrix exponential is too large to be computed.
-    #[error(
-        "the exponential of a matrix of norm {norm:.1e} overflows: the time step is too long for \
-         the system"
-    )]
-    ExponentialOverflow {
-        /// Largest column sum of moduli, dimensionless.
-        norm: f64,
-    },
     /// A word that names none of the choices.
     #[error("there is no {what} `{name}`: {known}")]
     UnknownName {
@@ -258,6 +225,9 @@ pub enum ModelError {
     /// A signal is not usable.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+    /// A decomposition fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
 }
 
 /// First and last name of the entries for `dof` degrees of freedom.

@@ -30,8 +30,6 @@
 //! | frequency response | [`SecondOrderSystem::dynamic_stiffness`], [`SecondOrderSystem::receptance`] |
 //! | an exact response of one degree of freedom | [`Sdof::free_response`], [`Sdof::step_response`], [`Sdof::harmonic_response`], [`Sdof::held_force_response`], [`Sdof::linear_force_response`] |
 //! | the exact step from one sample to the next | [`StateTransition`] |
-//! | eigenvalues of any matrix, equal ones too | [`RealSchur`] |
-//! | singular values, a matrix exponential | [`linear_algebra`] |
 //! | the names of what is measured, assumed and identified | [`ResponseQuantity`], [`Discretisation`], [`Parameter`] |
 //! | a system that was identified, with its covariance | [`UncertainSystem`] |
 //! | springs and dampers that are not linear | [`NonlinearSystem`], [`Terms`] |
@@ -45,11 +43,9 @@ mod error;
 mod frequency_response;
 mod initial_state;
 mod journal_bearing;
-pub mod linear_algebra;
 mod modes;
 mod nonlinear;
 mod parameter;
-mod real_schur;
 mod response;
 mod response_quantity;
 mod sampled_force;
@@ -67,13 +63,13 @@ pub use discretisation::Discretisation;
 pub use error::ModelError;
 pub use initial_state::InitialState;
 pub use journal_bearing::{JournalBearing, KyxSign, OilFilm};
+pub use mechid_numerics::{RealSchur, linear_algebra};
 pub use modes::{EIGENVALUE_ROUNDING, Instability, Mode};
 pub use nonlinear::{
     BackbonePoint, Constant, Coordinate, Law, NonlinearParameter, NonlinearSystem, Power,
     QuadraticDamping, SaturatingDamping, Term, Terms, UncertainNonlinearSystem,
 };
 pub use parameter::Parameter;
-pub use real_schur::RealSchur;
 pub use response::Response;
 pub use response_quantity::ResponseQuantity;
 pub use sampling_rule::npi_sampling;

@@ -1,10 +1,11 @@
 //! Eigenvalues and complex mode shapes of a system with any damping.
 
+use mechid_numerics::RealSchur;
 use mechid_signal::message;
 use nalgebra::linalg::balancing::balance_parlett_reinsch;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use crate::{ModelError, RealSchur, SecondOrderSystem};
+use crate::{ModelError, SecondOrderSystem};
 
 /// Eigenvalues closer than this, relative to their modulus, count as one repeated eigenvalue:
 /// about √ε, what rounding makes of a defective pair.
@@ -336,7 +337,7 @@ mod tests {
     use nalgebra::dmatrix;
 
     use super::*;
-    use crate::linear_algebra::singular_values;
+    use mechid_numerics::linear_algebra::singular_values;
 
     fn system(m: DMatrix<f64>, c: DMatrix<f64>, k: DMatrix<f64>) -> SecondOrderSystem {
         SecondOrderSystem::new(m, c, k).unwrap()

@@ -4,8 +4,8 @@ use std::fmt;
 
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use crate::linear_algebra::singular_values;
 use crate::{ModelError, Parameter};
+use mechid_numerics::linear_algebra::singular_values;
 
 /// One of the three matrices of a [`SecondOrderSystem`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
-use crate::linear_algebra::exponential;
 use crate::{ModelError, SecondOrderSystem};
+use mechid_numerics::linear_algebra::exponential;
 
 /// Transition of the state over one step Δt:
 /// z(k+1) = Φ z(k) + Γ₀ u(k) + Γ₁ (u(k+1) − u(k)), with Γ₁ only for a linear input.

@@ -1,7 +1,7 @@
 //! What must hold for every system: sums and products of eigenvalues, invariances, inverses.
 
-use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Mode, SecondOrderSystem};
+use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::{Complex, DMatrix, DVector};
 use proptest::prelude::*;
 

@@ -1,7 +1,27 @@
 //! Numerical methods that several crates share; nothing here knows of machines or records.
+//!
+//! | Method | Module |
+//! |---|---|
+//! | least squares from row blocks, with covariance and undetermined directions | [`least_squares`] |
+//! | the triangular factor of any number of rows | [`triangular`] |
+//! | the Cholesky factor of a large matrix | [`cholesky`] |
+//! | singular values, eigenvalues of a Hermitian matrix, exponential, all of which end | [`linear_algebra`] |
+//! | eigenvalues of any matrix, equal ones too | [`real_schur`] |
+//! | the logarithm of a matrix, its integral and their derivatives | [`logarithm`] |
+//! | the minimum of a function of a few variables, without derivatives | [`nelder_mead`] |
+//! | values with a standard error, and their intervals | [`Uncertain`] |
 
+pub mod cholesky;
 mod error;
+pub mod least_squares;
+pub mod linear_algebra;
+pub mod logarithm;
+pub mod nelder_mead;
+mod quasi_triangular;
+pub mod real_schur;
+pub mod triangular;
 mod uncertain;
 
-pub use error::NumericsError;
+pub use error::{NumericsError, check_finite, check_size};
+pub use real_schur::RealSchur;
 pub use uncertain::{Uncertain, student_interval};

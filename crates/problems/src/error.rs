@@ -33,4 +33,7 @@ pub enum ProblemError {
     /// The response is not finite: an unstable system outgrew double precision.
     #[error(transparent)]
     Signal(#[from] SignalError),
+    /// A decomposition fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
 }

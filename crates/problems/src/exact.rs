@@ -13,8 +13,8 @@
 //! force jumps at every sample and the acceleration with it: ẍ is the limit from the right,
 //! under the force that begins there.
 
-use mechid_model::linear_algebra::singular_values;
 use mechid_model::{InitialState, ModelError, Response, SecondOrderSystem};
+use mechid_numerics::linear_algebra::singular_values;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 

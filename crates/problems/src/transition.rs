@@ -1,7 +1,7 @@
 //! Exact response over one time step.
 
-use mechid_model::linear_algebra::exponential;
 use mechid_model::{ModelError, SecondOrderSystem};
+use mechid_numerics::linear_algebra::exponential;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
 use crate::ProblemError;

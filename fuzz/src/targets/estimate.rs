@@ -10,10 +10,12 @@ use mechid_estimate::frequency_domain::{
 use mechid_estimate::nonlinear::{self, EquationErrorOptions, SteadyExperiments};
 use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use mechid_estimate::{
-    EquationOfMotion, Estimate, Frf, FrfAverage, FrfEstimator, LeastSquares, Segments, StartFit,
-    Unknowns, Window, checks, fit_percent, fitted_start, logarithm, predict, predict_periodic,
+    EquationOfMotion, Estimate, Frf, FrfAverage, FrfEstimator, Segments, StartFit, Unknowns,
+    Window, checks, fit_percent, fitted_start, predict, predict_periodic,
 };
 use mechid_model::{Discretisation, Matrix, Response, Terms};
+use mechid_numerics::least_squares::LeastSquares;
+use mechid_numerics::logarithm::logarithm;
 use mechid_signal::{Extent, Interpolation, Record, Sampling};
 use nalgebra::{Complex, DMatrix};
 

@@ -2,10 +2,11 @@
 
 use mechid_bearing::{Bore, Conditions, FiniteBearing, Mesh, ShortBearing, ShortFilm, Threshold};
 use mechid_model::{
-    Discretisation, JournalBearing, KyxSign, NonlinearSystem, OilFilm, Parameter, RealSchur,
-    Response, ResponseQuantity, Sdof, SecondOrderSystem, SparseSystem, StateTransition, Term,
-    Terms, UncertainSystem, linear_algebra, npi_sampling, triplets,
+    Discretisation, JournalBearing, KyxSign, NonlinearSystem, OilFilm, Parameter, Response,
+    ResponseQuantity, Sdof, SecondOrderSystem, SparseSystem, StateTransition, Term, Terms,
+    UncertainSystem, npi_sampling, triplets,
 };
+use mechid_numerics::{RealSchur, linear_algebra};
 use nalgebra::Complex;
 
 use super::draw::{Draw, finite, passed};

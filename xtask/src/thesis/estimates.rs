@@ -1,9 +1,10 @@
 //! Stiffness and damping from the sequences of a simulation, with and without slips.
 
+use mechid::estimate::Unknowns;
 use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
 use mechid::estimate::time_domain::TimeDomain;
-use mechid::estimate::{LeastSquares, Unknowns};
 use mechid::model::{Discretisation, ResponseQuantity};
+use mechid::numerics::least_squares::LeastSquares;
 use mechid::signal::{Extent, Spectrum};
 use nalgebra::{Complex, DMatrix};
 

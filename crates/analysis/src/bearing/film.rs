@@ -1,10 +1,11 @@
 //! Eight or twelve coefficients of a film, less those of the baseline.
 
+use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{
     LikelihoodRatio, OutputErrorFit, likelihood_ratio, output_error,
 };
-use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, Parameter};
+use mechid_numerics::NumericsError;
 use nalgebra::{DMatrix, DVector, Matrix2};
 
 use super::{BearingData, Coefficients};
@@ -182,7 +183,7 @@ fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, AnalysisErr
     let scale = a.diagonal().map(|v| if v > 0.0 { v.sqrt().recip() } else { 1.0 });
     let scaling = DMatrix::from_diagonal(&scale);
     let solution = (&scaling * a * &scaling).lu().solve(&(&scaling * b));
-    Ok(&scaling * solution.ok_or(AnalysisError::Estimate(EstimateError::Overflow))?)
+    Ok(&scaling * solution.ok_or(NumericsError::Overflow)?)
 }
 
 fn row_by_row(matrix: &Matrix2<f64>) -> [f64; EACH] {

@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 use std::fmt;
 
 use mechid_bearing::{Conditions, Threshold};
-use mechid_estimate as estimate;
 use mechid_estimate::frequency_domain::LikelihoodRatio;
 use mechid_io::ParameterCovariance;
 use mechid_model::OilFilm;
@@ -121,7 +120,8 @@ impl BearingSummary {
         let uncertain = |value: f64, variance: f64| {
             let standard_error = variance.max(0.0).sqrt();
             let degrees_of_freedom = film.degrees_of_freedom;
-            let uncertain = mechid_numerics::Uncertain { value, standard_error, degrees_of_freedom };
+            let uncertain =
+                mechid_numerics::Uncertain { value, standard_error, degrees_of_freedom };
             Uncertain::of(&uncertain)
         };
         let count = film.values().len();

@@ -1,6 +1,6 @@
 //! Rows of the tables that a result is made of: samples and lines used, parameters, modes.
 
-use mechid_estimate::{self as estimate, Estimate, IdentifiedMode, Unknowns, frequency_domain};
+use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, frequency_domain};
 use mechid_io::ParameterCovariance;
 use mechid_model::{EIGENVALUE_ROUNDING, Parameter};
 use serde::Serialize;

@@ -1,5 +1,6 @@
 //! Residuals against noise: whiteness, and correlation with the forces.
 
+use mechid_numerics::check_size;
 use mechid_signal::Record;
 
 use super::correlation::{
@@ -20,7 +21,7 @@ use crate::EstimateError;
 /// correlation with a force is judged with the colour that the residual has.
 ///
 /// # Errors
-/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or [`EstimateError::Size`] if the records
+/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records
 /// do not belong together.
 ///
 /// # Source
@@ -34,7 +35,7 @@ pub fn after_fit(
 ) -> Result<Vec<Finding>, EstimateError> {
     residual.check_same_sampling(fitted)?;
     residual.check_same_sampling(force)?;
-    crate::least_squares::size("channels of the residual", fitted.channels(), residual.channels())?;
+    check_size("channels of the residual", fitted.channels(), residual.channels())?;
     let mut findings = Vec::new();
     for channel in 0..residual.channels() {
         let e = residual.channel(channel);

@@ -2,7 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mechid_model::{Discretisation, RealSchur, Response, SecondOrderSystem};
+use mechid_model::{Discretisation, Response, SecondOrderSystem};
+use mechid_numerics::{NumericsError, RealSchur};
 use mechid_signal::measures::persistent_excitation_order;
 use mechid_signal::{Record, Spectrum};
 
@@ -17,7 +18,7 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 ///
 /// # Errors
 /// [`EstimateError::NoDof`] without a record; as [`Transitions::push`], and
-/// [`EstimateError::TooFewRows`].
+/// [`NumericsError::TooFewRows`].
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), chapter 13 (persistence of
@@ -152,7 +153,7 @@ pub fn periodicity_across(beginning: &Record, end: &Record) -> Finding {
 fn step(rows: &Transitions, discretisation: Discretisation) -> Result<Finding, EstimateError> {
     let exact = match rows.state_matrix(Discretisation::ZeroOrderHold) {
         Ok(matrix) => matrix,
-        Err(EstimateError::NoLogarithm { eigenvalue }) => {
+        Err(EstimateError::Numerics(NumericsError::NoLogarithm { eigenvalue })) => {
             return Ok(Finding::NoLogarithm { eigenvalue });
         }
         Err(other) => return Err(other),

@@ -1,5 +1,6 @@
 //! Correlations over lags, and their p-values.
 
+use mechid_numerics::{check_finite, check_size};
 use mechid_signal::measures::{peak, power_of_two};
 use nalgebra::DVectorView;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -78,7 +79,7 @@ pub fn whiteness_beyond(
 /// go together.
 ///
 /// # Errors
-/// As [`whiteness`], and [`EstimateError::Size`] if the two differ in length.
+/// As [`whiteness`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the two differ in length.
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), section 16.6; Box (1954),
@@ -99,7 +100,7 @@ pub(super) fn cross_correlation_of_coloured(
     lags: usize,
     colour: &[f64],
 ) -> Result<Correlation, EstimateError> {
-    crate::least_squares::size("samples of the input", residual.len(), input.len())?;
+    check_size("samples of the input", residual.len(), input.len())?;
     let (e, u) = (centred(residual, lags, 0)?, centred(input, lags, 0)?);
     let power = (products(&e, &e) * products(&u, &u)).sqrt();
     let before = (1..=lags).rev().map(|lag| products(&u[lag..], &e));
@@ -179,10 +180,7 @@ pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f6
     if lags == 0 || values.len() < needed {
         return Err(EstimateError::TooShort { samples: values.len(), needed });
     }
-    crate::least_squares::finite(
-        "residual or input",
-        DVectorView::from_slice(values, values.len()).as_view(),
-    )?;
+    check_finite("residual or input", DVectorView::from_slice(values, values.len()).as_view())?;
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     // In units of a power of two, which changes no coefficient: fourth powers stay finite.
     let unit = power_of_two(peak(values));

@@ -1,6 +1,7 @@
 //! Consistency of displacement, velocity and acceleration.
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::check_size;
 use mechid_signal::Record;
 
 use super::finding::Finding;
@@ -15,7 +16,7 @@ const STANDARD_ERRORS: f64 = 4.0;
 /// displacement (m), velocity (m/s) and acceleration (m/s²) that is measured, in that order.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
 ///
 /// # Source
 /// Ours: regression of x(k+1) − x(k) on the trapezoidal rule for ẋ, and of x(k+1) − 2x(k) + x(k−1) on
@@ -44,7 +45,7 @@ pub fn kinematics(
     let mut findings = Vec::new();
     for (quantity, low, derivative, high) in pairs {
         low.check_same_sampling(high)?;
-        crate::least_squares::size("channels of the response", low.channels(), high.channels())?;
+        check_size("channels of the response", low.channels(), high.channels())?;
         let twice = derivative == ResponseQuantity::Acceleration
             && quantity == ResponseQuantity::Displacement;
         for dof in 0..low.channels() {

@@ -1,6 +1,7 @@
 //! Correlation of a residual with powers of displacement and velocity.
 
 use mechid_model::{Response, ResponseQuantity};
+use mechid_numerics::check_size;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use statrs::distribution::{ContinuousCDF, Normal};
@@ -25,7 +26,7 @@ const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Pow
 ///
 /// # Errors
 /// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is no machine,
-/// [`EstimateError::Size`] for another number of responses and [`EstimateError::NoExcitedLine`] if fewer than three
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses and [`EstimateError::NoExcitedLine`] if fewer than three
 /// lines lie in the band.
 ///
 /// # Source
@@ -58,7 +59,7 @@ pub fn linearity(
 /// off, and the force (N) as it was measured.
 ///
 /// # Errors
-/// The errors of [`linearity`]; [`EstimateError::Size`] if the data are not those of the lines.
+/// The errors of [`linearity`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the data are not those of the lines.
 ///
 /// # Source
 /// The source of [`linearity`].
@@ -68,7 +69,7 @@ pub fn linearity_of_open_record(
     data: &FrequencyData,
     lines: &Lines,
 ) -> Result<Finding, EstimateError> {
-    crate::least_squares::size("lines of the data", lines.as_slice().len(), data.len())?;
+    check_size("lines of the data", lines.as_slice().len(), data.len())?;
     Tested::new(estimate, data)?.finding(estimate, force, lines.as_slice(), &[1.0])
 }
 
@@ -94,7 +95,7 @@ struct Tested {
 impl Tested {
     fn new(estimate: &Estimate, data: &FrequencyData) -> Result<Self, EstimateError> {
         let (system, n) = (estimate.system()?, data.dof());
-        crate::least_squares::size("channels of the response", system.dof(), n)?;
+        check_size("channels of the response", system.dof(), n)?;
         let mut receptances = Vec::with_capacity(data.len());
         let mut residual = DMatrix::zeros(n, data.len());
         for (row, omega) in data.omega().iter().enumerate() {

@@ -1,6 +1,7 @@
 //! Direction of the power between force and machine.
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::check_size;
 use mechid_signal::{Record, Spectrum};
 
 use super::finding::Finding;
@@ -23,7 +24,7 @@ const FORCE_FLOOR: f64 = 1e-3;
 /// The power is Σ ½ Re(F V̄), the apparent power Σ ½ |F| |V|.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together.
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
 ///
 /// # Source
 /// Cremer, Heckl & Petersson, *Structure-Borne Sound*, 3rd ed. (2005), the section on mechanical
@@ -34,7 +35,7 @@ pub fn power(
     measured: ResponseQuantity,
 ) -> Result<Option<Finding>, EstimateError> {
     force.check_same_sampling(response)?;
-    crate::least_squares::size("channels of the response", force.channels(), response.channels())?;
+    check_size("channels of the response", force.channels(), response.channels())?;
     let (forces, responses) = (Spectrum::of(force), Spectrum::of(response));
     let all = &forces;
     let carried = |dof: usize| {

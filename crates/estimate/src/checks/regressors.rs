@@ -1,6 +1,8 @@
 //! Noise on the response that biases least squares while its residual stays white.
 
 use mechid_model::{Matrix, Parameter, Response};
+use mechid_numerics::least_squares::{LeastSquares, Solution};
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
@@ -9,7 +11,7 @@ use super::MAX_SAMPLES;
 use super::correlation::whiteness;
 use super::finding::{Finding, PValue, Reference};
 use super::thresholds::{LAGS, ROUNDING, SIGNIFICANCE};
-use crate::{Estimate, EstimateError, LeastSquares};
+use crate::{Estimate, EstimateError};
 
 /// Minimum number of samples per unknown.
 const SAMPLES_PER_UNKNOWN: usize = 4;
@@ -24,7 +26,7 @@ const SAMPLES_PER_UNKNOWN: usize = 4;
 /// The finding names the parameter that changes most, in standard errors of `estimate`.
 ///
 /// # Errors
-/// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together, and
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together, and
 /// what [`LeastSquares::push_rows`] refuses.
 ///
 /// # Source
@@ -37,7 +39,7 @@ pub fn noise_on_response(
     estimate: &Estimate,
 ) -> Result<Option<Finding>, EstimateError> {
     response.displacement().check_same_sampling(force)?;
-    crate::least_squares::size("channels of the force", response.dof(), force.channels())?;
+    check_size("channels of the force", response.dof(), force.channels())?;
     let equations = estimate.unknowns().dof();
     let mut least: Option<Change> = None;
     for dof in 0..equations {
@@ -171,10 +173,7 @@ impl Equation {
     }
 }
 
-fn fit(
-    regressors: &DMatrix<f64>,
-    targets: &DMatrix<f64>,
-) -> Result<crate::Solution, EstimateError> {
+fn fit(regressors: &DMatrix<f64>, targets: &DMatrix<f64>) -> Result<Solution, NumericsError> {
     let mut rows = LeastSquares::new(regressors.ncols(), targets.ncols());
     rows.push_rows(regressors.as_view(), targets.as_view())?;
     rows.solve()

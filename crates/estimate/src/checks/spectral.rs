@@ -1,6 +1,7 @@
 //! Checks of a record before a fit of its spectra or frequency responses.
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::NumericsError;
 use mechid_signal::{Record, Spectrum, lines};
 use nalgebra::DMatrix;
 
@@ -29,7 +30,7 @@ pub fn before_spectral_fit(
     let mut findings = vec![excitation(data, unknowns)];
     match equation_rows(data)?.solve(unknowns) {
         // Nothing else can be checked then.
-        Err(EstimateError::TooFewRows { .. }) => {}
+        Err(EstimateError::Numerics(NumericsError::TooFewRows { .. })) => {}
         solved => findings.push(conditioning(&solved?)),
     }
     Ok(findings)

@@ -1,7 +1,9 @@
 //! Residuals of spectra weighted by their covariance, with what other parameters explain of them.
 
 use mechid_model::SecondOrderSystem;
-use mechid_model::linear_algebra::svd;
+use mechid_numerics::check_size;
+use mechid_numerics::linear_algebra::svd;
+use mechid_numerics::triangular::TriangularFactor;
 use mechid_signal::Extent;
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
@@ -12,7 +14,6 @@ use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
 use super::thresholds::ROUNDING;
 use crate::frequency_domain::{FrequencyData, NoiseModel, NoiseSpectrum, Whitened, motion_level};
 use crate::relations::Relations;
-use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
 
 /// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
@@ -64,7 +65,7 @@ pub struct AfterSpectralFit {
 /// leaves at the ends of several periods, where the noise is found to be one.
 ///
 /// # Errors
-/// [`EstimateError::Size`] if the estimate has another number of degrees of freedom than the data.
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the estimate has another number of degrees of freedom than the data.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on maximum
@@ -77,7 +78,7 @@ pub fn after_spectral_fit(
 ) -> Result<AfterSpectralFit, EstimateError> {
     for data in records {
         let what = "degrees of freedom of the data";
-        crate::least_squares::size(what, data.dof(), estimate.dof())?;
+        check_size(what, data.dof(), estimate.dof())?;
     }
     let Some(fit) = WeightedFit::of(records, estimate, extent) else {
         return Ok(AfterSpectralFit { records: Vec::new(), bias: None });

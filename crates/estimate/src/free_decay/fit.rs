@@ -1,10 +1,10 @@
 //! The poles that make a record most likely, their number and the colour of the noise being given.
 
+use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use super::autoregression::Autoregression;
 use super::poles::{Pole, columns, linear_columns};
-use crate::triangular::TriangularFactor;
 
 /// Rows made at a time.
 const CHUNK: usize = 4096;

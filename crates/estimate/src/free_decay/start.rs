@@ -2,8 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use mechid_model::RealSchur;
-use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_numerics::RealSchur;
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_signal::transform;
 use nalgebra::{Complex, DMatrix};
 

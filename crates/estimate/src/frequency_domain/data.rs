@@ -5,6 +5,7 @@ mod derived;
 use std::ops::Range;
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
@@ -60,7 +61,7 @@ impl FrequencyData {
     /// Force (N) and motion at prepared lines.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the records have not the same number of channels,
+    /// [`NumericsError::Size`] if the records have not the same number of channels,
     /// [`EstimateError::Signal`] if their time axes are not that of the lines.
     pub fn read(
         lines: &Lines,
@@ -74,7 +75,7 @@ impl FrequencyData {
     /// The chosen lines of two spectra over the same whole periods.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::LineOutOfRange`],
+    /// [`NumericsError::Size`], [`EstimateError::LineOutOfRange`],
     /// [`EstimateError::NoExcitedLine`] or [`EstimateError::Signal`], as for records.
     pub fn from_spectra(
         force: &Spectrum,
@@ -95,8 +96,8 @@ impl FrequencyData {
     /// Takes complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the shapes differ, [`EstimateError::NoExcitedLine`]
-    /// if there is no row, [`EstimateError::NotFinite`] for a frequency that is not
+    /// [`NumericsError::Size`] if the shapes differ, [`EstimateError::NoExcitedLine`]
+    /// if there is no row, [`NumericsError::NotFinite`] for a frequency that is not
     /// positive or an amplitude that is not finite.
     pub fn from_amplitudes(
         omega: Vec<f64>,
@@ -130,7 +131,7 @@ impl FrequencyData {
     /// entry, in the square of its unit, if it is known; errors of two entries are independent.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the shapes differ or a degree of freedom does not exist, and what
+    /// [`NumericsError::Size`] if the shapes differ or a degree of freedom does not exist, and what
     /// [`FrequencyData::from_amplitudes`] and [`NoiseSpectrum::new`] refuse.
     ///
     /// # Source
@@ -142,7 +143,7 @@ impl FrequencyData {
         measured: ResponseQuantity,
         force_dof: &[usize],
     ) -> Result<Self, EstimateError> {
-        let size = crate::least_squares::size;
+        let size = check_size;
         let (lines, n) = (omega.len(), response.first().map_or(0, |h| h.nrows()));
         size("frequency response matrices", lines, response.len())?;
         size("variances of frequency responses", lines, variance.map_or(lines, <[_]>::len))?;
@@ -153,7 +154,7 @@ impl FrequencyData {
         }
         if let Some(&got) = force_dof.iter().find(|dof| **dof >= n) {
             let what = "driven degree of freedom, at most";
-            return Err(EstimateError::Size { what, expected: n.saturating_sub(1), got });
+            return Err(NumericsError::Size { what, expected: n.saturating_sub(1), got }.into());
         }
         let mut all: Option<Self> = None;
         for (input, &dof) in force_dof.iter().enumerate() {
@@ -180,17 +181,18 @@ impl FrequencyData {
     /// The same data with what is known of their noise.
     ///
     /// # Errors
-    /// [`EstimateError::FrequencyMismatch`] or [`EstimateError::Size`] if the noise
+    /// [`EstimateError::FrequencyMismatch`] or [`NumericsError::Size`] if the noise
     /// belongs to other frequencies or another number of degrees of freedom.
     pub fn with_noise(mut self, noise: NoiseSpectrum) -> Result<Self, EstimateError> {
         check_same_frequencies(&self.omega, noise.omega())?;
         if noise.dof() != self.dof() {
             let (got, expected) = (noise.dof(), self.dof());
-            return Err(EstimateError::Size {
+            return Err(NumericsError::Size {
                 what: "channels of the noise spectrum",
                 got,
                 expected,
-            });
+            }
+            .into());
         }
         self.noise = Some(noise);
         Ok(self)
@@ -202,7 +204,7 @@ impl FrequencyData {
     /// comes first.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] unless there is one deviation per degree of freedom,
+    /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,
     /// [`EstimateError::NoiseVariance`] if one is negative or not finite.
     ///
     /// # Source
@@ -213,7 +215,7 @@ impl FrequencyData {
         deviation: &[f64],
         samples: usize,
     ) -> Result<Self, EstimateError> {
-        crate::least_squares::size("noise levels of the force", self.dof(), deviation.len())?;
+        check_size("noise levels of the force", self.dof(), deviation.len())?;
         for (channel, &value) in deviation.iter().enumerate() {
             if !(value >= 0.0 && value.is_finite()) {
                 let column = self.dof() + channel;
@@ -229,7 +231,7 @@ impl FrequencyData {
     /// counted from 0, and none on the others: those of the pulse of a hit. The lines of such noise err together.
     ///
     /// # Errors
-    /// The errors of [`FrequencyData::with_force_noise`]; [`EstimateError::Size`] if there is no such channel or sample.
+    /// The errors of [`FrequencyData::with_force_noise`]; [`NumericsError::Size`] if there is no such channel or sample.
     ///
     /// # Source
     /// The source of [`FrequencyData::with_force_noise`].
@@ -247,7 +249,7 @@ impl FrequencyData {
             ("sample with noise, below", sampling.len(), samples.end.saturating_sub(1)),
         ] {
             if got >= expected {
-                return Err(EstimateError::Size { what, expected, got });
+                return Err(NumericsError::Size { what, expected, got }.into());
             }
         }
         levels[channel] = deviation * share.sqrt();
@@ -317,16 +319,17 @@ impl FrequencyData {
     /// The noise is kept if it is known of both.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the numbers of degrees of freedom differ,
+    /// [`NumericsError::Size`] if the numbers of degrees of freedom differ,
     /// [`EstimateError::MixedQuantities`] if the quantities measured do.
     pub fn and(&self, other: &Self) -> Result<Self, EstimateError> {
         if self.dof() != other.dof() {
             let (got, expected) = (other.dof(), self.dof());
-            return Err(EstimateError::Size {
+            return Err(NumericsError::Size {
                 what: "channels of the second experiment",
                 got,
                 expected,
-            });
+            }
+            .into());
         }
         if self.measured != other.measured {
             return Err(EstimateError::MixedQuantities {
@@ -427,7 +430,7 @@ fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatr
 pub(crate) fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), EstimateError> {
     if left.len() != right.len() {
         let (got, expected) = (right.len(), left.len());
-        return Err(EstimateError::Size { what: "frequencies", got, expected });
+        return Err(NumericsError::Size { what: "frequencies", got, expected }.into());
     }
     for (row, (&left, &right)) in left.iter().zip(right).enumerate() {
         if (left - right).abs() > 1e-9 * left.abs() {
@@ -444,15 +447,16 @@ fn check_shapes(
 ) -> Result<(), EstimateError> {
     if force.ncols() != motion.ncols() || motion.ncols() == 0 {
         let (got, expected) = (motion.ncols(), force.ncols().max(1));
-        return Err(EstimateError::Size { what: "channels of the motion", got, expected });
+        return Err(NumericsError::Size { what: "channels of the motion", got, expected }.into());
     }
     for rows in [force.nrows(), motion.nrows()] {
         if rows != omega.len() {
-            return Err(EstimateError::Size {
+            return Err(NumericsError::Size {
                 what: "rows of amplitudes",
                 got: rows,
                 expected: omega.len(),
-            });
+            }
+            .into());
         }
     }
     if omega.is_empty() {
@@ -464,12 +468,13 @@ fn check_shapes(
     for (what, amplitudes) in [("force amplitudes", force), ("motion amplitudes", motion)] {
         if let Some(at) = amplitudes.iter().position(|z| !z.is_finite()) {
             let (row, column) = (at % omega.len(), at / omega.len());
-            return Err(EstimateError::NotFinite {
+            return Err(NumericsError::NotFinite {
                 what,
                 row,
                 column,
                 value: amplitudes[at].norm(),
-            });
+            }
+            .into());
         }
     }
     Ok(())

@@ -1,7 +1,8 @@
 //! Instrumental variables: another measurement of the same motion rids least squares of its bias.
 
-use mechid_model::linear_algebra::singular_values;
 use mechid_model::{Matrix, Parameter};
+use mechid_numerics::NumericsError;
+use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::FrequencyData;
@@ -23,7 +24,7 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// an equation error of unequal size over the lines.
 ///
 /// # Errors
-/// [`EstimateError::FrequencyMismatch`] or [`EstimateError::Size`] if the two are not alike,
+/// [`EstimateError::FrequencyMismatch`] or [`NumericsError::Size`] if the two are not alike,
 /// [`EstimateError::Undetermined`] if the data leave a parameter open, and what
 /// [`equation_error`](super::equation_error) refuses.
 ///
@@ -38,7 +39,7 @@ pub fn instrumental_variables(
     check_same_frequencies(first.omega(), second.omega())?;
     if first.dof() != second.dof() {
         let what = "channels of the second measurement";
-        return Err(EstimateError::Size { what, expected: first.dof(), got: second.dof() });
+        return Err(NumericsError::Size { what, expected: first.dof(), got: second.dof() }.into());
     }
     unknowns.check_unrelated("an estimator with instrumental variables")?;
     // Least squares finds out what can be determined, and refuses what it must.

@@ -42,7 +42,6 @@
 //! ```
 
 mod between_lines;
-mod cholesky;
 mod data;
 mod ends;
 mod equation_error;

@@ -4,13 +4,13 @@
 use std::rc::Rc;
 
 use mechid_model::Matrix;
-use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_numerics::cholesky::Cholesky;
+use mechid_numerics::linear_algebra::hermitian_eigen;
+use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
 
-use super::cholesky::Cholesky;
 use super::ends;
 use crate::Unknowns;
-use crate::triangular::TriangularFactor;
 
 /// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
 const DEPENDENT: f64 = 1e-14;

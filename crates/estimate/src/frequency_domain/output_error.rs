@@ -1,6 +1,7 @@
 //! Maximum likelihood: modelled against measured displacement, weighted by the noise.
 
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::check_size;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::ends;
@@ -13,7 +14,6 @@ use super::residual_noise::with_residual_noise;
 use super::search::SumOfSquares;
 use super::starts::Starts;
 use super::{FrequencyData, NoiseSpectrum, Pooling, equation_error};
-use crate::least_squares::size;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -52,7 +52,7 @@ pub fn output_error(
 /// finite element model.
 ///
 /// # Errors
-/// As [`output_error`], and [`EstimateError::Size`] if the machine has another number of degrees of
+/// As [`output_error`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the machine has another number of degrees of
 /// freedom.
 ///
 /// # Source
@@ -63,7 +63,7 @@ pub fn output_error_near(
     nominal: Option<&SecondOrderSystem>,
 ) -> Result<OutputErrorFit, EstimateError> {
     if let Some(system) = nominal {
-        size("degrees of freedom of the machine expected", unknowns.dof(), system.dof())?;
+        check_size("degrees of freedom of the machine expected", unknowns.dof(), system.dof())?;
     }
     search_near(data, unknowns, nominal, Pooling::Automatic)
 }

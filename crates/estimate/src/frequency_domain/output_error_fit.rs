@@ -1,6 +1,7 @@
 //! The result of maximum likelihood, made of the minimum that its search found.
 
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::{NumericsError, check_size};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -82,13 +83,13 @@ impl EndLoads {
     /// The records that were fitted, each with its loads taken off the force (N): as if it were a period.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if there are more or fewer open records or degrees of freedom.
+    /// [`NumericsError::Size`] if there are more or fewer open records or degrees of freedom.
     pub fn taken_off(
         &self,
         records: &[FrequencyData],
     ) -> Result<Vec<FrequencyData>, EstimateError> {
         let all = records.iter().map(ends::count).sum();
-        crate::least_squares::size("loads of open ends", all, self.tau.len())?;
+        check_size("loads of open ends", all, self.tau.len())?;
         let mut rest = &self.tau[..];
         let closed = records.iter().map(|record| {
             let (tau, others) = rest.split_at(ends::count(record));
@@ -102,7 +103,7 @@ impl EndLoads {
     /// of `system` is taken off the displacement (m), where its receptance exists.
     ///
     /// # Errors
-    /// As [`EndLoads::taken_off`], and [`EstimateError::Size`] for another number of degrees of freedom.
+    /// As [`EndLoads::taken_off`], and [`NumericsError::Size`] for another number of degrees of freedom.
     pub fn taken_off_responses(
         &self,
         records: &[FrequencyData],
@@ -110,7 +111,7 @@ impl EndLoads {
     ) -> Result<Vec<FrequencyData>, EstimateError> {
         let closed = self.taken_off(records)?;
         let each = records.iter().zip(&closed).map(|(record, closed)| {
-            crate::least_squares::size("degrees of freedom", record.dof(), system.dof())?;
+            check_size("degrees of freedom", record.dof(), system.dof())?;
             Ok(record.with_response_of_load_taken_off(closed.force(), system))
         });
         each.collect()
@@ -162,8 +163,8 @@ pub(super) fn finish(
     best: &GlobalMinimum,
     scale: Scale,
 ) -> Result<OutputErrorFit, EstimateError> {
-    let equations = misfit.normal_equations().ok_or(EstimateError::Overflow)?;
-    let (covariance, condition) = equations.covariance().ok_or(EstimateError::Overflow)?;
+    let equations = misfit.normal_equations().ok_or(NumericsError::Overflow)?;
+    let (covariance, condition) = equations.covariance().ok_or(NumericsError::Overflow)?;
     let (independent, tau) = parts(data, &best.minimum.theta);
     let count = independent.len();
     let of_ends = covariance.view((count, count), (tau.len(), tau.len()));

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -49,7 +50,7 @@ impl RepeatedPeriods {
     /// incomplete period at the end, if there is one, is left out.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if the records have not the same number of channels,
+    /// [`NumericsError::Size`] if the records have not the same number of channels,
     /// [`EstimateError::Signal`] if they have not the same time axis, not the time step
     /// of the lines, or less than one period.
     pub fn new(
@@ -93,13 +94,13 @@ impl RepeatedPeriods {
     /// without other noise and so not part of their scatter.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] unless there is one step per channel.
+    /// [`NumericsError::Size`] unless there is one step per channel.
     ///
     /// # Source
     /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: beside noise of the standard deviation s steps q
     /// leave Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the error alike from period to period.
     pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, EstimateError> {
-        crate::least_squares::size("quantisation steps", 2 * self.dof, steps.len())?;
+        check_size("quantisation steps", 2 * self.dof, steps.len())?;
         self.steps = steps;
         Ok(self)
     }
@@ -139,7 +140,7 @@ impl RepeatedPeriods {
             ("channels of the motion", motion.channels()),
         ] {
             if got != dof {
-                return Err(EstimateError::Size { what, got, expected: dof });
+                return Err(NumericsError::Size { what, got, expected: dof }.into());
             }
         }
         let lines = self.lines.clone();
@@ -264,7 +265,7 @@ impl RepeatedPeriods {
     /// The same where a smooth spectrum may also be that of the response of a `machine` to unmeasured forces.
     ///
     /// # Errors
-    /// The errors of [`RepeatedPeriods::noise`]; [`EstimateError::Size`] for a machine of other degrees of freedom.
+    /// The errors of [`RepeatedPeriods::noise`]; [`NumericsError::Size`] for a machine of other degrees of freedom.
     ///
     /// # Source
     /// The sources of [`RepeatedPeriods::noise`].
@@ -276,7 +277,7 @@ impl RepeatedPeriods {
         let (n, omega) = (self.dof, self.lines.omega());
         let (what, got) = ("degrees of freedom of the machine", machine.dof());
         if got != n {
-            return Err(EstimateError::Size { what, got, expected: n });
+            return Err(NumericsError::Size { what, got, expected: n }.into());
         }
         // At a pole on a line the noise has no level to compare with.
         let Ok(receptances) = machine.receptances(&omega) else { return self.noise(pooling) };

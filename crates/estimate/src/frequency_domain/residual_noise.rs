@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use mechid_model::SecondOrderSystem;
+use mechid_numerics::NumericsError;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::misfit::Misfit;
@@ -70,7 +71,7 @@ pub(super) fn with_residual_noise(
     let is_white = coloured.is_none();
     let Weighted { fit, noise } = coloured.unwrap_or(white);
     let mut misfit = Misfit::new(data, unknowns, &noise)?;
-    misfit.try_at(&fit.minimum.theta).ok_or(EstimateError::Overflow)?;
+    misfit.try_at(&fit.minimum.theta).ok_or(NumericsError::Overflow)?;
     misfit.accept();
     let of_sinusoids = sinusoids.iter().flatten().map(Sinusoid::unknowns).sum();
     let free = spare(data, unknowns).saturating_sub(of_sinusoids);
@@ -110,7 +111,7 @@ impl<'a> BesideSinusoids<'a> {
         for round in 0..SINUSOID_ROUNDS {
             let residual = {
                 let mut misfit = Misfit::new(data, unknowns, &self.white.noise)?;
-                misfit.try_at(&self.white.fit.minimum.theta).ok_or(EstimateError::Overflow)?;
+                misfit.try_at(&self.white.fit.minimum.theta).ok_or(NumericsError::Overflow)?;
                 misfit.accept();
                 misfit.errors()
             };
@@ -212,7 +213,7 @@ fn spectrum_of_residual(
 ) -> Result<NoiseSpectrum, EstimateError> {
     let (n, theta) = (data.dof(), &before.fit.minimum.theta);
     let mut misfit = Misfit::new(data, unknowns, &before.noise)?;
-    misfit.try_at(theta).ok_or(EstimateError::Overflow)?;
+    misfit.try_at(theta).ok_or(NumericsError::Overflow)?;
     misfit.accept();
     let (errors, leverage) = (misfit.errors(), leverage(data, unknowns, before));
     let by_force = misfit.variance_by_force();
@@ -285,7 +286,7 @@ pub(super) fn white_noise_at(
 ) -> Result<NoiseSpectrum, EstimateError> {
     let any = white_noise(data, &measured_size(data, data.displacement()))?;
     let mut misfit = Misfit::new(data, unknowns, &any)?;
-    misfit.try_at(theta).ok_or(EstimateError::Overflow)?;
+    misfit.try_at(theta).ok_or(NumericsError::Overflow)?;
     misfit.accept();
     white_noise(data, &levels_of(data, &misfit))
 }

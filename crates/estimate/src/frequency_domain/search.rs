@@ -1,9 +1,9 @@
 //! Nonlinear least squares: Gauss–Newton steps along the curve of the residuals, damped where they
 //! do not descend.
 
+use mechid_numerics::cholesky::Cholesky;
 use nalgebra::DVector;
 
-use super::cholesky::Cholesky;
 use super::normal_equations::{Coordinates, NormalEquations};
 
 /// A sum of squares to be minimised over its parameters.

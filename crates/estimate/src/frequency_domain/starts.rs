@@ -3,8 +3,9 @@
 
 use std::borrow::Cow;
 
-use mechid_model::linear_algebra::hermitian_eigen;
 use mechid_model::{Matrix, Parameter, SecondOrderSystem};
+use mechid_numerics::linear_algebra::hermitian_eigen;
+use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::ends;
@@ -12,7 +13,6 @@ use super::equation_error::weighted_equation_errors;
 use super::misfit::powers;
 use super::{FrequencyData, NoiseSpectrum};
 use crate::relations::Relations;
-use crate::triangular::TriangularFactor;
 use crate::{Estimate, Unknowns};
 
 /// Exponents e of the weights ω^−e that stand in for a noise that is white in the displacement,

@@ -1,6 +1,7 @@
 //! Cross-spectra of force and motion, averaged over pieces of records of any length.
 
 use mechid_model::ResponseQuantity;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
 use nalgebra::DMatrix;
 
@@ -45,7 +46,7 @@ impl FrfAverage {
     /// No segments yet, of so many forces and motions; `lines` belong to one segment.
     ///
     /// # Errors
-    /// [`EstimateError::Hop`], and [`EstimateError::Size`] if the lines are not those of a segment.
+    /// [`EstimateError::Hop`], and [`NumericsError::Size`] if the lines are not those of a segment.
     pub fn new(
         lines: Lines,
         [inputs, outputs]: [usize; 2],
@@ -53,7 +54,7 @@ impl FrfAverage {
         segments: Segments,
     ) -> Result<Self, EstimateError> {
         let (expected, got) = (segments.samples(), lines.sampling().len());
-        crate::least_squares::size("samples of a segment", expected, got)?;
+        check_size("samples of a segment", expected, got)?;
         let weights = segments.weights()?;
         let sums = vec![CrossSpectra::new(inputs, outputs); lines.as_slice().len()];
         Ok(Self { lines, inputs, outputs, measured, segments, weights, pieces: 0, sums })
@@ -65,14 +66,14 @@ impl FrfAverage {
     ///
     /// # Errors
     /// [`EstimateError::Signal`] if the records have not the same time axis or not the time step of
-    /// the lines, [`EstimateError::Size`] for another number of channels.
+    /// the lines, [`NumericsError::Size`] for another number of channels.
     ///
     /// # Source
     /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
     pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), EstimateError> {
         force.check_same_sampling(motion)?;
-        crate::least_squares::size("channels of the force", self.inputs, force.channels())?;
-        crate::least_squares::size("channels of the motion", self.outputs, motion.channels())?;
+        check_size("channels of the force", self.inputs, force.channels())?;
+        check_size("channels of the motion", self.outputs, motion.channels())?;
         let len = self.segments.samples();
         if force.len() < len {
             return Ok(());
@@ -105,12 +106,12 @@ impl FrfAverage {
     /// record of the same machine.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if it has other channels or lines.
+    /// [`NumericsError::Size`] if it has other channels or lines.
     ///
     /// # Source
     /// That of [`FrfAverage::push`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
-        let size = crate::least_squares::size;
+        let size = check_size;
         size("channels of the force", self.inputs, other.inputs)?;
         size("channels of the motion", self.outputs, other.outputs)?;
         size("lines of a segment", self.sums.len(), other.sums.len())?;
@@ -314,7 +315,7 @@ impl FrfAverage {
         let (inputs, outputs) = (self.inputs, self.outputs);
         if estimator == FrfEstimator::H2 && inputs > 1 && inputs != outputs {
             let what = "channels of the motion, for H2";
-            return Err(EstimateError::Size { what, expected: inputs, got: outputs });
+            return Err(NumericsError::Size { what, expected: inputs, got: outputs }.into());
         }
         if self.pieces <= inputs {
             return Err(EstimateError::TooFewAverages { got: self.pieces, needed: inputs + 1 });

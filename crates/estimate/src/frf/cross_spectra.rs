@@ -1,6 +1,6 @@
 //! Averaged cross-spectra of forces and motions, and the responses they give.
 
-use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{Complex, DMatrix, DVector, Dyn, MatrixView, U1};
 
 use statrs::distribution::{Beta, ContinuousCDF};

@@ -1,5 +1,6 @@
 //! Responses to forces that have lines of their own, on which the others act a little.
 
+use mechid_numerics::check_size;
 use nalgebra::{Complex, DVector};
 use statrs::distribution::{Beta, ContinuousCDF};
 
@@ -41,7 +42,7 @@ impl OwnLines {
     /// lines. The error that the interpolation may have is added to the variance.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] unless there is an average of all forces for each of them, and as [`FrfAverage::frf`].
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is an average of all forces for each of them, and as [`FrfAverage::frf`].
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 2.7
@@ -49,7 +50,7 @@ impl OwnLines {
     pub fn of(own: &[FrfAverage], estimator: FrfEstimator) -> Result<Self, EstimateError> {
         let (mut raw, mut crosstalk, mut couplings) = (Vec::new(), Vec::new(), Vec::new());
         for (driver, average) in own.iter().enumerate() {
-            crate::least_squares::size("channels of the force", own.len(), average.inputs)?;
+            check_size("channels of the force", own.len(), average.inputs)?;
             raw.push(average.of_inputs(&[driver]).frf(estimator)?);
             for force in (0..own.len()).filter(|force| *force != driver) {
                 if let Some(coupling) = Coupling::found(average, force, driver) {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use mechid_model::{Coordinate, Power, QuadraticDamping, ResponseQuantity, Term, Terms};
+use mechid_numerics::least_squares::LeastSquares;
 use mechid_signal::Record;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -12,7 +13,7 @@ use super::shape::{Shape, ShapeConstants};
 use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
 use crate::frequency_domain::{Lines, Pooling, RepeatedPeriods};
-use crate::{EstimateError, LeastSquares, Unknowns};
+use crate::{EstimateError, Unknowns};
 
 /// Response on lines without force, against that on lines with force.
 #[derive(Debug, Clone, Copy, PartialEq)]

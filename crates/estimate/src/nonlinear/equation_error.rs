@@ -2,6 +2,7 @@
 
 use mechid_model::{Term, Terms};
 use mechid_numerics::Uncertain;
+use mechid_numerics::least_squares::{Direction, LeastSquares};
 use mechid_signal::message;
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -15,7 +16,7 @@ use super::shape::{Shape, ShapeConstants, fit_shape};
 use super::weighting::{Weighting, Weights};
 use crate::error::{NAMED_DIRECTIONS, NAMED_PARAMETERS};
 use crate::estimate::Findings;
-use crate::{Direction, Estimate, EstimateError, LeastSquares, Unknowns};
+use crate::{Estimate, EstimateError, Unknowns};
 
 /// Settings of [`equation_error`]: weighting of the rows, and constants to search for.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -50,8 +51,8 @@ const SETTLED: f64 = 1e-3;
 /// or as the start of [`output_error`](super::output_error).
 ///
 /// # Errors
-/// [`EstimateError::Size`] or [`EstimateError::Model`] if unknowns or terms do not belong to the
-/// data, [`EstimateError::NothingUnknown`], [`EstimateError::TooFewRows`],
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Model`] if unknowns or terms do not belong to the
+/// data, [`NumericsError::NothingUnknown`](mechid_numerics::NumericsError::NothingUnknown), [`NumericsError::TooFewRows`](mechid_numerics::NumericsError::TooFewRows),
 /// [`EstimateError::OnlyRatios`] for an equation with neither force nor known entry,
 /// [`EstimateError::Undetermined`] if the data leave a parameter open, and
 /// [`EstimateError::NotConverged`] if the search for the constants fails.

@@ -1,12 +1,13 @@
 //! The equations of motion with nonlinear columns, line by line, ready for least squares.
 
 use mechid_model::{Matrix, Parameter, Term, Terms};
+use mechid_numerics::least_squares::{LeastSquares, Solution};
+use mechid_numerics::{NumericsError, check_size};
 use nalgebra::{Complex, DMatrix};
 
 use super::experiments::Columns;
 use super::{ChannelPhase, SteadyExperiments};
-use crate::least_squares::size;
-use crate::{EstimateError, LeastSquares, Solution, Unknowns};
+use crate::{EstimateError, Unknowns};
 
 /// Lines whose rows are handed to the least squares at a time.
 const CHUNK: usize = 256;
@@ -40,15 +41,17 @@ impl<'a> Equations<'a> {
         unknowns: &'a Unknowns,
         terms: &Terms,
     ) -> Result<Self, EstimateError> {
-        size("degrees of freedom of the unknowns", data.dof(), unknowns.dof())?;
+        check_size("degrees of freedom of the unknowns", data.dof(), unknowns.dof())?;
         terms.check_dof(data.dof())?;
         unknowns.check_unrelated("a fit with nonlinear terms")?;
         let free = unknowns.free();
         if free.is_empty() && terms.is_empty() {
-            return Err(EstimateError::NothingUnknown);
+            return Err(NumericsError::NothingUnknown.into());
         }
         if data.count() == 0 {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() + terms.len() });
+            return Err(
+                NumericsError::TooFewRows { rows: 0, unknowns: free.len() + terms.len() }.into()
+            );
         }
         let constant = |dof: usize| {
             let here = |t: &Term| t.law().is_constant() && t.coordinate().sign(dof) != 0.0;
@@ -147,7 +150,7 @@ impl<'a> Equations<'a> {
             let extra = extra.get(at).map_or(&[][..], Vec::as_slice);
             self.push(&mut rows, columns, weights, extra)?;
         }
-        rows.solve()
+        Ok(rows.solve()?)
     }
 
     /// Weighted rows of one experiment, each line and equation by its real and imaginary part.

@@ -3,11 +3,10 @@
 use std::fmt;
 
 use mechid_model::{Matrix, NonlinearParameter, NonlinearSystem, Terms, UncertainNonlinearSystem};
-use mechid_numerics::Uncertain;
+use mechid_numerics::{Uncertain, check_size};
 use nalgebra::{DMatrix, DVector};
 
 use super::{ChannelPhase, Weighting};
-use crate::least_squares::size;
 use crate::{Estimate, EstimateError};
 
 /// A parameter with its name and unit.
@@ -140,7 +139,7 @@ impl NonlinearEstimate {
     /// error grows beyond them tells how far it can be extrapolated.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] unless there is one displacement and one velocity for each degree of
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) unless there is one displacement and one velocity for each degree of
     /// freedom.
     ///
     /// # Source
@@ -152,8 +151,8 @@ impl NonlinearEstimate {
         velocity: &[f64],
     ) -> Result<Vec<Uncertain>, EstimateError> {
         let n = self.linear.dof();
-        size("displacements", n, displacement.len())?;
-        size("velocities", n, velocity.len())?;
+        check_size("displacements", n, displacement.len())?;
+        check_size("velocities", n, velocity.len())?;
         let free = self.linear.unknowns().free();
         let matrices = [self.linear.damping(), self.linear.stiffness()];
         let of = |dof: usize| {

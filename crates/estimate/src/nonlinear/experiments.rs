@@ -1,6 +1,7 @@
 //! Steady periods of one or several experiments, and the columns that terms make of them.
 
 use mechid_model::{ResponseQuantity, Terms};
+use mechid_numerics::check_size;
 use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -10,7 +11,6 @@ use super::channel_phase::displacement_lines;
 use super::grid::Grid;
 use crate::EstimateError;
 use crate::frequency_domain::{Lines, check_sampling};
-use crate::least_squares::size;
 
 /// Samples of the grid that nonlinear terms are evaluated on, per sample: products of up to seven
 /// lines of the record do not fold back onto it.
@@ -67,12 +67,12 @@ impl SteadyExperiments {
     /// the whole record ([`Record::without_mean`]) if nothing better is known.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::Signal`] if the
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::Signal`] if the
     /// records have not the time step of the lines or less than one period.
     pub fn push(&mut self, force: &Record, response: &Record) -> Result<(), EstimateError> {
         force.check_same_sampling(response)?;
-        size("channels of the force", self.dof, force.channels())?;
-        size("channels of the response", self.dof, response.channels())?;
+        check_size("channels of the force", self.dof, force.channels())?;
+        check_size("channels of the response", self.dof, response.channels())?;
         let [force, response] = [force, response].map(|r| r.period_mean(self.period.len()));
         let (force, response) = (force?, response?);
         check_sampling(self.period, force.sampling())?;

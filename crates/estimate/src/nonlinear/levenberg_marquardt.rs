@@ -1,8 +1,7 @@
 //! Nonlinear least squares: Gauss–Newton steps, damped where they do not descend.
 
+use mechid_numerics::triangular::TriangularFactor;
 use nalgebra::{DMatrix, DVector};
-
-use crate::triangular::TriangularFactor;
 
 /// A sum of squares to be minimised over its parameters.
 pub(super) trait SumOfSquares {

@@ -1,7 +1,9 @@
 //! The simulated response fitted to the measured one.
 
 use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
-use mechid_numerics::Uncertain;
+use mechid_numerics::least_squares::LeastSquares;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, Uncertain, check_size};
 use mechid_signal::{Extent, Record, message};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -14,9 +16,7 @@ use super::predict::{fitted_start, initial};
 use super::simulate::{Course, Direction, FineForce, Tangent};
 use crate::error::NAMED_PARAMETERS;
 use crate::estimate::Findings;
-use crate::least_squares::size;
-use crate::triangular::TriangularFactor;
-use crate::{Estimate, EstimateError, LeastSquares, Unknowns};
+use crate::{Estimate, EstimateError, Unknowns};
 
 /// A record for [`output_error`].
 #[derive(Debug, Clone)]
@@ -58,8 +58,8 @@ const FORGOTTEN: f64 = 8.0;
 /// misses a resonance's damping by a little, the white formula is several times too small.
 ///
 /// # Errors
-/// [`EstimateError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,
-/// [`EstimateError::TooFewRows`] without a record, [`EstimateError::TooStiff`],
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,
+/// [`NumericsError::TooFewRows`] without a record, [`EstimateError::TooStiff`],
 /// [`EstimateError::Diverged`] if the start's response does, [`EstimateError::NotConverged`], and
 /// [`EstimateError::Undetermined`] if the records leave a parameter open.
 ///
@@ -74,8 +74,8 @@ pub fn output_error(
     let system = start.system()?;
     let n = system.dof();
     for record in records {
-        size("channels of the force", n, record.force.channels())?;
-        size("channels of the response", n, record.response.channels())?;
+        check_size("channels of the force", n, record.force.channels())?;
+        check_size("channels of the response", n, record.response.channels())?;
     }
     let mut problem = Problem::new(records, measured, start, &system)?;
     let theta = problem.start(&system)?;
@@ -149,7 +149,7 @@ impl<'a> Problem<'a> {
         });
         let records = prepared.collect::<Result<Vec<_>, EstimateError>>()?;
         if records.is_empty() {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: free.len() });
+            return Err(NumericsError::TooFewRows { rows: 0, unknowns: free.len() }.into());
         }
         let mut problem = Self {
             records,
@@ -328,7 +328,7 @@ impl<'a> Problem<'a> {
         self.jacobian(&mut jacobian);
         let mut factor = TriangularFactor::new(parameters);
         if !factor.push(&[jacobian.as_view()]) {
-            return Err(EstimateError::Overflow);
+            return Err(NumericsError::Overflow.into());
         }
         let mut rows = LeastSquares::new(parameters, 1);
         rows.push_rows(factor.r().as_view(), DMatrix::zeros(parameters, 1).as_view())?;

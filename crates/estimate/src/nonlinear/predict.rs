@@ -1,12 +1,12 @@
 //! Response of a nonlinear system to a measured force.
 
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity, exact_periodic};
+use mechid_numerics::check_size;
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::levenberg_marquardt::{SumOfSquares, minimise};
 use super::simulate::{Course, Direction, FineForce, Tangent};
-use crate::least_squares::size;
 use crate::{EstimateError, prediction};
 
 /// Newton steps towards a periodic response, at most.
@@ -26,7 +26,7 @@ const CLOSED: f64 = 1e-10;
 /// spring may have several steady states; the one found is near the start.
 ///
 /// # Errors
-/// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::TooStiff`] if the fastest
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::TooStiff`] if the fastest
 /// mode is too fast for the sampling, [`EstimateError::Diverged`] if the response overflows,
 /// [`EstimateError::NoSteadyState`] if none was found.
 ///
@@ -41,8 +41,8 @@ pub fn predict(
     start: &InitialState,
 ) -> Result<Response, EstimateError> {
     let n = system.dof();
-    size("channels of the force", n, force.channels())?;
-    size("degrees of freedom of the initial state", n, start.dof())?;
+    check_size("channels of the force", n, force.channels())?;
+    check_size("degrees of freedom of the initial state", n, start.dof())?;
     if extent == Extent::WholePeriod && system.terms().is_empty() {
         return Ok(exact_periodic(system.linear(), force)?);
     }
@@ -103,7 +103,7 @@ pub(super) fn initial(state: &DVector<f64>) -> Result<InitialState, EstimateErro
 /// Take the first samples only, some time constants of the system: the start shows no longer later.
 ///
 /// # Errors
-/// As [`predict`]; [`EstimateError::Size`] or [`EstimateError::Signal`] if the responses do not belong
+/// As [`predict`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Signal`] if the responses do not belong
 /// to the force, [`EstimateError::NotConverged`].
 ///
 /// # Source

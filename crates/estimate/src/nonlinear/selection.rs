@@ -1,13 +1,14 @@
 //! Selection of the nonlinear terms that the data ask for.
 
 use mechid_model::{Term, Terms};
+use mechid_numerics::least_squares::LeastSquares;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::equation_error::{EquationErrorOptions, equation_error, weighted};
 use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
 use super::{SteadyExperiments, Weighting};
-use crate::{EstimateError, LeastSquares, Unknowns};
+use crate::{EstimateError, Unknowns};
 
 /// Criterion by which a term is added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -1,14 +1,15 @@
 //! Errors of prediction from one measured sample to the next.
 
 use mechid_model::{Discretisation, Matrix};
+use mechid_numerics::least_squares::solve_compressed;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Extent;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::{At, Step};
-use crate::least_squares::{size, solve_compressed};
-use crate::triangular::TriangularFactor;
 use crate::{Estimate, EstimateError};
 
 /// The mean force (N) that is missing in each measured interval, and the inertia force (N) it is
@@ -30,9 +31,9 @@ use crate::{Estimate, EstimateError};
 /// discretisation says; Euler's is taken as held.
 ///
 /// # Errors
-/// [`EstimateError::Size`] or [`EstimateError::Signal`] if the records do not belong to the machine,
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the machine,
 /// or together, or cannot be refined; [`EstimateError::Undetermined`] if the estimate is no machine;
-/// [`EstimateError::TooFewRows`].
+/// [`NumericsError::TooFewRows`].
 ///
 /// # Source
 /// The refinement is that of Appendix B of the dissertation.
@@ -45,7 +46,7 @@ pub fn missing_force(
 ) -> Result<[Record; 2], EstimateError> {
     let (n, system) = (estimate.dof(), estimate.system()?);
     for record in [displacement, velocity, force] {
-        size("channels of a record", n, record.channels())?;
+        check_size("channels of a record", n, record.channels())?;
         displacement.check_same_sampling(record)?;
     }
     let (factor, way) = between.unwrap_or((1, Interpolation::Linear));
@@ -88,7 +89,7 @@ fn remainder(columns: DMatrix<f64>, target: DVector<f64>) -> Result<DVector<f64>
     let mut factor = TriangularFactor::new(columns.ncols() + 1);
     let right = DMatrix::from_columns(&[target]);
     if !factor.push(&[columns.as_view(), right.as_view()]) {
-        return Err(EstimateError::Overflow);
+        return Err(NumericsError::Overflow.into());
     }
     let (regressors, targets) = factor.r().columns_range_pair(..columns.ncols(), columns.ncols()..);
     let solution = solve_compressed(regressors, targets, factor.rows())?;

@@ -1,11 +1,11 @@
 //! The steady state under a band-limited force, line by line.
 
 use mechid_model::{Response, SecondOrderSystem};
+use mechid_numerics::check_size;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
 use crate::EstimateError;
-use crate::least_squares::size;
 
 /// Displacement, velocity and acceleration of a machine in the steady state under the band-limited
 /// force (N) through the samples of whole periods: what a fit of spectra predicts.
@@ -13,7 +13,7 @@ use crate::least_squares::size;
 /// Nothing is predicted at half the sampling rate (even length), where samples carry no phase.
 ///
 /// # Errors
-/// [`EstimateError::Size`] for a wrong number of channels, [`EstimateError::Model`] if a line stands
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::Model`] if a line stands
 /// on an undamped resonance, DC included.
 ///
 /// # Source
@@ -23,7 +23,7 @@ pub fn predict_periodic(
     system: &SecondOrderSystem,
     force: &Record,
 ) -> Result<Response, EstimateError> {
-    size("channels of the force", system.dof(), force.channels())?;
+    check_size("channels of the force", system.dof(), force.channels())?;
     let forces = Spectrum::of(force);
     let mut lines = [(); 3].map(|()| DMatrix::zeros(forces.len(), system.dof()));
     for n in (0..forces.len()).filter(|n| 2 * n < force.len()) {

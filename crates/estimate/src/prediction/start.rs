@@ -1,14 +1,14 @@
 //! Initial state of a machine, from its response.
 
-use mechid_model::linear_algebra::svd;
 use mechid_model::{Discretisation, InitialState, Response, ResponseQuantity, SecondOrderSystem};
+use mechid_numerics::linear_algebra::svd;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, DVector};
 
 use super::predict;
 use crate::EstimateError;
-use crate::least_squares::size;
-use crate::triangular::TriangularFactor;
 
 /// Relative singular value below which a direction of the start does not show in the motion.
 const UNSEEN: f64 = 1e-10;
@@ -21,7 +21,7 @@ const UNSEEN: f64 = 1e-10;
 /// is taken as 0.
 ///
 /// # Errors
-/// As [`predict`] for [`Extent::Open`]; [`EstimateError::Size`] or [`EstimateError::Signal`] if the
+/// As [`predict`] for [`Extent::Open`]; [`NumericsError::Size`] or [`EstimateError::Signal`] if the
 /// motions do not belong to the force.
 ///
 /// # Source
@@ -77,8 +77,8 @@ impl StartFit {
     /// motions measured, the same kinds each time (samples × degrees of freedom).
     ///
     /// # Errors
-    /// As [`predict`] for [`Extent::Open`]; [`EstimateError::Size`] or [`EstimateError::Signal`] if
-    /// the motions do not belong to the force, [`EstimateError::Overflow`].
+    /// As [`predict`] for [`Extent::Open`]; [`NumericsError::Size`] or [`EstimateError::Signal`] if
+    /// the motions do not belong to the force, [`NumericsError::Overflow`].
     pub fn push(
         &mut self,
         force: &Record,
@@ -86,7 +86,7 @@ impl StartFit {
     ) -> Result<(), EstimateError> {
         let (n, len) = (self.system.dof(), force.len());
         for (_, record) in measured {
-            size("channels of the motion", n, record.channels())?;
+            check_size("channels of the motion", n, record.channels())?;
             record.check_same_sampling(force)?;
         }
         let still = Record::new(force.sampling(), DMatrix::zeros(len, n))?;
@@ -115,7 +115,7 @@ impl StartFit {
                 free => column(free)[seen + k],
             });
             if !factor.push(&[rows.as_view()]) {
-                return Err(EstimateError::Overflow);
+                return Err(NumericsError::Overflow.into());
             }
             *size += measured[seen..].iter().map(|x| x * x).sum::<f64>();
         }
@@ -125,11 +125,11 @@ impl StartFit {
     /// The start that fits all stretches so far.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewRows`] if there was none.
+    /// [`NumericsError::TooFewRows`] if there was none.
     pub fn start(&self) -> Result<InitialState, EstimateError> {
         let n = self.system.dof();
         if self.channels.iter().all(|factor| factor.rows() == 0) {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: 2 * n });
+            return Err(NumericsError::TooFewRows { rows: 0, unknowns: 2 * n }.into());
         }
         let width = 2 * n + 1;
         let mut rows = DMatrix::zeros(self.channels.len() * width, width);

@@ -1,10 +1,10 @@
 //! Continuous-time system from the transition between samples, with its covariance.
 
 use mechid_model::Discretisation;
+use mechid_numerics::logarithm::Generator;
 use nalgebra::DMatrix;
 
 use crate::EstimateError;
-use crate::logarithm::Generator;
 
 /// \[A B\] from \[Φ − I, Γ\], and the derivative of that.
 ///

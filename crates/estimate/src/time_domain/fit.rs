@@ -1,6 +1,8 @@
 //! The time-domain estimate: M, C, K and the transition they come from.
 
 use mechid_model::{Discretisation, Matrix, Parameter};
+use mechid_numerics::check_size;
+use mechid_numerics::least_squares::{Solution, solve_compressed};
 use mechid_signal::{Extent, Record};
 use nalgebra::{DMatrix, RowDVector};
 
@@ -8,7 +10,6 @@ use super::Transitions;
 use super::continuous::Continuous;
 use crate::covariance::Product;
 use crate::estimate::Findings;
-use crate::least_squares::{Solution, size, solve_compressed};
 use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
 /// M̂, Ĉ, K̂ and the sampled and continuous state equations they were found through.
@@ -107,7 +108,7 @@ impl TimeDomainFit {
     /// errors of x⁺ (m), then those of ẋ⁺ (m/s).
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::Signal`], [`EstimateError::Step`] if the record
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size), [`EstimateError::Signal`], [`EstimateError::Step`] if the record
     /// does not fit.
     ///
     /// # Source
@@ -121,7 +122,7 @@ impl TimeDomainFit {
     ) -> Result<DMatrix<f64>, EstimateError> {
         let n = self.estimate.dof();
         for record in [displacement, velocity, force] {
-            size("channels of a record", n, record.channels())?;
+            check_size("channels of a record", n, record.channels())?;
             displacement.check_same_sampling(record)?;
         }
         let got = displacement.sampling().dt();

@@ -80,7 +80,7 @@ impl TimeDomain {
     /// freedom on one time axis.
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] or [`EstimateError::Size`] if the records do not belong together,
+    /// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together,
     /// and as [`Transitions::fit`].
     pub fn fit(
         &self,

@@ -1,14 +1,14 @@
 //! Pairs of neighbouring samples, gathered from any number of records.
 
 use mechid_model::Discretisation;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Extent;
 use mechid_signal::resample::refine;
 use mechid_signal::{Interpolation, Record, Sampling};
 use nalgebra::{DMatrix, DMatrixView};
 
 use super::TimeDomainFit;
-use crate::least_squares::size;
-use crate::triangular::TriangularFactor;
 use crate::{EstimateError, Unknowns};
 
 /// Pairs reduced at a time.
@@ -61,9 +61,9 @@ impl Transitions {
     /// Adds the pairs of one record: displacement (m), velocity (m/s), force (N).
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if they lie on different time axes, [`EstimateError::Size`] for a
+    /// [`EstimateError::Signal`] if they lie on different time axes, [`NumericsError::Size`] for a
     /// wrong number of channels, [`EstimateError::Step`] for another step than the first record's,
-    /// [`EstimateError::Overflow`].
+    /// [`NumericsError::Overflow`].
     pub fn push(
         &mut self,
         displacement: &Record,
@@ -71,9 +71,9 @@ impl Transitions {
         force: &Record,
         extent: Extent,
     ) -> Result<(), EstimateError> {
-        size("channels of the displacement", self.dof, displacement.channels())?;
-        size("channels of the velocity", self.dof, velocity.channels())?;
-        size("channels of the force", self.dof, force.channels())?;
+        check_size("channels of the displacement", self.dof, displacement.channels())?;
+        check_size("channels of the velocity", self.dof, velocity.channels())?;
+        check_size("channels of the force", self.dof, force.channels())?;
         displacement.check_same_sampling(velocity)?;
         displacement.check_same_sampling(force)?;
         let got = displacement.sampling().dt();
@@ -90,7 +90,7 @@ impl Transitions {
             let len = BLOCK.min(pairs - start);
             self.fill(&mut block, quantities, start, len);
             if !self.factor.push(&[block.rows(0, len)]) {
-                return Err(EstimateError::Overflow);
+                return Err(NumericsError::Overflow.into());
             }
         }
         Ok(())
@@ -99,13 +99,13 @@ impl Transitions {
     /// Adds everything `other` has seen.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::Step`], [`EstimateError::Overflow`].
+    /// [`NumericsError::Size`], [`EstimateError::Step`], [`NumericsError::Overflow`].
     pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
-        size("degrees of freedom", self.dof, other.dof)?;
+        check_size("degrees of freedom", self.dof, other.dof)?;
         if (other.dt - self.dt).abs() > 1e-9 * self.dt {
             return Err(EstimateError::Step { expected: self.dt, got: other.dt });
         }
-        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow.into()) }
     }
 
     /// Adds the pairs of one record with `factor − 1` intermediate points in every interval; the step
@@ -144,7 +144,7 @@ impl Transitions {
     /// through the logarithm.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewRows`], [`EstimateError::Underflow`]; [`EstimateError::NoLogarithm`] if the samples belong to no
+    /// [`NumericsError::TooFewRows`], [`NumericsError::Underflow`]; [`NumericsError::NoLogarithm`] if the samples belong to no
     /// continuous machine; and as [`crate::EquationOfMotion::solve`].
     ///
     /// # Source
@@ -154,7 +154,7 @@ impl Transitions {
         discretisation: Discretisation,
         unknowns: &Unknowns,
     ) -> Result<TimeDomainFit, EstimateError> {
-        size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
+        check_size("degrees of freedom of the unknowns", self.dof, unknowns.dof())?;
         unknowns.check_unrelated("a fit from sample to sample")?;
         TimeDomainFit::new(self, discretisation, unknowns)
     }
@@ -206,12 +206,12 @@ impl Transitions {
     /// An error if the squares of a quantity are too small to be told from 0.
     pub(super) fn check_size(&self) -> Result<(), EstimateError> {
         if self.rows() == 0 {
-            return Err(EstimateError::TooFewRows { rows: 0, unknowns: 3 * self.dof });
+            return Err(NumericsError::TooFewRows { rows: 0, unknowns: 3 * self.dof }.into());
         }
         match self.factor.too_small() {
             Some((at, norm)) if at < 3 * self.dof => {
                 let what = ["displacement", "velocity", "force"][at / self.dof];
-                Err(EstimateError::Underflow { what, column: at % self.dof, norm })
+                Err(NumericsError::Underflow { what, column: at % self.dof, norm }.into())
             }
             _ => Ok(()),
         }

@@ -6,6 +6,7 @@ use crate::common::{
 use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
+use mechid_numerics::NumericsError;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
@@ -159,7 +160,7 @@ fn bad_data_are_refused_with_their_numbers() {
     assert_eq!(read(&[]), Err(EstimateError::NoExcitedLine));
     assert_eq!(read(&[1, 128]), Err(EstimateError::LineOutOfRange { line: 128, last: 127 }));
     let e = equation_error(&read(&[5]).unwrap(), &unknown).unwrap_err();
-    assert_eq!(e, EstimateError::TooFewRows { rows: 2, unknowns: 3 });
+    assert_eq!(e, EstimateError::Numerics(NumericsError::TooFewRows { rows: 2, unknowns: 3 }));
 
     let still = Record::from_channel(force.sampling(), vec![0.0; 256]).unwrap();
     let unforced =
@@ -170,7 +171,10 @@ fn bad_data_are_refused_with_their_numbers() {
     let two = Record::from_channels(force.sampling(), &[force.channel(0), force.channel(0)]);
     let e =
         FrequencyData::from_records(&force, &two.unwrap(), ResponseQuantity::Displacement, 1..=20);
-    assert!(matches!(e, Err(EstimateError::Size { expected: 1, got: 2, .. })));
+    assert!(matches!(
+        e,
+        Err(EstimateError::Numerics(NumericsError::Size { expected: 1, got: 2, .. }))
+    ));
 
     let other = motion.window(0, 255).unwrap();
     let e = FrequencyData::from_records(&force, &other, ResponseQuantity::Displacement, 1..=20);
@@ -182,5 +186,8 @@ fn bad_data_are_refused_with_their_numbers() {
         FrequencyData::from_amplitudes(vec![w], one.clone(), x.clone(), ResponseQuantity::Velocity)
     };
     assert_eq!(make(0.0, &one), Err(EstimateError::Frequency { value: 0.0 }));
-    assert!(matches!(make(1.0, &nan), Err(EstimateError::NotFinite { row: 0, column: 0, .. })));
+    assert!(matches!(
+        make(1.0, &nan),
+        Err(EstimateError::Numerics(NumericsError::NotFinite { row: 0, column: 0, .. }))
+    ));
 }

@@ -1,8 +1,9 @@
 //! The linear fit of the equation of motion, judged by explicit normal equations and by hand.
 
-use mechid_estimate::{EquationOfMotion, EstimateError, LeastSquares, Unknowns};
+use mechid_estimate::{EquationOfMotion, EstimateError, Unknowns};
 use mechid_model::Matrix;
 use mechid_numerics::NumericsError;
+use mechid_numerics::least_squares::LeastSquares;
 use nalgebra::{DMatrix, dmatrix};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -126,7 +127,7 @@ fn hopeless_data_are_refused_in_words() {
     let unknown = Unknowns::unknown_mass(2).unwrap();
     assert_eq!(
         data.rows().solve(&unknown).unwrap_err(),
-        EstimateError::TooFewRows { rows: 3, unknowns: 6 }
+        EstimateError::Numerics(NumericsError::TooFewRows { rows: 3, unknowns: 6 })
     );
     data = Data::new([m, c, k], 30, 0.0, 4);
     data.f.column_mut(1).fill(0.0);
@@ -136,12 +137,15 @@ fn hopeless_data_are_refused_in_words() {
     let mut rows = EquationOfMotion::new(2);
     let refused =
         rows.push_rows(data.a.as_view(), data.v.as_view(), data.x.as_view(), data.f.as_view());
-    assert!(matches!(refused, Err(EstimateError::NotFinite { what: "displacement", row: 4, .. })));
+    assert!(matches!(
+        refused,
+        Err(EstimateError::Numerics(NumericsError::NotFinite { what: "displacement", row: 4, .. }))
+    ));
     assert_eq!(rows.rows(), 0);
     data.x[(4, 1)] = 1e200;
     let refused =
         rows.push_rows(data.a.as_view(), data.v.as_view(), data.x.as_view(), data.f.as_view());
-    assert_eq!((refused, rows.rows()), (Err(EstimateError::Overflow), 0));
+    assert_eq!((refused, rows.rows()), (Err(EstimateError::Numerics(NumericsError::Overflow)), 0));
 }
 
 #[test]

@@ -13,7 +13,6 @@ mod extremes;
 mod free_decay;
 mod frequency_invariance;
 mod frf;
-mod logarithm;
 mod modal;
 mod monte_carlo;
 mod noise;

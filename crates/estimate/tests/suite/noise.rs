@@ -7,6 +7,7 @@ use mechid_estimate::frequency_domain::{
 };
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
+use mechid_numerics::NumericsError;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
@@ -297,7 +298,7 @@ fn noise_that_cannot_weigh_is_refused() {
     )
     .unwrap();
     let e = instrumental_variables(&short, &periods.mean().unwrap(), &unknowns).unwrap_err();
-    assert!(matches!(e, EstimateError::Size { expected: 1, got: 40, .. }));
+    assert!(matches!(e, EstimateError::Numerics(NumericsError::Size { expected: 1, got: 40, .. })));
 }
 
 /// Judge: the lines of the seven periods taken as one record, between those of one period.

@@ -1,10 +1,12 @@
 //! The time-domain estimators on exact responses to forces that truly are held or linear.
 
 use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
-use mechid_estimate::{Estimate, EstimateError, Unknowns, logarithm};
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{
     Discretisation, InitialState, KyxSign, Matrix, Response, Sdof, SecondOrderSystem, npi_sampling,
 };
+use mechid_numerics::NumericsError;
+use mechid_numerics::logarithm::logarithm;
 use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic,
     exact_harmonic_periodic, exact_zoh, exact_zoh_periodic, random_stable,
@@ -268,7 +270,9 @@ fn an_undersampled_machine_is_explained() {
     let known = Unknowns::known_mass(&dmatrix![1.0]).unwrap();
     let estimator = TimeDomain::new(ZeroOrderHold, Extent::WholePeriod);
     let refused = estimator.fit(motion.displacement(), motion.velocity(), &force, &known);
-    let Err(EstimateError::NoLogarithm { eigenvalue }) = refused else { panic!("{refused:?}") };
+    let Err(EstimateError::Numerics(NumericsError::NoLogarithm { eigenvalue })) = refused else {
+        panic!("{refused:?}")
+    };
     let expected = -(-0.02f64 * 20.0 * dt).exp();
     assert!((eigenvalue - expected).abs() < 1e-6);
     assert!(logarithm(&dmatrix![eigenvalue]).is_err());

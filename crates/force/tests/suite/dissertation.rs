@@ -5,8 +5,8 @@ use mechid_force::{continuous, discretised, spectrum_ratio, spurious_ratio};
 use mechid_integrate::{
     CentralDifference, Houbolt, Newmark, Scheme, WilsonTheta, integrate_periodic,
 };
-use mechid_model::linear_algebra::svd;
 use mechid_model::{Discretisation, KyxSign, Response, SecondOrderSystem, npi_sampling};
+use mechid_numerics::linear_algebra::svd;
 use mechid_problems::{dissertation_bearing, dissertation_sdof};
 use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, Spectrum, lines};
 use nalgebra::DMatrix;

@@ -1,6 +1,7 @@
 //! The subspace that the iteration spans, and the modes in it.
 
-use mechid_model::{Matrix, Mode, RealSchur, SparseSystem};
+use mechid_model::{Matrix, Mode, SparseSystem};
+use mechid_numerics::RealSchur;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::inverse::{Inverse, largest_row};

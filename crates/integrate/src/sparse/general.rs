@@ -129,8 +129,8 @@ fn largest<T: ComplexField<RealField = f64>>(vector: &[T]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use mechid_model::linear_algebra::hermitian_eigen;
     use mechid_model::triplets;
+    use mechid_numerics::linear_algebra::hermitian_eigen;
     use nalgebra::{Complex, DMatrix, DVector};
     use nalgebra_sparse::csr::CsrMatrix;
 

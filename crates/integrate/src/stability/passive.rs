@@ -1,7 +1,7 @@
 //! Systems that can only lose energy, and their highest frequencies.
 
 use mechid_model::Matrix;
-use mechid_model::linear_algebra::hermitian_eigen;
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{DMatrix, DVector};
 use nalgebra_sparse::csr::CsrMatrix;
 

@@ -1,8 +1,8 @@
 //! Superposition, shifts in time, units, and what diagonal and modal forms have in common.
 
 use mechid_integrate::*;
-use mechid_model::linear_algebra::hermitian_eigen;
 use mechid_model::{InitialState, Response, Sdof, SecondOrderSystem};
+use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_problems::exact_foh;
 use mechid_signal::{Multisine, Phases, Record, Sampling};
 use nalgebra::{DMatrix, DVector};

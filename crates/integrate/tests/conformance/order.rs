@@ -1,8 +1,8 @@
 //! Measured orders of convergence against the exact answer.
 
 use mechid_integrate::*;
-use mechid_model::linear_algebra::exponential;
 use mechid_model::{InitialState, Response, SecondOrderSystem};
+use mechid_numerics::linear_algebra::exponential;
 use mechid_signal::Sampling;
 use nalgebra::{DMatrix, DVector};
 

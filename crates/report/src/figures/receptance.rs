@@ -4,7 +4,7 @@ use mechid_analysis::identify::ResponseCoherence;
 use mechid_analysis::review::receptance::ActingAlone;
 use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
-use mechid_model::linear_algebra::singular_values;
+use mechid_numerics::linear_algebra::singular_values;
 use mechid_plot::charts::Quantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
 use nalgebra::{Complex, DMatrix, DVector};

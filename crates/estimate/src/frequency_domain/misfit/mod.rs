@@ -5,10 +5,10 @@ mod row;
 mod tests;
 
 use mechid_model::Matrix;
+use mechid_numerics::cholesky::Cholesky;
 use mechid_signal::{Sampling, noise};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::cholesky::Cholesky;
 use super::ends::{self, Ends};
 use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
 use super::search::SumOfSquares;

@@ -174,7 +174,7 @@ mod tests {
             let a = DMatrix::from_fn(3, 3, |i, j| {
                 Complex::new(entries[3 * i + j], entries[9 + 3 * i + j])
             });
-            let condition = 1.0 / mechid_model::linear_algebra::singular_values(a.clone()).unwrap().min();
+            let condition = 1.0 / mechid_numerics::linear_algebra::singular_values(a.clone()).unwrap().min();
             let mut inverse = DMatrix::identity(3, 3);
             prop_assume!(condition < 1e6);
             prop_assert!(solve_in_place(&mut a.clone(), &mut inverse));

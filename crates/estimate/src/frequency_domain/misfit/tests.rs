@@ -1,7 +1,7 @@
 //! Derivatives against differences, and the likelihood against its definition.
 
 use mechid_model::ResponseQuantity;
-use mechid_model::linear_algebra::singular_values;
+use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::dmatrix;
 
 use super::*;

@@ -22,7 +22,7 @@ const SEGMENT_ROWS: usize = 16_384;
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 5.2 (Householder QR);
 /// Demmel, Grigori, Hoemmen & Langou (2012), SIAM J. Sci. Comput. 34, A206–A239 (row-blocked QR).
 #[derive(Debug, Clone)]
-pub(crate) struct TriangularFactor {
+pub struct TriangularFactor {
     columns: usize,
     rows: usize,
     /// columns × columns, upper triangular.
@@ -37,7 +37,8 @@ pub(crate) struct TriangularFactor {
 const LEAST_NORM: f64 = 1e-140;
 
 impl TriangularFactor {
-    pub(crate) fn new(columns: usize) -> Self {
+    /// Returns the factor of no rows yet, of so many columns.
+    pub fn new(columns: usize) -> Self {
         Self { columns, rows: 0, r: DMatrix::zeros(0, 0), block: Vec::new(), vanished: Vec::new() }
     }
 
@@ -51,12 +52,12 @@ impl TriangularFactor {
     }
 
     /// Rows seen so far.
-    pub(crate) fn rows(&self) -> usize {
+    pub fn rows(&self) -> usize {
         self.rows
     }
 
     /// R: columns × columns, upper triangular; 0 × 0 before the first rows.
-    pub(crate) fn r(&self) -> &DMatrix<f64> {
+    pub fn r(&self) -> &DMatrix<f64> {
         &self.r
     }
 
@@ -64,7 +65,7 @@ impl TriangularFactor {
     ///
     /// False, and nothing taken, if a value is not finite or its square overflows.
     #[must_use]
-    pub(crate) fn push(&mut self, parts: &[DMatrixView<'_, f64>]) -> bool {
+    pub fn push(&mut self, parts: &[DMatrixView<'_, f64>]) -> bool {
         let rows = parts.first().map_or(0, |part| part.nrows());
         debug_assert_eq!(self.columns, parts.iter().map(|part| part.ncols()).sum::<usize>());
         if rows <= SEGMENT_ROWS {
@@ -108,7 +109,7 @@ impl TriangularFactor {
 
     /// Takes everything another factor has seen; false, and nothing taken, if a square overflows.
     #[must_use]
-    pub(crate) fn merge(&mut self, other: &Self) -> bool {
+    pub fn merge(&mut self, other: &Self) -> bool {
         if other.r.is_empty() {
             return true;
         }
@@ -122,7 +123,7 @@ impl TriangularFactor {
     }
 
     /// The first column whose squares are too small to be told from 0, and its largest entry in R.
-    pub(crate) fn too_small(&self) -> Option<(usize, f64)> {
+    pub fn too_small(&self) -> Option<(usize, f64)> {
         // The largest entry: the squares of what is too small vanish.
         let sizes = self.r.column_iter().map(|column| column.amax()).enumerate();
         sizes.into_iter().find(
@@ -133,7 +134,7 @@ impl TriangularFactor {
     }
 
     /// Counts the rows seen so far as `rows` from now on.
-    pub(crate) fn stand_for(&mut self, rows: usize) {
+    pub fn stand_for(&mut self, rows: usize) {
         self.rows = rows;
     }
 

@@ -10,10 +10,10 @@
 //! when the force is held. The logarithm of the left side therefore gives A and B at once, also
 //! when A is singular (a free body), and its derivative carries the covariance of Φ and Γ over.
 
-use mechid_model::RealSchur;
 use nalgebra::DMatrix;
 
-use crate::EstimateError;
+use crate::RealSchur;
+use crate::error::{NumericsError, check_finite, check_size};
 use crate::quasi_triangular::{root_derivative, shifted_root};
 
 /// ‖X‖₁ up to which the \[7/7\] Padé approximant of log(I + X) is exact to double precision.
@@ -40,26 +40,26 @@ const GAUSS_LEGENDRE: [(f64, f64); 7] = [
 /// carried along is the difference to I, so that a matrix close to I keeps its relative accuracy.
 ///
 /// ```
-/// use mechid_estimate::logarithm;
+/// use mechid_numerics::logarithm;
 /// use nalgebra::dmatrix;
 ///
 /// // A quarter turn: its logarithm is the generator of rotations times π/2.
 /// let log = logarithm(&dmatrix![0.0, -1.0; 1.0, 0.0])?;
 /// assert!((log[(1, 0)] - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
-/// # Ok::<(), mechid_estimate::EstimateError>(())
+/// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
 ///
 /// # Errors
-/// [`EstimateError::NoLogarithm`] if an eigenvalue is real and not positive (or two are, to
-/// rounding), [`EstimateError::Size`] if `a` is not square, [`EstimateError::NotFinite`],
-/// [`EstimateError::Eigenvalues`].
+/// [`NumericsError::NoLogarithm`] if an eigenvalue is real and not positive (or two are, to
+/// rounding), [`NumericsError::Size`] if `a` is not square, [`NumericsError::NotFinite`],
+/// [`NumericsError::Eigenvalues`].
 ///
 /// # Source
 /// Higham, *Functions of Matrices* (2008), chapter 11 (inverse scaling and squaring,
 /// algorithm 11.9; partial fractions of the Padé approximants).
-pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
-    crate::least_squares::size("columns of a square matrix", a.nrows(), a.ncols())?;
-    crate::least_squares::finite("matrix", a.as_view())?;
+pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
+    check_size("columns of a square matrix", a.nrows(), a.ncols())?;
+    check_finite("matrix", a.as_view())?;
     let size = a.nrows();
     let none = DMatrix::zeros(size, 0);
     Ok(Generator::new(&(a - DMatrix::identity(size, size)), &none)?.value)
@@ -67,9 +67,9 @@ pub fn logarithm(a: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
 
 /// \[AΔt BΔt\] from \[Φ − I, Γ\], ready to be differentiated.
 #[derive(Debug, Clone)]
-pub(crate) struct Generator {
+pub struct Generator {
     /// \[AΔt BΔt\]: states × (states + inputs).
-    pub(crate) value: DMatrix<f64>,
+    pub value: DMatrix<f64>,
     /// Schur vectors of Φ.
     q: DMatrix<f64>,
     blocks: Vec<(usize, usize)>,
@@ -83,13 +83,10 @@ pub(crate) struct Generator {
 
 impl Generator {
     /// `difference` is Φ − I (states × states), `input` is Γ (states × inputs).
-    pub(crate) fn new(
-        difference: &DMatrix<f64>,
-        input: &DMatrix<f64>,
-    ) -> Result<Self, EstimateError> {
+    pub fn new(difference: &DMatrix<f64>, input: &DMatrix<f64>) -> Result<Self, NumericsError> {
         let (states, inputs) = input.shape();
         let RealSchur { q, t, mut blocks } = RealSchur::new(difference.clone())
-            .map_err(|_| EstimateError::Eigenvalues { size: states })?;
+            .map_err(|_| NumericsError::Eigenvalues { size: states })?;
         blocks.iter().try_for_each(|block| check_block(&t, *block))?;
         blocks.extend((states..states + inputs).map(|at| (at, 1)));
         let input_scale = match (one_norm(difference), one_norm(input)) {
@@ -116,7 +113,7 @@ impl Generator {
     ///
     /// # Source
     /// Al-Mohy, Higham & Relton (2013), SIAM J. Sci. Comput. 35, C394–C410.
-    pub(crate) fn derivative(&self, change: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
+    pub fn derivative(&self, change: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
         let (states, all) = (self.q.nrows(), self.x.nrows());
         let mut e = DMatrix::zeros(all, all);
         let turned = self.q.tr_mul(change);
@@ -142,7 +139,7 @@ impl Generator {
 }
 
 /// An error unless the eigenvalues 1 + λ of a diagonal block of Φ − I keep off (−∞, 0].
-fn check_block(t: &DMatrix<f64>, (start, width): (usize, usize)) -> Result<(), EstimateError> {
+fn check_block(t: &DMatrix<f64>, (start, width): (usize, usize)) -> Result<(), NumericsError> {
     let smallest = if width == 1 {
         Some(1.0 + t[(start, start)])
     } else {
@@ -155,7 +152,7 @@ fn check_block(t: &DMatrix<f64>, (start, width): (usize, usize)) -> Result<(), E
     let scale = 1.0 + one_norm(t);
     match smallest {
         Some(eigenvalue) if eigenvalue <= f64::EPSILON * scale => {
-            Err(EstimateError::NoLogarithm { eigenvalue })
+            Err(NumericsError::NoLogarithm { eigenvalue })
         }
         _ => Ok(()),
     }
@@ -171,7 +168,7 @@ fn nodes() -> impl Iterator<Item = (f64, f64)> {
 }
 
 /// log(I + X) ≈ Σ w (I + t X)⁻¹ X, which is the \[7/7\] Padé approximant.
-fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
+fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     let mut sum = DMatrix::zeros(x.nrows(), x.ncols());
     for (node, weight) in nodes() {
         sum += solve(&shifted(x, node), x)? * weight;
@@ -180,7 +177,7 @@ fn pade(x: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
 }
 
 /// Σ w (I + t X)⁻¹ E (I + t X)⁻¹.
-fn pade_derivative(x: &DMatrix<f64>, e: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
+fn pade_derivative(x: &DMatrix<f64>, e: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     let mut sum = DMatrix::zeros(x.nrows(), x.ncols());
     for (node, weight) in nodes() {
         let factor = shifted(x, node);
@@ -194,9 +191,9 @@ fn shifted(x: &DMatrix<f64>, node: f64) -> DMatrix<f64> {
     DMatrix::identity(x.nrows(), x.ncols()) + x * node
 }
 
-fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, EstimateError> {
+fn solve(a: &DMatrix<f64>, b: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     // I + t X with ‖X‖ ≤ 0.264 is never singular; a non-finite X is the only way here.
-    a.clone().lu().solve(b).ok_or(EstimateError::Eigenvalues { size: a.nrows() })
+    a.clone().lu().solve(b).ok_or(NumericsError::Eigenvalues { size: a.nrows() })
 }
 
 #[cfg(test)]

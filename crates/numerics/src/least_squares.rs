@@ -1,9 +1,9 @@
 //! Linear least squares from row blocks, with everything one must know about the answer.
 
-use mechid_model::linear_algebra::svd;
 use nalgebra::{DMatrix, DMatrixView, DVector};
 
-use crate::EstimateError;
+use crate::error::{NumericsError, check_finite, check_size};
+use crate::linear_algebra::svd;
 use crate::triangular::TriangularFactor;
 
 /// Relative singular value below which a direction counts as not determined by the data:
@@ -16,7 +16,7 @@ const SHARE_TOLERANCE: f64 = 1e-6;
 /// Overdetermined linear equations A θ ≈ B gathered block by block; memory does not grow with rows.
 ///
 /// ```
-/// use mechid_estimate::LeastSquares;
+/// use mechid_numerics::LeastSquares;
 /// use nalgebra::DMatrix;
 ///
 /// // A straight line 2 + 3 t through a million points, a thousand at a time.
@@ -29,7 +29,7 @@ const SHARE_TOLERANCE: f64 = 1e-6;
 /// }
 /// let solution = line.solve()?;
 /// assert!((solution.coefficients[(1, 0)] - 3.0).abs() < 1e-12);
-/// # Ok::<(), mechid_estimate::EstimateError>(())
+/// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct LeastSquares {
@@ -60,9 +60,9 @@ pub struct Solution {
     /// The combinations of unknowns on which the data say nothing.
     pub undetermined: Vec<Direction>,
     /// A⁺ acting on the triangular factor's rows.
-    pub(crate) inverse: DMatrix<f64>,
+    pub inverse: DMatrix<f64>,
     /// Residuals of the triangular factor's rows.
-    pub(crate) residuals: DMatrix<f64>,
+    pub residuals: DMatrix<f64>,
 }
 
 /// A combination of unknowns that can be added to a solution without changing the fit.
@@ -90,20 +90,20 @@ impl LeastSquares {
     /// Adds rows: `regressors` rows × unknowns, `targets` rows × right-hand sides, in any units.
     ///
     /// # Errors
-    /// [`EstimateError::Size`], [`EstimateError::NotFinite`] and [`EstimateError::Overflow`]; then
+    /// [`NumericsError::Size`], [`NumericsError::NotFinite`] and [`NumericsError::Overflow`]; then
     /// nothing is added.
     pub fn push_rows(
         &mut self,
         regressors: DMatrixView<'_, f64>,
         targets: DMatrixView<'_, f64>,
-    ) -> Result<(), EstimateError> {
-        size("columns of the regressors", self.unknowns, regressors.ncols())?;
-        size("columns of the right-hand side", self.targets, targets.ncols())?;
-        size("rows of the right-hand side", regressors.nrows(), targets.nrows())?;
+    ) -> Result<(), NumericsError> {
+        check_size("columns of the regressors", self.unknowns, regressors.ncols())?;
+        check_size("columns of the right-hand side", self.targets, targets.ncols())?;
+        check_size("rows of the right-hand side", regressors.nrows(), targets.nrows())?;
         if !self.factor.push(&[regressors, targets]) {
-            finite("regressors", regressors)?;
-            finite("right-hand side", targets)?;
-            return Err(EstimateError::Overflow);
+            check_finite("regressors", regressors)?;
+            check_finite("right-hand side", targets)?;
+            return Err(NumericsError::Overflow);
         }
         Ok(())
     }
@@ -111,16 +111,16 @@ impl LeastSquares {
     /// Adds everything `other` has seen, as from another record.
     ///
     /// # Errors
-    /// [`EstimateError::Size`] if it has other numbers of unknowns or right-hand sides,
-    /// [`EstimateError::Overflow`].
-    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
-        size("columns of the regressors", self.unknowns, other.unknowns)?;
-        size("columns of the right-hand side", self.targets, other.targets)?;
-        if self.factor.merge(&other.factor) { Ok(()) } else { Err(EstimateError::Overflow) }
+    /// [`NumericsError::Size`] if it has other numbers of unknowns or right-hand sides,
+    /// [`NumericsError::Overflow`].
+    pub fn merge(&mut self, other: &Self) -> Result<(), NumericsError> {
+        check_size("columns of the regressors", self.unknowns, other.unknowns)?;
+        check_size("columns of the right-hand side", self.targets, other.targets)?;
+        if self.factor.merge(&other.factor) { Ok(()) } else { Err(NumericsError::Overflow) }
     }
 
     /// The triangle of \[A | B\], which has the Gram matrix of all rows so far.
-    pub(crate) fn triangle(&self) -> &DMatrix<f64> {
+    pub fn triangle(&self) -> &DMatrix<f64> {
         self.factor.r()
     }
 
@@ -130,25 +130,25 @@ impl LeastSquares {
     /// singular value decomposition where it is rank-deficient.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewRows`], [`EstimateError::NothingUnknown`] without unknowns,
-    /// [`EstimateError::Underflow`].
+    /// [`NumericsError::TooFewRows`], [`NumericsError::NothingUnknown`] without unknowns,
+    /// [`NumericsError::Underflow`].
     ///
     /// # Source
     /// Björck, *Numerical Methods for Least Squares Problems* (1996), chapters 1–2;
     /// Dissertation eqs. (4.4.1)–(4.4.6), there by normal equations.
-    pub fn solve(&self) -> Result<Solution, EstimateError> {
+    pub fn solve(&self) -> Result<Solution, NumericsError> {
         if let Some((at, norm)) = self.factor.too_small() {
             let (what, column) = match at.checked_sub(self.unknowns) {
                 None => ("regressors in column", at),
                 Some(target) => ("right-hand side in column", target),
             };
-            return Err(EstimateError::Underflow { what, column, norm });
+            return Err(NumericsError::Underflow { what, column, norm });
         }
         let r = self.factor.r();
         if r.is_empty() {
             return match self.unknowns {
-                0 => Err(EstimateError::NothingUnknown),
-                unknowns => Err(EstimateError::TooFewRows { rows: 0, unknowns }),
+                0 => Err(NumericsError::NothingUnknown),
+                unknowns => Err(NumericsError::TooFewRows { rows: 0, unknowns }),
             };
         }
         let regressors = r.columns(0, self.unknowns);
@@ -158,17 +158,17 @@ impl LeastSquares {
 }
 
 /// Least squares on rows that stand for `rows` original ones with the same Gram matrices.
-pub(crate) fn solve_compressed(
+pub fn solve_compressed(
     regressors: DMatrixView<'_, f64>,
     targets: DMatrixView<'_, f64>,
     rows: usize,
-) -> Result<Solution, EstimateError> {
+) -> Result<Solution, NumericsError> {
     let unknowns = regressors.ncols();
     if unknowns == 0 {
-        return Err(EstimateError::NothingUnknown);
+        return Err(NumericsError::NothingUnknown);
     }
     if rows < unknowns {
-        return Err(EstimateError::TooFewRows { rows, unknowns });
+        return Err(NumericsError::TooFewRows { rows, unknowns });
     }
     let scaled = Scaled::new(regressors)?;
     let undetermined = scaled.undetermined();
@@ -215,7 +215,7 @@ struct Scaled {
 }
 
 impl Scaled {
-    fn new(regressors: DMatrixView<'_, f64>) -> Result<Self, EstimateError> {
+    fn new(regressors: DMatrixView<'_, f64>) -> Result<Self, NumericsError> {
         let mut scaled = regressors.into_owned();
         let lengths = DVector::from_iterator(
             scaled.ncols(),
@@ -276,18 +276,4 @@ impl Scaled {
         }
         inverse
     }
-}
-
-pub(crate) fn size(what: &'static str, expected: usize, got: usize) -> Result<(), EstimateError> {
-    if expected == got { Ok(()) } else { Err(EstimateError::Size { what, expected, got }) }
-}
-
-pub(crate) fn finite(what: &'static str, data: DMatrixView<'_, f64>) -> Result<(), EstimateError> {
-    for (column, values) in data.column_iter().enumerate() {
-        if let Some(row) = values.iter().position(|v| !v.is_finite()) {
-            let value = values[row];
-            return Err(EstimateError::NotFinite { what, row, column, value });
-        }
-    }
-    Ok(())
 }

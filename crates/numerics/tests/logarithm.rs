@@ -1,6 +1,7 @@
 //! The matrix logarithm alone, judged by the exponential and by closed forms.
 
-use mechid_estimate::{EstimateError, logarithm};
+use mechid_numerics::NumericsError;
+use mechid_numerics::logarithm::logarithm;
 use nalgebra::{DMatrix, dmatrix};
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -111,14 +112,14 @@ fn matrices_close_to_the_identity_keep_their_relative_accuracy() {
 fn what_has_no_logarithm_is_refused_with_its_eigenvalue() {
     for eigenvalue in [-0.4, 0.0] {
         let a = with_eigenvalues(&[eigenvalue, 0.3], &[(0.2, 0.4)], 4);
-        let Err(EstimateError::NoLogarithm { eigenvalue: got }) = logarithm(&a) else {
+        let Err(NumericsError::NoLogarithm { eigenvalue: got }) = logarithm(&a) else {
             panic!("eigenvalue {eigenvalue} accepted")
         };
         assert!((got - eigenvalue).abs() < 1e-14);
     }
     assert!(logarithm(&DMatrix::zeros(2, 3)).is_err());
     assert!(logarithm(&dmatrix![f64::INFINITY]).is_err());
-    let message = EstimateError::NoLogarithm { eigenvalue: -0.4 }.to_string();
+    let message = NumericsError::NoLogarithm { eigenvalue: -0.4 }.to_string();
     assert!(message.contains("sample faster"));
 }
 

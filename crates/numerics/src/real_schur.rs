@@ -5,7 +5,7 @@
 
 use nalgebra::{Complex, DMatrix, Hessenberg, Vector3};
 
-use crate::ModelError;
+use crate::NumericsError;
 use crate::linear_algebra::{check_finite, check_square};
 
 /// Sweeps without a deflation after which a subdiagonal entry below ε‖A‖ is dropped too.
@@ -17,14 +17,14 @@ const LIMIT: usize = 100;
 /// A = Q T Qᵀ, all size × size, Q orthogonal and T quasi-upper-triangular.
 ///
 /// ```
-/// use mechid_model::RealSchur;
+/// use mechid_numerics::RealSchur;
 /// use nalgebra::dmatrix;
 ///
 /// // A quarter turn: eigenvalues ±i.
 /// let schur = RealSchur::new(dmatrix![0.0, -1.0; 1.0, 0.0])?;
 /// assert_eq!(schur.blocks, [(0, 2)]);
 /// assert!((schur.eigenvalues()[0].im - 1.0).abs() < 1e-15);
-/// # Ok::<(), mechid_model::ModelError>(())
+/// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RealSchur {
@@ -42,11 +42,11 @@ impl RealSchur {
     /// with exceptional shifts.
     ///
     /// # Errors
-    /// [`ModelError::NotSquare`], [`ModelError::EntryNotFinite`], [`ModelError::NotConverged`].
+    /// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
     ///
     /// # Source
     /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), algorithms 7.5.1 and 7.5.2.
-    pub fn new(a: DMatrix<f64>) -> Result<Self, ModelError> {
+    pub fn new(a: DMatrix<f64>) -> Result<Self, NumericsError> {
         check_square(&a)?;
         check_finite(&a)?;
         let size = a.nrows();
@@ -70,7 +70,7 @@ impl RealSchur {
             }
             sweeps += 1;
             if sweeps > LIMIT {
-                return Err(ModelError::NotConverged { rows: size, columns: size });
+                return Err(NumericsError::NotConverged { rows: size, columns: size });
             }
             sweep(&mut t, &mut q, start, last, sweeps);
         }

@@ -7,7 +7,7 @@
 
 use nalgebra::{ComplexField, DMatrix, DVector, Dyn, SVD, SymmetricEigen};
 
-use crate::ModelError;
+use crate::NumericsError;
 
 /// Iterations per row or column after which a decomposition is given up; two or three are usual.
 const ITERATIONS: usize = 200;
@@ -24,23 +24,23 @@ const NEGLIGIBLE: f64 = 1e-140;
 /// falling, in the unit of A, with both sets of singular vectors.
 ///
 /// # Errors
-/// [`ModelError::EntryNotFinite`], [`ModelError::NotConverged`].
+/// [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 8.6.
 ///
 /// ```
-/// use mechid_model::linear_algebra::svd;
+/// use mechid_numerics::linear_algebra::svd;
 /// use nalgebra::dmatrix;
 ///
 /// let found = svd(dmatrix![3.0, 0.0; 0.0, -5.0])?;
 /// assert_eq!(found.singular_values.as_slice(), [5.0, 3.0]);
 /// assert!(svd(dmatrix![f64::NAN, 0.0; 0.0, 1.0]).is_err());
-/// # Ok::<(), mechid_model::ModelError>(())
+/// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
 pub fn svd<T: ComplexField<RealField = f64>>(
     matrix: DMatrix<T>,
-) -> Result<SVD<T, Dyn, Dyn>, ModelError> {
+) -> Result<SVD<T, Dyn, Dyn>, NumericsError> {
     decomposed(matrix, true, 5.0 * f64::EPSILON)
 }
 
@@ -53,7 +53,7 @@ pub fn svd<T: ComplexField<RealField = f64>>(
 /// As [`svd`].
 pub fn singular_values<T: ComplexField<RealField = f64>>(
     matrix: DMatrix<T>,
-) -> Result<DVector<f64>, ModelError> {
+) -> Result<DVector<f64>, NumericsError> {
     decomposed(matrix, false, 5.0 * f64::EPSILON).map(|svd| svd.singular_values)
 }
 
@@ -62,7 +62,7 @@ fn decomposed<T: ComplexField<RealField = f64>>(
     mut matrix: DMatrix<T>,
     vectors: bool,
     tolerance: f64,
-) -> Result<SVD<T, Dyn, Dyn>, ModelError> {
+) -> Result<SVD<T, Dyn, Dyn>, NumericsError> {
     let (rows, columns) = matrix.shape();
     check_finite(&matrix)?;
     clear_negligible(&mut matrix);
@@ -75,7 +75,7 @@ fn decomposed<T: ComplexField<RealField = f64>>(
     let mut svd = SVD::try_new_unordered(matrix, vectors, vectors, tolerance, limit)
         .filter(|svd| svd.singular_values.iter().all(|s| s.is_finite()))
         .filter(|svd| [&svd.u, &svd.v_t].iter().all(|part| sound(part.as_ref())))
-        .ok_or(ModelError::NotConverged { rows, columns })?;
+        .ok_or(NumericsError::NotConverged { rows, columns })?;
     svd.sort_by_singular_values();
     Ok(svd)
 }
@@ -84,13 +84,13 @@ fn decomposed<T: ComplexField<RealField = f64>>(
 /// Hermitian n × n matrix, of which the lower triangle is read.
 ///
 /// # Errors
-/// [`ModelError::NotSquare`], [`ModelError::EntryNotFinite`], [`ModelError::NotConverged`].
+/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`], [`NumericsError::NotConverged`].
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 8.3.
 pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
     mut matrix: DMatrix<T>,
-) -> Result<SymmetricEigen<T, Dyn>, ModelError> {
+) -> Result<SymmetricEigen<T, Dyn>, NumericsError> {
     let (rows, columns) = matrix.shape();
     check_square(&matrix)?;
     check_finite(&matrix)?;
@@ -100,27 +100,27 @@ pub fn hermitian_eigen<T: ComplexField<RealField = f64>>(
     }
     SymmetricEigen::try_new(matrix, f64::EPSILON, ITERATIONS * rows)
         .filter(|eigen| eigen.eigenvalues.iter().all(|l| l.is_finite()))
-        .ok_or(ModelError::NotConverged { rows, columns })
+        .ok_or(NumericsError::NotConverged { rows, columns })
 }
 
 /// Returns the exponential of an n × n matrix without unit.
 ///
 /// # Errors
-/// [`ModelError::NotSquare`], [`ModelError::EntryNotFinite`]; [`ModelError::ExponentialOverflow`]
+/// [`NumericsError::NotSquare`], [`NumericsError::EntryNotFinite`]; [`NumericsError::ExponentialOverflow`]
 /// if the 1-norm of the matrix exceeds 1e11 or its exponential the largest number.
 ///
 /// # Source
 /// Al-Mohy & Higham (2009), SIAM J. Matrix Anal. Appl. 31, 970–989 (scaling and squaring).
 ///
 /// ```
-/// use mechid_model::linear_algebra::exponential;
+/// use mechid_numerics::linear_algebra::exponential;
 /// use nalgebra::dmatrix;
 ///
 /// assert_eq!(exponential(&dmatrix![0.0, 2.0; 0.0, 0.0])?, dmatrix![1.0, 2.0; 0.0, 1.0]);
 /// assert!(exponential(&dmatrix![1e3, 0.0; 0.0, 1.0]).is_err());
-/// # Ok::<(), mechid_model::ModelError>(())
+/// # Ok::<(), mechid_numerics::NumericsError>(())
 /// ```
-pub fn exponential(matrix: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
+pub fn exponential(matrix: &DMatrix<f64>) -> Result<DMatrix<f64>, NumericsError> {
     check_square(matrix)?;
     check_finite(matrix)?;
     let sums = matrix.column_iter().map(|column| column.iter().map(|v| v.abs()).sum());
@@ -132,7 +132,7 @@ pub fn exponential(matrix: &DMatrix<f64>) -> Result<DMatrix<f64>, ModelError> {
         .filter(|_| norm <= EXPONENTIAL_NORM)
         .map(DMatrix::exp)
         .filter(|eigenvalues| eigenvalues.iter().all(|v| v.is_finite()))
-        .ok_or(ModelError::ExponentialOverflow { norm })
+        .ok_or(NumericsError::ExponentialOverflow { norm })
 }
 
 fn sound<T: ComplexField>(part: Option<&DMatrix<T>>) -> bool {
@@ -146,17 +146,17 @@ fn clear_negligible<T: ComplexField<RealField = f64>>(matrix: &mut DMatrix<T>) {
     }
 }
 
-/// [`ModelError::NotSquare`] for a matrix that is not.
-pub(crate) fn check_square<T>(matrix: &DMatrix<T>) -> Result<(), ModelError> {
+/// [`NumericsError::NotSquare`] for a matrix that is not.
+pub(crate) fn check_square<T>(matrix: &DMatrix<T>) -> Result<(), NumericsError> {
     let (rows, columns) = matrix.shape();
-    if rows == columns { Ok(()) } else { Err(ModelError::NotSquare { rows, columns }) }
+    if rows == columns { Ok(()) } else { Err(NumericsError::NotSquare { rows, columns }) }
 }
 
-/// [`ModelError::EntryNotFinite`] for a matrix with a NaN or infinity.
-pub(crate) fn check_finite<T: ComplexField>(matrix: &DMatrix<T>) -> Result<(), ModelError> {
+/// [`NumericsError::EntryNotFinite`] for a matrix with a NaN or infinity.
+pub(crate) fn check_finite<T: ComplexField>(matrix: &DMatrix<T>) -> Result<(), NumericsError> {
     match matrix.iter().position(|entry| !entry.is_finite()) {
         None => Ok(()),
-        Some(at) => Err(ModelError::EntryNotFinite {
+        Some(at) => Err(NumericsError::EntryNotFinite {
             row: at % matrix.nrows(),
             column: at / matrix.nrows(),
         }),
@@ -214,17 +214,17 @@ mod tests {
     #[test]
     fn what_cannot_be_decomposed_is_told() {
         let tall: DMatrix<f64> = DMatrix::zeros(3, 2);
-        let not_square = ModelError::NotSquare { rows: 3, columns: 2 };
+        let not_square = NumericsError::NotSquare { rows: 3, columns: 2 };
         assert_eq!(exponential(&tall), Err(not_square.clone()));
         assert_eq!(hermitian_eigen(tall).unwrap_err(), not_square);
         let infinite = dmatrix![1.0, 0.0; 0.0, f64::INFINITY];
-        let expected = ModelError::EntryNotFinite { row: 1, column: 1 };
+        let expected = NumericsError::EntryNotFinite { row: 1, column: 1 };
         assert_eq!(svd(infinite.clone()).unwrap_err(), expected);
         assert_eq!(exponential(&infinite).unwrap_err(), expected);
         // Nilpotent, but its modulus is not: the bound on the truncation error overflows.
         for large in [1e12, 1e40, 1e300] {
             let refused = exponential(&(dmatrix![1.0, 1.0; -1.0, -1.0] * large));
-            assert_eq!(refused, Err(ModelError::ExponentialOverflow { norm: 2.0 * large }));
+            assert_eq!(refused, Err(NumericsError::ExponentialOverflow { norm: 2.0 * large }));
         }
     }
 }

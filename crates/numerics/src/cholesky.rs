@@ -12,14 +12,14 @@ const BLOCK: usize = 48;
 ///
 /// # Source
 /// Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), section 4.2.6.
-pub(super) struct Cholesky {
+pub struct Cholesky {
     lower: DMatrix<f64>,
 }
 
 impl Cholesky {
     /// The factor of A + `damping`·I; only the lower triangle of A is read. `None` if it is not positive
     /// definite.
-    pub(super) fn new(matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
+    pub fn new(matrix: &DMatrix<f64>, damping: f64) -> Option<Self> {
         let size = matrix.nrows();
         let mut lower = matrix.lower_triangle();
         for at in 0..size {
@@ -53,7 +53,7 @@ impl Cholesky {
     }
 
     /// A⁻¹b.
-    pub(super) fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
         let mut solution = right.clone();
         self.lower.solve_lower_triangular_unchecked_mut(&mut solution);
         self.lower.tr_solve_lower_triangular_unchecked_mut(&mut solution);
@@ -61,7 +61,7 @@ impl Cholesky {
     }
 
     /// L⁻¹.
-    pub(super) fn inverse_of_lower(&self) -> DMatrix<f64> {
+    pub fn inverse_of_lower(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut inverse = DMatrix::zeros(size, size);
         for start in (0..size).step_by(BLOCK) {

@@ -5,7 +5,7 @@
 ///
 /// # Source
 /// Nelder & Mead (1965), with the usual coefficients 1, 2, ½, ½.
-pub(crate) fn minimise(
+pub fn minimise(
     cost: impl Fn(&[f64]) -> f64,
     start: &[f64],
     step: f64,
