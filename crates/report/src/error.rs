@@ -25,6 +25,9 @@ pub enum ReportError {
     /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+    /// A numerical method fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
     /// An estimate cannot be evaluated.
     #[error(transparent)]
     Estimate(#[from] mechid_estimate::EstimateError),
