@@ -7,6 +7,7 @@ use mechid::analysis::AnalysisError;
 use mechid::analysis::identify::ValidationWindow;
 use mechid::analysis::review::Review;
 use mechid::analysis::review::receptance::ActingAlone;
+use mechid::estimate::EstimateError;
 use mechid::report::{PageSettings, page};
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray1, PyArray2};
@@ -161,7 +162,9 @@ impl Identified {
 
     /// Confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
-        work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
+        work::brief(py, || {
+            Ok::<_, EstimateError>(self.0.estimate().parameter(name)?.interval(level)?)
+        })
     }
 
     /// Names of the parameters that were estimated, and their covariance.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use mechid::estimate::EstimateError;
 use mechid::io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid::{IdentifyResponses, ResponseQuantity};
 use nalgebra::Complex;
@@ -127,7 +128,9 @@ impl IdentifiedResponses {
 
     /// Confidence interval of a parameter.
     fn interval(&self, py: Python<'_>, name: &str, level: f64) -> PyResult<[f64; 2]> {
-        work::brief(py, || self.0.estimate().parameter(name)?.interval(level))
+        work::brief(py, || {
+            Ok::<_, EstimateError>(self.0.estimate().parameter(name)?.interval(level)?)
+        })
     }
 
     /// Names of the parameters that were estimated, and their covariance.
