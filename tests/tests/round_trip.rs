@@ -1,10 +1,11 @@
 //! Several rooms at once: simulate, write, read back, identify; exact responses from elsewhere judge.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::io::{Experiment, Table, TimeAxis, csv_text};
 use mechid::model::{KyxSign, ResponseQuantity, SecondOrderSystem};
 use mechid::signal::{Record, lines};
+use mechid::spectra::FrequencyData;
 use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh_periodic, exact_harmonic_periodic,
 };

@@ -14,11 +14,10 @@ use mechid_analysis::{
     identify_bearing,
 };
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseSpectrum, RepeatedPeriods, output_error,
-};
+use mechid_estimate::frequency_domain::output_error;
 use mechid_problems::rig::{BearingRig, RigTest, Shakers};
 use mechid_signal::{Record, Sampling};
+use mechid_spectra::{FrequencyData, Lines, NoiseSpectrum, RepeatedPeriods};
 use nalgebra::{DMatrix, Matrix2};
 use rayon::prelude::*;
 

@@ -430,6 +430,9 @@ pub enum AnalysisError {
     /// The identification failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// Spectral lines are unusable.
+    #[error(transparent)]
+    Spectra(#[from] mechid_spectra::SpectraError),
     /// A numerical method fails.
     #[error(transparent)]
     Numerics(#[from] mechid_numerics::NumericsError),

@@ -10,16 +10,16 @@ mod common;
 use std::hint::black_box;
 use std::time::Instant;
 
-use common::monte_carlo::{Estimator, Experiment};
-use common::{bearing, displacements, forces, synthesise};
 use criterion::{Criterion, criterion_group, criterion_main};
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Pooling, RepeatedPeriods, equation_error, output_error,
-};
+use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_model::ResponseQuantity;
 use mechid_problems::machines::{self, Support};
 use mechid_signal::{NoiseLevel, Sampling, Spectrum, noise};
+use mechid_spectra::{FrequencyData, Lines, Pooling, RepeatedPeriods};
+
+use common::monte_carlo::{Estimator, Experiment};
+use common::{bearing, displacements, forces, synthesise};
 
 /// 1,024 samples of two forces and two displacements to C and K with their covariance.
 fn identify(c: &mut Criterion) {

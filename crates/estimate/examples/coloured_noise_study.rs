@@ -15,15 +15,13 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::f64::consts::TAU;
 
-use mechid_estimate::frequency_domain::{
-    Lines, NoiseModel, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods, output_error,
-    output_error_pooling,
-};
+use mechid_estimate::frequency_domain::{OutputErrorFit, output_error, output_error_pooling};
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, Test, chain, repeated, steady_test};
 use mechid_signal::{Multisine, Phases, Record, Sampling, noise};
+use mechid_spectra::{Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 

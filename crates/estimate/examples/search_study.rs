@@ -14,12 +14,11 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Pooling, RepeatedPeriods, output_error, output_error_near,
-};
+use mechid_estimate::frequency_domain::{output_error, output_error_near};
 use mechid_model::ResponseQuantity;
 use mechid_problems::machines::{Support, Test, chain, repeated, series, steady_test};
 use mechid_signal::{NoiseLevel, noise};
+use mechid_spectra::{FrequencyData, Lines, Pooling, RepeatedPeriods};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 

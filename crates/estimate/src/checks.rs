@@ -7,7 +7,6 @@
 mod after;
 mod before;
 mod concentration;
-mod correlation;
 mod delay;
 mod distortion;
 mod family;
@@ -32,7 +31,6 @@ mod weighted_fit;
 
 pub use after::after_fit;
 pub use before::{before_equation_of_motion, before_fit, periodicity, periodicity_across};
-pub use correlation::{Correlation, cross_correlation, whiteness, whiteness_beyond};
 pub use delay::{delay_at_samples, delay_between_samples, delay_of_lines, delay_of_open_records};
 pub use distortion::distortion_of_periods;
 pub use family::adjust_p_values;

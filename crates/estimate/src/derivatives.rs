@@ -118,12 +118,12 @@ impl SavitzkyGolay {
     /// its unit per s^`times`.
     ///
     /// # Errors
-    /// [`EstimateError::TooShort`] if the record is shorter than the window,
+    /// [`SignalError::TooShort`](mechid_signal::SignalError::TooShort) if the record is shorter than the window,
     /// [`EstimateError::Window`] if the polynomial has no such derivative.
     pub fn differentiate(&self, record: &Record, times: usize) -> Result<Record, EstimateError> {
         let window = self.window();
         if record.len() < window {
-            return Err(EstimateError::TooShort { samples: record.len(), needed: window });
+            return Err(SignalError::TooShort { samples: record.len(), needed: window }.into());
         }
         if times > self.order {
             return Err(EstimateError::Window { samples: window, order: self.order });

@@ -32,12 +32,9 @@ mod error;
 mod estimate;
 mod free_decay;
 pub mod frequency_domain;
-mod frf;
+mod frequency_responses;
 mod modal;
-mod noise_shape;
-mod noise_spectrum;
 pub mod nonlinear;
-mod pooling;
 mod prediction;
 mod related_equations;
 mod relations;
@@ -49,11 +46,7 @@ pub use equation_of_motion::EquationOfMotion;
 pub use error::EstimateError;
 pub use estimate::{Estimate, Estimated, Undetermined};
 pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
-pub use frf::{
-    Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, ResponseEstimate, Segments,
-    output_error_of_responses,
-};
-pub use mechid_signal::Window;
+pub use frequency_responses::{ResponseEstimate, output_error_of_responses};
 pub use modal::{IdentifiedMode, identified_modes};
 pub use prediction::{
     StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,

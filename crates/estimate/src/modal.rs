@@ -61,7 +61,9 @@ impl Estimate {
     ///
     /// ```
     /// use mechid_model::ResponseQuantity;
-    /// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, equation_error}};
+    /// use mechid_estimate::Unknowns;
+    /// use mechid_spectra::FrequencyData;
+    /// use mechid_estimate::frequency_domain::equation_error;
     /// use nalgebra::{Complex, DMatrix};
     ///
     /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies, displacements read to a micrometre.

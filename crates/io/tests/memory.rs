@@ -2,15 +2,16 @@
 //!
 //! The counter is that of the whole program: this file has one test.
 
-use mechid_model::ResponseQuantity;
 use std::fs::File;
 use std::io::{BufWriter, Write as _};
 use std::path::Path;
 
-use mechid_estimate::frequency_domain::{Lines, RepeatedPeriods};
-use mechid_estimate::{EquationOfMotion, EstimateError, FrfAverage, Segments};
+use mechid_estimate::{EquationOfMotion, EstimateError};
 use mechid_io::{IoError, ReadOptions, RecordFile, TimeAxis};
+use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
+use mechid_spectra::frf::{FrfAverage, Segments};
+use mechid_spectra::{Lines, RepeatedPeriods, SpectraError};
 use peak_alloc::PeakAlloc;
 
 #[global_allocator]
@@ -33,6 +34,7 @@ const COLUMNS: [&str; 4] = ["f", "x", "v", "a"];
 enum Failure {
     Io(IoError),
     Estimate(EstimateError),
+    Spectra(SpectraError),
 }
 
 impl From<IoError> for Failure {
@@ -44,6 +46,12 @@ impl From<IoError> for Failure {
 impl From<EstimateError> for Failure {
     fn from(error: EstimateError) -> Self {
         Failure::Estimate(error)
+    }
+}
+
+impl From<SpectraError> for Failure {
+    fn from(error: SpectraError) -> Self {
+        Failure::Spectra(error)
     }
 }
 

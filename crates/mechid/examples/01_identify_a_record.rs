@@ -3,12 +3,13 @@
 //! `cargo run --package mechid --example 01_identify_a_record`
 #![allow(clippy::print_stdout, reason = "an example shows its result")]
 
-use mechid::model::ResponseQuantity;
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{Lines, RepeatedPeriods, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::io::{Table, TimeAxis};
+use mechid::model::ResponseQuantity;
+use mechid::spectra::{Lines, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // The record lies in the repository; put the path of your own here.

@@ -7,12 +7,13 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::integrate::{
     CentralDifference, Houbolt, Newmark, RungeKutta4, Scheme, WilsonTheta, integrate_periodic,
 };
 use mechid::model::{Response, ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid::signal::{Multisine, Phases, Record, Sampling};
+use mechid::spectra::FrequencyData;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Ten samples per natural period.

@@ -6,9 +6,10 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::{Multisine, Phases, Sampling};
+use mechid::spectra::FrequencyData;
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let machine = Sdof::new(10.0, 180.0, 5000.0)?.system();

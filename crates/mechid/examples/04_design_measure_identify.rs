@@ -7,12 +7,11 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{
-    Lines, Pooling, RepeatedPeriods, equation_error, output_error,
-};
+use mechid::estimate::frequency_domain::{equation_error, output_error};
 use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::noise::{self, NoiseLevel};
 use mechid::signal::{CrestSearch, Multisine, Phases, Sampling, Spectrum, measures};
+use mechid::spectra::{Lines, Pooling, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     // Around an expected 20 Hz: lines of 0.5 Hz from 5 to 40 Hz, 256 Hz for 2 s.

@@ -6,13 +6,12 @@
 
 use std::error::Error;
 
-use mechid::estimate::frequency_domain::{
-    Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
-};
+use mechid::estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid::estimate::{Estimate, Unknowns};
 use mechid::model::{ResponseQuantity, Sdof};
 use mechid::signal::noise::{self, Colour, NoiseLevel};
 use mechid::signal::{Multisine, Phases, Sampling};
+use mechid::spectra::{Lines, Pooling, RepeatedPeriods};
 
 pub(crate) fn main() -> Result<(), Box<dyn Error>> {
     let truth = Sdof::new(10.0, 60.0, 4.0e4)?.system(); // 10 Hz

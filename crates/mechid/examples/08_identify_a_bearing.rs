@@ -7,10 +7,11 @@
 use std::error::Error;
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
+use mechid::estimate::frequency_domain::output_error;
 use mechid::model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity};
 use mechid::signal::noise::{self, NoiseLevel};
 use mechid::signal::{Multisine, Phases, Record, Sampling, lines};
+use mechid::spectra::{Lines, Pooling, RepeatedPeriods};
 use nalgebra::DMatrix;
 
 const MASS: f64 = 14.8;

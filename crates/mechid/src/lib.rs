@@ -26,6 +26,7 @@
 //! | [`model`] | M, C, K; modes and receptance |
 //! | [`bearing`] | journal bearings from their geometry: film force, coefficients, threshold of instability |
 //! | [`integrate`] | the response by time-stepping schemes, linear and nonlinear |
+//! | [`spectra`] | spectral lines of records, their noise, frequency responses |
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |
@@ -79,14 +80,16 @@ pub use mechid_force as force;
 pub use mechid_integrate as integrate;
 pub use mechid_io as io;
 pub use mechid_model as model;
-pub use mechid_numerics as numerics;
 pub use mechid_model::ResponseQuantity::{self, Acceleration, Displacement, Velocity};
 pub use mechid_model::exact_periodic;
+pub use mechid_numerics as numerics;
 #[cfg(feature = "report")]
 pub use mechid_plot as plot;
 #[cfg(feature = "report")]
 pub use mechid_report as report;
 pub use mechid_signal as signal;
+pub use mechid_spectra as spectra;
+
 #[cfg(feature = "parquet")]
 pub use simulation::{RunsSummary, simulate_runs};
 pub use simulation::{

@@ -25,6 +25,9 @@ pub enum ReportError {
     /// A signal cannot be used.
     #[error(transparent)]
     Signal(#[from] mechid_signal::SignalError),
+    /// Spectral lines are unusable.
+    #[error(transparent)]
+    Spectra(#[from] mechid_spectra::SpectraError),
     /// A numerical method fails.
     #[error(transparent)]
     Numerics(#[from] mechid_numerics::NumericsError),

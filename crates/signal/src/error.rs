@@ -41,6 +41,22 @@ pub enum SignalError {
         /// The value found, in the unit of the record.
         value: f64,
     },
+    /// A record is too short for what is asked of it.
+    #[error("the record has {} where at least {needed} are needed", message::count(*samples, "sample"))]
+    TooShort {
+        /// Number of samples of the record.
+        samples: usize,
+        /// Number of samples needed.
+        needed: usize,
+    },
+    /// Two series that belong together differ in length.
+    #[error("one series has {}, the other {right}", message::count(*left, "sample"))]
+    PairLength {
+        /// Number of samples of the first.
+        left: usize,
+        /// Number of samples of the second.
+        right: usize,
+    },
     /// A record does not fit in memory.
     #[error("{} of {} do not fit in memory", message::count(*channels, "channel"), message::count(*samples, "sample"))]
     Memory {

@@ -45,6 +45,7 @@
 //! | numbers and counts in sentences | [`message`] |
 
 mod clipping;
+pub mod correlation;
 pub mod crest;
 mod driven;
 mod error;

@@ -1,6 +1,6 @@
 //! Errors of this crate.
 
-use mechid_signal::SignalError;
+use mechid_signal::{SignalError, message};
 use thiserror::Error;
 
 /// Error of spectral lines and their noise.
@@ -39,6 +39,100 @@ pub enum SpectraError {
         /// The value.
         value: f64,
     },
+    /// Segments that do not move on, or leave samples out.
+    #[error("segments of {} cannot start {} apart: from 1 to {len}", message::count(*len, "sample"), message::count(*hop, "sample"))]
+    Hop {
+        /// Samples of a segment.
+        len: usize,
+        /// Samples from one start to the next.
+        hop: usize,
+    },
+    /// No spectral line was chosen, or none of them carries force.
+    #[error("no spectral line carries force: choose lines the excitation drives")]
+    NoExcitedLine,
+    /// A chosen line does not exist or carries no phase.
+    #[error(
+        "line {line} cannot be used: lines 1 to {last} of this record have amplitude and phase"
+    )]
+    LineOutOfRange {
+        /// The line asked for.
+        line: usize,
+        /// The last usable line, just below half the sampling rate.
+        last: usize,
+    },
+    /// A frequency is not positive and finite.
+    #[error("a frequency of {value} rad/s cannot be used: it must be positive and finite")]
+    Frequency {
+        /// The frequency, in rad/s.
+        value: f64,
+    },
+    /// Two experiments measured different quantities.
+    #[error("one experiment measured {left}, the other {right}")]
+    MixedQuantities {
+        /// Quantity of the first.
+        left: mechid_model::ResponseQuantity,
+        /// Quantity of the second.
+        right: mechid_model::ResponseQuantity,
+    },
+    /// Two sets of spectral lines that must be the same are not.
+    #[error("row {row}: {left} rad/s against {right} rad/s; both must hold the same frequencies")]
+    FrequencyMismatch {
+        /// First row that differs, counted from 0.
+        row: usize,
+        /// Frequency in the first set, in rad/s.
+        left: f64,
+        /// Frequency in the second, in rad/s.
+        right: f64,
+    },
+    /// A ratio or covariance needs more averages than there are.
+    #[error("signal cannot be told from noise: at least {needed} averages are needed, got {got}")]
+    TooFewAverages {
+        /// Averages there are.
+        got: usize,
+        /// Averages needed.
+        needed: usize,
+    },
+    /// The forces do not determine a frequency response at a line.
+    #[error(
+        "the forces at {frequency_hz} Hz do not act independently (reciprocal condition {reciprocal_condition:.1e}): \
+         leave the line out, or make experiments with different forces"
+    )]
+    DependentForces {
+        /// Frequency, in Hz.
+        frequency_hz: f64,
+        /// Smallest over largest eigenvalue of the scaled force cross-spectrum.
+        reciprocal_condition: f64,
+    },
+    /// A noise variance is negative or not finite.
+    #[error("noise variance {column} of row {row} is {value}: it must be finite and not negative")]
+    NoiseVariance {
+        /// Row, counted from 0.
+        row: usize,
+        /// Channel, counted from 0, displacements first, then forces.
+        column: usize,
+        /// The value given, in m² or N².
+        value: f64,
+    },
+    /// A coherence outside (0, 1].
+    #[error("a coherence lies above 0 and at most at 1, got {value}")]
+    Coherence {
+        /// The value given, a pure number.
+        value: f64,
+    },
+    /// The motion has nothing in common with the force.
+    #[error(
+        "the motion at {frequency_hz} Hz has nothing in common with the force: H2 does not exist there"
+    )]
+    IncoherentMotion {
+        /// Frequency, in Hz.
+        frequency_hz: f64,
+    },
+    /// A numerical method fails.
+    #[error(transparent)]
+    Numerics(#[from] mechid_numerics::NumericsError),
+    /// A system is unusable.
+    #[error(transparent)]
+    Model(#[from] mechid_model::ModelError),
     /// A record is unusable.
     #[error(transparent)]
     Signal(#[from] SignalError),

@@ -1,7 +1,32 @@
 //! Spectral lines of measured inputs and outputs: what every estimator in the frequency domain takes.
+//!
+//! | Content | Module |
+//! |---|---|
+//! | inputs and outputs line by line, of any number of sensors and forces | [`line_data`] |
+//! | forces and displacements of every degree of freedom | [`FrequencyData`] |
+//! | chosen lines, the transform prepared once | [`Lines`] |
+//! | repeated periods, whose scatter shows the noise | [`RepeatedPeriods`] |
+//! | the transient of an open record | [`transient`] |
+//! | sinusoids of unknown frequency | [`sinusoids`] |
+//! | noise: spectrum, pooling, smooth spectra, level, pulses | [`noise`] |
+//! | frequency responses and coherence from averages | [`frf`] |
 
 mod error;
+pub mod frequency_data;
+pub mod frf;
 pub mod line_data;
+mod lines;
+pub mod noise;
+pub mod open_record;
+mod periods;
+pub mod sinusoids;
+pub mod transient;
 
 pub use error::SpectraError;
+pub use frequency_data::FrequencyData;
 pub use line_data::{LineData, Transient};
+pub use lines::{Lines, check_sampling};
+pub use noise::pooling::{NoiseModel, Pooling};
+pub use noise::spectrum::NoiseSpectrum;
+pub use periods::RepeatedPeriods;
+pub use sinusoids::Sinusoid;

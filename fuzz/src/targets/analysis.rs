@@ -16,9 +16,9 @@ use mechid_analysis::{
     Predict, Reconstruct, Segmentation, Window, frf, identify, identify_bearing, predict,
     reconstruct,
 };
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_model::Discretisation;
 use mechid_signal::Record;
+use mechid_spectra::Pooling;
 
 use super::draw::{Draw, passed};
 

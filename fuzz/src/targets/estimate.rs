@@ -4,19 +4,21 @@ use mechid_estimate::derivatives::{
     SavitzkyGolay, spectral_from_acceleration, spectral_from_displacement,
 };
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods, equation_error, equation_rows,
-    instrumental_variables, output_error,
+    equation_error, equation_rows, instrumental_variables, output_error,
 };
 use mechid_estimate::nonlinear::{self, EquationErrorOptions, SteadyExperiments};
 use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use mechid_estimate::{
-    EquationOfMotion, Estimate, Frf, FrfAverage, FrfEstimator, Segments, StartFit, Unknowns,
-    Window, checks, fit_percent, fitted_start, predict, predict_periodic,
+    EquationOfMotion, Estimate, StartFit, Unknowns, checks, fit_percent, fitted_start, predict,
+    predict_periodic,
 };
 use mechid_model::{Discretisation, Matrix, Response, Terms};
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_numerics::logarithm::logarithm;
-use mechid_signal::{Extent, Interpolation, Record, Sampling};
+use mechid_signal::Window;
+use mechid_signal::{Extent, Interpolation, Record, Sampling, correlation};
+use mechid_spectra::frf::{Frf, FrfAverage, FrfEstimator, Segments};
+use mechid_spectra::{FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
 
 use super::draw::{Draw, finite, passed};
@@ -301,9 +303,9 @@ fn predictions(d: &mut Draw) -> Result<(), String> {
 fn tests(d: &mut Draw) -> Result<(), String> {
     let most = d.below(60);
     let (a, b) = (d.numbers(most), d.numbers(most));
-    passed(checks::whiteness(&a, d.size()))?;
-    passed(checks::whiteness_beyond(&a, d.size(), d.size()))?;
-    passed(checks::cross_correlation(&a, &b, d.size()))?;
+    passed(correlation::whiteness(&a, d.size()))?;
+    passed(correlation::whiteness_beyond(&a, d.size(), d.size()))?;
+    passed(correlation::cross_correlation(&a, &b, d.size()))?;
     let dof = 1 + d.below(2);
     let Some([force, response]) = experiment(d, dof)? else { return Ok(()) };
     let _ = checks::periodicity(&force);

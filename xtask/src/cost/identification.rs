@@ -1,11 +1,10 @@
 //! Every entry of M, C and K from displacements, all masses of a chain driven.
 
-use mechid::estimate::frequency_domain::{
-    FrequencyData, Lines, Pooling, RepeatedPeriods, output_error,
-};
+use mechid::estimate::frequency_domain::output_error;
 use mechid::estimate::{EquationOfMotion, Unknowns};
 use mechid::model::ResponseQuantity;
 use mechid::signal::{NoiseLevel, noise};
+use mechid::spectra::{FrequencyData, Lines, Pooling, RepeatedPeriods};
 use mechid_problems::machines::{Support, chain, repeated, steady_test};
 use nalgebra::DMatrix;
 

@@ -1,11 +1,12 @@
 //! Stiffness and damping from the sequences of a simulation, with and without slips.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::estimate::time_domain::TimeDomain;
 use mechid::model::{Discretisation, ResponseQuantity};
 use mechid::numerics::least_squares::LeastSquares;
 use mechid::signal::{Extent, Spectrum};
+use mechid::spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix};
 
 use super::simulate::Sequences;

@@ -2,12 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods,
-};
 use mechid_io::FrequencyResponses;
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
+use mechid_spectra::{FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
 
 use super::IdentifyBearing;

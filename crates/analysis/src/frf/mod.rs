@@ -6,9 +6,10 @@ mod segment_length;
 pub mod table;
 mod whole;
 
-use mechid_estimate::frequency_domain::Lines;
-use mechid_estimate::{Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, Segments, Window};
+use mechid_signal::Window;
 use mechid_signal::{HitRule, Record, Spectrum, message};
+use mechid_spectra::Lines;
+use mechid_spectra::frf::{Crosstalk, Frf, FrfAverage, FrfEstimator, OwnLines, Segments};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use self::of_hits::average_of_hits;

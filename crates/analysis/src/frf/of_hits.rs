@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use mechid_estimate::frequency_domain::Lines;
-use mechid_estimate::{FrfAverage, Segments};
 use mechid_signal::{HitRule, Record};
+use mechid_spectra::Lines;
+use mechid_spectra::frf::{FrfAverage, Segments};
 use nalgebra::DVector;
 
 use super::{FrfSettings, Responses};

@@ -1,6 +1,6 @@
 //! Width of the peaks of frequency responses.
 
-use mechid_estimate::Frf;
+use mechid_spectra::frf::Frf;
 
 /// Part of a peak at which its width is taken: half its power.
 const HALF_POWER: f64 = std::f64::consts::FRAC_1_SQRT_2;

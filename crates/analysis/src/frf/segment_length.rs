@@ -1,7 +1,7 @@
 //! The length of the segments that a record of a random test is cut into, where none is given.
 
-use mechid_estimate::FrfEstimator;
-use mechid_estimate::frequency_domain::Lines;
+use mechid_spectra::Lines;
+use mechid_spectra::frf::FrfEstimator;
 
 use super::peak::Peak;
 use super::{Segmentation, average_of};
@@ -28,7 +28,7 @@ impl Segmentation {
     ///
     /// The length is the shortest of the powers of two, as far as they leave averages enough, whose responses say at
     /// least nine tenths of what the best say, by their coherence, averages and number of lines
-    /// ([`Frf::information`](mechid_estimate::Frf::information)); or a longer one in which the narrowest of the largest
+    /// ([`Frf::information`](mechid_spectra::frf::Frf::information)); or a longer one in which the narrowest of the largest
     /// peaks is three lines wide, if there is one. The samples held in memory are looked at.
     ///
     /// # Errors

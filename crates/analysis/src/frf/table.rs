@@ -1,15 +1,16 @@
 //! Frequency responses for people and for programs.
 
-use mechid_model::ResponseQuantity;
 use std::f64::consts::TAU;
 use std::fmt::{self, Write as _};
 
-use mechid_estimate::{Segments, Window};
 use mechid_io::{
     ADDED_DECAY, AveragedSegments, CoherenceFunction, DERIVATIVE, FrequencyResponses,
     ResponseFunction, derivative,
 };
+use mechid_model::ResponseQuantity;
+use mechid_signal::Window;
 use mechid_signal::message;
+use mechid_spectra::frf::Segments;
 use nalgebra::Complex;
 use serde::Serialize;
 

@@ -6,8 +6,8 @@ use mechid_estimate::checks::{
     constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, negative_mass, power,
     quantised_channels, spiked_channels,
 };
-use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_model::ResponseQuantity;
+use mechid_spectra::NoiseModel;
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual};

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mechid_estimate::{Frf, FrfEstimator};
 use mechid_signal::{Extent, message};
+use mechid_spectra::frf::{Frf, FrfEstimator};
 use nalgebra::DMatrix;
 
 use super::Identified;

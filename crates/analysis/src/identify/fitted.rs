@@ -5,10 +5,10 @@ use std::fmt;
 use mechid_estimate::Estimate;
 use mechid_estimate::checks::thresholds::{LAGS, SAMPLES_PER_LAG};
 use mechid_estimate::checks::{Finding, SpectralResidual};
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, NoiseModel};
 use mechid_estimate::nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Record;
+use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 
 use super::coherence::ResponseCoherence;
 use super::force_noise::ForceNoise;

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::Estimate;
-use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::Matrix;
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_signal::noise_above_band;
+use mechid_spectra::FrequencyData;
 use serde::Serialize;
 
 use crate::AnalysisError;

@@ -49,12 +49,12 @@ pub mod validation;
 
 use std::fmt;
 
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
 use mechid_signal::Extent;
+use mechid_spectra::Pooling;
 use serde::{Serialize, Serializer};
 
 use self::checks::CheckRow;
@@ -467,13 +467,13 @@ impl Identified {
     }
 
     /// Returns the spectra that were fitted; `None` for a fit in the time domain.
-    pub fn spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
+    pub fn spectra(&self) -> Option<&mechid_spectra::FrequencyData> {
         self.fitted.frequency.as_ref().map(|(_, data)| data)
     }
 
     /// Returns the spectra to draw: of open records the responses to the forces alone, of segments their averages as
     /// measured, otherwise those fitted; `None` for a fit in the time domain.
-    pub fn drawn_spectra(&self) -> Option<&mechid_estimate::frequency_domain::FrequencyData> {
+    pub fn drawn_spectra(&self) -> Option<&mechid_spectra::FrequencyData> {
         self.fitted.drawn.as_ref().or_else(|| self.spectra())
     }
 }

@@ -2,7 +2,6 @@
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{Verdict, before_spectral_fit, steady_periods};
-use mechid_estimate::frequency_domain::{FrequencyData, Lines};
 use mechid_estimate::nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
     SelectionStep, StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion,
@@ -10,6 +9,7 @@ use mechid_estimate::nonlinear::{
 };
 use mechid_model::Terms;
 use mechid_signal::{Extent, Record, driven_lines, lines, message};
+use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
 
 use super::fitted::{Fitted, Residual, SampleResidual, WithTerms};

@@ -4,12 +4,11 @@ use mechid_estimate::checks::{
     AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
     delay_of_open_records, fitted_band, linearity_of_open_record,
 };
-use mechid_estimate::frequency_domain::{
-    EndLoads, FrequencyData, Lines, Pooling, output_error_pooling,
-};
+use mechid_estimate::frequency_domain::{EndLoads, output_error_pooling};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
+use mechid_spectra::{FrequencyData, Lines, Pooling};
 
 use super::fitted::{Fitted, Residual};
 use super::force_noise::ForceNoise;

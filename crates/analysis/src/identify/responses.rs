@@ -4,12 +4,13 @@ use mechid_estimate::checks::{
     Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
     delay_of_lines, leakage, linearity,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
+use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{
     Estimate, EstimateError, ResponseEstimate, Unknowns, output_error_of_responses,
 };
 use mechid_model::Discretisation;
 use mechid_signal::Extent;
+use mechid_spectra::{FrequencyData, Lines};
 
 use super::coherence::ResponseCoherence;
 use super::fitted::{Fitted, Misfit};

@@ -1,6 +1,6 @@
 //! Rows of the tables that a result is made of: samples and lines used, parameters, modes.
 
-use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, frequency_domain};
+use mechid_estimate::{Estimate, IdentifiedMode, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::{EIGENVALUE_ROUNDING, Parameter};
 use serde::Serialize;
@@ -195,7 +195,7 @@ impl ModeRow {
 
 impl LinesUsed {
     /// The first, the last and the number of the lines used.
-    pub(crate) fn of(used: &frequency_domain::Lines) -> Self {
+    pub(crate) fn of(used: &mechid_spectra::Lines) -> Self {
         let (lines, spacing_hz) = (used.as_slice(), used.sampling().line_spacing_hz());
         let first = lines.iter().copied().min().unwrap_or(0);
         let last = lines.iter().copied().max().unwrap_or(0);

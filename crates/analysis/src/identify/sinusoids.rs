@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use mechid_estimate::frequency_domain::Sinusoid;
 use mechid_signal::message;
+use mechid_spectra::Sinusoid;
 use serde::Serialize;
 
 use crate::measurement::Block;

@@ -5,12 +5,12 @@ use mechid_estimate::checks::{
     delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
 };
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, equation_error,
-    instrumental_variables, output_error_pooling,
+    equation_error, instrumental_variables, output_error_pooling,
 };
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::SecondOrderSystem;
 use mechid_signal::{Extent, Record, Repetition, quantisation_step, repetition};
+use mechid_spectra::{FrequencyData, Lines, NoiseModel, Pooling, RepeatedPeriods, SpectraError};
 
 use super::fitted::{Fitted, Misfit, Residual, unexplained_motion};
 use super::left_out::LineRule;
@@ -333,7 +333,7 @@ fn less_left(data: &FrequencyData, plain: Found, likely: Found) -> Result<Found,
 /// The rows of all records.
 fn together(
     spectra: &[Spectra],
-    of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, EstimateError>,
+    of: &dyn Fn(&RepeatedPeriods) -> Result<FrequencyData, SpectraError>,
 ) -> Result<FrequencyData, AnalysisError> {
     let mut all = of(&spectra[0].0)?;
     for (periods, _) in &spectra[1..] {
@@ -374,7 +374,7 @@ fn with_noise(
     periods: &RepeatedPeriods,
     noise: Pooling,
     machine: Option<&SecondOrderSystem>,
-) -> Result<FrequencyData, EstimateError> {
+) -> Result<FrequencyData, SpectraError> {
     if periods.count() < 2 {
         return periods.mean();
     }

@@ -4,10 +4,10 @@ use std::fmt;
 use std::path::Path;
 
 use mechid_estimate::checks::{Finding, Subject};
-use mechid_estimate::frequency_domain::NoiseModel;
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
+use mechid_spectra::NoiseModel;
 use serde::Serialize;
 
 use super::CONSPICUOUS;

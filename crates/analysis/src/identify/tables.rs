@@ -7,12 +7,11 @@ use mechid_estimate::checks::{
     Finding, adjust_p_values, before_spectral_fit, gain_symmetry, instability, mass_symmetry,
     negative_mass,
 };
-use mechid_estimate::frequency_domain::{
-    FrequencyData, NoiseModel, Pooling, equation_error, output_error_pooling,
-};
+use mechid_estimate::frequency_domain::{equation_error, output_error_pooling};
 use mechid_estimate::{Estimate, ResponseEstimate, Unknowns, output_error_of_responses};
 use mechid_io::{FrequencyResponses, ParameterCovariance, SystemMatrices};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
+use mechid_spectra::{FrequencyData, NoiseModel, Pooling};
 use serde::{Deserialize, Serialize};
 
 use super::added_decay;

@@ -3,12 +3,13 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+use mechid_estimate::Estimate;
 use mechid_estimate::checks::{Finding, after_response_fit, coherence, leakage};
-use mechid_estimate::frequency_domain::{FrequencyData, Lines};
-use mechid_estimate::{Estimate, Frf, Segments};
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;
+use mechid_spectra::frf::{Frf, Segments};
+use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix};
 
 use super::checks::When;

@@ -1,9 +1,10 @@
 //! The receptance that records show, whatever was fitted.
 
-use mechid_estimate::frequency_domain::{FrequencyData, Lines};
-use mechid_estimate::{FrfEstimator, Segments, Window};
 use mechid_signal::Extent;
+use mechid_signal::Window;
 use mechid_signal::lines;
+use mechid_spectra::frf::{FrfEstimator, Segments};
+use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix};
 
 use super::RecordReview;

@@ -1,6 +1,7 @@
 //! Residual of the measured response after the identified system's prediction.
 
-use mechid_estimate::checks::{Correlation, SpectralResidual, cross_correlation, whiteness};
+use mechid_estimate::checks::SpectralResidual;
+use mechid_signal::correlation::{Correlation, cross_correlation, whiteness};
 use mechid_signal::{Record, measures};
 
 use crate::AnalysisError;

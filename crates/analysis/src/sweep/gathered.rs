@@ -1,9 +1,10 @@
 //! The estimators, and what they gather from samples that come a chunk at a time.
 
-use mechid_estimate::frequency_domain::{Lines, RepeatedPeriods, equation_error, output_error};
+use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_estimate::time_domain::Transitions;
 use mechid_estimate::{EquationOfMotion, Estimate, Unknowns};
 use mechid_model::{Discretisation, ResponseQuantity};
+use mechid_spectra::{Lines, RepeatedPeriods};
 use serde::{Deserialize, Serialize};
 
 use super::samples::Samples;

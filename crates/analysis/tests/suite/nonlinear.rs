@@ -7,10 +7,10 @@ use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Machine, Measurement, ModalSummary, Predict,
     Reconstruct, ResponseQuantity, identify, predict, reconstruct,
 };
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_model::{NonlinearSystem, Response, Sdof, Terms, UncertainNonlinearSystem};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
+use mechid_spectra::Pooling;
 use nalgebra::{Complex, DMatrix};
 
 const PERIOD: usize = 256;

@@ -10,11 +10,11 @@ use mechid_analysis::{
 };
 use mechid_estimate::Estimate;
 use mechid_estimate::checks::{Finding, Power, Subject};
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::FrequencyResponses;
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};
 use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::Pooling;
 use rayon::prelude::*;
 
 const SAMPLES: usize = 2048;

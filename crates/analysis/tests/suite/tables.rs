@@ -9,11 +9,11 @@ use mechid_analysis::{
     identify, identify_responses,
 };
 use mechid_estimate::Estimate;
-use mechid_estimate::frequency_domain::Pooling;
 use mechid_io::{CoherenceFunction, FrequencyResponses, ResponseFunction};
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Multisine, NoiseLevel, Phases, Sampling, lines, noise};
+use mechid_spectra::Pooling;
 use nalgebra::{Complex, dmatrix};
 
 fn oscillator() -> SecondOrderSystem {

@@ -10,10 +10,10 @@ use mechid::analysis::identify::{
     SampleFit, Structure, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
-use mechid::estimate::frequency_domain::Pooling;
 use mechid::estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
+use mechid::spectra::Pooling;
 
 use super::choices::{
     BetweenSamplesChoice, CriterionChoice, EstimatorChoice, ExtentChoice, InterpolationChoice,

@@ -2,12 +2,12 @@
 
 use mechid_numerics::check_size;
 use mechid_signal::Record;
-
-use super::correlation::{
+use mechid_signal::correlation::{
     Correlation, autocorrelation, centred, cross_correlation_of_coloured, whiteness,
     whiteness_beyond,
 };
-use super::finding::{CorrelationTest, Finding, NoiseSpan, PValue, Residual};
+
+use super::finding::{CorrelationTest, Finding, NoiseSpan, Residual};
 use super::thresholds::{ROUNDING, SIGNIFICANCE};
 use crate::EstimateError;
 
@@ -45,16 +45,17 @@ pub fn after_fit(
         let span = (noise_span > 0 && is_noise(&beyond) && !is_noise(&white)).then(|| NoiseSpan {
             lags: noise_span,
             first_coefficient: white.coefficients[0],
-            beyond: beyond.test(rounding),
+            beyond: CorrelationTest::new(&beyond, rounding),
         });
-        let (residual, test) = (Residual::Samples { residual: channel }, white.test(rounding));
+        let (residual, test) =
+            (Residual::Samples { residual: channel }, CorrelationTest::new(&white, rounding));
         findings.push(Finding::Whiteness { residual, test, span });
         let colour = colour(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
         let acts =
             |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
         for input in (0..force.channels()).filter(acts) {
             let cross = cross_correlation_of_coloured(e, force.channel(input), lags, &colour)?;
-            let test = cross.test(rounding);
+            let test = CorrelationTest::new(&cross, rounding);
             findings.push(Finding::CrossCorrelation { residual: channel, force: input, test });
         }
     }
@@ -63,19 +64,6 @@ pub fn after_fit(
 
 fn is_noise(correlation: &Correlation) -> bool {
     correlation.p_value >= SIGNIFICANCE
-}
-
-impl Correlation {
-    /// Numbers of the test that a finding carries.
-    pub(super) fn test(&self, rounding: bool) -> CorrelationTest {
-        CorrelationTest {
-            coefficients: self.coefficients.len(),
-            outside: self.outside(),
-            bound: self.bound,
-            p_value: PValue::of(self.p_value),
-            rounding,
-        }
-    }
 }
 
 /// Autocorrelation of a residual from lag 0 as far as it counts.

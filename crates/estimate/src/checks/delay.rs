@@ -2,6 +2,7 @@
 
 use mechid_model::Response;
 use mechid_signal::{Extent, Record};
+use mechid_spectra::FrequencyData;
 use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
@@ -10,9 +11,7 @@ use super::spectral_residual::SpectralResidual;
 use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
 use super::weighted_fit::after_spectral_fit;
 use super::{MAX_SAMPLES, Subject, Verdict};
-use crate::frequency_domain::{
-    FrequencyData, LateForce, LateOpenRecord, OutputErrorFit, output_error,
-};
+use crate::frequency_domain::{LateForce, LateOpenRecord, OutputErrorFit, output_error};
 use crate::time_domain::{TimeDomain, equation_of_motion};
 use crate::{Estimate, EstimateError, Unknowns};
 

@@ -2,10 +2,10 @@
 
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
+use mechid_spectra::Lines;
 
 use super::finding::{Finding, PValue};
 use super::thresholds::DISTORTION_EXPLAINED;
-use crate::frequency_domain::Lines;
 use crate::nonlinear::{Level, distortion};
 use crate::{EstimateError, Unknowns};
 

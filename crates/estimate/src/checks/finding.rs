@@ -5,6 +5,7 @@
 //! m/s², kg, N·s/m, N/m) says so.
 
 use mechid_model::{Parameter, ResponseQuantity};
+use mechid_signal::correlation::Correlation;
 
 use super::Subject;
 use super::thresholds::SIGNIFICANCE;
@@ -505,6 +506,19 @@ pub struct CorrelationTest {
     pub p_value: PValue,
     /// Returns whether the residual is rounding, of which correlations mean nothing.
     pub rounding: bool,
+}
+
+impl CorrelationTest {
+    /// Returns the numbers of a test; `rounding` where the residual is rounding.
+    pub(super) fn new(correlation: &Correlation, rounding: bool) -> Self {
+        Self {
+            coefficients: correlation.coefficients.len(),
+            outside: correlation.outside(),
+            bound: correlation.bound,
+            p_value: PValue::of(correlation.p_value),
+            rounding,
+        }
+    }
 }
 
 /// Lags over which noise on the response correlates a residual.

@@ -2,9 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use mechid_spectra::frf::Frf;
+
 use super::finding::Finding;
 use super::thresholds::RESONANCE_LINES;
-use crate::{Frf, IdentifiedMode};
+use crate::IdentifiedMode;
 
 /// Checks that the narrowest resonance in the band of frequency responses, averaged over segments under a window, is
 /// lines enough wide for what the window blunts to be told from it ([`Finding::Leakage`]); `settled` says whether

@@ -3,11 +3,13 @@
 use mechid_model::{Response, ResponseQuantity};
 use mechid_numerics::check_size;
 use mechid_signal::{Record, Spectrum};
+use mechid_spectra::SpectraError;
+use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use statrs::distribution::{ContinuousCDF, Normal};
 
 use super::finding::{Finding, PValue, Power};
-use crate::frequency_domain::{FrequencyData, Lines, Whitened};
+use crate::frequency_domain::Whitened;
 use crate::{Estimate, EstimateError, predict_periodic};
 
 /// Powers of a motion that are tested.
@@ -26,7 +28,7 @@ const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Pow
 ///
 /// # Errors
 /// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is no machine,
-/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses and [`EstimateError::NoExcitedLine`] if fewer than three
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses and [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if fewer than three
 /// lines lie in the band.
 ///
 /// # Source
@@ -50,7 +52,7 @@ pub fn linearity(
     let tested = Tested::new(estimate, &data)?;
     let count = data.len();
     if count < 3 {
-        return Err(EstimateError::NoExcitedLine);
+        return Err(SpectraError::NoExcitedLine.into());
     }
     tested.under_hann_window().finding(estimate, force, &lines.as_slice()[1..count - 1], &HANN)
 }

@@ -4,11 +4,11 @@ use mechid_model::{Matrix, Parameter, Response};
 use mechid_numerics::least_squares::{LeastSquares, Solution};
 use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
+use mechid_signal::correlation::whiteness;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::MAX_SAMPLES;
-use super::correlation::whiteness;
 use super::finding::{Finding, PValue, Reference};
 use super::thresholds::{LAGS, ROUNDING, SIGNIFICANCE};
 use crate::{Estimate, EstimateError};

@@ -1,11 +1,12 @@
 //! Residuals of frequency responses against the noise that their coherence shows.
 
+use mechid_signal::correlation::{Correlation, correlated, share_above_of};
+use mechid_spectra::frf::Frf;
 use nalgebra::{Complex, DMatrix};
 
-use super::correlation::{Correlation, correlated, share_above_of};
-use super::finding::{Finding, NoiseSource, PValue, Residual};
+use super::finding::{CorrelationTest, Finding, NoiseSource, PValue, Residual};
 use crate::frequency_domain::in_units_of_noise;
-use crate::{Estimate, EstimateError, Frf};
+use crate::{Estimate, EstimateError};
 
 /// 1 − coherence, below which it is rounding.
 const ROUNDING: f64 = 1e-10;
@@ -57,7 +58,7 @@ pub fn after_response_fit(
         if let Some((correlation, distance)) = series.line_to_line(lines) {
             let (response, force) = (at % n, force_dof[at / n]);
             let residual = Residual::FrequencyResponse { response, force, distance };
-            let test = correlation.test(false);
+            let test = CorrelationTest::new(&correlation, false);
             findings.push(Finding::Whiteness { residual, test, span: None });
         }
     }

@@ -3,14 +3,16 @@
 use mechid_model::ResponseQuantity;
 use mechid_numerics::NumericsError;
 use mechid_signal::{Record, Spectrum, lines};
+use mechid_spectra::frf::{Frf, FrfAverage, Segments};
+use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::DMatrix;
 
 use super::before::{conditioning, highest_mode, periodicity, unknowns_of_an_equation};
 use super::claimed_period;
 use super::finding::{Finding, ModeLimit};
 use super::thresholds::{EXCITED_LINE, PERIOD_SCATTER_DOUBTFUL};
-use crate::frequency_domain::{FrequencyData, Lines, equation_rows};
-use crate::{Estimate, EstimateError, Frf, FrfAverage, Segments, Unknowns};
+use crate::frequency_domain::equation_rows;
+use crate::{Estimate, EstimateError, Unknowns};
 
 /// Amplitude of a line over that of the strongest of its force, above which the response to it shows.
 const STRONG_LINE: f64 = 0.01;

@@ -2,14 +2,14 @@
 
 use std::f64::consts::PI;
 
+use mechid_signal::correlation::{Correlation, share_above_of};
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 
 use super::concentration::Part;
-use super::correlation::{Correlation, share_above_of};
-use super::finding::{Concentration, Finding, NoiseSource, PValue, Residual};
+use super::finding::{Concentration, CorrelationTest, Finding, NoiseSource, PValue, Residual};
 use super::thresholds::LAGS;
-use crate::frequency_domain::{FrequencyData, NoiseSpectrum};
 
 /// Maximum distance of lines, counted in lines of the fit, at which residuals are correlated.
 const DISTANCES: usize = 12;
@@ -131,7 +131,7 @@ impl SpectralResidual {
         let whiteness = |residual: usize| {
             self.line_to_line(residual).map(|correlation| Finding::Whiteness {
                 residual: Residual::Lines { residual },
-                test: correlation.test(self.rounding),
+                test: CorrelationTest::new(&correlation, self.rounding),
                 span: None,
             })
         };
@@ -139,7 +139,7 @@ impl SpectralResidual {
         for (residual, whiteness) in whiteness.into_iter().enumerate() {
             findings.extend(whiteness);
             findings.extend(of_forces.iter().enumerate().filter_map(|(force, of_channels)| {
-                let test = of_channels[residual].as_ref()?.test(self.rounding);
+                let test = CorrelationTest::new(of_channels[residual].as_ref()?, self.rounding);
                 Some(Finding::CrossCorrelation { residual, force, test })
             }));
         }

@@ -5,6 +5,8 @@ use mechid_numerics::check_size;
 use mechid_numerics::linear_algebra::svd;
 use mechid_numerics::triangular::TriangularFactor;
 use mechid_signal::Extent;
+use mechid_spectra::noise::level::motion_level;
+use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
 
@@ -12,7 +14,7 @@ use super::concentration::{Part, concentration};
 use super::finding::{Finding, PValue, Reference};
 use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
 use super::thresholds::ROUNDING;
-use crate::frequency_domain::{FrequencyData, NoiseModel, NoiseSpectrum, Whitened, motion_level};
+use crate::frequency_domain::Whitened;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError};
 

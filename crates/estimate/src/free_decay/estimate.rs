@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 use mechid_model::Mode;
 use mechid_numerics::Uncertain;
 use mechid_signal::Record;
+use mechid_signal::correlation::{Correlation, whiteness};
 use nalgebra::{Complex, DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::fit::{Data, Fit};
 use super::poles::{Pole, linear_columns};
-use crate::checks::{Correlation, whiteness};
 use crate::{EstimateError, IdentifiedMode};
 
 /// Lags over which a residual is tested for being white.

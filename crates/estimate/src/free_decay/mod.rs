@@ -8,6 +8,7 @@ mod select;
 mod start;
 
 use mechid_signal::Record;
+use mechid_signal::SignalError;
 use mechid_signal::measures::{peak, power_of_two};
 use nalgebra::DMatrix;
 
@@ -78,7 +79,7 @@ const SURE: f64 = 4.0;
 /// ```
 ///
 /// # Errors
-/// [`EstimateError::SilentChannel`] if a channel does not move, [`EstimateError::TooShort`],
+/// [`EstimateError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`](mechid_signal::SignalError::TooShort),
 /// [`EstimateError::TooLong`], [`EstimateError::NumberOfModes`] if more modes are asked for than can be fitted,
 /// [`EstimateError::NoDecay`] if no oscillation stands out of the noise, [`EstimateError::Grows`] if most of
 /// the response grows, [`EstimateError::NotConverged`] if so many modes cannot be told apart.
@@ -101,7 +102,7 @@ pub fn free_decay(
     }
     let needed = SAMPLES_PER_MODE * settings.modes.unwrap_or(1) + usize::from(settings.offset);
     if samples < needed {
-        return Err(EstimateError::TooShort { samples, needed });
+        return Err(SignalError::TooShort { samples, needed }.into());
     }
     let units = units(record)?;
     let scaled = |k: usize, c: usize| record.channel(c)[k] / units[c][0] / units[c][1];

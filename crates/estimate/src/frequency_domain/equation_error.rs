@@ -1,8 +1,9 @@
 //! Least squares on the equation of motion, line by line.
 
+use mechid_spectra::FrequencyData;
+use mechid_spectra::SpectraError;
 use nalgebra::{Complex, DMatrix};
 
-use super::FrequencyData;
 use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 
 /// Least squares on −ω²M X + iωC X + K X = F at every row, real and imaginary parts apart.
@@ -16,7 +17,9 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 ///
 /// ```
 /// use mechid_model::ResponseQuantity;
-/// use mechid_estimate::{Unknowns, frequency_domain::{FrequencyData, equation_error}};
+/// use mechid_estimate::Unknowns;
+/// use mechid_spectra::FrequencyData;
+/// use mechid_estimate::frequency_domain::equation_error;
 /// use nalgebra::{Complex, DMatrix};
 ///
 /// // 10 ẍ + 180 ẋ + 5000 x = F at three frequencies.
@@ -33,7 +36,7 @@ use crate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 /// ```
 ///
 /// # Errors
-/// [`EstimateError::NoExcitedLine`] if no row carries force, [`EstimateError::OnlyRatios`]
+/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries force, [`EstimateError::OnlyRatios`]
 /// if an equation of motion has neither force nor a known entry, and what
 /// [`EquationOfMotion::solve`] refuses.
 ///
@@ -50,7 +53,7 @@ pub fn equation_error(
 /// for several sets of unknowns.
 ///
 /// # Errors
-/// [`EstimateError::NoExcitedLine`] if no row carries force.
+/// [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if no row carries force.
 pub fn equation_rows(data: &FrequencyData) -> Result<EquationOfMotion, EstimateError> {
     weighted_rows(data, 0.0, |_| 1.0)
 }
@@ -107,7 +110,7 @@ pub(super) fn weighted_rows(
     weight: impl Fn(usize) -> f64,
 ) -> Result<EquationOfMotion, EstimateError> {
     if data.force().iter().all(|f| *f == Complex::default()) {
-        return Err(EstimateError::NoExcitedLine);
+        return Err(SpectraError::NoExcitedLine.into());
     }
     let late = |row: usize| Complex::cis(-data.omega()[row] * delay);
     let weight: Vec<f64> = (0..data.len()).map(weight).collect();

@@ -3,10 +3,10 @@
 use mechid_model::{Matrix, Parameter};
 use mechid_numerics::NumericsError;
 use mechid_numerics::linear_algebra::singular_values;
+use mechid_spectra::FrequencyData;
+use mechid_spectra::frequency_data::check_same_frequencies;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::FrequencyData;
-use super::data::check_same_frequencies;
 use super::equation_error::{equation_rows, real_rows};
 use crate::estimate::Findings;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -24,7 +24,7 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// an equation error of unequal size over the lines.
 ///
 /// # Errors
-/// [`EstimateError::FrequencyMismatch`] or [`NumericsError::Size`] if the two are not alike,
+/// [`SpectraError::FrequencyMismatch`](mechid_spectra::SpectraError::FrequencyMismatch) or [`NumericsError::Size`] if the two are not alike,
 /// [`EstimateError::Undetermined`] if the data leave a parameter open, and what
 /// [`equation_error`](super::equation_error) refuses.
 ///

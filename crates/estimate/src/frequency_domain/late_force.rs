@@ -1,9 +1,9 @@
 //! The equations of motion of spectra with the force some time later.
 
 use mechid_model::Matrix;
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVectorView};
 
-use super::FrequencyData;
 use super::equation_error::{late_weight, motions, real_rows, weighted_rows};
 use crate::Unknowns;
 use crate::equation_of_motion::{Columns, equations_by_columns};

@@ -1,14 +1,15 @@
 //! Open records with the force some time later.
 
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::DVector;
 
+use super::OutputErrorFit;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{plausible, spare};
 use super::residual_noise::white_noise_at;
 use super::search::minimise;
 use super::starts::Starts;
-use super::{FrequencyData, NoiseSpectrum, OutputErrorFit};
 use crate::Unknowns;
 use crate::relations::Relations;
 

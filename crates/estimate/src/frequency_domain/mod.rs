@@ -1,7 +1,7 @@
 //! Estimators that work line by line on the spectra of whole periods.
 //!
-//! Forces and motions are read at chosen [`Lines`] into [`FrequencyData`], of one record or of
-//! [`RepeatedPeriods`], whose scatter shows the noise. Then there are three estimators:
+//! Forces and motions are read at chosen [`Lines`](mechid_spectra::Lines) into [`FrequencyData`](mechid_spectra::FrequencyData), of one record or of
+//! [`RepeatedPeriods`](mechid_spectra::RepeatedPeriods), whose scatter shows the noise. Then there are three estimators:
 //!
 //! | Estimator | Noise | Cost |
 //! |---|---|---|
@@ -12,7 +12,8 @@
 //! ```
 //! use mechid_model::ResponseQuantity;
 //! use mechid_estimate::Unknowns;
-//! use mechid_estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
+//! use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
+//! use mechid_estimate::frequency_domain::output_error;
 //! use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 //!
 //! // Eight periods of 10 ẍ + 180 ẋ + 5000 x = F under five cosines, x measured with 1 % noise.
@@ -41,45 +42,29 @@
 //! # Ok::<(), mechid_estimate::EstimateError>(())
 //! ```
 
-mod between_lines;
-mod data;
-mod ends;
 mod equation_error;
 mod instrumental;
 mod late_force;
 mod late_open_record;
 mod likelihood_ratio;
-mod lines;
 mod misfit;
-mod motion_level;
 mod multi_start;
 mod normal_equations;
 mod output_error;
 mod output_error_fit;
-mod periods;
-mod pulse_noise;
+mod pulse_covariance;
 mod residual_noise;
 mod search;
-mod sinusoids;
 mod starts;
 mod weight_uncertainty;
 mod whitened;
 
-pub use data::FrequencyData;
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
 pub(crate) use late_force::LateForce;
 pub(crate) use late_open_record::LateOpenRecord;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
-pub use lines::Lines;
-pub(crate) use lines::check_sampling;
-pub(crate) use motion_level::motion_level;
 pub(crate) use output_error::in_units_of_noise;
 pub use output_error::{output_error, output_error_near, output_error_pooling};
 pub use output_error_fit::{EndLoads, OutputErrorFit};
-pub use periods::RepeatedPeriods;
-pub use sinusoids::Sinusoid;
 pub(crate) use whitened::Whitened;
-
-pub use crate::noise_spectrum::NoiseSpectrum;
-pub use crate::pooling::{NoiseModel, Pooling};

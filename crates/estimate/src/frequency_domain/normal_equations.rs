@@ -7,9 +7,9 @@ use mechid_model::Matrix;
 use mechid_numerics::cholesky::Cholesky;
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_numerics::triangular::TriangularFactor;
+use mechid_spectra::transient;
 use nalgebra::{DMatrix, DVector};
 
-use super::ends;
 use crate::Unknowns;
 
 /// A diagonal entry of a triangle below this part of its column: the regressors are dependent.
@@ -100,7 +100,7 @@ impl Layout {
             };
             let of_row = of_row.map(|(at, p)| (at, place(&(p.matrix(), p.column()))));
             let of_ends = ends.iter().map(|column| {
-                let at = ends::place(n, column.1 - n, column.0, row);
+                let at = transient::index(n, column.1 - n, column.0, row);
                 (free.len() + at, place(column))
             });
             let mut both: Vec<(usize, usize)> = of_row.chain(of_ends).collect();

@@ -2,9 +2,11 @@
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::check_size;
+use mechid_spectra::transient;
+use mechid_spectra::{FrequencyData, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::ends;
+use super::equation_error;
 use super::misfit::Misfit;
 use super::multi_start::search;
 use super::output_error_fit::{
@@ -13,7 +15,6 @@ use super::output_error_fit::{
 use super::residual_noise::with_residual_noise;
 use super::search::SumOfSquares;
 use super::starts::Starts;
-use super::{FrequencyData, NoiseSpectrum, Pooling, equation_error};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -35,7 +36,7 @@ use crate::{Estimate, EstimateError, Unknowns};
 /// # Errors
 /// What [`equation_error`] refuses, [`EstimateError::Undetermined`] if the data leave a parameter
 /// open, [`EstimateError::SingularNoise`] if a stated noise covariance cannot be inverted,
-/// [`EstimateError::TooFewAverages`] if it comes from too few periods to weight with, and
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) if it comes from too few periods to weight with, and
 /// [`EstimateError::NotConverged`] if no start leads to a minimum.
 ///
 /// # Source
@@ -71,7 +72,7 @@ pub fn output_error_near(
 /// [`output_error`] with a given way to find the noise from the residual where the data state none.
 ///
 /// # Errors
-/// As [`output_error`]; [`EstimateError::TooFewAverages`] for [`Pooling::PerLine`] where the data state no
+/// As [`output_error`]; [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) for [`Pooling::PerLine`] where the data state no
 /// noise: the residual is one sample of each line.
 ///
 /// # Source
@@ -137,7 +138,7 @@ pub(crate) fn in_units_of_noise(
         theta = relations.unknowns(theta.as_slice());
     }
     let mut misfit = Misfit::new(data, estimate.unknowns(), data.noise()?).ok()?;
-    let all = theta.len() + ends::count(data);
+    let all = theta.len() + transient::len(data);
     misfit.try_at(&theta.resize_vertically(all, 0.0))?;
     misfit.accept();
     Some(misfit.white())

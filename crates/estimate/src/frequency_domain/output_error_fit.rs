@@ -2,15 +2,17 @@
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::{NumericsError, check_size};
+use mechid_spectra::SpectraError;
+use mechid_spectra::transient;
+use mechid_spectra::transient::TransientLoad;
+use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Sinusoid};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use super::ends::{self, Ends};
 use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, Plausible};
 use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
-use super::{FrequencyData, NoiseModel, NoiseSpectrum, Sinusoid};
 use crate::estimate::Findings;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
@@ -69,7 +71,7 @@ impl EndLoads {
         self.tau.len()
     }
 
-    /// The unknown loads, in the order of [`Ends`].
+    /// The unknown loads, in the order of [`TransientLoad`].
     pub(super) fn loads(&self) -> &[f64] {
         &self.tau
     }
@@ -88,13 +90,13 @@ impl EndLoads {
         &self,
         records: &[FrequencyData],
     ) -> Result<Vec<FrequencyData>, EstimateError> {
-        let all = records.iter().map(ends::count).sum();
+        let all = records.iter().map(transient::len).sum();
         check_size("loads of open ends", all, self.tau.len())?;
         let mut rest = &self.tau[..];
         let closed = records.iter().map(|record| {
-            let (tau, others) = rest.split_at(ends::count(record));
+            let (tau, others) = rest.split_at(transient::len(record));
             rest = others;
-            record.with_load_of_ends(tau)
+            record.without_transient(tau)
         });
         Ok(closed.collect())
     }
@@ -112,7 +114,7 @@ impl EndLoads {
         let closed = self.taken_off(records)?;
         let each = records.iter().zip(&closed).map(|(record, closed)| {
             check_size("degrees of freedom", record.dof(), system.dof())?;
-            Ok(record.with_response_of_load_taken_off(closed.force(), system))
+            Ok(record.without_response_to_transient(closed.force(), system))
         });
         each.collect()
     }
@@ -128,7 +130,7 @@ impl EndLoads {
         let in_errors = DVector::from_fn(tau.len(), |at, _| tau[at] / scale[at]);
         let statistic =
             scaled.cholesky().map_or(f64::INFINITY, |f| in_errors.dot(&f.solve(&in_errors)));
-        let loads = Ends::new(data, tau);
+        let loads = TransientLoad::new(data, tau);
         let load: f64 = (0..data.len()).map(|row| loads.load(row).norm_squared()).sum();
         let share = load / data.force().norm_squared();
         Some(Self { tau: tau.to_vec(), statistic, share })
@@ -229,7 +231,7 @@ pub(super) fn uncertain_weights(
     let entries = entries(unknowns, independent);
     match tau {
         [] => WeightUncertainty::of(data, unknowns, &entries, noise),
-        _ => WeightUncertainty::of(&data.with_load_of_ends(tau), unknowns, &entries, noise),
+        _ => WeightUncertainty::of(&data.without_transient(tau), unknowns, &entries, noise),
     }
 }
 
@@ -243,12 +245,12 @@ pub(super) fn entries(unknowns: &Unknowns, independent: &[f64]) -> DVector<f64> 
 
 /// The independent unknowns of M, C and K among the parameters of a search, and the loads of open ends.
 pub(super) fn parts<'a>(data: &FrequencyData, theta: &'a DVector<f64>) -> (&'a [f64], &'a [f64]) {
-    theta.as_slice().split_at(theta.len() - ends::count(data))
+    theta.as_slice().split_at(theta.len() - transient::len(data))
 }
 
 /// Real equations less unknowns.
 pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
-    let unknowns = unknowns.independent() + ends::count(data);
+    let unknowns = unknowns.independent() + transient::len(data);
     (2 * data.dof() * data.len()).saturating_sub(unknowns)
 }
 
@@ -260,7 +262,7 @@ pub(super) fn spare(data: &FrequencyData, unknowns: &Unknowns) -> usize {
 /// one computed.
 ///
 /// # Errors
-/// [`EstimateError::TooFewAverages`] where it does not exist.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) where it does not exist.
 pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, EstimateError> {
     if nu.is_infinite() {
         return Ok(1.0);
@@ -268,7 +270,7 @@ pub(super) fn sampled_weight_inflation(nu: f64, channels: usize) -> Result<f64, 
     let n = channels as f64;
     if nu <= n + 1.0 {
         let (got, needed) = (nu as usize + 1, channels + 3);
-        return Err(EstimateError::TooFewAverages { got, needed });
+        return Err(SpectraError::TooFewAverages { got, needed }.into());
     }
     Ok(nu * nu / ((nu - n) * (nu - n) - 1.0))
 }

@@ -4,20 +4,23 @@ use std::borrow::Cow;
 
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::NumericsError;
+use mechid_spectra::SpectraError;
+use mechid_spectra::noise::level::motion_level;
+use mechid_spectra::sinusoids;
+use mechid_spectra::sinusoids::Sinusoid;
+use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling};
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::Whitened;
 use super::misfit::Misfit;
-use super::motion_level::motion_level;
 use super::multi_start::{GlobalMinimum, search};
 use super::output_error_fit::{
     OutputErrorFit, Scale, entries, finish, parts, plausible, sampled_weight_inflation, spare,
     uncertain_weights,
 };
-use super::pulse_noise;
+use super::pulse_covariance;
 use super::search::SumOfSquares;
-use super::sinusoids::{self, Sinusoid};
 use super::starts::Starts;
-use super::{FrequencyData, NoiseModel, NoiseSpectrum, Pooling, Whitened};
 use crate::{EstimateError, Unknowns};
 
 /// Relative change of the noise levels below which another round of weighting is useless.
@@ -54,7 +57,7 @@ pub(super) fn with_residual_noise(
     pooling: Pooling,
 ) -> Result<OutputErrorFit, EstimateError> {
     if pooling == Pooling::PerLine {
-        return Err(EstimateError::TooFewAverages { got: 1, needed: 2 });
+        return Err(SpectraError::TooFewAverages { got: 1, needed: 2 }.into());
     }
     let (white, is_rounding) = with_white_noise(data, unknowns, nominal, None)?;
     let mut beside = BesideSinusoids { data: Cow::Borrowed(data), sinusoids: Vec::new(), white };
@@ -84,7 +87,7 @@ pub(super) fn with_residual_noise(
         level,
         inflation,
         weights: uncertain_weights(data, unknowns, &fit.minimum.theta, &noise),
-        pulses: pulse_noise::excess(data, unknowns, &fit.minimum.theta, &noise),
+        pulses: pulse_covariance::excess(data, unknowns, &fit.minimum.theta, &noise),
         degrees_of_freedom: free,
         misfit_ratio: 1.0,
         deviance: None,
@@ -248,7 +251,7 @@ fn leverage(data: &FrequencyData, unknowns: &Unknowns, fit: &Weighted) -> Option
         return None;
     }
     let (independent, tau) = parts(data, &fit.fit.minimum.theta);
-    let (data, entries) = (data.with_load_of_ends(tau), entries(unknowns, independent));
+    let (data, entries) = (data.without_transient(tau), entries(unknowns, independent));
     let covariance = |row: usize| fit.noise.covariance(row).clone();
     let mut sensitivity = Whitened::of(&data, unknowns, &entries, covariance)?.sensitivity;
     for mut column in sensitivity.column_iter_mut() {

@@ -6,12 +6,12 @@ use std::borrow::Cow;
 use mechid_model::{Matrix, Parameter, SecondOrderSystem};
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use mechid_numerics::triangular::TriangularFactor;
+use mechid_spectra::transient;
+use mechid_spectra::transient::powers;
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::ends;
 use super::equation_error::weighted_equation_errors;
-use super::misfit::powers;
-use super::{FrequencyData, NoiseSpectrum};
 use crate::relations::Relations;
 use crate::{Estimate, Unknowns};
 
@@ -66,13 +66,13 @@ impl<'a> Starts<'a> {
         };
         let equations =
             (0..unknowns.dof()).map(equation).filter(|e| !e.parameters.is_empty()).collect();
-        let under = match ends::count(data) {
+        let under = match transient::len(data) {
             0 => Cow::Borrowed(data),
             _ => Cow::Owned(data.under_hann_window()),
         };
         Self {
             data: under,
-            ends: ends::count(data),
+            ends: transient::len(data),
             unknowns,
             noise,
             equations,

@@ -1,8 +1,9 @@
 //! Uncertainty of an estimate that follows from that of the smooth noise spectrum by which it is weighted.
 
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{DMatrix, DVector};
 
-use super::{FrequencyData, NoiseSpectrum, Whitened};
+use super::Whitened;
 use crate::Unknowns;
 
 /// Maximum number of sensitivities, residuals times parameters.

@@ -1,9 +1,9 @@
 //! Residuals and sensitivities in units of the noise.
 
 use mechid_model::{Parameter, SecondOrderSystem};
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::FrequencyData;
 use crate::Unknowns;
 use crate::relations::Relations;
 

@@ -5,6 +5,7 @@ use std::fmt;
 use mechid_model::{Coordinate, Power, QuadraticDamping, ResponseQuantity, Term, Terms};
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_signal::Record;
+use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::equation_error::weighted;
@@ -12,7 +13,6 @@ use super::equations::Equations;
 use super::shape::{Shape, ShapeConstants};
 use super::weighting::as_response;
 use super::{SteadyExperiments, Weighting};
-use crate::frequency_domain::{Lines, Pooling, RepeatedPeriods};
 use crate::{EstimateError, Unknowns};
 
 /// Response on lines without force, against that on lines with force.

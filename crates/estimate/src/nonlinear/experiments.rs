@@ -3,6 +3,7 @@
 use mechid_model::{ResponseQuantity, Terms};
 use mechid_numerics::check_size;
 use mechid_signal::{Record, Sampling, Spectrum};
+use mechid_spectra::{Lines, check_sampling};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
@@ -10,7 +11,6 @@ use super::ChannelPhase;
 use super::channel_phase::displacement_lines;
 use super::grid::Grid;
 use crate::EstimateError;
-use crate::frequency_domain::{Lines, check_sampling};
 
 /// Samples of the grid that nonlinear terms are evaluated on, per sample: products of up to seven
 /// lines of the record do not fold back onto it.

@@ -2,6 +2,7 @@
 
 use mechid_model::{Term, Terms};
 use mechid_numerics::least_squares::LeastSquares;
+use mechid_spectra::SpectraError;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::equation_error::{EquationErrorOptions, equation_error, weighted};
@@ -76,7 +77,7 @@ const ZERO: f64 = 0.01;
 ///
 /// # Errors
 /// As [`equation_error`](super::equation_error) for all terms together, and
-/// [`EstimateError::TooFewAverages`] to hold out one of fewer than three experiments.
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) to hold out one of fewer than three experiments.
 ///
 /// # Source
 /// Billings, *Nonlinear System Identification: NARMAX Methods* (2013), chapter 3 (forward selection
@@ -90,7 +91,7 @@ pub fn select_terms(
     weighting: Weighting,
 ) -> Result<Selection, EstimateError> {
     if criterion == Criterion::HeldOut && data.count() < 3 {
-        return Err(EstimateError::TooFewAverages { got: data.count(), needed: 3 });
+        return Err(SpectraError::TooFewAverages { got: data.count(), needed: 3 }.into());
     }
     let all = candidates.iter().try_fold(given.clone(), |all, term| all.and(term.clone()))?;
     let equations = Equations::new(data, unknowns, &all)?;

@@ -5,7 +5,6 @@ use mechid_estimate::checks::{
     delay_at_samples, delay_between_samples, delay_of_lines, kinematics, noise_on_response, power,
     quantised_channels, spiked_channels,
 };
-use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Discretisation, Response, ResponseQuantity, SecondOrderSystem};
@@ -13,6 +12,7 @@ use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{
     Extent, Multisine, NoiseLevel, Phases, Record, Sampling, Spectrum, lines, noise,
 };
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 

@@ -1,8 +1,7 @@
 //! Checks before and after a fit, predictions for validation, and sweeps.
 
 use mechid_estimate::checks::{
-    Finding, PeriodFault, Subject, Verdict, before_fit, claimed_period, cross_correlation,
-    steady_periods, whiteness, whiteness_beyond,
+    Finding, PeriodFault, Subject, Verdict, before_fit, claimed_period, steady_periods,
 };
 use mechid_estimate::time_domain::TimeDomain;
 use mechid_estimate::{Estimate, EstimateError, Unknowns, fit_percent, predict, sweep};
@@ -11,6 +10,7 @@ use mechid_problems::{
     dissertation_bearing, dissertation_sdof, exact_foh, exact_foh_periodic, exact_zoh,
     exact_zoh_periodic,
 };
+use mechid_signal::correlation::{cross_correlation, whiteness, whiteness_beyond};
 use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
 use nalgebra::DVector;
 

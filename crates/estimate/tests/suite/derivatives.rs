@@ -7,6 +7,7 @@ use mechid_estimate::time_domain::equation_of_motion;
 use mechid_estimate::{Estimate, EstimateError, Unknowns};
 use mechid_model::{InitialState, KyxSign, SecondOrderSystem};
 use mechid_problems::{dissertation_bearing, exact_harmonic, exact_harmonic_periodic};
+use mechid_signal::SignalError;
 use mechid_signal::{Multisine, Phases, Record, Sampling};
 
 /// Forces on lines 1 … 20 of a period of 40 s, the two directions on different phases.
@@ -117,7 +118,7 @@ fn impossible_windows_are_refused() {
     let short = Record::from_channel(Sampling::new(0.1, 6).unwrap(), vec![0.0; 6]).unwrap();
     assert_eq!(
         filter.differentiate(&short, 1),
-        Err(EstimateError::TooShort { samples: 6, needed: 7 })
+        Err(EstimateError::Signal(SignalError::TooShort { samples: 6, needed: 7 }))
     );
     let long = short.repeated(2).unwrap();
     assert!(matches!(filter.motion(&long), Err(EstimateError::Window { .. })));

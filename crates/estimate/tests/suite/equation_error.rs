@@ -1,14 +1,17 @@
 //! Least squares in the frequency domain on exact steady states.
 
-use crate::common::{
-    bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
-};
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error};
+use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_numerics::NumericsError;
 use mechid_signal::{Record, Spectrum};
+use mechid_spectra::SpectraError;
+use mechid_spectra::{FrequencyData, Lines};
 use nalgebra::{Complex, DMatrix, dmatrix};
+
+use crate::common::{
+    bearing, displacements, forces, oscillator, relative_error, sampling, synthesise,
+};
 
 /// Five masses in a chain with a follower force: nothing symmetric, all modes stable.
 fn chain() -> SecondOrderSystem {
@@ -157,8 +160,8 @@ fn bad_data_are_refused_with_their_numbers() {
         )
     };
     let unknown = Unknowns::unknown_mass(1).unwrap();
-    assert_eq!(read(&[]), Err(EstimateError::NoExcitedLine));
-    assert_eq!(read(&[1, 128]), Err(EstimateError::LineOutOfRange { line: 128, last: 127 }));
+    assert_eq!(read(&[]), Err(SpectraError::NoExcitedLine));
+    assert_eq!(read(&[1, 128]), Err(SpectraError::LineOutOfRange { line: 128, last: 127 }));
     let e = equation_error(&read(&[5]).unwrap(), &unknown).unwrap_err();
     assert_eq!(e, EstimateError::Numerics(NumericsError::TooFewRows { rows: 2, unknowns: 3 }));
 
@@ -166,28 +169,28 @@ fn bad_data_are_refused_with_their_numbers() {
     let unforced =
         FrequencyData::from_records(&still, &motion, ResponseQuantity::Displacement, 1..=20)
             .unwrap();
-    assert_eq!(equation_error(&unforced, &unknown), Err(EstimateError::NoExcitedLine));
+    assert_eq!(equation_error(&unforced, &unknown), Err(SpectraError::NoExcitedLine.into()));
 
     let two = Record::from_channels(force.sampling(), &[force.channel(0), force.channel(0)]);
     let e =
         FrequencyData::from_records(&force, &two.unwrap(), ResponseQuantity::Displacement, 1..=20);
     assert!(matches!(
         e,
-        Err(EstimateError::Numerics(NumericsError::Size { expected: 1, got: 2, .. }))
+        Err(SpectraError::Numerics(NumericsError::Size { expected: 1, got: 2, .. }))
     ));
 
     let other = motion.window(0, 255).unwrap();
     let e = FrequencyData::from_records(&force, &other, ResponseQuantity::Displacement, 1..=20);
-    assert!(matches!(e, Err(EstimateError::Signal(_))));
+    assert!(matches!(e, Err(SpectraError::Signal(_))));
 
     let one = dmatrix![Complex::new(1.0, 0.0)];
     let nan = dmatrix![Complex::new(f64::NAN, 0.0)];
     let make = |w: f64, x: &DMatrix<Complex<f64>>| {
         FrequencyData::from_amplitudes(vec![w], one.clone(), x.clone(), ResponseQuantity::Velocity)
     };
-    assert_eq!(make(0.0, &one), Err(EstimateError::Frequency { value: 0.0 }));
+    assert_eq!(make(0.0, &one), Err(SpectraError::Frequency { value: 0.0 }));
     assert!(matches!(
         make(1.0, &nan),
-        Err(EstimateError::Numerics(NumericsError::NotFinite { row: 0, column: 0, .. }))
+        Err(SpectraError::Numerics(NumericsError::NotFinite { row: 0, column: 0, .. }))
     ));
 }

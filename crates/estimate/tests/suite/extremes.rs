@@ -1,10 +1,11 @@
 //! Values and sizes beyond anything measured: an error that names the cause, or the right number.
 
-use mechid_estimate::checks::{cross_correlation, whiteness};
 use mechid_estimate::derivatives::SavitzkyGolay;
 use mechid_estimate::{EquationOfMotion, EstimateError, Unknowns};
 use mechid_numerics::NumericsError;
 use mechid_numerics::least_squares::LeastSquares;
+use mechid_signal::SignalError;
+use mechid_signal::correlation::{cross_correlation, whiteness};
 use nalgebra::DMatrix;
 
 fn noise(seed: usize) -> Vec<f64> {
@@ -30,10 +31,7 @@ fn correlations_do_not_depend_on_the_unit() {
     }
     let mut broken = e;
     broken[7] = f64::NAN;
-    assert!(matches!(
-        whiteness(&broken, 20),
-        Err(EstimateError::Numerics(NumericsError::NotFinite { row: 7, .. }))
-    ));
+    assert!(matches!(whiteness(&broken, 20), Err(SignalError::NotFinite { sample: 7, .. })));
 }
 
 /// m ẍ + c ẋ + k x = F at random instants, each quantity in a unit of its own.

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::{EstimateError, FreeDecay, FreeDecayEstimate, free_decay};
+use mechid_signal::SignalError;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
 
 use crate::decay::{Case, found_in_noise};
@@ -148,7 +149,7 @@ fn what_is_no_free_decay_is_told() {
     let silent = found(sampling, &[fine.clone(), vec![2.0; 500]]);
     assert_eq!(silent, Err(EstimateError::SilentChannel { channel: 1, value: 2.0 }));
     let short = Sampling::new(1e-2, 8).unwrap();
-    let few = EstimateError::TooShort { samples: 8, needed: 13 };
+    let few = EstimateError::Signal(SignalError::TooShort { samples: 8, needed: 13 });
     assert_eq!(found(short, &[fine[..8].to_vec()]), Err(few));
     let white = noise::white(sampling, 1, 1.0, 7).unwrap();
     let nothing = free_decay(&white, &FreeDecay::default());

@@ -1,14 +1,14 @@
 //! What must not matter: units, the order of the degrees of freedom, the direction of the axes,
 //! a second copy of the data.
 
-use crate::common::{bearing, displacements, forces};
-use mechid_estimate::frequency_domain::{
-    FrequencyData, NoiseSpectrum, equation_error, instrumental_variables, output_error,
-};
+use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::ResponseQuantity;
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, dmatrix};
 use proptest::prelude::*;
+
+use crate::common::{bearing, displacements, forces};
 
 const LINES: usize = 40;
 

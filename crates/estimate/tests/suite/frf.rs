@@ -1,16 +1,18 @@
 //! Frequency response functions: against the closed-form receptance, and what noise does to them.
 
-use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
-use mechid_estimate::frequency_domain::{Lines, equation_error, output_error};
-use mechid_estimate::{
-    EstimateError, Frf, FrfAverage, FrfEstimator, Segments, Unknowns, Window,
-    output_error_of_responses,
-};
+use mechid_estimate::frequency_domain::{equation_error, output_error};
+use mechid_estimate::{Unknowns, output_error_of_responses};
 use mechid_model::ResponseQuantity;
 use mechid_numerics::NumericsError;
 use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::Window;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::Lines;
+use mechid_spectra::SpectraError;
+use mechid_spectra::frf::{Frf, FrfAverage, FrfEstimator, Segments};
 use nalgebra::{Complex, DMatrix};
+
+use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 
 const ALL: [FrfEstimator; 3] = [FrfEstimator::H1, FrfEstimator::H2, FrfEstimator::Hv];
 
@@ -205,7 +207,7 @@ fn weights_by_coherence_leave_less_error() {
         )
         .unwrap();
         let data = frf.data(&[0]).unwrap();
-        let bare = mechid_estimate::frequency_domain::FrequencyData::from_amplitudes(
+        let bare = mechid_spectra::FrequencyData::from_amplitudes(
             data.omega().to_vec(),
             data.force().clone(),
             data.displacement().clone(),
@@ -257,7 +259,7 @@ fn windows_and_overlap_are_the_callers() {
     assert!(hann < 0.1 && none > 2.0 * hann, "{hann} {none}");
     assert!(worst(Window::Hamming) < none && worst(Window::Blackman) < none);
     for hop in [0, 257] {
-        assert_eq!(frf(hop, Window::Hann), Err(EstimateError::Hop { len: 256, hop }));
+        assert_eq!(frf(hop, Window::Hann), Err(SpectraError::Hop { len: 256, hop }));
     }
 }
 
@@ -329,36 +331,36 @@ fn what_cannot_be_estimated_is_refused() {
     let short = |r: &Record| r.window(0, 256).unwrap();
     assert_eq!(
         estimate(&short(&force), &short(&motion), line, FrfEstimator::H1),
-        Err(EstimateError::TooFewAverages { got: 2, needed: 3 })
+        Err(SpectraError::TooFewAverages { got: 2, needed: 3 })
     );
     let same =
         Record::from_channels(force.sampling(), &[force.channel(0), force.channel(0)]).unwrap();
     assert!(matches!(
         estimate(&same, &motion, line, FrfEstimator::H1),
-        Err(EstimateError::DependentForces { .. })
+        Err(SpectraError::DependentForces { .. })
     ));
     let zero = Record::from_channel(force.sampling(), vec![0.0; force.len()]).unwrap();
     assert!(matches!(
         estimate(&zero, &motion, line, FrfEstimator::H1),
-        Err(EstimateError::DependentForces { reciprocal_condition: 0.0, .. })
+        Err(SpectraError::DependentForces { reciprocal_condition: 0.0, .. })
     ));
     let one = Record::from_channel(motion.sampling(), motion.channel(0).to_vec()).unwrap();
     assert!(matches!(
         estimate(&force, &one, line, FrfEstimator::H2),
-        Err(EstimateError::Numerics(NumericsError::Size { expected: 2, got: 1, .. }))
+        Err(SpectraError::Numerics(NumericsError::Size { expected: 2, got: 1, .. }))
     ));
     assert!(matches!(
         estimate(&force, &motion, 64, FrfEstimator::H1),
-        Err(EstimateError::LineOutOfRange { line: 64, last: 63 })
+        Err(SpectraError::LineOutOfRange { line: 64, last: 63 })
     ));
     let frf = estimate(&force, &motion, line, FrfEstimator::H1).unwrap();
     assert!(matches!(
         frf.data(&[0]),
-        Err(EstimateError::Numerics(NumericsError::Size { expected: 2, got: 1, .. }))
+        Err(SpectraError::Numerics(NumericsError::Size { expected: 2, got: 1, .. }))
     ));
     assert!(matches!(
         frf.data(&[0, 2]),
-        Err(EstimateError::Numerics(NumericsError::Size { expected: 1, got: 2, .. }))
+        Err(SpectraError::Numerics(NumericsError::Size { expected: 1, got: 2, .. }))
     ));
     let coherence = |value| {
         let response = vec![DMatrix::from_element(1, 1, Complex::from(1.0))];
@@ -367,7 +369,7 @@ fn what_cannot_be_estimated_is_refused() {
     };
     assert!(coherence(1.0).is_ok());
     for value in [0.0, 1.1] {
-        assert_eq!(coherence(value), Err(EstimateError::Coherence { value }));
+        assert_eq!(coherence(value), Err(SpectraError::Coherence { value }));
     }
 }
 
@@ -405,7 +407,7 @@ fn segments_may_come_a_few_at_a_time() {
         FrfAverage::new(lines, [2, 2], ResponseQuantity::Displacement, Segments::hann(128));
     assert!(matches!(
         average,
-        Err(EstimateError::Numerics(NumericsError::Size { expected: 128, got: 1152, .. }))
+        Err(SpectraError::Numerics(NumericsError::Size { expected: 128, got: 1152, .. }))
     ));
 }
 

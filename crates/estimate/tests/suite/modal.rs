@@ -1,14 +1,16 @@
 //! Modes of identified matrices: a published case, derivatives, and intervals that hold.
 
-use crate::common::monte_carlo::{Estimator, Experiment};
-use crate::common::{bearing, displacements, forces, oscillator};
 use mechid_estimate::checks::{Finding, Verdict, instability};
-use mechid_estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{Estimate, Unknowns, identified_modes};
 use mechid_model::{Matrix, Mode, Parameter, ResponseQuantity, SecondOrderSystem, UncertainSystem};
 use mechid_problems::steffen_rade;
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 use rayon::prelude::*;
+
+use crate::common::monte_carlo::{Estimator, Experiment};
+use crate::common::{bearing, displacements, forces, oscillator};
 
 /// Equation-error estimate of all entries from a steady state with the displacement off by `noise`.
 fn identified(system: &SecondOrderSystem, noise: f64) -> Estimate {

@@ -1,16 +1,18 @@
 //! Noise spectra from repeated periods, and what maximum likelihood makes of them.
 
-use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseSpectrum, OutputErrorFit, Pooling, RepeatedPeriods, equation_error,
-    instrumental_variables, output_error,
+    OutputErrorFit, equation_error, instrumental_variables, output_error,
 };
 use mechid_estimate::{EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_numerics::NumericsError;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::SpectraError;
+use mechid_spectra::{FrequencyData, Lines, NoiseSpectrum, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
+
+use crate::common::{bearing, displacements, forces, oscillator, relative_error, synthesise};
 
 /// Records of `periods` periods of a steady state, the motion in the quantity asked for.
 struct Setup {
@@ -263,7 +265,7 @@ fn noise_that_cannot_weigh_is_refused() {
     let data = periods.mean_with_noise(Pooling::PerLine).unwrap();
     assert!(matches!(
         output_error(&data, &unknowns),
-        Err(EstimateError::TooFewAverages { got: 3, needed: 5 })
+        Err(EstimateError::Spectra(SpectraError::TooFewAverages { got: 3, needed: 5 }))
     ));
     let one = RepeatedPeriods::new(
         &setup.lines,
@@ -272,7 +274,7 @@ fn noise_that_cannot_weigh_is_refused() {
         ResponseQuantity::Displacement,
     )
     .unwrap();
-    let refused = EstimateError::TooFewAverages { got: 1, needed: 2 };
+    let refused = SpectraError::TooFewAverages { got: 1, needed: 2 };
     assert_eq!(one.noise(Pooling::AllLines), Err(refused.clone()));
     assert_eq!(one.halves().unwrap_err(), refused);
 
@@ -283,11 +285,11 @@ fn noise_that_cannot_weigh_is_refused() {
 
     let other = NoiseSpectrum::new(vec![1.0; 40], vec![DMatrix::identity(4, 4); 40]).unwrap();
     let e = mean.with_noise(other).unwrap_err();
-    assert!(matches!(e, EstimateError::FrequencyMismatch { row: 0, right: 1.0, .. }));
+    assert!(matches!(e, SpectraError::FrequencyMismatch { row: 0, right: 1.0, .. }));
     let mut negative = DMatrix::<Complex<f64>>::identity(2, 2);
     negative[(1, 1)] = Complex::from(-1.0);
     let e = NoiseSpectrum::new(vec![1.0], vec![negative]).unwrap_err();
-    assert_eq!(e, EstimateError::NoiseVariance { row: 0, column: 1, value: -1.0 });
+    assert_eq!(e, SpectraError::NoiseVariance { row: 0, column: 1, value: -1.0 });
 
     // Instruments belong to the same lines.
     let short = FrequencyData::from_amplitudes(
@@ -345,12 +347,12 @@ fn periods_may_come_a_few_at_a_time() {
 fn halves_need_all_periods_that_were_expected() {
     let setup = setup(&oscillator(), 4, ResponseQuantity::Displacement);
     let mut periods = RepeatedPeriods::expecting(&setup.lines, 1, setup.measured, 6);
-    assert_eq!(periods.mean().unwrap_err(), EstimateError::TooFewAverages { got: 0, needed: 1 });
+    assert_eq!(periods.mean().unwrap_err(), SpectraError::TooFewAverages { got: 0, needed: 1 });
     periods.push(&setup.force, &setup.motion).unwrap();
-    let missing = EstimateError::TooFewAverages { got: 4, needed: 6 };
+    let missing = SpectraError::TooFewAverages { got: 4, needed: 6 };
     assert_eq!(periods.halves().unwrap_err(), missing);
     periods.push(&setup.force, &setup.motion).unwrap();
     assert!(periods.halves().is_ok());
     let short = setup.force.window(0, 100).unwrap();
-    assert!(matches!(periods.push(&short, &short), Err(EstimateError::Signal(_))));
+    assert!(matches!(periods.push(&short, &short), Err(SpectraError::Signal(_))));
 }

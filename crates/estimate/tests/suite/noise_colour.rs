@@ -4,13 +4,12 @@ use std::f64::consts::TAU;
 
 use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{Verdict, after_spectral_fit};
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods, output_error,
-    output_error_pooling,
-};
+use mechid_estimate::frequency_domain::{output_error, output_error_pooling};
 use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Extent, Multisine, Phases, Record, Sampling, noise};
+use mechid_spectra::SpectraError;
+use mechid_spectra::{FrequencyData, Lines, NoiseModel, NoiseSpectrum, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
 
@@ -219,8 +218,8 @@ fn single_samples_of_a_line_make_no_spectrum() {
     let one = Rig::new(1).measure(white, 1).mean().unwrap();
     let unknowns = Unknowns::unknown_mass(1).unwrap();
     let refused = output_error_pooling(&one, &unknowns, Pooling::PerLine).unwrap_err();
-    let expected = mechid_estimate::EstimateError::TooFewAverages { got: 1, needed: 2 };
-    assert_eq!(refused, expected);
+    let expected = SpectraError::TooFewAverages { got: 1, needed: 2 };
+    assert_eq!(refused, expected.into());
 }
 
 #[test]

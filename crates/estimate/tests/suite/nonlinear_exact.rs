@@ -1,7 +1,6 @@
 //! Nonlinear systems whose force is known in closed form: the displacement is prescribed, and the
 //! force that it takes computed from it.
 
-use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, ShapeConstants, SteadyExperiments,
     SteppedRecord, Weighting, distortion, equation_error, fitted_start, output_error, predict,
@@ -13,6 +12,8 @@ use mechid_model::{
 };
 use mechid_numerics::NumericsError;
 use mechid_signal::{Extent, Record, Sampling, Spectrum};
+use mechid_spectra::Lines;
+use mechid_spectra::SpectraError;
 use nalgebra::{Complex, DMatrix, dmatrix};
 
 use crate::common::stepped::random_phases;
@@ -311,7 +312,7 @@ fn the_right_terms_are_chosen_and_named() {
     assert!(found.refused.is_some());
     assert_eq!(
         select(Criterion::HeldOut),
-        Err(EstimateError::TooFewAverages { got: 1, needed: 3 })
+        Err(SpectraError::TooFewAverages { got: 1, needed: 3 }.into())
     );
 
     let lines = Lines::new(sampling(), 1..=250).unwrap();

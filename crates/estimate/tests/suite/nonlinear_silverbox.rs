@@ -1,7 +1,6 @@
 //! A measured spring that hardens: what nonlinear terms explain, and how honest their errors are.
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, NonlinearEstimate, ShapeConstants,
     SteadyExperiments, SteppedRecord, Weighting, distortion, equation_error, output_error, predict,
@@ -9,6 +8,7 @@ use mechid_estimate::nonlinear::{
 };
 use mechid_model::{InitialState, NonlinearSystem, ResponseQuantity, Terms};
 use mechid_signal::{Extent, Record};
+use mechid_spectra::Lines;
 
 use crate::common::silverbox::{REALISATION, part, realisations, schroeder, start_of};
 

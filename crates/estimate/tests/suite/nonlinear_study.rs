@@ -3,13 +3,13 @@
 //! `MECHID_RUNS=1000` repeats the studies with as many runs; the suite takes fewer.
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::Lines;
 use mechid_estimate::nonlinear::{
     Criterion, EquationErrorOptions, NonlinearEstimate, SteadyExperiments, SteppedRecord,
     Weighting, distortion, equation_error, output_error, select_terms,
 };
 use mechid_model::{Matrix, ResponseQuantity, Terms};
 use mechid_signal::{Extent, NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::Lines;
 use rayon::prelude::*;
 
 use crate::common::stepped::{random_phases, steady};

@@ -1,12 +1,14 @@
 //! Noise on the samples of a hit: does the covariance know that its lines err together?
 
-use crate::common::oscillator;
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, Pooling, output_error_pooling};
+use mechid_estimate::frequency_domain::output_error_pooling;
 use mechid_model::ResponseQuantity;
 use mechid_signal::{Record, Sampling, noise};
+use mechid_spectra::{FrequencyData, Lines, Pooling};
 use nalgebra::{Complex, DMatrix};
 use rayon::prelude::*;
+
+use crate::common::oscillator;
 
 const SAMPLES: usize = 1024;
 const PULSE: std::ops::Range<usize> = 20..32;

@@ -1,12 +1,11 @@
 //! Symmetric matrices, chains and proportional damping: fewer unknowns than entries.
 
 use mechid_estimate::checks::{Finding, delay_of_lines};
-use mechid_estimate::frequency_domain::{
-    FrequencyData, NoiseSpectrum, equation_error, instrumental_variables, output_error,
-};
+use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{Sampling, noise};
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector, dmatrix};
 
 /// Damping factors α (1/s) and β (s).

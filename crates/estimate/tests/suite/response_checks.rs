@@ -1,19 +1,23 @@
 //! How often the checks after a fit of frequency responses and of spectra are right.
 
-use crate::common::oscillator;
+use mechid_estimate::Unknowns;
 use mechid_estimate::checks::{
     Finding, Subject, Verdict, after_response_fit, after_spectral_fit, linearity,
 };
-use mechid_estimate::frequency_domain::{Lines, Pooling, RepeatedPeriods, output_error};
-use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns, Window};
+use mechid_estimate::frequency_domain::output_error;
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
+use mechid_signal::Window;
 use mechid_signal::resample::refine;
 use mechid_signal::{
     Extent, Interpolation, Multisine, NoiseLevel, Phases, Record, Sampling, noise,
 };
+use mechid_spectra::frf::{Frf, FrfEstimator, Segments};
+use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+
+use crate::common::oscillator;
 
 /// Of misfit, of whiteness from line to line and of linearity, true for good.
 fn verdicts(checks: &[Finding]) -> [bool; 3] {

@@ -1,17 +1,18 @@
 //! Whether the search by maximum likelihood finds the best minimum, and where it starts when most lines
 //! are nothing but noise.
 
-use crate::common::{oscillator, relative_error};
-use mechid_estimate::frequency_domain::{
-    FrequencyData, Lines, Pooling, RepeatedPeriods, output_error, output_error_near,
-};
-use mechid_estimate::{Frf, FrfEstimator, Segments, Unknowns};
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::{output_error, output_error_near};
 use mechid_model::ResponseQuantity;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Test, repeated, series};
 use mechid_signal::excitation::Random;
 use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+use mechid_spectra::frf::{Frf, FrfEstimator, Segments};
+use mechid_spectra::{FrequencyData, Lines, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix};
+
+use crate::common::{oscillator, relative_error};
 
 /// Accelerances of which the upper half is nothing but noise, as above the band of a random
 /// excitation: by the coherence they weigh next to nothing, in the start of the search as in its end.

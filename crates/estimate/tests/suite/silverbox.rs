@@ -4,11 +4,13 @@
 //! system identification", ECC 2013. The data stand beside the project, not in it; without
 //! them this test says so and passes.
 
-use crate::common::silverbox::schroeder;
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, equation_error, output_error};
+use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
+use mechid_spectra::{FrequencyData, Lines};
+
+use crate::common::silverbox::schroeder;
 
 #[test]
 fn the_measured_oscillator_has_its_known_frequency_and_damping() {

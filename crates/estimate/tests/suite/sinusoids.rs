@@ -3,11 +3,12 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, OutputErrorFit, output_error};
+use mechid_estimate::frequency_domain::{OutputErrorFit, output_error};
 use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};
 use mechid_signal::noise::{self, Colour};
 use mechid_signal::{NoiseLevel, Record, Sampling, lines};
+use mechid_spectra::FrequencyData;
 use nalgebra::dmatrix;
 use rayon::prelude::*;
 

@@ -4,14 +4,16 @@ use mechid_estimate::checks::{
     self, Finding, Subject, Verdict, after_fit, before_equation_of_motion, before_spectral_fit,
     fitted_band, steady_periods,
 };
-use mechid_estimate::frequency_domain::{FrequencyData, Lines, RepeatedPeriods, equation_error};
+use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{
-    EstimateError, Frf, StartFit, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
+    EstimateError, StartFit, Unknowns, fit_percent, fitted_start, predict, predict_periodic,
 };
 use mechid_model::{Discretisation, InitialState, KyxSign, ResponseQuantity, SecondOrderSystem};
 use mechid_numerics::NumericsError;
 use mechid_problems::{dissertation_bearing, exact_foh, exact_harmonic_periodic};
 use mechid_signal::{Extent, Multisine, NoiseLevel, Phases, Record, Sampling, noise};
+use mechid_spectra::frf::Frf;
+use mechid_spectra::{FrequencyData, Lines, RepeatedPeriods};
 use nalgebra::{DMatrix, DVector};
 
 fn bearing() -> SecondOrderSystem {

@@ -22,9 +22,9 @@ use mechid_analysis::{
     AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
     Inspected, Machine, Reconstructed, SweepSummary,
 };
-use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
+use mechid_spectra::FrequencyData;
 
 use self::receptance::Names;
 pub use self::style::{FigureStyle, FrequencyScale, MagnitudeScale, PhaseStyle};

@@ -2,11 +2,11 @@
 
 use mechid_analysis::identify::ResponseCoherence;
 use mechid_analysis::review::receptance::ActingAlone;
-use mechid_estimate::frequency_domain::FrequencyData;
 use mechid_model::SecondOrderSystem;
 use mechid_numerics::linear_algebra::singular_values;
 use mechid_plot::charts::Quantity;
 use mechid_plot::{Axis, Curve, Figure, Panel};
+use mechid_spectra::FrequencyData;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::style::{FigureStyle, FrequencyScale, MagnitudeScale};

@@ -1,10 +1,11 @@
 //! Simulations and estimates that no printed table asks for.
 
 use mechid::estimate::Unknowns;
-use mechid::estimate::frequency_domain::{FrequencyData, equation_error};
+use mechid::estimate::frequency_domain::equation_error;
 use mechid::force::{continuous, discretised, discretised_by_taylor, spectrum_ratio};
 use mechid::model::{Discretisation, ResponseQuantity, SecondOrderSystem};
 use mechid::signal::{Extent, Spectrum};
+use mechid::spectra::FrequencyData;
 use nalgebra::DMatrix;
 
 use super::super::case::{Case, Machine};
@@ -75,7 +76,6 @@ pub fn errors(
 /// # Errors
 /// The estimator's own words.
 pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, String> {
-    let words = |e: mechid::estimate::EstimateError| e.to_string();
     let machine = sequences.machine;
     let displacement = sequences.response.displacement();
     let lines = 1..last + 1;
@@ -85,9 +85,10 @@ pub fn frequency_up_to(sequences: &Sequences, last: usize) -> Result<Vec<f64>, S
         ResponseQuantity::Displacement,
         lines,
     )
-    .map_err(words)?;
-    let unknowns = Unknowns::known_mass(machine.system().mass()).map_err(words)?;
-    let found = equation_error(&data, &unknowns).map_err(words)?;
+    .map_err(|error| error.to_string())?;
+    let unknowns =
+        Unknowns::known_mass(machine.system().mass()).map_err(|error| error.to_string())?;
+    let found = equation_error(&data, &unknowns).map_err(|error| error.to_string())?;
     Ok(percent(&machine.listed(&found.stiffness(), &found.damping()), machine))
 }
 

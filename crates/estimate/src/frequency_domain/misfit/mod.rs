@@ -4,15 +4,14 @@ mod row;
 #[cfg(test)]
 mod tests;
 
-use mechid_model::Matrix;
 use mechid_numerics::cholesky::Cholesky;
 use mechid_signal::{Sampling, noise};
+use mechid_spectra::transient::{self, TransientLoad, powers};
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::ends::{self, Ends};
 use super::normal_equations::{Coordinates, Factors, Layout, NormalEquations};
 use super::search::SumOfSquares;
-use super::{FrequencyData, NoiseSpectrum};
 use crate::relations::Relations;
 use crate::{EstimateError, Unknowns};
 use row::Row;
@@ -83,7 +82,7 @@ impl<'a> Misfit<'a> {
             data,
             unknowns,
             relations: Relations::of(unknowns),
-            layout: Layout::new(unknowns, data.ends().ncols()),
+            layout: Layout::new(unknowns, data.transient().ncols()),
             noise,
             force: data.force().transpose(),
             displacement: data.displacement().transpose(),
@@ -133,7 +132,7 @@ impl<'a> Misfit<'a> {
     /// the entries are related.
     fn tangent(&self) -> Option<DMatrix<f64>> {
         let relations = self.relations.as_ref()?;
-        let ends = ends::count(self.data);
+        let ends = transient::len(self.data);
         let tangent = relations.tangent(self.at.rows(0, self.at.len() - ends).as_slice());
         let (entries, unknowns) = tangent.shape();
         let mut all = tangent.resize(entries + ends, unknowns + ends, 0.0);
@@ -142,16 +141,16 @@ impl<'a> Misfit<'a> {
     }
 
     fn evaluate(&mut self, theta: &DVector<f64>) -> Option<f64> {
-        let (unknowns, tau) = theta.as_slice().split_at(theta.len() - ends::count(self.data));
+        let (unknowns, tau) = theta.as_slice().split_at(theta.len() - transient::len(self.data));
         let matrices = match &self.relations {
             None => self.unknowns.assemble(unknowns),
             Some(relations) => self.unknowns.assemble(relations.entries(unknowns).as_slice()),
         };
         if !tau.is_empty() {
-            let ends = Ends::new(self.data, tau);
+            let ends = TransientLoad::new(self.data, tau);
             for (at, mut force) in self.force.column_iter_mut().enumerate() {
                 force.iter_mut().zip(self.data.force().row(at).iter()).for_each(|(to, f)| *to = *f);
-                ends.take_off(at, force.as_mut_slice());
+                ends.subtract(at, force.as_mut_slice());
             }
         }
         let mut cost = 0.0;
@@ -186,7 +185,7 @@ impl<'a> Misfit<'a> {
             for (to, (matrix, column)) in columns.iter().enumerate() {
                 let x = match column.checked_sub(n) {
                     None => displacement(at, *column),
-                    Some(column) => self.data.ends()[(at, column)],
+                    Some(column) => self.data.transient()[(at, column)],
                 };
                 let z = powers[*matrix as usize] * x;
                 (regressors[(to, at)], regressors[(to, lines + at)]) = (z.re, z.im);
@@ -263,11 +262,11 @@ impl SumOfSquares for Misfit<'_> {
             None => step.clone(),
             Some(tangent) => tangent * step,
         };
-        let (entries, tau) = step.as_slice().split_at(step.len() - ends::count(self.data));
+        let (entries, tau) = step.as_slice().split_at(step.len() - transient::len(self.data));
         let zero = self.unknowns.assemble(&vec![0.0; entries.len()]);
         let moved = self.unknowns.assemble(entries);
         let [m, c, k] = [0, 1, 2].map(|at| &moved[at] - &zero[at]);
-        let ends = Ends::new(self.data, tau);
+        let ends = TransientLoad::new(self.data, tau);
         let mut residuals = DMatrix::zeros(2 * self.rows.len(), self.data.dof());
         for (at, row) in self.rows.iter().enumerate() {
             let omega = self.data.omega()[at];
@@ -280,14 +279,6 @@ impl SumOfSquares for Misfit<'_> {
         }
         coordinates.project(&self.regressors, &residuals)
     }
-}
-
-/// s², s and 1 with s = iω, in the order of the matrices.
-pub(super) fn powers(omega: f64) -> [Complex<f64>; 3] {
-    let mut powers = [Complex::from(1.0); 3];
-    powers[Matrix::Mass as usize] = Complex::from(-omega * omega);
-    powers[Matrix::Damping as usize] = Complex::new(0.0, omega);
-    powers
 }
 
 /// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.

@@ -1,6 +1,6 @@
 //! Derivatives against differences, and the likelihood against its definition.
 
-use mechid_model::ResponseQuantity;
+use mechid_model::{Matrix, ResponseQuantity};
 use mechid_numerics::linear_algebra::singular_values;
 use nalgebra::dmatrix;
 

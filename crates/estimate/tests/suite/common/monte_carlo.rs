@@ -1,11 +1,10 @@
 //! Repeated experiments with seeded noise, and the bound no unbiased estimator can beat.
 
-use mechid_estimate::frequency_domain::{
-    Lines, Pooling, RepeatedPeriods, equation_error, instrumental_variables, output_error,
-};
+use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::{NoiseLevel, Record, noise};
+use mechid_spectra::{Lines, Pooling, RepeatedPeriods};
 use nalgebra::{Complex, DMatrix, DVector};
 use rayon::prelude::*;
 

@@ -5,8 +5,8 @@ use mechid_numerics::NumericsError;
 use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
-use crate::EstimateError;
-use crate::pooling::{NoiseModel, Pooled, Pooling, pooled};
+use crate::SpectraError;
+use crate::noise::pooling::{NoiseModel, Pooled, Pooling, pooled};
 
 /// Covariance of the measured displacement and force amplitudes, one matrix per row of data.
 ///
@@ -26,11 +26,11 @@ pub struct NoiseSpectrum {
 
 /// Functions that the log powers of an experiment were fitted with.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SmoothPart {
+pub struct SmoothPart {
     /// Orthonormal columns, rows × terms.
-    pub(crate) basis: DMatrix<f64>,
+    pub basis: DMatrix<f64>,
     /// Complex deviations that each sample covariance was made of.
-    pub(crate) nu: f64,
+    pub nu: f64,
 }
 
 impl NoiseSpectrum {
@@ -39,11 +39,11 @@ impl NoiseSpectrum {
     /// # Errors
     /// [`NumericsError::Size`] if there is not one matrix per frequency,
     /// [`NumericsError::Size`] if they are not square of one even size,
-    /// [`EstimateError::NoiseVariance`] if a variance is negative or not finite.
+    /// [`SpectraError::NoiseVariance`] if a variance is negative or not finite.
     pub fn new(
         omega: Vec<f64>,
         covariance: Vec<DMatrix<Complex<f64>>>,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         if covariance.len() != omega.len() || omega.is_empty() {
             let (got, expected) = (covariance.len(), omega.len().max(1));
             return Err(NumericsError::Size { what: "noise covariances", got, expected }.into());
@@ -62,7 +62,7 @@ impl NoiseSpectrum {
             let bad = |v: &Complex<f64>| !(v.re >= 0.0 && v.re.is_finite());
             if let Some(column) = c.diagonal().iter().position(bad) {
                 let value = c[(column, column)].re;
-                return Err(EstimateError::NoiseVariance { row, column, value });
+                return Err(SpectraError::NoiseVariance { row, column, value });
             }
         }
         let known = f64::INFINITY;
@@ -92,7 +92,7 @@ impl NoiseSpectrum {
         measured: ResponseQuantity,
         motion_deviation: &[f64],
         force_deviation: &[f64],
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let diagonal: Vec<_> = motion_deviation
             .iter()
             .chain(force_deviation)
@@ -107,14 +107,14 @@ impl NoiseSpectrum {
 
     /// Makes the spectrum from sample covariances of the quantity measured, each of `degrees_of_freedom`; it may
     /// be smooth over the `relative` powers of the channels (rows × 2n) instead of being smooth itself.
-    pub(crate) fn of_measured(
+    pub fn of_measured(
         omega: &[f64],
         covariance: Vec<DMatrix<Complex<f64>>>,
         measured: ResponseQuantity,
         degrees_of_freedom: usize,
         pooling: Pooling,
         relative: Option<&DMatrix<f64>>,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let Pooled { mut covariance, model, freedom, basis } =
             pooled(omega, covariance, degrees_of_freedom as f64, pooling, relative);
         to_displacement(omega, &mut covariance, measured);
@@ -130,7 +130,7 @@ impl NoiseSpectrum {
 
     /// The same noise and beside it white noise of these variances on the samples of each channel, 2n: motions in
     /// the square of the unit measured, forces in N².
-    pub(crate) fn with_more(
+    pub fn with_more(
         mut self,
         variance: &[f64],
         measured: ResponseQuantity,
@@ -159,7 +159,7 @@ impl NoiseSpectrum {
     }
 
     /// The same noise with these variances of the forces, rows × n, in N², independent of all others.
-    pub(crate) fn with_force_variance(mut self, variance: &DMatrix<f64>) -> Self {
+    pub fn with_force_variance(mut self, variance: &DMatrix<f64>) -> Self {
         let n = self.dof();
         for (c, variance) in self.covariance.iter_mut().zip(variance.row_iter()) {
             for (channel, variance) in variance.iter().enumerate() {
@@ -170,7 +170,7 @@ impl NoiseSpectrum {
     }
 
     /// The noise of data whose force is `delay` seconds later.
-    pub(crate) fn with_later_force(&self, delay: f64) -> Self {
+    pub fn with_later_force(&self, delay: f64) -> Self {
         let mut later = self.clone();
         for (c, omega) in later.covariance.iter_mut().zip(&self.omega) {
             let (n, turn) = (c.nrows() / 2, Complex::cis(-omega * delay));
@@ -211,14 +211,14 @@ impl NoiseSpectrum {
 
     /// Returns the functions that the log powers were fitted with, experiment by experiment; `None` unless each
     /// of them is smooth or white, and at least one is not white.
-    pub(crate) fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
+    pub fn smooth_parts(&self) -> Option<Vec<&SmoothPart>> {
         let parts: Option<Vec<&SmoothPart>> = self.parts.iter().map(Option::as_ref).collect();
         parts.filter(|parts| parts.iter().any(|part| part.basis.ncols() > 1))
     }
 
     /// Returns the number of covariances independent of one another; infinite or undefined for known
     /// noise.
-    pub(crate) fn groups(&self) -> f64 {
+    pub fn groups(&self) -> f64 {
         self.total_degrees_of_freedom / self.degrees_of_freedom
     }
 
@@ -230,19 +230,19 @@ impl NoiseSpectrum {
 
     /// Degrees of freedom of a variance averaged over all rows, for Student's t; known noise
     /// has as many as make it the normal distribution.
-    pub(crate) fn total_degrees_of_freedom(&self) -> usize {
+    pub fn total_degrees_of_freedom(&self) -> usize {
         // Real and imaginary deviations both count.
         (2.0 * self.total_degrees_of_freedom).min(1e6) as usize
     }
 
     /// E[Ŝ⁻¹] S of a sample covariance Ŝ of `channels` channels: ν/(ν − n).
-    pub(crate) fn mean_inverse_ratio(&self, channels: usize) -> f64 {
+    pub fn mean_inverse_ratio(&self, channels: usize) -> f64 {
         let nu = self.degrees_of_freedom;
         if nu.is_infinite() { 1.0 } else { nu / (nu - channels as f64) }
     }
 
     /// Rows of `self`, then those of `other`: the noise of two experiments.
-    pub(crate) fn chain(&self, other: &Self) -> Self {
+    pub fn chain(&self, other: &Self) -> Self {
         Self {
             omega: [&self.omega[..], &other.omega].concat(),
             covariance: [&self.covariance[..], &other.covariance].concat(),
@@ -257,7 +257,7 @@ impl NoiseSpectrum {
 }
 
 /// E|X_n|² = 4 s²/N of a line of N samples that have white noise of the standard deviation s.
-pub(crate) fn variance_on_lines(deviation: f64, samples: usize) -> f64 {
+pub fn variance_on_lines(deviation: f64, samples: usize) -> f64 {
     4.0 * deviation * deviation / samples as f64
 }
 

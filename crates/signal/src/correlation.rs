@@ -1,11 +1,9 @@
 //! Correlations over lags, and their p-values.
 
-use mechid_numerics::{check_finite, check_size};
-use mechid_signal::measures::{peak, power_of_two};
-use nalgebra::DVectorView;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::EstimateError;
+use crate::SignalError;
+use crate::measures::{peak, power_of_two};
 
 /// Correlations at a number of lags, with their p-value for noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,11 +30,11 @@ impl Correlation {
 /// the statistic of Ljung and Box.
 ///
 /// # Errors
-/// [`EstimateError::TooShort`] unless there are more than `lags + 1` samples and lags.
+/// [`SignalError::TooShort`] unless there are more than `lags + 1` samples and lags.
 ///
 /// # Source
 /// Ljung & Box (1978), Biometrika 65, 297–303.
-pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, EstimateError> {
+pub fn whiteness(residual: &[f64], lags: usize) -> Result<Correlation, SignalError> {
     whiteness_beyond(residual, 0, lags)
 }
 
@@ -58,7 +56,7 @@ pub fn whiteness_beyond(
     residual: &[f64],
     span: usize,
     lags: usize,
-) -> Result<Correlation, EstimateError> {
+) -> Result<Correlation, SignalError> {
     let e = centred(residual, lags, span)?;
     let all = autocorrelation(&e, span + lags);
     let count = e.len() as f64;
@@ -79,7 +77,7 @@ pub fn whiteness_beyond(
 /// go together.
 ///
 /// # Errors
-/// As [`whiteness`], and [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the two differ in length.
+/// As [`whiteness`], and [`SignalError::PairLength`] if the two differ in length.
 ///
 /// # Source
 /// Ljung, *System Identification: Theory for the User*, 2nd ed. (1999), section 16.6; Box (1954),
@@ -88,19 +86,27 @@ pub fn cross_correlation(
     residual: &[f64],
     input: &[f64],
     lags: usize,
-) -> Result<Correlation, EstimateError> {
+) -> Result<Correlation, SignalError> {
     cross_correlation_of_coloured(residual, input, lags, &[1.0])
 }
 
-/// Correlation with an input of a residual that is correlated itself: `colour` has its coefficients at
-/// the lags 0, 1 … as far as they count.
-pub(super) fn cross_correlation_of_coloured(
+/// Returns the correlation with an input of a residual that is correlated itself: `colour` has its coefficients
+/// at the lags 0, 1 … as far as they count.
+///
+/// # Errors
+/// As [`cross_correlation`].
+///
+/// # Source
+/// As [`cross_correlation`].
+pub fn cross_correlation_of_coloured(
     residual: &[f64],
     input: &[f64],
     lags: usize,
     colour: &[f64],
-) -> Result<Correlation, EstimateError> {
-    check_size("samples of the input", residual.len(), input.len())?;
+) -> Result<Correlation, SignalError> {
+    if residual.len() != input.len() {
+        return Err(SignalError::PairLength { left: residual.len(), right: input.len() });
+    }
     let (e, u) = (centred(residual, lags, 0)?, centred(input, lags, 0)?);
     let power = (products(&e, &e) * products(&u, &u)).sqrt();
     let before = (1..=lags).rev().map(|lag| products(&u[lag..], &e));
@@ -147,9 +153,12 @@ fn share_above(sum: f64, terms: usize, covariance: &[f64], shared: f64) -> f64 {
     share_above_of(sum, terms as f64 * covariance[0], squares.sum::<f64>() + shared)
 }
 
-/// Probability that a sum of squares of normal numbers is above `sum`, where their covariance has the
-/// trace `mean` and its square the trace `square`.
-pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
+/// Returns the probability that a sum of squares of normal numbers is above `sum`, where their covariance has
+/// the trace `mean` and its square the trace `square`.
+///
+/// # Source
+/// Box (1954), Annals of Mathematical Statistics 25, 290–302.
+pub fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
     let unit = square.sqrt();
     let ratio = mean / unit;
     match ChiSquared::new(ratio * ratio) {
@@ -161,26 +170,32 @@ pub(super) fn share_above_of(sum: f64, mean: f64, square: f64) -> f64 {
 
 /// Σ_k a(k) b(k + j) over all k, positive and negative, at j = 0, 1 … `lags − 1`, for two
 /// autocorrelations given at 0, 1 … and zero beyond.
-pub(super) fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
+pub fn correlated(a: &[f64], b: &[f64], lags: usize) -> Vec<f64> {
     let last = a.len() as isize - 1;
     let at = |of: &[f64], lag: isize| of.get(lag.unsigned_abs()).copied().unwrap_or(0.0);
     (0..lags as isize).map(|j| (-last..=last).map(|k| at(a, k) * at(b, k + j)).sum()).collect()
 }
 
-/// Coefficients at the lags 0 … `lags`.
-pub(super) fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
+/// Returns the coefficients of centred values at the lags 0 … `lags`, pure numbers.
+pub fn autocorrelation(centred: &[f64], lags: usize) -> Vec<f64> {
     let power = products(centred, centred);
     let at =
         |lag: usize| if lag == 0 { 1.0 } else { ratio(products(&centred[lag..], centred), power) };
     (0..=lags).map(at).collect()
 }
 
-pub(super) fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, EstimateError> {
+/// Returns values less their mean, in units of a power of two.
+///
+/// # Errors
+/// [`SignalError::TooShort`] unless there are `lags + span + 2` values, [`SignalError::NotFinite`].
+pub fn centred(values: &[f64], lags: usize, span: usize) -> Result<Vec<f64>, SignalError> {
     let needed = lags.max(1).saturating_add(span).saturating_add(2);
     if lags == 0 || values.len() < needed {
-        return Err(EstimateError::TooShort { samples: values.len(), needed });
+        return Err(SignalError::TooShort { samples: values.len(), needed });
     }
-    check_finite("residual or input", DVectorView::from_slice(values, values.len()).as_view())?;
+    if let Some(sample) = values.iter().position(|value| !value.is_finite()) {
+        return Err(SignalError::NotFinite { sample, channel: 0, value: values[sample] });
+    }
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     // In units of a power of two, which changes no coefficient: fourth powers stay finite.
     let unit = power_of_two(peak(values));

@@ -2,8 +2,7 @@
 
 mod average;
 mod cross_spectra;
-mod fit;
-mod own_lines;
+mod interleaved;
 mod scatter;
 mod segments;
 
@@ -14,12 +13,12 @@ use nalgebra::{Complex, DMatrix};
 
 pub use self::average::FrfAverage;
 use self::cross_spectra::CrossSpectra;
-pub use self::fit::{ResponseEstimate, output_error_of_responses};
-pub use self::own_lines::{Crosstalk, OwnLines};
+pub use self::interleaved::{Crosstalk, OwnLines};
 use self::scatter::Scatter;
 pub use self::segments::Segments;
-use crate::EstimateError;
-use crate::frequency_domain::{FrequencyData, Lines};
+use crate::SpectraError;
+use crate::frequency_data::FrequencyData;
+use crate::lines::Lines;
 
 type ComplexMatrix = DMatrix<Complex<f64>>;
 
@@ -64,8 +63,8 @@ impl Frf {
     /// Every force channel must carry force; select the channels that do.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewAverages`] unless there are more segments than forces,
-    /// [`EstimateError::Hop`], [`EstimateError::DependentForces`] at a line where the forces are zero or
+    /// [`SpectraError::TooFewAverages`] unless there are more segments than forces,
+    /// [`SpectraError::Hop`], [`SpectraError::DependentForces`] at a line where the forces are zero or
     /// proportional to one another in all segments, [`NumericsError::Size`] for H2 with
     /// several forces and another number of motions, and what [`Lines::new`] refuses.
     ///
@@ -78,7 +77,7 @@ impl Frf {
         segments: Segments,
         lines: impl IntoIterator<Item = usize>,
         estimator: FrfEstimator,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let lines = Lines::new(force.window(0, segments.samples())?.sampling(), lines)?;
         let mut average =
             FrfAverage::new(lines, [force.channels(), motion.channels()], measured, segments)?;
@@ -93,8 +92,8 @@ impl Frf {
     /// uncorrelated and equally large.
     ///
     /// # Errors
-    /// [`NumericsError::Size`], [`EstimateError::Coherence`] outside (0, 1\],
-    /// [`EstimateError::TooFewAverages`] unless there are more averages than forces.
+    /// [`NumericsError::Size`], [`SpectraError::Coherence`] outside (0, 1\],
+    /// [`SpectraError::TooFewAverages`] unless there are more averages than forces.
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9 (the variance that the coherence
@@ -105,7 +104,7 @@ impl Frf {
         coherence: DMatrix<f64>,
         averages: f64,
         measured: ResponseQuantity,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let size = check_size;
         size("frequency response matrices", omega.len(), response.len())?;
         size("rows of the coherence", omega.len(), coherence.nrows())?;
@@ -116,10 +115,10 @@ impl Frf {
         }
         if averages.is_nan() || averages <= inputs as f64 {
             let needed = inputs + 1;
-            return Err(EstimateError::TooFewAverages { got: averages as usize, needed });
+            return Err(SpectraError::TooFewAverages { got: averages as usize, needed });
         }
         if let Some(&value) = coherence.iter().find(|c| !(**c > 0.0 && **c <= 1.0)) {
-            return Err(EstimateError::Coherence { value });
+            return Err(SpectraError::Coherence { value });
         }
         let variance = response
             .iter()
@@ -151,7 +150,7 @@ impl Frf {
     /// they are known. Forces, and what they leave of the motions, are taken as uncorrelated.
     ///
     /// # Errors
-    /// As [`Frf::new`], and [`EstimateError::Hop`].
+    /// As [`Frf::new`], and [`SpectraError::Hop`].
     ///
     /// # Source
     /// Welch (1967); Bendat & Piersol, *Random Data*, 4th ed. (2010), chapter 9.
@@ -162,7 +161,7 @@ impl Frf {
         standard_error: Option<&[DMatrix<f64>]>,
         (segments, count): (Segments, usize),
         measured: ResponseQuantity,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let averages = segments.averages(count)?;
         let coherence = match standard_error {
             // No error follows from it.
@@ -207,7 +206,7 @@ impl Frf {
         line: usize,
         spectra: &CrossSpectra,
         estimator: FrfEstimator,
-    ) -> Result<[ComplexMatrix; 2], EstimateError> {
+    ) -> Result<[ComplexMatrix; 2], SpectraError> {
         let frequency_hz = self.omega[line] / std::f64::consts::TAU;
         let inverse = spectra.inverse_force(frequency_hz)?;
         let h1 = &spectra.motion_force * &inverse;
@@ -228,7 +227,7 @@ impl Frf {
         let response = match estimator {
             FrfEstimator::H1 => h1.clone(),
             FrfEstimator::H2 => {
-                spectra.h2().ok_or(EstimateError::IncoherentMotion { frequency_hz })?
+                spectra.h2().ok_or(SpectraError::IncoherentMotion { frequency_hz })?
             }
             FrfEstimator::Hv => spectra.hv()?,
         };
@@ -252,7 +251,7 @@ impl Frf {
     /// # Errors
     /// [`NumericsError::Size`] if there is not one degree of freedom per force or one of
     /// them does not exist.
-    pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, EstimateError> {
+    pub fn data(&self, force_dof: &[usize]) -> Result<FrequencyData, SpectraError> {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         if force_dof.len() != inputs {
             let (expected, got) = (inputs, force_dof.len());
@@ -292,7 +291,7 @@ impl Frf {
     }
 
     /// Number of independent complex deviations behind the variances that weigh an estimate.
-    pub(crate) fn deviations(&self) -> f64 {
+    pub fn deviations(&self) -> f64 {
         let inputs = self.response.first().map_or(0, |h| h.ncols());
         let own = self.averages - inputs as f64;
         self.scatter.as_ref().map_or(own, |scatter| scatter.freedom)
@@ -321,12 +320,12 @@ impl Frf {
     }
 
     /// Number of the line of each frequency; of responses measured elsewhere they are counted.
-    pub(crate) fn lines(&self) -> &[usize] {
+    pub fn lines(&self) -> &[usize] {
         &self.lines
     }
 
     /// Correlation of the noise of two lines, by how many lines they are apart.
-    pub(crate) fn line_correlation(&self) -> &[f64] {
+    pub fn line_correlation(&self) -> &[f64] {
         &self.line_correlation
     }
 

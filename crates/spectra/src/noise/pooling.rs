@@ -11,7 +11,8 @@ use mechid_signal::message;
 use nalgebra::{Complex, DMatrix};
 
 use self::neighbours::Neighbours;
-use crate::noise_shape::{self, Form, Smooth};
+use crate::noise::smooth;
+use crate::noise::smooth::{Form, Smooth};
 
 type Covariances = Vec<DMatrix<Complex<f64>>>;
 
@@ -259,12 +260,12 @@ impl Candidate {
                 covariance[line][(noisy[at], noisy[at])].re
             });
             match relative {
-                None => (noise_shape::choose(&omega, &variances, nu), false),
+                None => (smooth::choose(&omega, &variances, nu), false),
                 Some(relative) => {
                     let relative = DMatrix::from_fn(omega.len(), noisy.len(), |line, at| {
                         relative[(places.0[line], noisy[at])]
                     });
-                    noise_shape::choose_beside(&omega, &variances, nu, &relative)
+                    smooth::choose_beside(&omega, &variances, nu, &relative)
                 }
             }
         });

@@ -7,9 +7,12 @@ use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::Record;
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::between_lines::{BetweenLines, periods_as_one};
-use super::{FrequencyData, Lines, NoiseSpectrum, Pooling};
-use crate::EstimateError;
+use crate::SpectraError;
+use crate::frequency_data::FrequencyData;
+use crate::lines::{Lines, check_sampling};
+use crate::noise::between_lines::{BetweenLines, periods_as_one};
+use crate::noise::pooling::Pooling;
+use crate::noise::spectrum::NoiseSpectrum;
 
 /// Forces and motions at chosen lines, period by period, of a steady periodic experiment.
 ///
@@ -51,14 +54,14 @@ impl RepeatedPeriods {
     ///
     /// # Errors
     /// [`NumericsError::Size`] if the records have not the same number of channels,
-    /// [`EstimateError::Signal`] if they have not the same time axis, not the time step
+    /// [`SpectraError::Signal`] if they have not the same time axis, not the time step
     /// of the lines, or less than one period.
     pub fn new(
         lines: &Lines,
         force: &Record,
         motion: &Record,
         measured: ResponseQuantity,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let periods = force.len() / lines.sampling().len();
         let mut all = Self::expecting(lines, force.channels(), measured, periods);
         all.push(force, motion)?;
@@ -99,7 +102,7 @@ impl RepeatedPeriods {
     /// # Source
     /// Widrow & Kollár, *Quantization Noise* (2008), chapter on dither: beside noise of the standard deviation s steps q
     /// leave Σ q²/(2π²k²) exp(−4π²k²s²/q²) of the error alike from period to period.
-    pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, EstimateError> {
+    pub fn with_quantisation(mut self, steps: Vec<f64>) -> Result<Self, SpectraError> {
         check_size("quantisation steps", 2 * self.dof, steps.len())?;
         self.steps = steps;
         Ok(self)
@@ -129,11 +132,11 @@ impl RepeatedPeriods {
     ///
     /// # Errors
     /// As [`RepeatedPeriods::new`]; then nothing is added.
-    pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), EstimateError> {
+    pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         let period = self.lines.sampling().len();
         // The window also refuses records shorter than a period.
-        super::lines::check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
+        check_sampling(self.lines.sampling(), force.window(0, period)?.sampling())?;
         let dof = self.dof.max(1);
         for (what, got) in [
             ("channels of the force", force.channels()),
@@ -213,9 +216,9 @@ impl RepeatedPeriods {
     /// The mean over all periods, without a statement on its noise.
     ///
     /// # Errors
-    /// As [`FrequencyData::from_amplitudes`], and [`EstimateError::TooFewAverages`] if there is no
+    /// As [`FrequencyData::from_amplitudes`], and [`SpectraError::TooFewAverages`] if there is no
     /// period.
-    pub fn mean(&self) -> Result<FrequencyData, EstimateError> {
+    pub fn mean(&self) -> Result<FrequencyData, SpectraError> {
         self.at_least(1)?;
         let deviations: Vec<f64> = self.rounding()[self.dof..].iter().map(|v| v.sqrt()).collect();
         let mean = self.data(self.sum.unscale(self.count as f64))?;
@@ -226,7 +229,7 @@ impl RepeatedPeriods {
     ///
     /// # Errors
     /// As [`RepeatedPeriods::mean`] and [`RepeatedPeriods::noise`].
-    pub fn mean_with_noise(&self, pooling: Pooling) -> Result<FrequencyData, EstimateError> {
+    pub fn mean_with_noise(&self, pooling: Pooling) -> Result<FrequencyData, SpectraError> {
         self.mean()?.with_noise(self.noise(pooling)?)
     }
 
@@ -234,9 +237,9 @@ impl RepeatedPeriods {
     /// odd number is left out): two measurements of the same signal with independent noise.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewAverages`] if there is only one period, or not yet all of those
+    /// [`SpectraError::TooFewAverages`] if there is only one period, or not yet all of those
     /// expected.
-    pub fn halves(&self) -> Result<(FrequencyData, FrequencyData), EstimateError> {
+    pub fn halves(&self) -> Result<(FrequencyData, FrequencyData), SpectraError> {
         self.at_least(self.expected.max(2))?;
         let count = (self.expected / 2) as f64;
         let [first, second] = &self.half_sums;
@@ -251,14 +254,14 @@ impl RepeatedPeriods {
     /// A force that is the same in every period to rounding is taken as exact.
     ///
     /// # Errors
-    /// [`EstimateError::TooFewAverages`] if there is only one period, or not yet all of those expected.
+    /// [`SpectraError::TooFewAverages`] if there is only one period, or not yet all of those expected.
     ///
     /// # Source
     /// Pintelon & Schoukens, the chapters of above: noise on the lines that are not excited.
     /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (smooth spectra: variances with
     /// a logarithmic link); Schwarz (1978), Annals of Statistics 6, 461–464 (order and bands); Stone
     /// (1974), Journal of the Royal Statistical Society B 36, 111–147 (choice by prediction).
-    pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, EstimateError> {
+    pub fn noise(&self, pooling: Pooling) -> Result<NoiseSpectrum, SpectraError> {
         self.noise_relative_to(pooling, None)
     }
 
@@ -273,7 +276,7 @@ impl RepeatedPeriods {
         &self,
         pooling: Pooling,
         machine: &SecondOrderSystem,
-    ) -> Result<NoiseSpectrum, EstimateError> {
+    ) -> Result<NoiseSpectrum, SpectraError> {
         let (n, omega) = (self.dof, self.lines.omega());
         let (what, got) = ("degrees of freedom of the machine", machine.dof());
         if got != n {
@@ -295,7 +298,7 @@ impl RepeatedPeriods {
         &self,
         pooling: Pooling,
         relative: Option<&DMatrix<f64>>,
-    ) -> Result<NoiseSpectrum, EstimateError> {
+    ) -> Result<NoiseSpectrum, SpectraError> {
         self.at_least(self.expected.max(2))?;
         let count = self.count;
         // Of the mean: the scatter of one period, divided by their number once more.
@@ -332,14 +335,14 @@ impl RepeatedPeriods {
         rms <= REPEATS * self.sum.columns(n, n).norm() / count
     }
 
-    fn at_least(&self, needed: usize) -> Result<(), EstimateError> {
+    fn at_least(&self, needed: usize) -> Result<(), SpectraError> {
         match self.count {
-            got if got < needed => Err(EstimateError::TooFewAverages { got, needed }),
+            got if got < needed => Err(SpectraError::TooFewAverages { got, needed }),
             _ => Ok(()),
         }
     }
 
-    fn data(&self, mean: DMatrix<Complex<f64>>) -> Result<FrequencyData, EstimateError> {
+    fn data(&self, mean: DMatrix<Complex<f64>>) -> Result<FrequencyData, SpectraError> {
         let n = self.dof;
         let (motion, force) = (mean.columns(0, n).into_owned(), mean.columns(n, n).into_owned());
         FrequencyData::from_amplitudes(self.lines.omega(), force, motion, self.measured)

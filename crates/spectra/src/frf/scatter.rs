@@ -136,13 +136,14 @@ fn independent(lines: usize, correlation: &[f64]) -> f64 {
 
 impl Frf {
     /// Returns whether the window of the segments smooths the responses.
-    pub(super) fn is_smoothed(&self) -> bool {
+    pub fn is_smoothed(&self) -> bool {
         self.scatter.as_ref().is_some_and(|scatter| scatter.smoothing.len() > 1)
     }
 
-    /// The same responses less what the window of the segments makes of those of `system`: averages over pieces
+    /// Returns the responses less what the window of the segments makes of those of `system`: averages over pieces
     /// smooth a response, and blunt a resonance. Forces act at the degrees of freedom `force_dof`.
-    pub(super) fn sharpened(&self, system: &SecondOrderSystem, force_dof: &[usize]) -> Self {
+    #[must_use]
+    pub fn sharpened(&self, system: &SecondOrderSystem, force_dof: &[usize]) -> Self {
         let Some(scatter) = self.scatter.as_ref().filter(|_| self.is_smoothed()) else {
             return self.clone();
         };
@@ -175,9 +176,30 @@ impl Frf {
     }
 
     /// Distance of the lines, in rad/s, and samples of the segments, if their window blunts the responses.
-    pub(crate) fn resolution(&self) -> Option<[f64; 2]> {
+    pub fn resolution(&self) -> Option<[f64; 2]> {
         let scatter = self.scatter.as_ref().filter(|_| self.is_smoothed())?;
         Some([self.line_spacing(), scatter.samples as f64])
+    }
+
+    /// Returns whether the covariance of the errors of two responses of a line is known.
+    pub fn has_error_covariance(&self) -> bool {
+        self.scatter.is_some()
+    }
+
+    /// Returns the covariance of the errors of two responses at a line, (output, input) each, over the standard
+    /// deviations that weigh them; `None` of responses measured elsewhere.
+    pub fn error_covariance(&self, line: usize, pair: [(usize, usize); 2]) -> Option<Complex<f64>> {
+        Some(self.scatter.as_ref()?.covariance(line, self.averages, pair))
+    }
+
+    /// Returns the lines whose errors are correlated with those of a line, itself among them, and by how much.
+    pub fn correlated_lines(&self, line: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+        let reach = self.line_correlation.len() - 1;
+        let around = line.saturating_sub(reach)..(line + reach + 1).min(self.lines.len());
+        around.filter_map(move |other| {
+            let apart = self.lines[other].abs_diff(self.lines[line]);
+            Some((other, *self.line_correlation.get(apart)?))
+        })
     }
 
     /// Distance of the lines of a segment, in rad/s.

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DVector};
 use statrs::distribution::{Beta, ContinuousCDF};
 
 use super::{Frf, FrfAverage, FrfEstimator};
-use crate::EstimateError;
+use crate::SpectraError;
 
 /// Probability that noise of a channel has so much in common with the force of the lines.
 const CHANCE: f64 = 1e-4;
@@ -47,7 +47,7 @@ impl OwnLines {
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 2.7
     /// (multisines on interleaved lines); Goodman (1957) for the coherence of no signal; the limits are ours.
-    pub fn of(own: &[FrfAverage], estimator: FrfEstimator) -> Result<Self, EstimateError> {
+    pub fn of(own: &[FrfAverage], estimator: FrfEstimator) -> Result<Self, SpectraError> {
         let (mut raw, mut crosstalk, mut couplings) = (Vec::new(), Vec::new(), Vec::new());
         for (driver, average) in own.iter().enumerate() {
             check_size("channels of the force", own.len(), average.inputs)?;

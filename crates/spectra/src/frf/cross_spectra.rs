@@ -2,11 +2,10 @@
 
 use mechid_numerics::linear_algebra::hermitian_eigen;
 use nalgebra::{Complex, DMatrix, DVector, Dyn, MatrixView, U1};
-
 use statrs::distribution::{Beta, ContinuousCDF};
 
 use super::ComplexMatrix;
-use crate::EstimateError;
+use crate::SpectraError;
 
 /// Scaled force cross-spectra with eigenvalues further apart than this determine nothing.
 const FORCE_TOLERANCE: f64 = 1e-10;
@@ -109,7 +108,7 @@ impl CrossSpectra {
     }
 
     /// S_FF⁻¹, refused where the forces do not act independently.
-    pub(super) fn inverse_force(&self, frequency_hz: f64) -> Result<ComplexMatrix, EstimateError> {
+    pub(super) fn inverse_force(&self, frequency_hz: f64) -> Result<ComplexMatrix, SpectraError> {
         let inputs = self.force.nrows();
         let size = self.force.diagonal().map(|s| s.re.sqrt());
         let scaled =
@@ -122,7 +121,7 @@ impl CrossSpectra {
         let ratio = eigenvalues.min() / eigenvalues.max();
         if ratio.is_nan() || ratio < FORCE_TOLERANCE {
             let reciprocal_condition = if ratio.is_nan() { 0.0 } else { ratio.max(0.0) };
-            return Err(EstimateError::DependentForces { frequency_hz, reciprocal_condition });
+            return Err(SpectraError::DependentForces { frequency_hz, reciprocal_condition });
         }
         let mut inverse = DMatrix::identity(inputs, inputs);
         scaled.lu().solve_mut(&mut inverse);
@@ -142,7 +141,7 @@ impl CrossSpectra {
     }
 
     /// Per motion, the eigenvector of least power of the cross-spectra of forces and motion.
-    pub(super) fn hv(&self) -> Result<ComplexMatrix, EstimateError> {
+    pub(super) fn hv(&self) -> Result<ComplexMatrix, SpectraError> {
         let (outputs, inputs) = self.motion_force.shape();
         let mut h = DMatrix::zeros(outputs, inputs);
         for o in 0..outputs {

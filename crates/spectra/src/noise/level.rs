@@ -14,7 +14,7 @@ const LEAST: f64 = 1e-12;
 ///
 /// # Source
 /// Searle, Casella & McCulloch, *Variance Components* (1992), chapter 8 (Fisher scoring).
-pub(crate) fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
+pub fn motion_level(residuals: impl Iterator<Item = (f64, f64)>) -> f64 {
     let residuals: Vec<(f64, f64)> = residuals.collect();
     let mean = residuals.iter().map(|(power, _)| power).sum::<f64>() / residuals.len() as f64;
     let least = LEAST * mean;

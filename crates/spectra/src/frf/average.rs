@@ -9,8 +9,8 @@ use super::cross_spectra::CrossSpectra;
 use super::scatter::Scatter;
 use super::segments::weigh;
 use super::{ComplexMatrix, Crosstalk, Frf, FrfEstimator, Segments};
-use crate::EstimateError;
-use crate::frequency_domain::Lines;
+use crate::SpectraError;
+use crate::lines::{Lines, check_sampling};
 
 /// Amplitude of a force over that of the strongest, below which its channel may be idle.
 const IDLE: f64 = 0.1;
@@ -46,13 +46,13 @@ impl FrfAverage {
     /// No segments yet, of so many forces and motions; `lines` belong to one segment.
     ///
     /// # Errors
-    /// [`EstimateError::Hop`], and [`NumericsError::Size`] if the lines are not those of a segment.
+    /// [`SpectraError::Hop`], and [`NumericsError::Size`] if the lines are not those of a segment.
     pub fn new(
         lines: Lines,
         [inputs, outputs]: [usize; 2],
         measured: ResponseQuantity,
         segments: Segments,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let (expected, got) = (segments.samples(), lines.sampling().len());
         check_size("samples of a segment", expected, got)?;
         let weights = segments.weights()?;
@@ -65,12 +65,12 @@ impl FrfAverage {
     /// after the last one that was whole.
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if the records have not the same time axis or not the time step of
+    /// [`SpectraError::Signal`] if the records have not the same time axis or not the time step of
     /// the lines, [`NumericsError::Size`] for another number of channels.
     ///
     /// # Source
     /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
-    pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), EstimateError> {
+    pub fn push(&mut self, force: &Record, motion: &Record) -> Result<(), SpectraError> {
         force.check_same_sampling(motion)?;
         check_size("channels of the force", self.inputs, force.channels())?;
         check_size("channels of the motion", self.outputs, motion.channels())?;
@@ -78,10 +78,7 @@ impl FrfAverage {
         if force.len() < len {
             return Ok(());
         }
-        crate::frequency_domain::check_sampling(
-            self.lines.sampling(),
-            force.sampling().with_len(len)?,
-        )?;
+        check_sampling(self.lines.sampling(), force.sampling().with_len(len)?)?;
         let mut reader = self.lines.reader();
         let amplitudes = |channels| ComplexMatrix::zeros(self.sums.len(), channels);
         let (mut forces, mut motions) = (amplitudes(self.inputs), amplitudes(self.outputs));
@@ -110,7 +107,7 @@ impl FrfAverage {
     ///
     /// # Source
     /// That of [`FrfAverage::push`].
-    pub fn merge(&mut self, other: &Self) -> Result<(), EstimateError> {
+    pub fn merge(&mut self, other: &Self) -> Result<(), SpectraError> {
         let size = check_size;
         size("channels of the force", self.inputs, other.inputs)?;
         size("channels of the motion", self.outputs, other.outputs)?;
@@ -265,7 +262,7 @@ impl FrfAverage {
     ///
     /// # Panics
     /// If there is no such line.
-    pub fn at(&self, places: &[usize]) -> Result<Self, EstimateError> {
+    pub fn at(&self, places: &[usize]) -> Result<Self, SpectraError> {
         let lines = places.iter().map(|at| self.lines.as_slice()[*at]);
         let lines = Lines::new(self.lines.sampling(), lines)?;
         let sums = places.iter().map(|at| self.sums[*at].clone()).collect();
@@ -278,7 +275,7 @@ impl FrfAverage {
     }
 
     /// Returns whether a response has something in common with a force, from so many independent averages.
-    pub(crate) fn response_follows(&self, averages: f64) -> bool {
+    pub fn response_follows(&self, averages: f64) -> bool {
         let follows = |input: usize| {
             let each =
                 self.sums.iter().filter_map(|s| s.evidence_of_motion(input, averages)).flatten();
@@ -311,14 +308,14 @@ impl FrfAverage {
     ///
     /// # Source
     /// Bendat & Piersol, *Random Data*, 4th ed. (2010), chapters 6, 7 and 9; Welch (1967).
-    pub fn frf(&self, estimator: FrfEstimator) -> Result<Frf, EstimateError> {
+    pub fn frf(&self, estimator: FrfEstimator) -> Result<Frf, SpectraError> {
         let (inputs, outputs) = (self.inputs, self.outputs);
         if estimator == FrfEstimator::H2 && inputs > 1 && inputs != outputs {
             let what = "channels of the motion, for H2";
             return Err(NumericsError::Size { what, expected: inputs, got: outputs }.into());
         }
         if self.pieces <= inputs {
-            return Err(EstimateError::TooFewAverages { got: self.pieces, needed: inputs + 1 });
+            return Err(SpectraError::TooFewAverages { got: self.pieces, needed: inputs + 1 });
         }
         let omega = self.lines.omega();
         let mut frf = Frf {

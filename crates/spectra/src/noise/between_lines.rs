@@ -16,7 +16,7 @@ const MAX_HELD: usize = 1 << 20;
 /// against a period (an unmeasured force through a resonance) is there what it is on the lines of the mean; the
 /// scatter of the periods also has what their ends leave in each of them, most of which cancels in the mean.
 #[derive(Debug, Clone)]
-pub(super) struct BetweenLines {
+pub(crate) struct BetweenLines {
     /// Samples of a period.
     period: usize,
     /// Periods that are taken as one; where it is one period there is nothing between its lines.
@@ -30,7 +30,7 @@ pub(super) struct BetweenLines {
 /// Periods that are to be taken as one where `remaining` are to come.
 ///
 /// Parts hardly differ, and are as large as may be held.
-pub(super) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
+pub(crate) fn periods_as_one(remaining: usize, period: usize, channels: usize) -> usize {
     let most = (MAX_HELD / (period * channels).max(1)).min(MAX_PERIODS);
     if most.min(remaining) < MIN_PERIODS {
         return 1;
@@ -43,13 +43,13 @@ pub(super) fn periods_as_one(remaining: usize, period: usize, channels: usize) -
 }
 
 impl BetweenLines {
-    pub(super) fn new(periods: usize, period: usize, channels: usize) -> Self {
+    pub(crate) fn new(periods: usize, period: usize, channels: usize) -> Self {
         let samples = if periods > 1 { periods * period } else { 0 };
         Self { period, periods, held: 0, samples: DMatrix::zeros(samples, channels) }
     }
 
     /// Holds the next period, its channels in their order.
-    pub(super) fn hold<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
+    pub(crate) fn hold<'a>(&mut self, channels: impl Iterator<Item = &'a [f64]>) {
         let start = self.held * self.period;
         self.held += 1;
         if self.periods == 1 {
@@ -61,7 +61,7 @@ impl BetweenLines {
     }
 
     /// Number of periods where all that are taken as one are held.
-    pub(super) fn complete(&self) -> Option<usize> {
+    pub(crate) fn complete(&self) -> Option<usize> {
         (self.held == self.periods).then_some(self.periods)
     }
 
@@ -70,7 +70,7 @@ impl BetweenLines {
     ///
     /// Each line has those nearer to it than to another line of a period, and the one in the middle above it, so that
     /// no two share any.
-    pub(super) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
+    pub(crate) fn add_scatter(&self, lines: &[usize], scatter: &mut [DMatrix<Complex<f64>>]) {
         if self.periods == 1 {
             return;
         }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use mechid_signal::Window;
 use nalgebra::{Complex, DVectorView};
 
-use crate::EstimateError;
+use crate::SpectraError;
 
 /// Lines less correlated than this count as independent.
 const INDEPENDENT: f64 = 0.01;
@@ -47,11 +47,11 @@ impl Segments {
     /// Equivalent number of independent pieces among so many, a pure number: those that overlap share samples.
     ///
     /// # Errors
-    /// [`EstimateError::Hop`].
+    /// [`SpectraError::Hop`].
     ///
     /// # Source
     /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73.
-    pub fn averages(self, pieces: usize) -> Result<f64, EstimateError> {
+    pub fn averages(self, pieces: usize) -> Result<f64, SpectraError> {
         Ok(self.averages_under(self.weights()?.as_deref(), pieces))
     }
 
@@ -126,11 +126,11 @@ impl Segments {
     }
 
     /// Returns the window over the samples of a piece; `None` for none.
-    pub(super) fn weights(self) -> Result<Option<Vec<f64>>, EstimateError> {
+    pub(super) fn weights(self) -> Result<Option<Vec<f64>>, SpectraError> {
         match self {
             Segments::Periods(_) => Ok(None),
             Segments::Windowed { len, hop, .. } if hop == 0 || hop > len => {
-                Err(EstimateError::Hop { len, hop })
+                Err(SpectraError::Hop { len, hop })
             }
             Segments::Windowed { len, window, .. } => {
                 Ok(Some((0..len).map(|k| window.weight(k, len)).collect()))

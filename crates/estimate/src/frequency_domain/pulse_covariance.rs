@@ -1,38 +1,17 @@
-//! Noise of forces that act for a few samples only, whose lines err together.
+//! Covariance by the noise of forces that act for a few samples only, whose lines err together.
 
 use std::ops::Range;
 
-use mechid_signal::Sampling;
+use mechid_spectra::transient::powers;
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::misfit::powers;
+use super::Whitened;
 use super::output_error_fit::{entries, parts};
-use super::{FrequencyData, NoiseSpectrum, Whitened};
 use crate::Unknowns;
 
 /// Maximum number of sensitivities, residuals times parameters; of larger fits the lines are taken to err one by one.
 const SENSITIVITIES: usize = 1 << 22;
-
-/// Noise on the samples of a pulse, and none on the others of its record.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct PulseNoise {
-    /// Rows of the record.
-    pub(super) rows: Range<usize>,
-    pub(super) sampling: Sampling,
-    /// Degree of freedom that the force acts on, counted from 0.
-    pub(super) channel: usize,
-    /// Standard deviation, in N.
-    pub(super) deviation: f64,
-    pub(super) samples: Range<usize>,
-}
-
-impl PulseNoise {
-    /// Amplitudes that a force of 1 N on a sample has on a line, in N.
-    fn impulse(&self, sample: usize, omega: f64) -> Complex<f64> {
-        let turn = -omega * sample as f64 * self.sampling.dt();
-        Complex::from_polar(2.0 / self.sampling.len() as f64, turn)
-    }
-}
 
 /// Matrix that the noise of pulses adds to the inverse of the Fisher information, which takes the lines to err one by
 /// one; `None` without such noise and for large fits.
@@ -55,7 +34,7 @@ pub(super) fn excess(
     let (independent, tau) = parts(data, theta);
     let values = entries(unknowns, independent);
     let covariance = |row: usize| noise.covariance(row).clone();
-    let closed = data.with_load_of_ends(tau);
+    let closed = data.without_transient(tau);
     let mut sensitivity = Whitened::of(&closed, unknowns, &values, covariance)?.sensitivity;
     // Weighted responses to a force on each degree of freedom, 1 N on every line.
     let of_force: Vec<DVector<f64>> = (0..n)
@@ -78,13 +57,13 @@ pub(super) fn excess(
         }
         turned
     };
-    for record in 0..data.ends().ncols() / 2 {
+    for record in 0..data.transient().ncols() / 2 {
         let rows = data.open_record(record)?.rows;
         let loads: Vec<DVector<f64>> = (0..2 * 3 * n)
             .map(|load| {
                 let (column, power, dof) = (2 * record + load / (3 * n), (load / n) % 3, load % n);
                 turned(&rows, dof, &|row| {
-                    data.ends()[(row, column)] * powers(data.omega()[row])[power]
+                    data.transient()[(row, column)] * powers(data.omega()[row])[power]
                 })
             })
             .collect();

@@ -11,7 +11,8 @@ use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_signal::Sampling;
 use nalgebra::{Complex, DMatrix};
 
-use super::FrequencyData;
+use crate::frequency_data::FrequencyData;
+use crate::open_record::OpenRecord;
 
 /// Power of a line under Hann's window over the level around it from which it is looked at: noise passes it on one
 /// of 10⁷ lines, with a level of 20 independent lines.
@@ -62,7 +63,7 @@ impl Sinusoid {
     }
 
     /// Number of real unknowns.
-    pub(super) fn unknowns(&self) -> usize {
+    pub fn unknowns(&self) -> usize {
         2 * self.amplitude.len() + 1
     }
 
@@ -91,7 +92,7 @@ fn sides(sampling: Sampling, omega: f64, line: usize) -> [Complex<f64>; 2] {
 }
 
 impl FrequencyData {
-    /// The rows of open records with the sinusoids of each, as [`output_error`](super::output_error()) found them,
+    /// The rows of open records with the sinusoids of each, as the maximum-likelihood estimator found them,
     /// taken off the displacement.
     #[must_use]
     pub fn without_sinusoids(&self, sinusoids: &[Vec<Sinusoid>]) -> Self {
@@ -116,12 +117,6 @@ impl FrequencyData {
     }
 }
 
-/// An open record among the rows of data.
-pub(super) struct OpenRecord {
-    pub(super) sampling: Sampling,
-    pub(super) rows: Range<usize>,
-}
-
 /// Finds the sinusoids that stand out of a residual (rows × n, in m), for each open record of the data; those `known`
 /// from a residual before are looked for first.
 ///
@@ -132,7 +127,7 @@ pub(super) struct OpenRecord {
 /// # Source
 /// Rife & Boorstyn (1974), IEEE Transactions on Information Theory 20, 591–598 (frequency of a sinusoid in
 /// noise); Harris (1978), Proceedings of the IEEE 66, 51–83 (Hann's window); the limits are ours.
-pub(super) fn find(
+pub fn find(
     data: &FrequencyData,
     residual: &DMatrix<Complex<f64>>,
     system: Option<&SecondOrderSystem>,

@@ -7,7 +7,7 @@ use mechid_signal::transform::{self, RealToComplex};
 use mechid_signal::{Record, Sampling};
 use nalgebra::{Complex, DMatrix};
 
-use crate::EstimateError;
+use crate::SpectraError;
 
 /// Spectral lines to be read from records of one sampling, the transform planned once.
 ///
@@ -36,19 +36,19 @@ impl Lines {
     /// The given lines of records of this sampling, in the given order.
     ///
     /// # Errors
-    /// [`EstimateError::NoExcitedLine`] if none is given, [`EstimateError::LineOutOfRange`]
+    /// [`SpectraError::NoExcitedLine`] if none is given, [`SpectraError::LineOutOfRange`]
     /// for a line that does not exist or carries no phase.
     pub fn new(
         sampling: Sampling,
         lines: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let last = last_line(sampling);
         let lines: Vec<usize> = lines.into_iter().collect();
         if lines.is_empty() {
-            return Err(EstimateError::NoExcitedLine);
+            return Err(SpectraError::NoExcitedLine);
         }
         if let Some(&line) = lines.iter().find(|&&line| line == 0 || line > last) {
-            return Err(EstimateError::LineOutOfRange { line, last });
+            return Err(SpectraError::LineOutOfRange { line, last });
         }
         let plan = transform::forward(sampling.len());
         Ok(Self { sampling, lines, plan })
@@ -60,11 +60,11 @@ impl Lines {
     /// A multisine stands far above the noise between its lines: 0.1 separates them.
     ///
     /// # Errors
-    /// [`EstimateError::NoExcitedLine`] if the force is zero on all usable lines.
+    /// [`SpectraError::NoExcitedLine`] if the force is zero on all usable lines.
     ///
     /// # Source
     /// Ours.
-    pub fn excited(force: &Record, threshold: f64) -> Result<Self, EstimateError> {
+    pub fn excited(force: &Record, threshold: f64) -> Result<Self, SpectraError> {
         let all = Self::new(force.sampling(), 1..=last_line(force.sampling()))?;
         let amplitudes = all.read(force)?.map(|z| z.norm());
         // A constant has a spectrum too: its rounding.
@@ -81,7 +81,7 @@ impl Lines {
             .map(|(n, _)| n + 1)
             .collect();
         if lines.is_empty() {
-            return Err(EstimateError::NoExcitedLine);
+            return Err(SpectraError::NoExcitedLine);
         }
         Ok(Self { lines, ..all })
     }
@@ -106,8 +106,8 @@ impl Lines {
     /// scaled as in [`mechid_signal::spectrum`].
     ///
     /// # Errors
-    /// [`EstimateError::Signal`] if the record has another time axis.
-    pub fn read(&self, record: &Record) -> Result<DMatrix<Complex<f64>>, EstimateError> {
+    /// [`SpectraError::Signal`] if the record has another time axis.
+    pub fn read(&self, record: &Record) -> Result<DMatrix<Complex<f64>>, SpectraError> {
         check_sampling(self.sampling, record.sampling())?;
         Ok(self.read_window(record, 0))
     }
@@ -168,7 +168,11 @@ fn last_line(sampling: Sampling) -> usize {
     (sampling.len() - 1) / 2
 }
 
-pub(crate) fn check_sampling(left: Sampling, right: Sampling) -> Result<(), EstimateError> {
+/// Returns an error unless two time axes are the same up to rounding.
+///
+/// # Errors
+/// [`SpectraError::Signal`].
+pub fn check_sampling(left: Sampling, right: Sampling) -> Result<(), SpectraError> {
     // Steps read from files differ by rounding.
     if left.len() == right.len() && (left.dt() - right.dt()).abs() <= 1e-9 * left.dt() {
         return Ok(());
@@ -215,9 +219,9 @@ mod tests {
         let s = Sampling::new(0.01, 16).unwrap();
         for line in [0, 8, 99] {
             let e = Lines::new(s, [1, line]).unwrap_err();
-            assert_eq!(e, EstimateError::LineOutOfRange { line, last: 7 });
+            assert_eq!(e, SpectraError::LineOutOfRange { line, last: 7 });
         }
-        assert_eq!(Lines::new(s, []).unwrap_err(), EstimateError::NoExcitedLine);
+        assert_eq!(Lines::new(s, []).unwrap_err(), SpectraError::NoExcitedLine);
     }
 
     #[test]
@@ -225,6 +229,6 @@ mod tests {
         assert_eq!(Lines::excited(&record(16), 0.1).unwrap().as_slice(), [2, 3]);
         assert_eq!(Lines::excited(&record(16), 0.5).unwrap().as_slice(), [3]);
         let still = Record::from_channel(Sampling::new(0.1, 7).unwrap(), vec![0.1; 7]).unwrap();
-        assert_eq!(Lines::excited(&still, 0.1).unwrap_err(), EstimateError::NoExcitedLine);
+        assert_eq!(Lines::excited(&still, 0.1).unwrap_err(), SpectraError::NoExcitedLine);
     }
 }

@@ -1,11 +1,11 @@
 //! Maximum likelihood on averaged frequency responses, with what their segments do to them.
 
+use mechid_spectra::SpectraError;
+use mechid_spectra::frf::Frf;
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use nalgebra::{Complex, DMatrix, DVector};
 
-use super::Frf;
-use crate::frequency_domain::{
-    FrequencyData, NoiseSpectrum, OutputErrorFit, Whitened, output_error,
-};
+use crate::frequency_domain::{OutputErrorFit, Whitened, output_error};
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -39,7 +39,7 @@ pub struct ResponseEstimate {
 /// are sampled from few segments.
 ///
 /// # Errors
-/// As [`output_error`] and [`Frf::data`]; [`EstimateError::NoExcitedLine`] without a record.
+/// As [`output_error`] and [`Frf::data`]; [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) without a record.
 ///
 /// # Source
 /// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73, for the correlation of lines; Bendat & Piersol,
@@ -52,10 +52,10 @@ pub fn output_error_of_responses(
     let raw: Vec<Frf> = records.iter().map(|(frf, _)| frf.clone()).collect();
     let data = joined(records, &raw)?;
     let fit = output_error(&data, unknowns)?;
-    let noise = data.noise().cloned().ok_or(EstimateError::NoExcitedLine)?;
+    let noise = data.noise().cloned().ok_or(SpectraError::NoExcitedLine)?;
     let count = unknowns.independent();
     let plain = |fit| ResponseEstimate { fit, responses: raw.clone(), blunted: 0.0, settled: true };
-    if records.iter().any(|(frf, _)| frf.scatter.is_none())
+    if records.iter().any(|(frf, _)| !frf.has_error_covariance())
         || 2 * data.dof() * data.len() * count > SENSITIVITIES
     {
         return Ok(plain(fit));
@@ -133,7 +133,7 @@ fn joined(
             Some(before) => before.and(&data)?,
         });
     }
-    all.ok_or(EstimateError::NoExcitedLine)
+    Ok(all.ok_or(SpectraError::NoExcitedLine)?)
 }
 
 /// Weighted residuals at some parameters, with their sensitivities J = Q R.
@@ -189,8 +189,10 @@ impl Errors {
         let (mut spread, mut inflation) = (DVector::<f64>::zeros(count), 1.0_f64);
         let mut first = 0;
         for (frf, dofs) in records {
-            let lines = frf.omega.len();
-            let Some(scatter) = frf.scatter.as_ref() else { continue };
+            let lines = frf.omega().len();
+            if !frf.has_error_covariance() {
+                continue;
+            }
             let pairs: Vec<(usize, usize)> =
                 (0..dofs.len()).flat_map(|i| (0..self.dof).map(move |o| (o, i))).collect();
             // Row of a line, of an output and an input, in units of its weight.
@@ -201,15 +203,15 @@ impl Errors {
                 let row = at(line, pair);
                 Complex::new(influence[(row, parameter)], influence[(row + 1, parameter)])
             };
-            let own = (frf.averages - dofs.len() as f64).max(1.0);
+            let own = (frf.averages() - dofs.len() as f64).max(1.0);
             let mut shares = DMatrix::<f64>::zeros(lines, count);
             for line in 0..lines {
                 let local = DMatrix::from_fn(pairs.len(), pairs.len(), |a, b| {
-                    scatter.covariance(line, frf.averages, [pairs[a], pairs[b]])
+                    frf.error_covariance(line, [pairs[a], pairs[b]]).unwrap_or_default()
                 });
                 let here = DMatrix::from_fn(pairs.len(), count, |a, p| of(line, pairs[a], p));
                 let mut around = DMatrix::zeros(pairs.len(), count);
-                for (other, c) in frf.tied(line) {
+                for (other, c) in frf.correlated_lines(line) {
                     around += DMatrix::from_fn(pairs.len(), count, |a, p| {
                         of(other, pairs[a], p) * Complex::from(c)
                     });
@@ -219,7 +221,7 @@ impl Errors {
                 covariance += (&part + part.transpose()) * 0.5;
             }
             for line in 0..lines {
-                for (other, c) in frf.tied(line) {
+                for (other, c) in frf.correlated_lines(line) {
                     for parameter in 0..count {
                         spread[parameter] +=
                             c * shares[(line, parameter)] * shares[(other, parameter)] / own;
@@ -234,17 +236,5 @@ impl Errors {
         let freedom = variances.iter().zip(spread.iter()).map(|(v, s)| 2.0 * v * v / s.max(0.0));
         let fewest = freedom.fold(f64::INFINITY, f64::min).clamp(1.0, 1e6);
         (covariance * inflation, fewest as usize)
-    }
-}
-
-impl Frf {
-    /// Lines whose errors are correlated with those of a line, itself among them, and by how much.
-    fn tied(&self, line: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
-        let reach = self.line_correlation.len() - 1;
-        let around = line.saturating_sub(reach)..(line + reach + 1).min(self.lines.len());
-        around.filter_map(move |other| {
-            let apart = self.lines[other].abs_diff(self.lines[line]);
-            Some((other, *self.line_correlation.get(apart)?))
-        })
     }
 }

@@ -1,6 +1,6 @@
 //! Forces and displacements at chosen frequencies: what every estimator of this module takes.
 
-mod derived;
+mod derived_data;
 
 use std::ops::Range;
 
@@ -9,11 +9,12 @@ use mechid_numerics::{NumericsError, check_size};
 use mechid_signal::{Record, Sampling, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use super::pulse_noise::PulseNoise;
-use super::sinusoids::OpenRecord;
-use super::{Lines, NoiseSpectrum};
-use crate::EstimateError;
-use crate::noise_spectrum::variance_on_lines;
+use crate::SpectraError;
+use crate::lines::{Lines, check_sampling};
+use crate::noise::pulse::PulseNoise;
+use crate::noise::spectrum::NoiseSpectrum;
+use crate::noise::spectrum::variance_on_lines;
+use crate::open_record::OpenRecord;
 
 /// Noise relative to the signal (RMS), below which it is rounding.
 const SCATTER_ROUNDING: f64 = 1e-10;
@@ -33,7 +34,7 @@ pub struct FrequencyData {
     force_variance: DMatrix<f64>,
     /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
     /// on the rows of others.
-    ends: DMatrix<Complex<f64>>,
+    transient: DMatrix<Complex<f64>>,
     /// Time axis of each open record.
     open: Vec<Sampling>,
     /// Noise of forces that act for a few samples only.
@@ -54,7 +55,7 @@ impl FrequencyData {
         motion: &Record,
         measured: ResponseQuantity,
         lines: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         Self::read(&Lines::new(force.sampling(), lines)?, force, motion, measured)
     }
 
@@ -62,28 +63,28 @@ impl FrequencyData {
     ///
     /// # Errors
     /// [`NumericsError::Size`] if the records have not the same number of channels,
-    /// [`EstimateError::Signal`] if their time axes are not that of the lines.
+    /// [`SpectraError::Signal`] if their time axes are not that of the lines.
     pub fn read(
         lines: &Lines,
         force: &Record,
         motion: &Record,
         measured: ResponseQuantity,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         Self::from_amplitudes(lines.omega(), lines.read(force)?, lines.read(motion)?, measured)
     }
 
     /// The chosen lines of two spectra over the same whole periods.
     ///
     /// # Errors
-    /// [`NumericsError::Size`], [`EstimateError::LineOutOfRange`],
-    /// [`EstimateError::NoExcitedLine`] or [`EstimateError::Signal`], as for records.
+    /// [`NumericsError::Size`], [`SpectraError::LineOutOfRange`],
+    /// [`SpectraError::NoExcitedLine`] or [`SpectraError::Signal`], as for records.
     pub fn from_spectra(
         force: &Spectrum,
         motion: &Spectrum,
         measured: ResponseQuantity,
         lines: impl IntoIterator<Item = usize>,
-    ) -> Result<Self, EstimateError> {
-        super::lines::check_sampling(force.sampling(), motion.sampling())?;
+    ) -> Result<Self, SpectraError> {
+        check_sampling(force.sampling(), motion.sampling())?;
         let lines = Lines::new(force.sampling(), lines)?;
         let rows = |s: &Spectrum| {
             DMatrix::from_fn(lines.as_slice().len(), s.channels(), |r, c| {
@@ -96,7 +97,7 @@ impl FrequencyData {
     /// Takes complex amplitudes, frequencies × degrees of freedom, at `omega` (rad/s).
     ///
     /// # Errors
-    /// [`NumericsError::Size`] if the shapes differ, [`EstimateError::NoExcitedLine`]
+    /// [`NumericsError::Size`] if the shapes differ, [`SpectraError::NoExcitedLine`]
     /// if there is no row, [`NumericsError::NotFinite`] for a frequency that is not
     /// positive or an amplitude that is not finite.
     pub fn from_amplitudes(
@@ -104,13 +105,13 @@ impl FrequencyData {
         force: DMatrix<Complex<f64>>,
         mut motion: DMatrix<Complex<f64>>,
         measured: ResponseQuantity,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         check_shapes(&omega, &force, &motion)?;
         for (r, &w) in omega.iter().enumerate() {
             let to_displacement = measured.per_displacement(w).inv();
             motion.row_mut(r).apply(|x| *x *= to_displacement);
         }
-        let ends = DMatrix::zeros(omega.len(), 0);
+        let transient = DMatrix::zeros(omega.len(), 0);
         let force_variance = DMatrix::zeros(omega.len(), force.ncols());
         Ok(Self {
             omega,
@@ -119,7 +120,7 @@ impl FrequencyData {
             measured,
             noise: None,
             force_variance,
-            ends,
+            transient,
             open: Vec::new(),
             pulses: Vec::new(),
         })
@@ -142,7 +143,7 @@ impl FrequencyData {
         variance: Option<&[DMatrix<f64>]>,
         measured: ResponseQuantity,
         force_dof: &[usize],
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let size = check_size;
         let (lines, n) = (omega.len(), response.first().map_or(0, |h| h.nrows()));
         size("frequency response matrices", lines, response.len())?;
@@ -175,15 +176,15 @@ impl FrequencyData {
                 Some(before) => before.and(&one)?,
             });
         }
-        all.ok_or(EstimateError::NoExcitedLine)
+        all.ok_or(SpectraError::NoExcitedLine)
     }
 
     /// The same data with what is known of their noise.
     ///
     /// # Errors
-    /// [`EstimateError::FrequencyMismatch`] or [`NumericsError::Size`] if the noise
+    /// [`SpectraError::FrequencyMismatch`] or [`NumericsError::Size`] if the noise
     /// belongs to other frequencies or another number of degrees of freedom.
-    pub fn with_noise(mut self, noise: NoiseSpectrum) -> Result<Self, EstimateError> {
+    pub fn with_noise(mut self, noise: NoiseSpectrum) -> Result<Self, SpectraError> {
         check_same_frequencies(&self.omega, noise.omega())?;
         if noise.dof() != self.dof() {
             let (got, expected) = (noise.dof(), self.dof());
@@ -205,7 +206,7 @@ impl FrequencyData {
     ///
     /// # Errors
     /// [`NumericsError::Size`] unless there is one deviation per degree of freedom,
-    /// [`EstimateError::NoiseVariance`] if one is negative or not finite.
+    /// [`SpectraError::NoiseVariance`] if one is negative or not finite.
     ///
     /// # Source
     /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
@@ -214,12 +215,12 @@ impl FrequencyData {
         mut self,
         deviation: &[f64],
         samples: usize,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         check_size("noise levels of the force", self.dof(), deviation.len())?;
         for (channel, &value) in deviation.iter().enumerate() {
             if !(value >= 0.0 && value.is_finite()) {
                 let column = self.dof() + channel;
-                return Err(EstimateError::NoiseVariance { row: 0, column, value });
+                return Err(SpectraError::NoiseVariance { row: 0, column, value });
             }
             let variance = variance_on_lines(value, samples);
             self.force_variance.column_mut(channel).fill(variance);
@@ -241,7 +242,7 @@ impl FrequencyData {
         deviation: f64,
         samples: Range<usize>,
         sampling: Sampling,
-    ) -> Result<Self, EstimateError> {
+    ) -> Result<Self, SpectraError> {
         let share = samples.len() as f64 / sampling.len() as f64;
         let mut levels = vec![0.0; self.dof()];
         for (what, expected, got) in [
@@ -260,12 +261,12 @@ impl FrequencyData {
     }
 
     /// Noise of forces that act for a few samples only.
-    pub(super) fn pulses(&self) -> &[PulseNoise] {
+    pub fn pulses(&self) -> &[PulseNoise] {
         &self.pulses
     }
 
     /// Variances of the noise of the forces, rows × n, in N², where the noise of the displacement is not known.
-    pub(crate) fn force_variance(&self) -> &DMatrix<f64> {
+    pub fn force_variance(&self) -> &DMatrix<f64> {
         &self.force_variance
     }
 
@@ -281,7 +282,7 @@ impl FrequencyData {
     /// ```
     ///
     /// with unknown real τ, of every degree of freedom, and Z = 1, 1/s or 1/s² as displacement, velocity or
-    /// acceleration was measured. [`output_error`](super::output_error()) finds them with the machine; the
+    /// acceleration was measured. the maximum-likelihood estimator finds them with the machine; the
     /// rows are to be all lines of a band, for it is on neighbouring lines that the two differ, and not much
     /// more than 0.4 of the sampling rate.
     ///
@@ -291,7 +292,7 @@ impl FrequencyData {
     #[must_use]
     pub fn of_open_record(mut self, sampling: Sampling) -> Self {
         self.open = vec![sampling];
-        self.ends = DMatrix::from_fn(self.len(), 2, |row, column| {
+        self.transient = DMatrix::from_fn(self.len(), 2, |row, column| {
             let omega = self.omega[row];
             let unit = self.measured.per_displacement(omega).inv();
             if column == 0 { unit } else { unit * Complex::new(0.0, omega).powu(3) }
@@ -301,14 +302,14 @@ impl FrequencyData {
 
     /// Displacements that read 1 and s³ in the quantity measured, two columns for each open record and zero
     /// on the rows of others.
-    pub(crate) fn ends(&self) -> &DMatrix<Complex<f64>> {
-        &self.ends
+    pub fn transient(&self) -> &DMatrix<Complex<f64>> {
+        &self.transient
     }
 
     /// An open record, counted from 0, if there is one.
-    pub(super) fn open_record(&self, record: usize) -> Option<OpenRecord> {
+    pub fn open_record(&self, record: usize) -> Option<OpenRecord> {
         let sampling = *self.open.get(record)?;
-        let of_record = |row: &usize| self.ends[(*row, 2 * record)] != Complex::ZERO;
+        let of_record = |row: &usize| self.transient[(*row, 2 * record)] != Complex::ZERO;
         let first = (0..self.len()).find(of_record)?;
         let last = (0..self.len()).rfind(of_record)?;
         Some(OpenRecord { sampling, rows: first..last + 1 })
@@ -320,8 +321,8 @@ impl FrequencyData {
     ///
     /// # Errors
     /// [`NumericsError::Size`] if the numbers of degrees of freedom differ,
-    /// [`EstimateError::MixedQuantities`] if the quantities measured do.
-    pub fn and(&self, other: &Self) -> Result<Self, EstimateError> {
+    /// [`SpectraError::MixedQuantities`] if the quantities measured do.
+    pub fn and(&self, other: &Self) -> Result<Self, SpectraError> {
         if self.dof() != other.dof() {
             let (got, expected) = (other.dof(), self.dof());
             return Err(NumericsError::Size {
@@ -332,7 +333,7 @@ impl FrequencyData {
             .into());
         }
         if self.measured != other.measured {
-            return Err(EstimateError::MixedQuantities {
+            return Err(SpectraError::MixedQuantities {
                 left: self.measured,
                 right: other.measured,
             });
@@ -344,7 +345,7 @@ impl FrequencyData {
             force_variance: stacked(&self.force_variance, &other.force_variance),
             measured: self.measured,
             noise: self.noise.as_ref().zip(other.noise.as_ref()).map(|(a, b)| a.chain(b)),
-            ends: self.ends_of_both(other),
+            transient: self.transient_of_both(other),
             open: [&self.open[..], &other.open].concat(),
             pulses: self.pulses_of_both(other),
         })
@@ -358,11 +359,12 @@ impl FrequencyData {
         self.pulses.iter().cloned().chain(other.pulses.iter().map(below)).collect()
     }
 
-    fn ends_of_both(&self, other: &Self) -> DMatrix<Complex<f64>> {
-        let (rows, columns) = (self.len() + other.len(), self.ends.ncols() + other.ends.ncols());
+    fn transient_of_both(&self, other: &Self) -> DMatrix<Complex<f64>> {
+        let (rows, columns) =
+            (self.len() + other.len(), self.transient.ncols() + other.transient.ncols());
         let mut both = DMatrix::zeros(rows, columns);
-        both.view_mut((0, 0), self.ends.shape()).copy_from(&self.ends);
-        both.view_mut(self.ends.shape(), other.ends.shape()).copy_from(&other.ends);
+        both.view_mut((0, 0), self.transient.shape()).copy_from(&self.transient);
+        both.view_mut(self.transient.shape(), other.transient.shape()).copy_from(&other.transient);
         both
     }
 
@@ -427,14 +429,18 @@ fn stacked<T: nalgebra::Scalar>(upper: &DMatrix<T>, lower: &DMatrix<T>) -> DMatr
     })
 }
 
-pub(crate) fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), EstimateError> {
+/// Returns an error unless two sets of frequencies (rad/s) are the same up to rounding.
+///
+/// # Errors
+/// [`NumericsError::Size`], [`SpectraError::FrequencyMismatch`].
+pub fn check_same_frequencies(left: &[f64], right: &[f64]) -> Result<(), SpectraError> {
     if left.len() != right.len() {
         let (got, expected) = (right.len(), left.len());
         return Err(NumericsError::Size { what: "frequencies", got, expected }.into());
     }
     for (row, (&left, &right)) in left.iter().zip(right).enumerate() {
         if (left - right).abs() > 1e-9 * left.abs() {
-            return Err(EstimateError::FrequencyMismatch { row, left, right });
+            return Err(SpectraError::FrequencyMismatch { row, left, right });
         }
     }
     Ok(())
@@ -444,7 +450,7 @@ fn check_shapes(
     omega: &[f64],
     force: &DMatrix<Complex<f64>>,
     motion: &DMatrix<Complex<f64>>,
-) -> Result<(), EstimateError> {
+) -> Result<(), SpectraError> {
     if force.ncols() != motion.ncols() || motion.ncols() == 0 {
         let (got, expected) = (motion.ncols(), force.ncols().max(1));
         return Err(NumericsError::Size { what: "channels of the motion", got, expected }.into());
@@ -460,10 +466,10 @@ fn check_shapes(
         }
     }
     if omega.is_empty() {
-        return Err(EstimateError::NoExcitedLine);
+        return Err(SpectraError::NoExcitedLine);
     }
     if let Some(&value) = omega.iter().find(|w| !(**w > 0.0 && w.is_finite())) {
-        return Err(EstimateError::Frequency { value });
+        return Err(SpectraError::Frequency { value });
     }
     for (what, amplitudes) in [("force amplitudes", force), ("motion amplitudes", motion)] {
         if let Some(at) = amplitudes.iter().position(|z| !z.is_finite()) {

@@ -1,0 +1,85 @@
+//! Transient of an open record: the load that the difference of its final and initial state puts on its lines.
+
+use mechid_model::Matrix;
+use nalgebra::{Complex, DVector};
+
+use crate::frequency_data::FrequencyData;
+
+/// Unknown loads τ of the transients of open records: column by column of [`FrequencyData::transient`], power by
+/// power in the order of the matrices, one of each degree of freedom.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section 6.3.
+pub struct TransientLoad<'a> {
+    data: &'a FrequencyData,
+    tau: &'a [f64],
+}
+
+impl<'a> TransientLoad<'a> {
+    /// Returns the loads `tau` of the open records of `data`.
+    ///
+    /// # Panics
+    /// If there are not as many loads as [`len`] says.
+    pub fn new(data: &'a FrequencyData, tau: &'a [f64]) -> Self {
+        assert_eq!(tau.len(), len(data), "one load of every record, power and degree of freedom");
+        Self { data, tau }
+    }
+
+    /// Subtracts (τ₀ + τ₁ s + …) Z of a row from forces, in N.
+    pub fn subtract(&self, row: usize, force: &mut [Complex<f64>]) {
+        let n = self.data.dof();
+        let powers = powers(self.data.omega()[row]);
+        for (column, z) in self.data.transient().row(row).iter().enumerate() {
+            for matrix in Matrix::ALL {
+                let z = z * powers[matrix as usize];
+                for (dof, force) in force.iter_mut().enumerate() {
+                    *force -= z * self.tau[index(n, column, matrix, dof)];
+                }
+            }
+        }
+    }
+
+    /// Returns the loads of a row, in N.
+    pub fn load(&self, row: usize) -> DVector<Complex<f64>> {
+        let mut force = DVector::zeros(self.data.dof());
+        self.subtract(row, force.as_mut_slice());
+        -force
+    }
+}
+
+/// Returns the number of unknown loads τ of all open records.
+pub fn len(data: &FrequencyData) -> usize {
+    Matrix::ALL.len() * data.dof() * data.transient().ncols()
+}
+
+/// Returns the index of a load among all: of a column of the transient, a power and a degree of freedom, of `n`.
+pub fn index(n: usize, column: usize, matrix: Matrix, dof: usize) -> usize {
+    (Matrix::ALL.len() * column + matrix as usize) * n + dof
+}
+
+/// Returns s², s and 1 with s = iω (rad/s), in the order of the matrices.
+pub fn powers(omega: f64) -> [Complex<f64>; 3] {
+    let mut powers = [Complex::from(1.0); 3];
+    powers[Matrix::Mass as usize] = Complex::from(-omega * omega);
+    powers[Matrix::Damping as usize] = Complex::new(0.0, omega);
+    powers
+}
+
+impl FrequencyData {
+    /// Returns the lines as if all records were whole periods: the transients of open records, by their loads
+    /// `tau` in the order of [`TransientLoad`], are subtracted from the force (N).
+    ///
+    /// # Panics
+    /// If there are not as many loads as [`len`] says.
+    #[must_use]
+    pub fn without_transient(&self, tau: &[f64]) -> Self {
+        let transient = TransientLoad::new(self, tau);
+        let mut force = self.force().clone();
+        for row in 0..self.len() {
+            let mut forces = force.row(row).transpose();
+            transient.subtract(row, forces.as_mut_slice());
+            force.row_mut(row).copy_from(&forces.transpose());
+        }
+        self.with_closed_force(force)
+    }
+}
