@@ -1,0 +1,325 @@
+//! Covariance of poles, participations and shapes under the whole noise: sensors and unmeasured forces.
+//!
+//! The fit weighs all outputs alike; its parameters have covariance G⁻¹ M G⁻¹, where M is the variance of the
+//! score under the noise as it is.
+//!
+//! # Source
+//! White, Econometrica 50 (1982) 1, with the variance of the score from the noise model.
+
+use std::ops::Range;
+
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+use crate::dense::{add_product, gram, transposed_product};
+use crate::limits::NEGLIGIBLE_PROCESS_POWER;
+use crate::lines::{Block, Lines};
+use crate::model::Model;
+use crate::noise::{Noise, modal_gain};
+use crate::normal::{
+    NormalEquations, ShapeProducts, block_pairs, parameter_scale, turn, whitened_shapes,
+};
+use crate::projection::{BlockArrays, Projection};
+use crate::search::Fit;
+
+type C = Complex<f64>;
+
+/// Covariances at a fit.
+#[derive(Debug, Clone)]
+pub(crate) struct Covariance {
+    /// Of the parameters of the search.
+    pub(crate) parameters: DMatrix<f64>,
+    /// Response of the linear unknowns of modes to the derivatives: A⁺ C, `2m × parameters`.
+    followed: DMatrix<f64>,
+    /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened units.
+    own: Vec<DMatrix<f64>>,
+    scale: Vec<f64>,
+    pairs: Vec<(usize, Option<usize>)>,
+    /// Shapes in whitened units.
+    shapes: Vec<f64>,
+}
+
+/// Products of one block after projection.
+struct BlockProducts {
+    /// C̃ᵀC̃, lower triangle, of the whole problem's parameters.
+    gram: Vec<f64>,
+    /// Rows of modes of A⁺ times its transpose.
+    inverse: Vec<f64>,
+    /// Projected derivatives, 2n rows.
+    derivatives: Vec<f64>,
+}
+
+impl Covariance {
+    /// Returns the covariance of a fit under `noise`, or `None` if its curvature is singular.
+    pub(crate) fn new(fit: &Fit<'_>, noise: &Noise) -> Option<Self> {
+        let (lines, model, projection) = (fit.lines, &fit.model, &fit.projection);
+        let normal = NormalEquations::new(lines, model, projection);
+        let pairs = model.pairs(lines.loads.len());
+        let (size, modes) = (normal.size, model.modes());
+        let scale = parameter_scale(&pairs, model);
+        let shapes = whitened_shapes(projection, modes);
+        let (followed, rows) = followed(lines, model, projection, &pairs);
+        let blocks: Vec<BlockProducts> = lines
+            .blocks
+            .par_iter()
+            .zip(&projection.blocks)
+            .map(|(block, arrays)| {
+                BlockProducts::new(lines, model, block, arrays, &pairs, &followed, &rows)
+            })
+            .collect();
+        let mut meat = vec![0.0; size * size];
+        let outputs = lines.outputs.len();
+        let mut own = vec![DMatrix::zeros(2 * modes, 2 * modes); outputs];
+        for (block, products) in lines.blocks.iter().zip(&blocks) {
+            let ratios = noise_ratios(fit, noise, block);
+            let weighted: Vec<f64> =
+                shapes.iter().enumerate().map(|(k, x)| x * ratios[k % outputs].sqrt()).collect();
+            let turned =
+                turn(&products.gram, &pairs, &ShapeProducts::new(&weighted, modes), &scale);
+            meat.iter_mut().zip(&turned).for_each(|(to, part)| *to += part);
+            for (own, ratio) in own.iter_mut().zip(&ratios) {
+                own.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
+            }
+        }
+        for mode in (0..modes).filter(|mode| noise.process[*mode] > 0.0) {
+            add_process(fit, noise, mode, &blocks, &pairs, &shapes, &scale, &mut meat);
+        }
+        let inverse = symmetric_inverse(&normal.curvature, size)?;
+        let meat = DMatrix::from_vec(size, size, meat);
+        let parameters = &inverse * meat * &inverse;
+        let columns = projection.triangle.size;
+        let followed =
+            DMatrix::from_fn(2 * modes, size, |row, column| followed[column * columns + row]);
+        Some(Self { parameters, followed, own, scale, pairs, shapes })
+    }
+
+    /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.
+    fn response_of_unknowns(&self, mode: usize, output: usize) -> DMatrix<f64> {
+        let outputs = self.own.len();
+        let part = |row: usize| self.shapes[row * outputs + output];
+        let mut response = DMatrix::zeros(2, self.scale.len());
+        for (pair, &(r, _)) in self.pairs.iter().enumerate() {
+            let (x, y) = (part(2 * r), part(2 * r + 1));
+            for row in 0..2 {
+                let u = self.followed[(2 * mode + row, 2 * pair)];
+                let v = self.followed[(2 * mode + row, 2 * pair + 1)];
+                response[(row, 2 * pair)] = (u * x + v * y) * self.scale[2 * pair];
+                response[(row, 2 * pair + 1)] = (v * x - u * y) * self.scale[2 * pair + 1];
+            }
+        }
+        response
+    }
+
+    /// Returns the covariance of real and imaginary part of a shape over its entry `reference`.
+    ///
+    /// Unmeasured forces on the mode itself change all its entries alike and cancel in the quotient.
+    pub(crate) fn of_normalised_shape(
+        &self,
+        mode: usize,
+        output: usize,
+        reference: usize,
+        shape: &[C],
+        levels: &[f64],
+    ) -> DMatrix<f64> {
+        if output == reference {
+            return DMatrix::zeros(2, 2);
+        }
+        let quotient = shape[output] / shape[reference];
+        let own = |output: usize| {
+            self.own[output].view((2 * mode, 2 * mode), (2, 2)) * levels[output].powi(2)
+        };
+        let by_quotient = rotation(quotient);
+        let by_reference = rotation(1.0 / shape[reference]);
+        let difference = self.response_of_unknowns(mode, output) * levels[output]
+            - &by_quotient * self.response_of_unknowns(mode, reference) * levels[reference];
+        let sum = own(output)
+            + &by_quotient * own(reference) * by_quotient.transpose()
+            + &difference * &self.parameters * difference.transpose();
+        &by_reference * sum * by_reference.transpose()
+    }
+
+    /// Returns the covariance of real and imaginary part of a participation times the shape's entry `reference`.
+    pub(crate) fn of_participation(
+        &self,
+        fit: &Fit<'_>,
+        mode: usize,
+        reference: usize,
+        input: usize,
+        entry: C,
+        level: f64,
+    ) -> DMatrix<f64> {
+        let value = fit.model.participation[mode][input];
+        let by_value = rotation(value);
+        let mut response = &by_value * self.response_of_unknowns(mode, reference) * -level;
+        if input != fit.model.gauge[mode] {
+            let pair = fit.model.pair_of(mode, input, fit.lines.loads.len());
+            let mut own = response.columns_mut(2 * pair, 2);
+            own += rotation(entry);
+        }
+        let own = self.own[reference].view((2 * mode, 2 * mode), (2, 2)) * (level * level);
+        &by_value * own * by_value.transpose() + &response * &self.parameters * response.transpose()
+    }
+}
+
+/// Multiplication by a complex number, as a matrix of real and imaginary parts.
+fn rotation(z: C) -> DMatrix<f64> {
+    DMatrix::from_row_slice(2, 2, &[z.re, -z.im, z.im, z.re])
+}
+
+/// Returns A⁺C (all columns of A), and the rows of modes of (AᵀA)⁻¹ as columns.
+fn followed(
+    lines: &Lines,
+    model: &Model,
+    projection: &Projection,
+    pairs: &[(usize, Option<usize>)],
+) -> (Vec<f64>, Vec<f64>) {
+    let (columns, size) = (projection.triangle.size, 2 * pairs.len());
+    let parts: Vec<Vec<f64>> = lines
+        .blocks
+        .par_iter()
+        .zip(&projection.blocks)
+        .map(|(block, arrays)| {
+            let rows = 2 * block.len();
+            let (places, local) = block_pairs(pairs, block);
+            let mut derivatives = vec![0.0; rows * 2 * local.len()];
+            model.fill_derivatives(lines, block, &arrays.weight, &local, &mut derivatives);
+            let cross = transposed_product(&arrays.design, &derivatives, rows);
+            let mut part = vec![0.0; columns * size];
+            for (k, from) in cross.chunks_exact(arrays.columns.len().max(1)).enumerate() {
+                let place = 2 * places[k / 2] + k % 2;
+                for (column, value) in arrays.columns.iter().zip(from) {
+                    part[place * columns + column] = *value;
+                }
+            }
+            part
+        })
+        .collect();
+    let mut sum = vec![0.0; columns * size];
+    for part in &parts {
+        sum.iter_mut().zip(part).for_each(|(to, part)| *to += part);
+    }
+    let mut rows = vec![0.0; columns * 2 * model.modes()];
+    (0..2 * model.modes()).for_each(|k| rows[k * columns + k] = 1.0);
+    for right in [&mut sum, &mut rows] {
+        projection.triangle.solve_transposed(right);
+        projection.triangle.solve(right);
+    }
+    (sum, rows)
+}
+
+/// Returns the columns of a block out of columns of the whole problem.
+fn local_rows(all: &[f64], columns: usize, places: &[usize]) -> Vec<f64> {
+    let chunks = all.chunks_exact(columns.max(1));
+    chunks.flat_map(|column| places.iter().map(|place| column[*place])).collect()
+}
+
+impl BlockProducts {
+    fn new(
+        lines: &Lines,
+        model: &Model,
+        block: &Block,
+        arrays: &BlockArrays,
+        pairs: &[(usize, Option<usize>)],
+        followed: &[f64],
+        inverse_rows: &[f64],
+    ) -> Self {
+        let (rows, size) = (2 * block.len(), 2 * pairs.len());
+        let columns = followed.len() / size.max(1);
+        let (places, local) = block_pairs(pairs, block);
+        let mut own = vec![0.0; rows * 2 * local.len()];
+        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut own);
+        let mut derivatives = vec![0.0; rows * size];
+        for (place, pair) in places.iter().zip(own.chunks_exact(2 * rows)) {
+            derivatives[2 * place * rows..(2 * place + 2) * rows].copy_from_slice(pair);
+        }
+        let inner = arrays.columns.len();
+        let part = local_rows(followed, columns, &arrays.columns);
+        add_product(&mut derivatives, &arrays.design, &part, rows, inner, -1.0);
+        let mut product = vec![0.0; size * size];
+        gram(&derivatives, rows, &mut product);
+        let own_rows = local_rows(inverse_rows, columns, &arrays.columns);
+        let mut influence = vec![0.0; rows * 2 * model.modes()];
+        add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
+        let inverse = transposed_product(&influence, &influence, rows);
+        Self { gram: product, inverse, derivatives }
+    }
+}
+
+/// Returns the variance of each output's sensor noise over that of the fit's weights, averaged over a block.
+fn noise_ratios(fit: &Fit<'_>, noise: &Noise, block: &Block) -> Vec<f64> {
+    let ratio = |(sensor, level): (&Vec<f64>, &f64)| {
+        let rows: Range<usize> = block.rows.clone();
+        let sum: f64 = rows.map(|row| sensor[row] / fit.weights.shape[row].powi(2)).sum();
+        sum / (block.len() as f64 * level * level)
+    };
+    noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()
+}
+
+/// Adds the variance of the score that the unmeasured force of one mode causes.
+#[expect(clippy::too_many_arguments, reason = "all that a score is made of")]
+fn add_process(
+    fit: &Fit<'_>,
+    noise: &Noise,
+    mode: usize,
+    blocks: &[BlockProducts],
+    pairs: &[(usize, Option<usize>)],
+    shapes: &[f64],
+    scale: &[f64],
+    meat: &mut [f64],
+) {
+    let (lines, size) = (fit.lines, 2 * pairs.len());
+    let modes = fit.model.modes();
+    let sums = transposed_product(shapes, shapes, lines.outputs.len());
+    let entry = |row: usize, column: usize| sums[column * 2 * modes + row];
+    // Σ_i x_si α_i and Σ_i y_si α_i, α the whitened shape of the mode that is driven.
+    let along: Vec<(C, C)> = pairs
+        .iter()
+        .map(|&(s, _)| {
+            let of = |row: usize| C::new(entry(row, 2 * mode), entry(row, 2 * mode + 1));
+            (of(2 * s), of(2 * s + 1))
+        })
+        .collect();
+    let direction = entry(2 * mode, 2 * mode) + entry(2 * mode + 1, 2 * mode + 1);
+    for (block, products) in lines.blocks.iter().zip(blocks) {
+        let n = block.len();
+        let gain = |line: &usize| {
+            let row = block.rows.start + line;
+            modal_gain(fit.model.poles[mode], lines.omega[row]) / fit.weights.shape[row]
+        };
+        let share = |line: &usize| noise.process[mode] * gain(line).norm_sqr() * direction;
+        let active: Vec<usize> =
+            (0..n).filter(|line| share(line) > NEGLIGIBLE_PROCESS_POWER).collect();
+        let rows = 2 * active.len();
+        if rows == 0 {
+            continue;
+        }
+        let mut scores = vec![0.0; rows * size];
+        for (pair, (p, q)) in along.iter().enumerate() {
+            let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
+            for (k, &line) in active.iter().enumerate() {
+                let u = C::new(own[line], -own[n + line]);
+                let v = C::new(own[2 * n + line], -own[3 * n + line]);
+                let factor = gain(&line) * noise.process[mode].sqrt();
+                let first = (u * p + v * q) * factor * scale[2 * pair];
+                let second = (v * p - u * q) * factor * scale[2 * pair + 1];
+                let (a, b) = (2 * pair * rows, (2 * pair + 1) * rows);
+                (scores[a + 2 * k], scores[a + 2 * k + 1]) = (first.re, first.im);
+                (scores[b + 2 * k], scores[b + 2 * k + 1]) = (second.re, second.im);
+            }
+        }
+        let part = transposed_product(&scores, &scores, rows);
+        meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
+    }
+}
+
+/// Returns the inverse of a symmetric positive definite matrix, scaled to a unit diagonal.
+fn symmetric_inverse(matrix: &[f64], size: usize) -> Option<DMatrix<f64>> {
+    let scale: Vec<f64> = (0..size).map(|k| 1.0 / matrix[k * size + k].sqrt()).collect();
+    if scale.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(size, size, |a, b| matrix[b * size + a] * scale[a] * scale[b]);
+    let factor = scaled.cholesky()?;
+    let inverse = factor.solve(&DMatrix::identity(size, size));
+    Some(DMatrix::from_fn(size, size, |a, b| inverse[(a, b)] * scale[a] * scale[b]))
+}

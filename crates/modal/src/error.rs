@@ -1,0 +1,89 @@
+//! Errors of the identification of modes.
+
+use thiserror::Error;
+
+/// Why no modes can be identified.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ModalError {
+    /// There is no output.
+    #[error("no output is given: modes need at least one response")]
+    NoOutput,
+    /// The lines are fewer than the unknowns of one mode.
+    #[error("the band has {lines} lines; one mode of this data needs at least {required}")]
+    TooFewLines {
+        /// Number of lines.
+        lines: usize,
+        /// Least number of lines.
+        required: usize,
+    },
+    /// Outputs without any power in the band.
+    #[error(
+        "outputs {outputs:?} (counted from 0) are constant or zero in the band: leave them out"
+    )]
+    DeadOutputs {
+        /// Indices of the outputs.
+        outputs: Vec<usize>,
+    },
+    /// Inputs without any power in the band.
+    #[error("inputs {inputs:?} (counted from 0) are constant or zero in the band: leave them out")]
+    DeadInputs {
+        /// Indices of the inputs.
+        inputs: Vec<usize>,
+    },
+    /// Inputs that are multiples of one another on every line.
+    #[error(
+        "input {input} follows the other inputs (share of its own {own_share:.1e}): their responses \
+         cannot be separated; record a test in which it differs, or leave it out"
+    )]
+    DependentInputs {
+        /// Index of the input.
+        input: usize,
+        /// Root-mean-square of what is its own, relative to its own.
+        own_share: f64,
+    },
+    /// No mode is significant.
+    #[error(
+        "no mode in {from_hz:.6} Hz to {to_hz:.6} Hz: {candidates} candidates, none significant"
+    )]
+    NoMode {
+        /// Lowest frequency, in Hz.
+        from_hz: f64,
+        /// Highest frequency, in Hz.
+        to_hz: f64,
+        /// Number of candidates that were tried.
+        candidates: usize,
+    },
+    /// A setting is out of its range.
+    #[error("`{setting}` is {value}, but must be {required}")]
+    Setting {
+        /// Name of the setting.
+        setting: &'static str,
+        /// Value that was given.
+        value: f64,
+        /// Values that are possible.
+        required: &'static str,
+    },
+    /// A decomposition of the numerical kernel failed.
+    #[error("the decomposition of {what} ({size} × {size}) did not converge")]
+    Decomposition {
+        /// Matrix that was decomposed.
+        what: &'static str,
+        /// Size of it.
+        size: usize,
+    },
+    /// Line data of other sizes than those of the estimate.
+    #[error(
+        "the data has {inputs} inputs and {outputs} outputs, the modes {model_inputs} and {model_outputs}"
+    )]
+    Size {
+        /// Inputs of the data.
+        inputs: usize,
+        /// Outputs of the data.
+        outputs: usize,
+        /// Inputs of the modes.
+        model_inputs: usize,
+        /// Outputs of the modes.
+        model_outputs: usize,
+    },
+}

@@ -1,0 +1,177 @@
+//! The identified modes of a record, and what they predict.
+
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DMatrix};
+
+use crate::ModalError;
+use crate::covariance::Covariance;
+use crate::lines::Lines;
+use crate::mode::{DroppedCandidate, IdentifiedMode};
+use crate::model::ResidualPowers;
+use crate::noise::{Noise, shapes};
+use crate::order::removal_losses;
+use crate::results::identified_mode;
+use crate::search::Fit;
+
+type C = Complex<f64>;
+
+/// Modes with everything that was estimated beside them.
+#[derive(Debug, Clone)]
+pub struct ModalEstimate {
+    modes: Vec<IdentifiedMode>,
+    dropped: Vec<DroppedCandidate>,
+    powers: ResidualPowers,
+    pub(crate) reference: f64,
+    /// Real coefficients of the residual powers: `[output][input][power]`.
+    residuals: Vec<Vec<Vec<f64>>>,
+    inputs: usize,
+    explained: Vec<f64>,
+    noise_level: Vec<f64>,
+    noise_spectrum: Vec<Vec<f64>>,
+    log_likelihood: f64,
+    iterations: usize,
+}
+
+impl ModalEstimate {
+    pub(crate) fn new(
+        fit: &Fit<'_>,
+        noise: &Noise,
+        covariance: &Covariance,
+        dropped: Vec<DroppedCandidate>,
+    ) -> Self {
+        let (lines, model) = (fit.lines, &fit.model);
+        let shapes = shapes(&fit.projection, &fit.weights, model.modes());
+        let gains = removal_losses(fit);
+        let modes = (0..model.modes())
+            .map(|mode| identified_mode(fit, noise, covariance, &shapes[mode], mode, gains[mode]))
+            .collect();
+        let columns = model.residual_columns(lines);
+        let inputs = lines.inputs();
+        let residuals = (0..lines.outputs.len())
+            .map(|output| {
+                let unknowns = fit.projection.unknowns_of(output, &fit.weights);
+                (0..inputs).map(|input| unknowns[columns[input].clone()].to_vec()).collect()
+            })
+            .collect();
+        let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
+        Self {
+            modes,
+            dropped,
+            powers: model.powers.clone(),
+            reference: model.reference,
+            residuals,
+            inputs,
+            explained: explained(fit),
+            noise_level: noise.sensor.iter().map(level).collect(),
+            noise_spectrum: noise.sensor.clone(),
+            log_likelihood: log_likelihood(fit),
+            iterations: fit.steps,
+        }
+    }
+
+    /// Returns the modes, by rising frequency.
+    pub fn modes(&self) -> &[IdentifiedMode] {
+        &self.modes
+    }
+
+    /// Returns the candidates that are no modes of the result, with the reason.
+    pub fn dropped(&self) -> &[DroppedCandidate] {
+        &self.dropped
+    }
+
+    /// Returns the share of each output's power in the band that the model explains.
+    pub fn variance_explained(&self) -> Vec<f64> {
+        self.explained.clone()
+    }
+
+    /// Returns the root-mean-square of each sensor's own noise on a line, in the unit of the output.
+    pub fn noise_levels(&self) -> &[f64] {
+        &self.noise_level
+    }
+
+    /// Returns the variance of each sensor's own noise on every line: `[output][line]`.
+    pub fn noise_spectra(&self) -> &[Vec<f64>] {
+        &self.noise_spectrum
+    }
+
+    /// Returns the logarithm of the likelihood at the weights of the fit, without constants.
+    pub fn log_likelihood(&self) -> f64 {
+        self.log_likelihood
+    }
+
+    /// Returns the powers of jω that stand for what lies outside the band.
+    pub fn residual_powers(&self) -> &ResidualPowers {
+        &self.powers
+    }
+
+    /// Returns the number of steps of all searches.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// Returns the frequency response at ω (rad/s), outputs × inputs.
+    pub fn response(&self, omega: f64) -> DMatrix<C> {
+        let s = C::new(0.0, omega);
+        let turn = C::new(0.0, omega / self.reference);
+        DMatrix::from_fn(self.residuals.len(), self.inputs, |output, input| {
+            let of_mode = |mode: &IdentifiedMode| {
+                let residue = mode.residue(output, input);
+                residue / (s - mode.pole) + residue.conj() / (s - mode.pole.conj())
+            };
+            let modal: C = self.modes.iter().map(of_mode).sum();
+            let own = self.powers.forces.iter().zip(&self.residuals[output][input]);
+            modal + own.map(|(power, value)| turn.powi(*power) * *value).sum::<C>()
+        })
+    }
+
+    /// Predicts the outputs of line data from its inputs, lines × outputs; the transients of its open records
+    /// are estimated from its outputs, one load of the modes per record and residual terms per output.
+    ///
+    /// # Errors
+    /// [`ModalError::Size`] if the numbers of inputs or outputs differ.
+    pub fn synthesis(&self, data: &LineData) -> Result<DMatrix<C>, ModalError> {
+        let (inputs, outputs) = (data.inputs().ncols(), data.outputs().ncols());
+        let (model_inputs, model_outputs) = (self.inputs, self.residuals.len());
+        if inputs != model_inputs || outputs != model_outputs {
+            return Err(ModalError::Size { inputs, outputs, model_inputs, model_outputs });
+        }
+        let mut predicted = DMatrix::zeros(data.len(), outputs);
+        for (line, omega) in data.omega().iter().enumerate() {
+            let row = self.response(*omega) * data.inputs().row(line).transpose();
+            predicted.row_mut(line).copy_from(&row.transpose());
+        }
+        let lines = Lines::new(data);
+        crate::synthesis::add_transients(
+            &lines,
+            &self.modes,
+            &self.powers.transients,
+            &mut predicted,
+        );
+        Ok(predicted)
+    }
+}
+
+fn explained(fit: &Fit<'_>) -> Vec<f64> {
+    let lines = fit.lines;
+    let mut rest = vec![0.0; lines.outputs.len()];
+    for (block, arrays) in lines.blocks.iter().zip(&fit.projection.blocks) {
+        let n = block.len();
+        for (output, column) in arrays.residual.chunks_exact(2 * n).enumerate() {
+            let scale = fit.weights.level[output];
+            for line in 0..n {
+                let power = column[line].powi(2) + column[n + line].powi(2);
+                rest[output] += power * (scale / arrays.weight[line]).powi(2);
+            }
+        }
+    }
+    let total = |output: &Vec<C>| output.iter().map(|z| z.norm_sqr()).sum::<f64>();
+    lines.outputs.iter().zip(&rest).map(|(output, rest)| 1.0 - rest / total(output)).collect()
+}
+
+fn log_likelihood(fit: &Fit<'_>) -> f64 {
+    let outputs = fit.weights.level.len() as f64;
+    let lines = fit.lines.len() as f64;
+    let shapes: f64 = fit.weights.shape.iter().map(|value| value.ln()).sum();
+    let levels: f64 = fit.weights.level.iter().map(|value| value.ln()).sum();
+    -(fit.cost() / 2.0 + 2.0 * (outputs * shapes + lines * levels))
+}

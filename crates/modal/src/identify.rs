@@ -1,0 +1,312 @@
+//! Identification of modes from line data: start, search, noise and number of modes.
+
+use std::f64::consts::TAU;
+
+use mechid_spectra::LineData;
+use nalgebra::Complex;
+
+use crate::ModalError;
+use crate::covariance::Covariance;
+use crate::estimate::ModalEstimate;
+use crate::initial_poles::initial_poles;
+use crate::limits::{MAX_DAMPING, NOISE_PASSES};
+use crate::lines::Lines;
+use crate::mode::{DropReason, DroppedCandidate};
+use crate::model::{Model, ResidualPowers};
+use crate::noise::{Noise, shapes};
+use crate::order::{add_best, removal_losses, required_gain};
+use crate::projection::Weights;
+use crate::residues::with_participations;
+use crate::rules::doubtful_modes;
+use crate::search::Fit;
+
+/// What is looked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalSettings {
+    /// Number of modes; `None` chooses it by the likelihood.
+    pub modes: Option<usize>,
+    /// Frequencies (Hz) near which modes are looked for, instead of the whole band; empty for all.
+    pub near_hz: Vec<f64>,
+    /// Largest number of modes that is tried.
+    pub max_modes: usize,
+    /// Whether unmeasured forces through the modes are part of the noise.
+    pub unmeasured_forces: bool,
+    /// Powers of jω for what lies outside the band; `None` chooses them by the data.
+    pub residual_powers: Option<ResidualPowers>,
+}
+
+impl Default for ModalSettings {
+    fn default() -> Self {
+        Self {
+            modes: None,
+            near_hz: Vec::new(),
+            max_modes: 100,
+            unmeasured_forces: true,
+            residual_powers: None,
+        }
+    }
+}
+
+/// Identifies the modes in the band of the data.
+///
+/// Maximum likelihood without a window: poles and participations are searched, shapes and residual terms
+/// are linear; the ends of each open record are one more load that all outputs share.
+///
+/// # Errors
+/// [`ModalError`] if the data cannot carry a mode, or if no mode is significant.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 9
+/// and 12; El-Kafafy, Peeters, Guillaume & De Troyer, Mechanical Systems and Signal Processing 70 (2016) 1034
+/// (maximum likelihood of the modal model).
+pub fn identify_modes(
+    data: &LineData,
+    settings: &ModalSettings,
+) -> Result<ModalEstimate, ModalError> {
+    check_settings(settings)?;
+    let lines = Lines::new(data);
+    lines.check()?;
+    let mut search = Identification::start(&lines, settings)?;
+    search.choose_modes();
+    search.choose_powers();
+    search.apply_rules();
+    search.finish()
+}
+
+fn check_settings(settings: &ModalSettings) -> Result<(), ModalError> {
+    if settings.modes == Some(0) || settings.max_modes == 0 {
+        let required = "at least 1";
+        return Err(ModalError::Setting { setting: "modes", value: 0.0, required });
+    }
+    let bad = settings.near_hz.iter().find(|hz| !(hz.is_finite() && **hz > 0.0));
+    bad.map_or(Ok(()), |value| {
+        let required = "positive and finite";
+        Err(ModalError::Setting { setting: "near_hz", value: *value, required })
+    })
+}
+
+/// State of an identification.
+struct Identification<'a> {
+    lines: &'a Lines,
+    settings: &'a ModalSettings,
+    fit: Fit<'a>,
+    noise: Noise,
+    dropped: Vec<DroppedCandidate>,
+}
+
+impl<'a> Identification<'a> {
+    /// Starts at the poles of the subspace method, or near the stated frequencies.
+    fn start(lines: &'a Lines, settings: &'a ModalSettings) -> Result<Self, ModalError> {
+        let powers = settings.residual_powers.clone().unwrap_or_else(|| first_powers(lines));
+        let mut poles = initial_poles(lines)?;
+        log::debug!("{} poles to start with", poles.len());
+        if !settings.near_hz.is_empty() {
+            poles = near_stated(&poles, &settings.near_hz);
+        }
+        poles.truncate(settings.max_modes);
+        let level = |output: &Vec<Complex<f64>>| {
+            let power = output.iter().map(|z| z.norm_sqr()).sum::<f64>();
+            0.1 * (power / output.len() as f64).sqrt()
+        };
+        let level = lines.outputs.iter().map(level).collect();
+        let weights = Weights { shape: vec![1.0; lines.len()], level };
+        let model = with_participations(lines, poles, &powers, &weights);
+        let mut fit = Fit::new(lines, model, weights);
+        fit.search();
+        let noise = Noise::from_fit(&fit, false);
+        let mut start = Self { lines, settings, fit, noise, dropped: Vec::new() };
+        for _ in 0..NOISE_PASSES {
+            start.update_noise();
+        }
+        Ok(start)
+    }
+
+    /// Estimates the noise again and searches with its weights.
+    fn update_noise(&mut self) {
+        self.noise = Noise::from_fit(&self.fit, self.settings.unmeasured_forces);
+        let shapes = shapes(&self.fit.projection, &self.fit.weights, self.fit.model.modes());
+        self.fit.weights = self.noise.weights(self.lines, &self.fit.model, &shapes);
+        self.fit.refresh();
+        self.fit.search();
+        log::debug!("{} modes, cost {:.1}", self.fit.model.modes(), self.fit.cost());
+    }
+
+    /// Takes modes out that are not worth their parameters, and adds those that are.
+    fn choose_modes(&mut self) {
+        let required = required_gain(self.lines);
+        self.remove_impossible();
+        self.remove_insignificant(required);
+        let stated = !self.settings.near_hz.is_empty() && self.settings.modes.is_none();
+        let most = self.settings.modes.unwrap_or(self.settings.max_modes);
+        while !stated && self.fit.model.modes() < most {
+            let least = if self.settings.modes.is_some() { 0.0 } else { required };
+            match add_best(&mut self.fit, least) {
+                Ok(()) => {
+                    self.update_noise();
+                    self.remove_impossible();
+                }
+                Err(tried) => {
+                    let reason = |gain| DropReason::Insignificant { gain, required };
+                    self.dropped.extend(
+                        tried.iter().map(|one| DroppedCandidate::new(one.pole, reason(one.gain))),
+                    );
+                    break;
+                }
+            }
+        }
+        if let Some(most) = self.settings.modes {
+            self.remove_beyond(most);
+        }
+    }
+
+    /// Takes out roots that left the band or are damped too much for a resonance.
+    fn remove_impossible(&mut self) {
+        let (low, high) = self.lines.band();
+        let reason = |pole: Complex<f64>| {
+            if -pole.re / pole.norm() > MAX_DAMPING {
+                Some(DropReason::TooDamped)
+            } else if pole.im < low || pole.im > high {
+                Some(DropReason::OutsideBand)
+            } else {
+                None
+            }
+        };
+        let reasons: Vec<Option<DropReason>> =
+            self.fit.model.poles.iter().map(|pole| reason(*pole)).collect();
+        self.remove(&reasons);
+    }
+
+    /// Takes out modes whose removal costs less than their parameters, one after the other.
+    fn remove_insignificant(&mut self, required: f64) {
+        while self.settings.modes.is_none() {
+            let losses = removal_losses(&self.fit);
+            let least = (0..losses.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+            let Some(mode) = least.filter(|mode| losses[*mode] < required) else { return };
+            let mut reasons = vec![None; losses.len()];
+            reasons[mode] = Some(DropReason::Insignificant { gain: losses[mode], required });
+            self.remove(&reasons);
+        }
+    }
+
+    /// Keeps the modes that bring most, up to a stated number.
+    fn remove_beyond(&mut self, most: usize) {
+        while self.fit.model.modes() > most {
+            let losses = removal_losses(&self.fit);
+            let least = (0..losses.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+            let Some(mode) = least else { return };
+            let mut reasons = vec![None; losses.len()];
+            reasons[mode] = Some(DropReason::BeyondNumber { gain: losses[mode] });
+            self.remove(&reasons);
+        }
+    }
+
+    /// Takes the modes with a reason out and searches again.
+    fn remove(&mut self, reasons: &[Option<DropReason>]) {
+        if reasons.iter().all(Option::is_none) {
+            return;
+        }
+        for (pole, reason) in self.fit.model.poles.iter().zip(reasons) {
+            if let Some(reason) = reason {
+                self.dropped.push(DroppedCandidate::new(*pole, *reason));
+            }
+        }
+        let kept: Vec<usize> = (0..reasons.len()).filter(|mode| reasons[*mode].is_none()).collect();
+        self.fit.model.select(&kept);
+        self.fit.refresh();
+        self.fit.search();
+        self.update_noise();
+    }
+
+    /// Chooses the residual powers by Akaike's criterion: bias of the poles is worse than a few unknowns more.
+    fn choose_powers(&mut self) {
+        if self.settings.residual_powers.is_some() || self.lines.inputs() == 0 {
+            return;
+        }
+        let unknowns =
+            |model: &Model| (model.columns(self.lines) * self.lines.outputs.len()) as f64;
+        let mut best = (f64::INFINITY, self.fit.model.powers.clone());
+        for powers in power_sets() {
+            let mut trial = self.fit.clone();
+            trial.model.powers = powers.clone();
+            trial.refresh();
+            trial.search_at_most(4);
+            let criterion = trial.cost() + 2.0 * unknowns(&trial.model);
+            log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
+            if criterion < best.0 {
+                best = (criterion, powers);
+            }
+        }
+        if best.1 != self.fit.model.powers {
+            self.fit.model.powers = best.1;
+            self.fit.refresh();
+            self.fit.search();
+            self.update_noise();
+        }
+    }
+
+    /// Takes out modes that the likelihood keeps for a reason other than a resonance.
+    fn apply_rules(&mut self) {
+        while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
+            let Some(covariance) = Covariance::new(&self.fit, &self.noise) else { return };
+            let reasons = doubtful_modes(&self.fit, &self.noise, &covariance);
+            if reasons.iter().all(Option::is_none) {
+                return;
+            }
+            self.remove(&reasons);
+            self.remove_impossible();
+        }
+    }
+
+    fn finish(mut self) -> Result<ModalEstimate, ModalError> {
+        self.fit.model.sort();
+        self.fit.refresh();
+        self.update_noise();
+        if self.fit.model.modes() == 0 {
+            let (low, high) = self.lines.band();
+            return Err(ModalError::NoMode {
+                from_hz: low / TAU,
+                to_hz: high / TAU,
+                candidates: self.dropped.len(),
+            });
+        }
+        let size = self.fit.model.parameters(self.lines);
+        let covariance = Covariance::new(&self.fit, &self.noise)
+            .ok_or(ModalError::Decomposition { what: "the curvature of the likelihood", size })?;
+        Ok(ModalEstimate::new(&self.fit, &self.noise, &covariance, self.dropped))
+    }
+}
+
+/// Powers to start with.
+fn first_powers(lines: &Lines) -> ResidualPowers {
+    let transients = if lines.inputs() == 0 { Vec::new() } else { vec![0, 1, 2] };
+    ResidualPowers { forces: vec![-4, -2, 0, 2, 4], transients }
+}
+
+/// Powers that are compared.
+fn power_sets() -> Vec<ResidualPowers> {
+    let forces = [
+        vec![-2, 0, 2],
+        vec![-4, -2, 0, 2, 4],
+        vec![-6, -4, -2, 0, 2, 4, 6],
+        vec![-4, -3, -2, -1, 0, 1, 2, 3, 4],
+        vec![-6, -5, -4, -3, -2, -1, 0, 1, 2, 3, 4, 5, 6],
+    ];
+    forces.into_iter().map(|forces| ResidualPowers { forces, transients: vec![0, 1, 2] }).collect()
+}
+
+/// Returns, for each stated frequency, the pole nearest to it, or a pole of small damping there.
+fn near_stated(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
+    /// Relative distance within which a pole of the start is the one that is meant.
+    const REACH: f64 = 0.02;
+    const DAMPING: f64 = 5e-3;
+    let of = |hz: &f64| {
+        let omega = TAU * hz;
+        let distance = |pole: &Complex<f64>| (pole.norm() - omega).abs();
+        let nearest = poles.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let made = Complex::new(-DAMPING * omega, omega);
+        nearest.filter(|pole| distance(pole) < REACH * omega).copied().unwrap_or(made)
+    };
+    let mut chosen: Vec<Complex<f64>> = near_hz.iter().map(of).collect();
+    chosen.dedup();
+    chosen
+}

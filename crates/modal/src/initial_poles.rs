@@ -1,0 +1,340 @@
+//! First estimate of the poles: subspace method on the lines, and clusters of its roots over the orders.
+//!
+//! The band is mapped to most of the unit circle, z = e^{j(ω − ω_a)Δ}; block rows are the lines times
+//! powers of z. Their products depend on differences of powers alone: one correlation per lag gives all.
+//! Past inputs and outputs are the instruments; future inputs and the transient of each record are
+//! projected out.
+//!
+//! # Source
+//! McKelvey, Akçay & Ljung, IEEE Trans. Automatic Control 41 (1996) 960 (subspace on spectral lines);
+//! Verhaegen, Automatica 30 (1994) 61 (past inputs and outputs as instruments).
+
+use std::f64::consts::TAU;
+
+use faer::prelude::{Solve, SolveLstsq};
+use faer::{Mat, Side};
+use nalgebra::Complex;
+use rayon::prelude::*;
+
+use crate::ModalError;
+use crate::limits::{
+    CIRCLE_SHARE, CLUSTER_DAMPING, CLUSTER_FREQUENCY, MAX_COMPONENTS, MAX_INITIAL_DAMPING,
+    MIN_ORDER_SHARE, SUBSPACE_SHIFTS,
+};
+use crate::lines::Lines;
+
+type C = Complex<f64>;
+
+/// Share of the power of a block row that regularises its products.
+const RIDGE: f64 = 1e-10;
+/// Number of orders whose roots are compared.
+const ORDERS: usize = 16;
+/// Largest order.
+const MAX_ORDER: usize = 72;
+/// Largest number of block rows times channels.
+const MAX_ROWS: usize = 520;
+
+/// Root of one order.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Root {
+    pub(crate) pole: C,
+    pub(crate) order: usize,
+}
+
+impl Root {
+    fn size(&self) -> f64 {
+        self.pole.norm()
+    }
+
+    fn damping(&self) -> f64 {
+        -self.pole.re / self.pole.norm()
+    }
+}
+
+/// Returns the poles that most orders of the subspace method agree on.
+pub(crate) fn initial_poles(lines: &Lines) -> Result<Vec<C>, ModalError> {
+    let (roots, orders) = subspace_roots(lines)?;
+    Ok(clusters(roots, orders))
+}
+
+/// Returns the roots in the band of a range of orders, and the number of orders.
+pub(crate) fn subspace_roots(lines: &Lines) -> Result<(Vec<Root>, usize), ModalError> {
+    let channels = leading_components(lines)?;
+    let Some(shifts) = shifts(lines, channels.len()) else {
+        return Ok((Vec::new(), 1));
+    };
+    let (low, high) = lines.band();
+    let step = TAU * CIRCLE_SHARE / (high - low);
+    let products = Products::new(lines, &channels, shifts, low, step)?;
+    let basis = products.observability()?;
+    let largest = (basis.nrows() - channels.len()).min(basis.ncols()).min(MAX_ORDER);
+    let smallest = (largest / 4).max(2).min(largest);
+    let count = ORDERS.min(largest - smallest + 1);
+    let order = |k: usize| smallest + (largest - smallest) * k / count.saturating_sub(1).max(1);
+    let mut orders: Vec<usize> = (0..count).map(order).collect();
+    orders.dedup();
+    let roots: Result<Vec<Vec<C>>, ModalError> =
+        orders.par_iter().map(|order| shift_roots(&basis, channels.len(), *order)).collect();
+    let mut kept = Vec::new();
+    for (roots, order) in roots?.into_iter().zip(&orders) {
+        for z in roots {
+            let rate = z.ln();
+            let turns = if rate.im < 0.0 { TAU } else { 0.0 };
+            let pole = C::new(rate.re / step, low + (rate.im + turns) / step);
+            if pole.re < 0.0 && pole.im > low && pole.im < high {
+                kept.push(Root { pole, order: *order });
+            }
+        }
+    }
+    kept.retain(|root| root.damping() < MAX_INITIAL_DAMPING);
+    Ok((kept, orders.len()))
+}
+
+/// Returns the number of block rows, or `None` if the lines are too few for two.
+fn shifts(lines: &Lines, components: usize) -> Option<usize> {
+    let channels = lines.inputs() + components;
+    let wanted = (2 * MAX_ORDER / components).max(SUBSPACE_SHIFTS);
+    let bound = (MAX_ROWS / channels).min(lines.len() / (2 * (2 * channels + 1)));
+    Some(wanted.min(bound)).filter(|shifts| *shifts >= 3)
+}
+
+/// Returns the leading principal components of the outputs, each output scaled to its level.
+fn leading_components(lines: &Lines) -> Result<Vec<Vec<C>>, ModalError> {
+    let scaled: Vec<Vec<C>> = lines
+        .outputs
+        .iter()
+        .map(|output| {
+            let power = output.iter().map(|z| z.norm_sqr()).sum::<f64>() / output.len() as f64;
+            output.iter().map(|z| z / power.sqrt()).collect()
+        })
+        .collect();
+    let outputs = scaled.len();
+    if outputs <= MAX_COMPONENTS {
+        return Ok(scaled);
+    }
+    let product = |a: &Vec<C>, b: &Vec<C>| a.iter().zip(b).map(|(a, b)| a * b.conj()).sum::<C>();
+    let gram = Mat::from_fn(outputs, outputs, |a, b| product(&scaled[a], &scaled[b]));
+    let eigen = gram
+        .self_adjoint_eigen(Side::Lower)
+        .map_err(|_| ModalError::Decomposition { what: "outputs", size: outputs })?;
+    let component = |rank: usize| -> Vec<C> {
+        let direction = eigen.U().col(outputs - 1 - rank);
+        let value = |line: usize| -> C {
+            (0..outputs).map(|output| direction[output].conj() * scaled[output][line]).sum()
+        };
+        (0..lines.len()).map(value).collect()
+    };
+    Ok((0..MAX_COMPONENTS).into_par_iter().map(component).collect())
+}
+
+/// Products of all block rows: future inputs, then past inputs and outputs, then future outputs.
+struct Products {
+    inputs: usize,
+    outputs: usize,
+    shifts: usize,
+    gram: Mat<C>,
+}
+
+impl Products {
+    fn new(
+        lines: &Lines,
+        components: &[Vec<C>],
+        shifts: usize,
+        low: f64,
+        step: f64,
+    ) -> Result<Self, ModalError> {
+        let (inputs, outputs) = (lines.inputs(), components.len());
+        let mut products = Self { inputs, outputs, shifts, gram: Mat::zeros(0, 0) };
+        let size = 2 * shifts * (inputs + outputs);
+        products.gram = Mat::zeros(size, size);
+        let levels: Vec<f64> = (0..inputs).map(|load| lines.load_level(load)).collect();
+        let mut from = 0;
+        while from < lines.blocks.len() {
+            let same = |b: &usize| lines.blocks[*b].active == lines.blocks[from].active;
+            let open = lines.blocks[from].delay.is_some();
+            let count = (from..lines.blocks.len()).take_while(same).count();
+            let rows = lines.blocks[from].rows.start..lines.blocks[from + count - 1].rows.end;
+            let mut channels: Vec<Vec<C>> = Vec::new();
+            for (load, level) in levels.iter().enumerate() {
+                let acts = lines.blocks[from].active.contains(&load);
+                let value = |row| if acts { lines.load(load, row) / *level } else { C::default() };
+                channels.push(rows.clone().map(value).collect());
+            }
+            channels.extend(components.iter().map(|component| component[rows.clone()].to_vec()));
+            if open {
+                channels.push(vec![C::new(1.0, 0.0); rows.len()]);
+            }
+            let turn: Vec<C> = lines.omega[rows].iter().map(|w| C::cis((w - low) * step)).collect();
+            products.add(&lags(&channels, &turn, 2 * shifts), open)?;
+            from += count;
+        }
+        Ok(products)
+    }
+
+    /// Returns channel and power of z of each row.
+    fn rows(&self) -> Vec<(usize, isize)> {
+        let (inputs, all) = (self.inputs, self.inputs + self.outputs);
+        let shifts = self.shifts as isize;
+        let block = |channels: std::ops::Range<usize>, powers: std::ops::Range<isize>| {
+            powers.flat_map(move |power| channels.clone().map(move |channel| (channel, power)))
+        };
+        block(0..inputs, 0..shifts)
+            .chain(block(0..all, -shifts..0))
+            .chain(block(inputs..all, 0..shifts))
+            .collect()
+    }
+
+    /// Adds the products of one record, its transient projected out.
+    fn add(&mut self, lags: &Lags, open: bool) -> Result<(), ModalError> {
+        let rows = self.rows();
+        let size = rows.len();
+        let part = Mat::from_fn(size, size, |a, b| lags.of(rows[a], rows[b]));
+        self.gram += &part;
+        if open {
+            let ends: Vec<(usize, isize)> = (0..self.shifts)
+                .map(|power| (self.inputs + self.outputs, power as isize))
+                .collect();
+            let own = Mat::from_fn(ends.len(), ends.len(), |a, b| lags.of(ends[a], ends[b]));
+            let cross = Mat::from_fn(ends.len(), size, |a, b| lags.of(ends[a], rows[b]));
+            self.gram -= cross.adjoint() * solve_ridged(own, &cross)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the leading directions of the future outputs that the past explains.
+    fn observability(&self) -> Result<Mat<C>, ModalError> {
+        let future = self.inputs * self.shifts;
+        let past = (self.inputs + self.outputs) * self.shifts;
+        let size = self.gram.nrows();
+        let rest = if future == 0 {
+            self.gram.clone()
+        } else {
+            let own = self.gram.submatrix(0, 0, future, future).to_owned();
+            let cross = self.gram.submatrix(0, future, future, size - future).to_owned();
+            let kept = self.gram.submatrix(future, future, size - future, size - future);
+            kept - cross.adjoint() * solve_ridged(own, &cross)?
+        };
+        let outputs = self.outputs * self.shifts;
+        let instruments = rest.submatrix(0, 0, past, past).to_owned();
+        let cross = rest.submatrix(0, past, past, outputs).to_owned();
+        let explained = cross.adjoint() * solve_ridged(instruments, &cross)?;
+        let failed = ModalError::Decomposition { what: "future outputs", size: outputs };
+        let eigen = explained.self_adjoint_eigen(Side::Lower).map_err(|_| failed)?;
+        let count = outputs.min(MAX_ORDER);
+        let basis = eigen.U();
+        Ok(Mat::from_fn(outputs, count, |row, rank| basis[(row, outputs - 1 - rank)]))
+    }
+}
+
+/// Solves with a Hermitian matrix of products whose diagonal is raised by a little.
+fn solve_ridged(mut own: Mat<C>, right: &Mat<C>) -> Result<Mat<C>, ModalError> {
+    let size = own.nrows();
+    let trace = (0..size).map(|k| own[(k, k)].re).sum::<f64>();
+    for k in 0..size {
+        own[(k, k)] += C::from(RIDGE * trace / size.max(1) as f64 + f64::MIN_POSITIVE);
+    }
+    match own.llt(Side::Lower) {
+        Ok(factor) => Ok(factor.solve(right)),
+        Err(_) => Err(ModalError::Decomposition { what: "products of inputs and outputs", size }),
+    }
+}
+
+/// Sums of products of channels times powers of z.
+struct Lags {
+    channels: usize,
+    /// `[lag][a + channels · b]`: Σ z^lag v_a v_b*.
+    sums: Vec<Vec<C>>,
+}
+
+impl Lags {
+    fn of(&self, (a, i): (usize, isize), (b, j): (usize, isize)) -> C {
+        if i >= j {
+            self.sums[(i - j) as usize][a + self.channels * b]
+        } else {
+            self.sums[(j - i) as usize][b + self.channels * a].conj()
+        }
+    }
+}
+
+fn lags(channels: &[Vec<C>], turn: &[C], count: usize) -> Lags {
+    let n = channels.len();
+    let conjugate: Vec<C> = channels.iter().flat_map(|v| v.iter().map(C::conj)).collect();
+    let right = faer::MatRef::from_column_major_slice(&conjugate, turn.len(), n);
+    let sum = |lag: usize| -> Vec<C> {
+        let power: Vec<C> = turn.iter().map(|z| z.powu(lag as u32)).collect();
+        let turned = |v: &Vec<C>| v.iter().zip(&power).map(|(v, z)| v * z).collect::<Vec<C>>();
+        let left: Vec<C> = channels.iter().flat_map(turned).collect();
+        let left = faer::MatRef::from_column_major_slice(&left, turn.len(), n);
+        let product = left.transpose() * right;
+        (0..n).flat_map(|b| (0..n).map(move |a| (a, b))).map(|(a, b)| product[(a, b)]).collect()
+    };
+    Lags { channels: n, sums: (0..count).into_par_iter().map(sum).collect() }
+}
+
+/// Returns the roots of the shift of the leading `order` directions.
+fn shift_roots(basis: &Mat<C>, outputs: usize, order: usize) -> Result<Vec<C>, ModalError> {
+    let rows = basis.nrows() - outputs;
+    let upper = basis.submatrix(0, 0, rows, order).to_owned();
+    let lower = basis.submatrix(outputs, 0, rows, order).to_owned();
+    let shift = upper.qr().solve_lstsq(&lower);
+    let failed = ModalError::Decomposition { what: "the shift of the block rows", size: order };
+    let finite =
+        (0..order).all(|k| shift.col(k).iter().all(|z| z.re.is_finite() && z.im.is_finite()));
+    if !finite {
+        return Err(failed);
+    }
+    shift.eigenvalues().map_err(|_| failed)
+}
+
+/// Returns the medians of roots that are one over the orders, sorted by frequency.
+///
+/// The roots with the most orders near them are taken first; roots nearer than 0.3 half-widths to a
+/// cluster that was taken belong to it.
+pub(crate) fn clusters(roots: Vec<Root>, orders: usize) -> Vec<C> {
+    let mut rest = roots;
+    let mut poles = Vec::new();
+    let least = (MIN_ORDER_SHARE * orders as f64).max(1.0);
+    while let Some(members) = largest_cluster(&rest) {
+        if (distinct_orders(&members) as f64) < least {
+            break;
+        }
+        let median = |part: fn(&Root) -> f64| {
+            let mut values: Vec<f64> = members.iter().map(part).collect();
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        };
+        let centre = C::new(median(|root| root.pole.re), median(|root| root.pole.im));
+        let size = centre.norm();
+        let reach = (-0.3 * centre.re).max(5e-5 * size);
+        let is_member = |root: &Root| members.iter().any(|member| member.pole == root.pole);
+        rest.retain(|root| !is_member(root) && (root.size() - size).abs() >= reach);
+        poles.push(centre);
+    }
+    poles.sort_by(|a: &C, b: &C| a.im.total_cmp(&b.im));
+    poles
+}
+
+fn largest_cluster(roots: &[Root]) -> Option<Vec<Root>> {
+    let near = |centre: &Root| -> Vec<Root> {
+        let (size, damping) = (centre.size(), centre.damping());
+        let reach = CLUSTER_FREQUENCY.min((2.0 * damping).max(4e-4)) * size;
+        let is_near = |root: &&Root| {
+            (root.size() - size).abs() < reach
+                && (root.damping() - damping).abs() < CLUSTER_DAMPING * damping + 1e-4
+        };
+        roots.iter().filter(is_near).copied().collect()
+    };
+    let clusters = roots.iter().map(near);
+    clusters.max_by_key(distinct_orders_of)
+}
+
+fn distinct_orders_of(members: &Vec<Root>) -> usize {
+    distinct_orders(members)
+}
+
+fn distinct_orders(members: &[Root]) -> usize {
+    let mut orders: Vec<usize> = members.iter().map(|root| root.order).collect();
+    orders.sort_unstable();
+    orders.dedup();
+    orders.len()
+}

@@ -1,0 +1,172 @@
+//! Line data in the arrangement of the search: loads (forces and transients) and blocks of lines.
+
+use std::ops::Range;
+
+use mechid_spectra::{LineData, Transient};
+use nalgebra::Complex;
+
+use crate::ModalError;
+use crate::limits::{BLOCK_LINES, DEAD_CHANNEL, DEPENDENT_INPUTS};
+
+/// One column of the extended inputs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Load {
+    /// A measured input.
+    Force(usize),
+    /// Difference between the states at the two ends of an open record.
+    Transient(usize),
+}
+
+/// Lines of one record that are summed together.
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    /// Rows of the line data.
+    pub(crate) rows: Range<usize>,
+    /// Loads that act on these lines.
+    pub(crate) active: Vec<usize>,
+    /// Time between two samples and e^{−jωΔt} of each line, if the record is open.
+    pub(crate) delay: Option<(f64, Vec<Complex<f64>>)>,
+}
+
+impl Block {
+    /// Returns the number of lines.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len()
+    }
+}
+
+/// Line data with its loads and blocks.
+#[derive(Debug, Clone)]
+pub(crate) struct Lines {
+    pub(crate) omega: Vec<f64>,
+    pub(crate) outputs: Vec<Vec<Complex<f64>>>,
+    pub(crate) loads: Vec<Load>,
+    /// Amplitude of each load on every line; empty for a transient, which is 1 on its record.
+    pub(crate) amplitude: Vec<Vec<Complex<f64>>>,
+    pub(crate) blocks: Vec<Block>,
+}
+
+impl Lines {
+    /// Arranges line data.
+    pub(crate) fn new(data: &LineData) -> Self {
+        let mut loads: Vec<Load> = (0..data.inputs().ncols()).map(Load::Force).collect();
+        let columns = |matrix: &nalgebra::DMatrix<Complex<f64>>| -> Vec<Vec<Complex<f64>>> {
+            matrix.column_iter().map(|column| column.iter().copied().collect()).collect()
+        };
+        let mut amplitude = columns(data.inputs());
+        let mut blocks = Vec::new();
+        for (record, (rows, transient)) in data.records().iter().enumerate() {
+            let zero = Complex::default();
+            let drives = |force: &usize| amplitude[*force][rows.clone()].iter().any(|z| *z != zero);
+            let mut active: Vec<usize> = (0..data.inputs().ncols()).filter(drives).collect();
+            if let Transient::Open { .. } = transient {
+                active.push(loads.len());
+                loads.push(Load::Transient(record));
+                amplitude.push(Vec::new());
+            }
+            let count = rows.len().div_ceil(BLOCK_LINES).max(1);
+            for part in 0..count {
+                let at = |part: usize| rows.start + rows.len() * part / count;
+                let rows = at(part)..at(part + 1);
+                let delay = match *transient {
+                    Transient::None => None,
+                    Transient::Open { sample_interval: dt } => {
+                        let turn = |omega: &f64| Complex::cis(-omega * dt);
+                        Some((dt, data.omega()[rows.clone()].iter().map(turn).collect()))
+                    }
+                };
+                blocks.push(Block { rows, active: active.clone(), delay });
+            }
+        }
+        blocks.retain(|block| block.len() > 0);
+        let (omega, outputs) = (data.omega().to_vec(), columns(data.outputs()));
+        Self { omega, outputs, loads, amplitude, blocks }
+    }
+
+    /// Returns the number of lines.
+    pub(crate) fn len(&self) -> usize {
+        self.omega.len()
+    }
+
+    /// Returns the number of measured inputs.
+    pub(crate) fn inputs(&self) -> usize {
+        self.loads.iter().filter(|load| matches!(load, Load::Force(_))).count()
+    }
+
+    /// Returns the lowest and the highest angular frequency, in rad/s.
+    pub(crate) fn band(&self) -> (f64, f64) {
+        let fold = |(low, high): (f64, f64), w: &f64| (low.min(*w), high.max(*w));
+        self.omega.iter().fold((f64::INFINITY, 0.0), fold)
+    }
+
+    /// Returns the amplitude of a load on a line of a block in which it acts.
+    pub(crate) fn load(&self, load: usize, row: usize) -> Complex<f64> {
+        self.amplitude[load].get(row).copied().unwrap_or(Complex::new(1.0, 0.0))
+    }
+
+    /// Returns the root-mean-square of a load over the lines on which it acts, or 0.
+    pub(crate) fn load_level(&self, load: usize) -> f64 {
+        let acts = |block: &&Block| block.active.contains(&load);
+        let (mut power, mut count) = (0.0, 0);
+        for block in self.blocks.iter().filter(acts) {
+            power += block.rows.clone().map(|row| self.load(load, row).norm_sqr()).sum::<f64>();
+            count += block.len();
+        }
+        (power / count.max(1) as f64).sqrt()
+    }
+
+    /// Checks that the channels can carry modes.
+    pub(crate) fn check(&self) -> Result<(), ModalError> {
+        if self.outputs.is_empty() {
+            return Err(ModalError::NoOutput);
+        }
+        let required = 2 * (self.loads.len() + 2);
+        if self.len() < required {
+            return Err(ModalError::TooFewLines { lines: self.len(), required });
+        }
+        let outputs = dead(&self.outputs);
+        if !outputs.is_empty() {
+            return Err(ModalError::DeadOutputs { outputs });
+        }
+        let inputs = dead(&self.amplitude[..self.inputs()]);
+        if !inputs.is_empty() {
+            return Err(ModalError::DeadInputs { inputs });
+        }
+        self.check_independence()
+    }
+
+    /// Checks by Gram–Schmidt, column by column, that no input is a combination of those before it.
+    fn check_independence(&self) -> Result<(), ModalError> {
+        let mut basis: Vec<Vec<Complex<f64>>> = Vec::new();
+        for input in 0..self.inputs() {
+            let mut rest = self.amplitude[input].clone();
+            let level = rest.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            for _ in 0..2 {
+                for direction in &basis {
+                    let products = direction.iter().zip(&rest).map(|(q, z)| q.conj() * z);
+                    let part: Complex<f64> = products.sum();
+                    for (z, q) in rest.iter_mut().zip(direction) {
+                        *z -= part * q;
+                    }
+                }
+            }
+            let length = rest.iter().map(|z| z.norm_sqr()).sum::<f64>().sqrt();
+            let own_share = length / level;
+            if own_share < DEPENDENT_INPUTS {
+                return Err(ModalError::DependentInputs { input, own_share });
+            }
+            rest.iter_mut().for_each(|z| *z /= length);
+            basis.push(rest);
+        }
+        Ok(())
+    }
+}
+
+/// Returns the channels whose power is nothing beside that of the strongest.
+fn dead(channels: &[Vec<Complex<f64>>]) -> Vec<usize> {
+    let power = |channel: &Vec<Complex<f64>>| channel.iter().map(|z| z.norm_sqr()).sum::<f64>();
+    let powers: Vec<f64> = channels.iter().map(power).collect();
+    let strongest = powers.iter().copied().fold(0.0, f64::max);
+    let silent = |index: &usize| powers[*index] <= strongest * DEAD_CHANNEL;
+    (0..channels.len()).filter(silent).collect()
+}

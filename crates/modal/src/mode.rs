@@ -1,0 +1,131 @@
+//! Results: modes with standard errors, what was dropped, and what the modes predict.
+
+use nalgebra::Complex;
+
+/// An estimate with its standard error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Uncertain {
+    /// Estimate.
+    pub value: f64,
+    /// Standard error.
+    pub standard_error: f64,
+    /// Degrees of freedom of the standard error; infinite where the noise is known well.
+    pub degrees_of_freedom: f64,
+}
+
+/// One mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IdentifiedMode {
+    /// Pole λ = −ζω₀ + jω₀√(1 − ζ²), in rad/s.
+    pub pole: Complex<f64>,
+    /// Undamped natural frequency |λ|/2π, in Hz.
+    pub natural_frequency_hz: Uncertain,
+    /// Damping ratio −Re λ/|λ|.
+    pub damping_ratio: Uncertain,
+    /// Covariance of natural frequency (Hz) and damping ratio.
+    pub frequency_damping_covariance: f64,
+    /// Shape at the outputs; its largest entry is 1.
+    pub shape: Vec<Complex<f64>>,
+    /// Standard errors of the real and imaginary part of each entry of `shape`, as real and imaginary part.
+    pub shape_standard_error: Vec<Complex<f64>>,
+    /// Participation of each input, such that the residue of output i and input j is shape_i participation_j.
+    pub participation: Vec<Complex<f64>>,
+    /// Standard errors of the real and imaginary part of each participation.
+    pub participation_standard_error: Vec<Complex<f64>>,
+    /// Share of this mode's motion that the measured forces drive; `None` without measured forces.
+    pub driven_share: Option<f64>,
+    /// Ratio of unmeasured to measured force of this mode (root-mean-square, modal); `None` without measured
+    /// forces.
+    pub unmeasured_ratio: Option<f64>,
+    /// Decrease of −2 log L that this mode brings.
+    pub gain: f64,
+    /// Whether the mode lies within a few half-widths of an edge of the band.
+    pub near_edge: bool,
+}
+
+impl IdentifiedMode {
+    /// Returns the residue of an output and an input: what is over jω − λ in their response.
+    pub fn residue(&self, output: usize, input: usize) -> Complex<f64> {
+        self.shape[output] * self.participation[input]
+    }
+
+    /// Returns the shape at the inputs, largest entry 1: where the inputs are forces at points of one
+    /// structure (roving hammer), reciprocity makes the participations its shape at these points.
+    ///
+    /// # Source
+    /// Ewins, *Modal Testing*, 2nd ed. (2000), section 3.5 (a row of a response matrix is as good as a column).
+    pub fn shape_at_inputs(&self) -> Vec<Complex<f64>> {
+        let norm = |z: &&Complex<f64>| z.norm();
+        let largest = self.participation.iter().max_by(|a, b| norm(a).total_cmp(&norm(b)));
+        let scale = largest.copied().unwrap_or(Complex::new(1.0, 0.0));
+        self.participation.iter().map(|value| value / scale).collect()
+    }
+
+    /// Returns the modal mass for the shape as it is scaled here, if `output` measures the
+    /// `derivative`-th time derivative of the displacement at which `input` acts as a force.
+    ///
+    /// With mass-normalised shapes ψ the residue of a displacement is ψ_i ψ_j/(2jω_d) for light, proportional
+    /// damping; the mass of a shape scaled to `shape` is shape_i²/ψ_i². It is in kg if the input is in N and
+    /// the output in m, m/s or m/s².
+    pub fn modal_mass(&self, output: usize, input: usize, derivative: i32) -> Complex<f64> {
+        let residue = self.residue(output, input) / self.pole.powi(derivative);
+        let squared = residue * Complex::new(0.0, 2.0 * self.pole.im);
+        self.shape[output] * self.shape[output] / squared
+    }
+}
+
+/// Why a candidate is no mode of the result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum DropReason {
+    /// The likelihood gains less than the parameters of a mode must bring.
+    Insignificant {
+        /// Decrease of −2 log L.
+        gain: f64,
+        /// Required decrease.
+        required: f64,
+    },
+    /// The damping ratio is not above zero beyond its error.
+    UndeterminedDamping {
+        /// Standard error of the damping ratio.
+        standard_error: f64,
+    },
+    /// The damping is that of no resonance: the root stands for what lies outside the band.
+    TooDamped,
+    /// The root left the band.
+    OutsideBand,
+    /// Another mode within a half-width has the same shape and participations.
+    Twin {
+        /// Natural frequency of the other, in Hz.
+        other_hz: f64,
+    },
+    /// Unmeasured forces drive the mode more than the measured ones.
+    Undriven {
+        /// Ratio of unmeasured to measured force.
+        ratio: f64,
+    },
+    /// The number of modes was stated, and others bring more.
+    BeyondNumber {
+        /// Decrease of −2 log L.
+        gain: f64,
+    },
+}
+
+/// A candidate that is no mode of the result.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DroppedCandidate {
+    /// Natural frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Why it was dropped.
+    pub reason: DropReason,
+}
+
+impl DroppedCandidate {
+    /// Takes pole (rad/s) and reason.
+    pub(crate) fn new(pole: Complex<f64>, reason: DropReason) -> Self {
+        let size = pole.norm();
+        Self { frequency_hz: size / std::f64::consts::TAU, damping_ratio: -pole.re / size, reason }
+    }
+}

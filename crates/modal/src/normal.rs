@@ -1,0 +1,258 @@
+//! Normal equations of poles and participations, with the linear unknowns projected out (Kaufman).
+//!
+//! The derivative of output i with respect to a pair of parameters is one pair of columns for all
+//! outputs, turned by the 2 × 2 matrix of the shape φ_i: JᵀJ = Σ_i T_iᵀ (CᵀP⊥C) T_i needs one product CᵀC,
+//! whatever the number of outputs.
+//!
+//! # Source
+//! Kaufman, BIT 15 (1975) 49.
+
+use rayon::prelude::*;
+
+use crate::dense::{add_product, gram, transposed_product};
+use crate::lines::{Block, Lines};
+use crate::model::Model;
+use crate::projection::{BlockArrays, Projection};
+
+/// Number of partial sums, each over neighbouring blocks: it fixes the order of the sums.
+const LANES: usize = 8;
+
+/// Curvature G and gradient of half the cost in the parameters of the search.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct NormalEquations {
+    /// Number of parameters.
+    pub(crate) size: usize,
+    /// Symmetric curvature, columns one after the other.
+    pub(crate) curvature: Vec<f64>,
+    /// (∂A x)ᵀ r: the direction in which the cost falls.
+    pub(crate) descent: Vec<f64>,
+}
+
+/// Sums over blocks.
+#[derive(Debug, Clone, Default)]
+struct Lane {
+    /// CᵀC, lower triangle.
+    gram: Vec<f64>,
+    /// AᵀC.
+    cross: Vec<f64>,
+    descent: Vec<f64>,
+    derivatives: Vec<f64>,
+    local_gram: Vec<f64>,
+    turned: Vec<f64>,
+}
+
+/// Outputs' shapes in whitened units: real parts in row 2r, imaginary parts in row 2r + 1, as columns over outputs.
+pub(crate) fn whitened_shapes(projection: &Projection, modes: usize) -> Vec<f64> {
+    let columns = projection.triangle.size.max(1);
+    let outputs = projection.unknowns.len() / columns;
+    let mut shapes = vec![0.0; outputs * 2 * modes];
+    for (output, own) in projection.unknowns.chunks_exact(columns).enumerate() {
+        for (row, value) in own[..2 * modes].iter().enumerate() {
+            shapes[row * outputs + output] = *value;
+        }
+    }
+    shapes
+}
+
+/// Pairs of parameters that act on a block: all poles, and participations of its loads.
+pub(crate) fn block_pairs(
+    pairs: &[(usize, Option<usize>)],
+    block: &Block,
+) -> (Vec<usize>, Vec<(usize, Option<usize>)>) {
+    let acts = |load: Option<usize>| load.is_none_or(|load| block.active.contains(&load));
+    let active = pairs.iter().copied().enumerate().filter(|(_, (_, load))| acts(*load));
+    active.unzip()
+}
+
+impl NormalEquations {
+    /// Sums the normal equations at the unknowns of `projection`.
+    pub(crate) fn new(lines: &Lines, model: &Model, projection: &Projection) -> Self {
+        let pairs = model.pairs(lines.loads.len());
+        let shapes = whitened_shapes(projection, model.modes());
+        let work: Vec<(&Block, &BlockArrays)> =
+            lines.blocks.iter().zip(&projection.blocks).collect();
+        let width = work.len().div_ceil(LANES).max(1);
+        let lanes: Vec<Lane> = work
+            .par_chunks(width)
+            .map(|chunk| {
+                let mut lane = Lane::new(2 * pairs.len(), projection.triangle.size);
+                for (block, arrays) in chunk {
+                    lane.add(lines, model, &pairs, block, arrays, &shapes);
+                }
+                lane
+            })
+            .collect();
+        let mut sum = Lane::new(2 * pairs.len(), projection.triangle.size);
+        for lane in &lanes {
+            let to = [&mut sum.gram, &mut sum.cross, &mut sum.descent];
+            for (to, from) in to.into_iter().zip([&lane.gram, &lane.cross, &lane.descent]) {
+                to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+            }
+        }
+        project(&mut sum, projection);
+        let products = ShapeProducts::new(&shapes, model.modes());
+        Self::assemble(&sum.gram, sum.descent, &pairs, model, &products)
+    }
+
+    /// Turns CᵀP⊥C by the shapes and scales it to the parameters.
+    fn assemble(
+        projected: &[f64],
+        mut descent: Vec<f64>,
+        pairs: &[(usize, Option<usize>)],
+        model: &Model,
+        products: &ShapeProducts,
+    ) -> Self {
+        let scale = parameter_scale(pairs, model);
+        let curvature = turn(projected, pairs, products, &scale);
+        descent.iter_mut().zip(&scale).for_each(|(value, scale)| *value *= scale);
+        Self { size: 2 * pairs.len(), curvature, descent }
+    }
+}
+
+/// Derivatives of Re λ and Im λ (or of L) with respect to the parameters.
+pub(crate) fn parameter_scale(pairs: &[(usize, Option<usize>)], model: &Model) -> Vec<f64> {
+    let scale = |&(mode, load): &(usize, Option<usize>)| match load {
+        None => [model.poles[mode].re, model.poles[mode].im],
+        Some(_) => [1.0; 2],
+    };
+    pairs.iter().flat_map(scale).collect()
+}
+
+/// Sums over outputs of the products of two modes' shapes, real with real (xx), real with imaginary (xy) and so on.
+pub(crate) struct ShapeProducts {
+    modes: usize,
+    sums: Vec<f64>,
+}
+
+impl ShapeProducts {
+    /// Sums over all outputs.
+    pub(crate) fn new(shapes: &[f64], modes: usize) -> Self {
+        let outputs = shapes.len() / (2 * modes).max(1);
+        Self { modes, sums: transposed_product(shapes, shapes, outputs.max(1)) }
+    }
+
+    /// Returns xx, xy, yx, yy of two modes.
+    fn of(&self, r: usize, s: usize) -> [f64; 4] {
+        let entry = |row: usize, column: usize| self.sums[column * 2 * self.modes + row];
+        let (x, y, u, v) = (2 * r, 2 * r + 1, 2 * s, 2 * s + 1);
+        [entry(x, u), entry(x, v), entry(y, u), entry(y, v)]
+    }
+}
+
+/// Returns Σ_i T_iᵀ G T_i for a lower triangle G, scaled, as a full symmetric matrix.
+pub(crate) fn turn(
+    lower: &[f64],
+    pairs: &[(usize, Option<usize>)],
+    products: &ShapeProducts,
+    scale: &[f64],
+) -> Vec<f64> {
+    let size = 2 * pairs.len();
+    let mut result = vec![0.0; size * size];
+    let entry = |row: usize, column: usize| {
+        let (row, column) = if row >= column { (row, column) } else { (column, row) };
+        lower[column * size + row]
+    };
+    for (b, &(s, _)) in pairs.iter().enumerate() {
+        for (a, &(r, _)) in pairs.iter().enumerate().skip(b) {
+            let [xx, xy, yx, yy] = products.of(r, s);
+            let (i, j) = (2 * a, 2 * b);
+            let (c00, c01) = (entry(i, j), entry(i, j + 1));
+            let (c10, c11) = (entry(i + 1, j), entry(i + 1, j + 1));
+            let turned = [
+                [
+                    c00 * xx + c01 * xy + c10 * yx + c11 * yy,
+                    c01 * xx - c00 * xy + c11 * yx - c10 * yy,
+                ],
+                [
+                    c10 * xx + c11 * xy - c00 * yx - c01 * yy,
+                    c11 * xx - c10 * xy - c01 * yx + c00 * yy,
+                ],
+            ];
+            for (p, row) in turned.iter().enumerate() {
+                for (q, value) in row.iter().enumerate() {
+                    let value = value * scale[i + p] * scale[j + q];
+                    result[(j + q) * size + i + p] = value;
+                    result[(i + p) * size + j + q] = value;
+                }
+            }
+        }
+    }
+    result
+}
+
+/// Subtracts from CᵀC what the linear unknowns can follow.
+fn project(sum: &mut Lane, projection: &Projection) {
+    let (columns, size) = (projection.triangle.size, sum.descent.len());
+    projection.triangle.solve_transposed(&mut sum.cross);
+    if columns > 0 && size > 0 {
+        let mut followed = vec![0.0; size * size];
+        gram(&sum.cross, columns, &mut followed);
+        sum.gram.iter_mut().zip(&followed).for_each(|(to, part)| *to -= part);
+    }
+}
+
+impl Lane {
+    fn new(parameters: usize, columns: usize) -> Self {
+        Self {
+            gram: vec![0.0; parameters * parameters],
+            cross: vec![0.0; columns * parameters],
+            descent: vec![0.0; parameters],
+            ..Self::default()
+        }
+    }
+
+    fn add(
+        &mut self,
+        lines: &Lines,
+        model: &Model,
+        pairs: &[(usize, Option<usize>)],
+        block: &Block,
+        arrays: &BlockArrays,
+        shapes: &[f64],
+    ) {
+        let rows = 2 * block.len();
+        let (places, local) = block_pairs(pairs, block);
+        self.derivatives.resize(2 * local.len() * rows, 0.0);
+        model.fill_derivatives(lines, block, &arrays.weight, &local, &mut self.derivatives);
+        self.add_products(&places, arrays, rows);
+        let outputs = lines.outputs.len();
+        self.turned.clear();
+        self.turned.resize(rows * 2 * model.modes(), 0.0);
+        add_product(&mut self.turned, &arrays.residual, shapes, rows, outputs, 1.0);
+        for ((place, (mode, _)), pair) in
+            places.iter().zip(&local).zip(self.derivatives.chunks_exact(2 * rows))
+        {
+            let (u, v) = pair.split_at(rows);
+            let turned = &self.turned[2 * mode * rows..(2 * mode + 2) * rows];
+            let (x, y) = turned.split_at(rows);
+            self.descent[2 * place] += dot(u, x) + dot(v, y);
+            self.descent[2 * place + 1] += dot(v, x) - dot(u, y);
+        }
+    }
+
+    /// Adds CᵀC and AᵀC of a block at the places of its parameters and columns.
+    fn add_products(&mut self, places: &[usize], arrays: &BlockArrays, rows: usize) {
+        let (count, size) = (2 * places.len(), self.descent.len());
+        self.local_gram.resize(count * count, 0.0);
+        gram(&self.derivatives, rows, &mut self.local_gram);
+        let at = |local: usize| 2 * places[local / 2] + local % 2;
+        for column in 0..count {
+            let to = &mut self.gram[at(column) * size..(at(column) + 1) * size];
+            for row in column..count {
+                to[at(row)] += self.local_gram[column * count + row];
+            }
+        }
+        let cross = transposed_product(&arrays.design, &self.derivatives, rows);
+        let (inner, columns) = (arrays.columns.len(), self.cross.len() / size.max(1));
+        for (local, from) in cross.chunks_exact(inner.max(1)).enumerate() {
+            let to = &mut self.cross[at(local) * columns..(at(local) + 1) * columns];
+            for (column, value) in arrays.columns.iter().zip(from) {
+                to[*column] += value;
+            }
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,237 @@
+//! Number of modes: candidates in the residual, and what a mode is worth in the likelihood.
+
+use nalgebra::Complex;
+use rayon::prelude::*;
+
+use crate::limits::{MAX_DAMPING, MAX_TRIES, MIN_SCAN_LINES, SCAN_HALF_WIDTHS};
+use crate::lines::Lines;
+use crate::residues::leading_row;
+use crate::search::Fit;
+
+type C = Complex<f64>;
+
+/// Damping ratios of the grid of candidates.
+const DAMPING_GRID: [f64; 6] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2];
+/// Step of the grid's frequencies, in half-widths.
+const GRID_STEP: f64 = 0.5;
+/// Steps of the search in which a candidate shows its gain.
+const TRIAL_STEPS: usize = 12;
+/// Share of the required gain that the scan must show before a candidate is tried.
+const TRIAL_GAIN: f64 = 0.5;
+
+/// A mode that the residual may hold.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) pole: C,
+    pub(crate) participation: Vec<C>,
+    /// Decrease of −2 log L by this mode alone.
+    pub(crate) gain: f64,
+}
+
+/// Returns the decrease of −2 log L that one more mode must bring: its parameters times the logarithm of
+/// the number of observations (Schwarz, Annals of Statistics 6 (1978) 461).
+pub(crate) fn required_gain(lines: &Lines) -> f64 {
+    let parameters = 2 * (lines.outputs.len() + lines.loads.len() - 1) + 2;
+    parameters as f64 * ((2 * lines.len()) as f64).ln()
+}
+
+/// Returns the increase of the cost if a mode were taken out and nothing else changed.
+pub(crate) fn removal_losses(fit: &Fit<'_>) -> Vec<f64> {
+    let (triangle, modes) = (&fit.projection.triangle, fit.model.modes());
+    let columns = triangle.size;
+    let mut rows = vec![0.0; columns * 2 * modes];
+    (0..2 * modes).for_each(|k| rows[k * columns + k] = 1.0);
+    triangle.solve_transposed(&mut rows);
+    let product = |a: usize, b: usize| -> f64 {
+        let (a, b) = (&rows[a * columns..(a + 1) * columns], &rows[b * columns..(b + 1) * columns]);
+        a.iter().zip(b).map(|(a, b)| a * b).sum()
+    };
+    let loss = |mode: usize| {
+        let (i, j) = (2 * mode, 2 * mode + 1);
+        let (a, b, c) = (product(i, i), product(i, j), product(j, j));
+        let determinant = a * c - b * b;
+        let of_output = |unknowns: &[f64]| {
+            let (x, y) = (unknowns[i], unknowns[j]);
+            (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
+        };
+        fit.projection.unknowns.chunks_exact(columns).map(of_output).sum()
+    };
+    (0..modes).map(loss).collect()
+}
+
+/// Returns the candidates of the residual, the best first.
+pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
+    let lines = fit.lines;
+    let (low, high) = lines.band();
+    let spacing = (high - low) / lines.blocks[0].len().max(2) as f64;
+    let spacing = line_spacing(lines).unwrap_or(spacing);
+    let mut grid = Vec::new();
+    for damping in DAMPING_GRID {
+        let mut omega = low;
+        while omega < high {
+            grid.push((omega, damping));
+            omega += (GRID_STEP * damping * omega).max(spacing / 2.0);
+        }
+    }
+    let residuals = Residual::new(fit);
+    let mut candidates: Vec<Candidate> = grid
+        .par_iter()
+        .filter_map(|&(omega, damping)| residuals.candidate(lines, omega, damping, spacing))
+        .collect();
+    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
+    candidates
+}
+
+/// Returns the distance of the first two lines.
+fn line_spacing(lines: &Lines) -> Option<f64> {
+    let [first, second] = lines.omega.get(..2)? else { return None };
+    Some((second - first).abs()).filter(|spacing| *spacing > 0.0)
+}
+
+/// Whitened residuals as complex rows.
+struct Residual {
+    /// `[line · outputs + output]`.
+    values: Vec<C>,
+    /// Weight of every line.
+    weight: Vec<f64>,
+}
+
+impl Residual {
+    fn new(fit: &Fit<'_>) -> Self {
+        let (lines, outputs) = (fit.lines, fit.lines.outputs.len());
+        let mut values = vec![C::default(); lines.len() * outputs];
+        let mut weight = Vec::with_capacity(lines.len());
+        for (block, arrays) in lines.blocks.iter().zip(&fit.projection.blocks) {
+            let n = block.len();
+            weight.extend_from_slice(&arrays.weight);
+            for (output, column) in arrays.residual.chunks_exact(2 * n).enumerate() {
+                for line in 0..n {
+                    let place = (block.rows.start + line) * outputs + output;
+                    values[place] = C::new(column[line], column[n + line]);
+                }
+            }
+        }
+        Self { values, weight }
+    }
+
+    /// Fits one more mode at a given pole to the residual around it.
+    fn candidate(
+        &self,
+        lines: &Lines,
+        omega: f64,
+        damping: f64,
+        spacing: f64,
+    ) -> Option<Candidate> {
+        let pole = C::new(-damping * omega, omega * (1.0 - damping * damping).sqrt());
+        let reach = (SCAN_HALF_WIDTHS * damping * omega).max(MIN_SCAN_LINES as f64 * spacing);
+        let (loads, outputs) = (lines.loads.len(), lines.outputs.len());
+        let mut square = vec![C::default(); loads * loads];
+        let mut cross = vec![C::default(); loads * outputs];
+        let mut column = vec![C::default(); loads];
+        for block in &lines.blocks {
+            let own = &lines.omega[block.rows.clone()];
+            let first = own.partition_point(|w| *w < omega - reach);
+            let last = own.partition_point(|w| *w <= omega + reach);
+            for row in block.rows.start + first..block.rows.start + last.max(first) {
+                let gain = self.weight[row] / (C::new(0.0, lines.omega[row]) - pole);
+                for &load in &block.active {
+                    column[load] = lines.load(load, row) * gain;
+                }
+                let residual = &self.values[row * outputs..(row + 1) * outputs];
+                for &a in &block.active {
+                    let left = column[a].conj();
+                    for &b in &block.active {
+                        square[a * loads + b] += left * column[b];
+                    }
+                    let to = &mut cross[a * outputs..(a + 1) * outputs];
+                    to.iter_mut().zip(residual).for_each(|(to, r)| *to += left * r);
+                }
+            }
+        }
+        rank_one(&mut square, &mut cross, loads, outputs).map(|(participation, gain)| Candidate {
+            pole,
+            participation,
+            gain,
+        })
+    }
+}
+
+/// Returns the leading participations and the gain of the best rank-one coefficient of a least-squares
+/// problem with products `square` (loads × loads) and `cross` (loads × outputs).
+fn rank_one(
+    square: &mut [C],
+    cross: &mut [C],
+    loads: usize,
+    outputs: usize,
+) -> Option<(Vec<C>, f64)> {
+    let trace: f64 = (0..loads).map(|k| square[k * loads + k].re).sum();
+    if !(trace > 0.0 && trace.is_finite()) {
+        return None;
+    }
+    // Cholesky factor in place: square = F Fᴴ; cross becomes F⁻¹ cross.
+    for k in 0..loads {
+        for j in 0..k {
+            let sum: C = (0..j).map(|i| square[k * loads + i] * square[j * loads + i].conj()).sum();
+            square[k * loads + j] = (square[k * loads + j] - sum) / square[j * loads + j];
+        }
+        let sum: f64 = (0..k).map(|i| square[k * loads + i].norm_sqr()).sum();
+        let pivot = square[k * loads + k].re - sum;
+        square[k * loads + k] = C::from(pivot.max(1e-12 * trace).sqrt());
+        for j in 0..k {
+            let factor = square[k * loads + j];
+            for output in 0..outputs {
+                let part = factor * cross[j * outputs + output];
+                cross[k * outputs + output] -= part;
+            }
+        }
+        let pivot = square[k * loads + k];
+        cross[k * outputs..(k + 1) * outputs].iter_mut().for_each(|value| *value /= pivot);
+    }
+    // Columns of F⁻¹ cross as rows over the loads.
+    let rows: Vec<Vec<C>> = (0..outputs)
+        .map(|output| (0..loads).map(|load| cross[load * outputs + output]).collect())
+        .collect();
+    let mut direction = leading_row(&rows);
+    let power: f64 = direction.iter().map(|z| z.norm_sqr()).sum();
+    let along = |row: &Vec<C>| {
+        let product: C = row.iter().zip(&direction).map(|(r, d)| r * d.conj()).sum();
+        product.norm_sqr()
+    };
+    let gain = rows.iter().map(along).sum::<f64>() / power;
+    for k in (0..loads).rev() {
+        let sum: C = (k + 1..loads).map(|i| square[i * loads + k].conj() * direction[i]).sum();
+        direction[k] = (direction[k] - sum) / square[k * loads + k];
+    }
+    gain.is_finite().then_some((direction, gain))
+}
+
+/// Adds the best candidate whose gain after a search is at least `required`; otherwise returns those that
+/// were tried, with their gains.
+pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candidate>> {
+    let mut tried: Vec<Candidate> = Vec::new();
+    for candidate in scan(fit) {
+        if tried.len() >= MAX_TRIES || candidate.gain < TRIAL_GAIN * required {
+            break;
+        }
+        let is_near = |other: &Candidate| {
+            let width = (-candidate.pole.re).max(-other.pole.re);
+            (candidate.pole.im - other.pole.im).abs() < 2.0 * width
+        };
+        if tried.iter().any(is_near) {
+            continue;
+        }
+        let mut trial = fit.clone();
+        trial.model.poles.push(candidate.pole);
+        trial.model.participation.push(candidate.participation.clone());
+        trial.model.gauge.push(0);
+        trial.search_at_most(TRIAL_STEPS);
+        let gain = fit.cost() - trial.cost();
+        let pole = trial.model.poles[fit.model.modes()];
+        if gain > required && -pole.re / pole.norm() < MAX_DAMPING {
+            *fit = trial;
+            return Ok(());
+        }
+        tried.push(Candidate { pole, gain, ..candidate });
+    }
+    Err(tried)
+}

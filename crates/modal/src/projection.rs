@@ -1,0 +1,179 @@
+//! Least squares of the linear unknowns, for all outputs with one matrix.
+
+use rayon::prelude::*;
+
+use crate::dense::{Triangle, add_product, triangularise};
+use crate::lines::{Block, Lines};
+
+/// Standard deviation of the noise, as far as the search needs it: a shape over the lines that all
+/// outputs share, times a level of each output. E|n_i(ω)|² is (shape(ω) level_i)².
+#[derive(Debug, Clone)]
+pub(crate) struct Weights {
+    pub(crate) shape: Vec<f64>,
+    pub(crate) level: Vec<f64>,
+}
+
+impl Weights {
+    /// Returns √2/shape of the lines of a block: it makes real and imaginary parts of variance 1.
+    pub(crate) fn of_block(&self, block: &Block) -> Vec<f64> {
+        let whiten = |shape: &f64| std::f64::consts::SQRT_2 / shape;
+        self.shape[block.rows.clone()].iter().map(whiten).collect()
+    }
+}
+
+/// Columns of a linear model, block by block.
+pub(crate) trait Design: Sync {
+    /// Returns the number of columns of all blocks.
+    fn columns(&self, lines: &Lines) -> usize;
+    /// Returns the columns that act on a block.
+    fn block_columns(&self, lines: &Lines, block: &Block) -> Vec<usize>;
+    /// Writes these columns, whitened; each has the real parts above the imaginary parts.
+    fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]);
+}
+
+impl Design for crate::model::Model {
+    fn columns(&self, lines: &Lines) -> usize {
+        self.columns(lines)
+    }
+
+    fn block_columns(&self, lines: &Lines, block: &Block) -> Vec<usize> {
+        self.block_columns(lines, block)
+    }
+
+    fn fill(&self, lines: &Lines, block: &Block, weight: &[f64], columns: &mut [f64]) {
+        self.fill(lines, block, weight, columns);
+    }
+}
+
+/// Arrays of one block; they keep their memory from step to step.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct BlockArrays {
+    pub(crate) weight: Vec<f64>,
+    /// Whitened outputs, 2n rows each.
+    pub(crate) outputs: Vec<f64>,
+    /// Columns of the whole problem that act here.
+    pub(crate) columns: Vec<usize>,
+    /// Whitened columns, 2n rows each.
+    pub(crate) design: Vec<f64>,
+    /// Whitened residuals, 2n rows each.
+    pub(crate) residual: Vec<f64>,
+    /// Design and outputs, replaced by their triangular factor.
+    stacked: Vec<f64>,
+    /// Unknowns of this block's columns.
+    local: Vec<f64>,
+}
+
+/// Linear unknowns of all outputs for given columns, and what remains of the outputs.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Projection {
+    pub(crate) blocks: Vec<BlockArrays>,
+    pub(crate) triangle: Triangle,
+    /// Unknowns of each output, one output after the other, over the level of the output.
+    pub(crate) unknowns: Vec<f64>,
+    /// Sum of the squared whitened residuals.
+    pub(crate) cost: f64,
+    stacked: Vec<f64>,
+}
+
+impl Projection {
+    /// Whitens the outputs.
+    pub(crate) fn whiten(&mut self, lines: &Lines, weights: &Weights) {
+        self.blocks.resize_with(lines.blocks.len(), BlockArrays::default);
+        for (arrays, block) in self.blocks.iter_mut().zip(&lines.blocks) {
+            let n = block.len();
+            arrays.weight = weights.of_block(block);
+            arrays.outputs.resize(2 * n * lines.outputs.len(), 0.0);
+            for (output, column) in arrays.outputs.chunks_exact_mut(2 * n).enumerate() {
+                let (real, imaginary) = column.split_at_mut(n);
+                let values = &lines.outputs[output][block.rows.clone()];
+                for (line, value) in values.iter().enumerate() {
+                    let whitened = value * (arrays.weight[line] / weights.level[output]);
+                    (real[line], imaginary[line]) = (whitened.re, whitened.im);
+                }
+            }
+        }
+    }
+
+    /// Solves for the linear unknowns and returns the cost.
+    ///
+    /// Each block is reduced to its triangular factor, the factors to one; no factor Q is formed.
+    pub(crate) fn solve(&mut self, lines: &Lines, design: &impl Design) -> f64 {
+        let (columns, outputs) = (design.columns(lines), lines.outputs.len());
+        self.blocks.par_iter_mut().zip(&lines.blocks).for_each(|(arrays, block)| {
+            arrays.reduce(lines, block, design);
+        });
+        self.join(columns, outputs);
+        let unknowns = &self.unknowns;
+        let costs: Vec<f64> = self
+            .blocks
+            .par_iter_mut()
+            .zip(&lines.blocks)
+            .map(|(arrays, block)| arrays.take_residual(unknowns, columns, 2 * block.len()))
+            .collect();
+        self.cost = costs.iter().sum();
+        self.cost
+    }
+
+    /// Joins the triangular factors of the blocks and solves.
+    fn join(&mut self, columns: usize, outputs: usize) {
+        let height = |arrays: &BlockArrays| {
+            let rows = 2 * arrays.weight.len();
+            arrays.columns.len().min(rows)
+        };
+        let rows = self.blocks.iter().map(height).sum::<usize>().max(columns);
+        let width = columns + outputs;
+        self.stacked.clear();
+        self.stacked.resize(rows * width, 0.0);
+        let mut top = 0;
+        for arrays in &self.blocks {
+            let (own, count) = (2 * arrays.weight.len(), height(arrays));
+            let places = arrays.columns.iter().copied().chain(columns..width);
+            for (local, place) in places.enumerate() {
+                let upper =
+                    if local < arrays.columns.len() { (local + 1).min(count) } else { count };
+                let from = &arrays.stacked[local * own..local * own + upper];
+                self.stacked[place * rows + top..place * rows + top + upper].copy_from_slice(from);
+            }
+            top += count;
+        }
+        triangularise(&mut self.stacked, rows);
+        self.triangle = Triangle::new(&self.stacked, rows, columns);
+        self.unknowns.resize(columns * outputs, 0.0);
+        for (output, to) in self.unknowns.chunks_exact_mut(columns.max(1)).enumerate() {
+            let start = (columns + output) * rows;
+            to.copy_from_slice(&self.stacked[start..start + columns]);
+        }
+        self.triangle.solve(&mut self.unknowns);
+    }
+
+    /// Returns the unknowns of one output in units of the output.
+    pub(crate) fn unknowns_of(&self, output: usize, weights: &Weights) -> Vec<f64> {
+        let columns = self.triangle.size;
+        let own = &self.unknowns[output * columns..(output + 1) * columns];
+        own.iter().map(|value| value * weights.level[output]).collect()
+    }
+}
+
+impl BlockArrays {
+    fn reduce(&mut self, lines: &Lines, block: &Block, design: &impl Design) {
+        let rows = 2 * block.len();
+        self.columns = design.block_columns(lines, block);
+        self.design.resize(rows * self.columns.len(), 0.0);
+        design.fill(lines, block, &self.weight, &mut self.design);
+        self.stacked.clear();
+        self.stacked.extend_from_slice(&self.design);
+        self.stacked.extend_from_slice(&self.outputs);
+        triangularise(&mut self.stacked, rows);
+    }
+
+    fn take_residual(&mut self, unknowns: &[f64], columns: usize, rows: usize) -> f64 {
+        self.local.clear();
+        for own in unknowns.chunks_exact(columns.max(1)) {
+            self.local.extend(self.columns.iter().map(|column| own[*column]));
+        }
+        self.residual.clone_from(&self.outputs);
+        let inner = self.columns.len();
+        add_product(&mut self.residual, &self.design, &self.local, rows, inner, -1.0);
+        self.residual.iter().map(|r| r * r).sum()
+    }
+}

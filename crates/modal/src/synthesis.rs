@@ -1,0 +1,151 @@
+//! Transients of records that the modes are to predict.
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::dense::{Triangle, triangularise};
+use crate::lines::{Lines, Load};
+use crate::mode::IdentifiedMode;
+use crate::model::{growth, kernels};
+
+type C = Complex<f64>;
+
+/// Adds to `predicted` the transients of open records, fitted to what remains of the outputs: one complex
+/// load of each mode per record, and real residual terms of each output.
+pub(crate) fn add_transients(
+    lines: &Lines,
+    modes: &[IdentifiedMode],
+    powers: &[i32],
+    predicted: &mut DMatrix<C>,
+) {
+    for (load, kind) in lines.loads.iter().enumerate() {
+        if let Load::Transient(_) = kind {
+            add_transient(lines, modes, powers, load, predicted);
+        }
+    }
+}
+
+/// Columns of one record: modes' transient responses to 1 and j per line, before the shapes.
+fn add_transient(
+    lines: &Lines,
+    modes: &[IdentifiedMode],
+    powers: &[i32],
+    load: usize,
+    predicted: &mut DMatrix<C>,
+) {
+    let (outputs, reference) = (lines.outputs.len(), lines.band().1);
+    let mut rows: Vec<(usize, Vec<(C, C)>)> = Vec::new();
+    for block in lines.blocks.iter().filter(|block| block.active.contains(&load)) {
+        let growths: Vec<C> = modes.iter().map(|mode| growth(mode.pole, block)).collect();
+        for line in 0..block.len() {
+            let kernel = |(mode, growth): (&IdentifiedMode, &C)| {
+                let (_, transient) = kernels(mode.pole, lines, block, line, *growth);
+                (transient.value, transient.mirror)
+            };
+            let row = block.rows.start + line;
+            rows.push((row, modes.iter().zip(&growths).map(kernel).collect()));
+        }
+    }
+    let residual = |row: usize, power: i32| {
+        Complex::i().powi(power) * (lines.omega[row] / reference).powi(power)
+    };
+    // The residual terms of an output are projected out of its rows; the loads are common to all outputs.
+    let width = 2 * modes.len();
+    let mut normal = Accumulator::new(width);
+    let mut parts = Vec::with_capacity(outputs);
+    for output in 0..outputs {
+        let count = powers.len() + width + 1;
+        let height = 2 * rows.len();
+        let mut columns = vec![0.0; height * count];
+        for (k, (row, kernels)) in rows.iter().enumerate() {
+            let mut put = |column: usize, value: C| {
+                columns[column * height + 2 * k] = value.re;
+                columns[column * height + 2 * k + 1] = value.im;
+            };
+            for (place, power) in powers.iter().enumerate() {
+                put(place, residual(*row, *power));
+            }
+            for (mode, (value, mirror)) in kernels.iter().enumerate() {
+                let shape = modes[mode].shape[output];
+                let (a, b) = (shape * value, shape.conj() * mirror);
+                put(powers.len() + 2 * mode, a + b);
+                put(powers.len() + 2 * mode + 1, C::i() * (a - b));
+            }
+            put(count - 1, lines.outputs[output][*row] - predicted[(*row, output)]);
+        }
+        triangularise(&mut columns, height);
+        normal.add(&columns, height, powers.len());
+        parts.push(Triangle::new(&columns, height, count));
+    }
+    let loads = normal.solve();
+    for (output, triangle) in parts.iter().enumerate() {
+        let terms = residual_terms(triangle, powers.len(), &loads);
+        for (row, kernels) in &rows {
+            let mut sum = C::default();
+            for (mode, (value, mirror)) in kernels.iter().enumerate() {
+                let part = modes[mode].shape[output] * C::new(loads[2 * mode], loads[2 * mode + 1]);
+                sum += part * value + part.conj() * mirror;
+            }
+            for (power, value) in powers.iter().zip(&terms) {
+                sum += residual(*row, *power) * *value;
+            }
+            predicted[(*row, output)] += sum;
+        }
+    }
+}
+
+/// Solves for the residual terms of one output at given loads.
+fn residual_terms(triangle: &Triangle, powers: usize, loads: &[f64]) -> Vec<f64> {
+    let size = triangle.size;
+    let entry = |row: usize, column: usize| triangle.entries[column * size + row];
+    let mut terms = vec![0.0; powers];
+    for row in (0..powers).rev() {
+        let mut right = entry(row, size - 1);
+        for (k, load) in loads.iter().enumerate() {
+            right -= entry(row, powers + k) * load;
+        }
+        for column in row + 1..powers {
+            right -= entry(row, column) * terms[column];
+        }
+        terms[row] = right / entry(row, row);
+    }
+    terms
+}
+
+/// Rows of a least-squares problem, reduced as they come.
+struct Accumulator {
+    width: usize,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Accumulator {
+    fn new(width: usize) -> Self {
+        Self { width, rows: Vec::new() }
+    }
+
+    /// Adds the rows of a triangular factor below its first `skip` rows.
+    fn add(&mut self, columns: &[f64], height: usize, skip: usize) {
+        let last = (skip + self.width).min(height);
+        for row in skip..last {
+            let entry = |column: usize| {
+                if column >= row { columns[column * height + row] } else { 0.0 }
+            };
+            self.rows.push((skip..=skip + self.width).map(entry).collect());
+        }
+    }
+
+    fn solve(&self) -> Vec<f64> {
+        let height = self.rows.len().max(self.width + 1);
+        let mut columns = vec![0.0; height * (self.width + 1)];
+        for (row, values) in self.rows.iter().enumerate() {
+            for (column, value) in values.iter().enumerate() {
+                columns[column * height + row] = *value;
+            }
+        }
+        triangularise(&mut columns, height);
+        let triangle = Triangle::new(&columns, height, self.width);
+        let start = self.width * height;
+        let mut solution = columns[start..start + self.width].to_vec();
+        triangle.solve(&mut solution);
+        solution
+    }
+}

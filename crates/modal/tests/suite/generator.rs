@@ -1,0 +1,292 @@
+//! Records of a known modal structure: a window cut out of a long, exactly band-limited steady state.
+//!
+//! Nothing of the estimator is used: the response is the closed modal sum on the lines of a period four
+//! times as long, so that the record is open and leaks as a measured one does.
+
+use std::f64::consts::TAU;
+
+use mechid_signal::{Record, Sampling, Spectrum};
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DMatrix};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+type C = Complex<f64>;
+
+/// What excites the structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Excitation {
+    /// White forces up to 0.9 of half the sampling rate.
+    Random,
+    /// Hits at irregular instants; the record starts in the decay of an earlier one.
+    Hammer { hits: usize },
+}
+
+/// A structure and the test of it.
+#[derive(Debug, Clone)]
+pub struct Case {
+    pub name: &'static str,
+    pub frequency_hz: Vec<f64>,
+    pub damping: Vec<f64>,
+    /// `[mode][output]`.
+    pub shape: Vec<Vec<C>>,
+    /// `[mode][input]`.
+    pub participation: Vec<Vec<f64>>,
+    pub band_hz: [f64; 2],
+    pub rate_hz: f64,
+    pub samples: usize,
+    pub excitation: Excitation,
+    /// Sensor noise, relative to the root-mean-square of each output.
+    pub noise: f64,
+    /// Pole of the sensor noise (first-order autoregression).
+    pub colour: f64,
+    /// Two unmeasured white forces, relative to the measured ones.
+    pub unmeasured: f64,
+    /// Noise of the measured forces, relative to their root-mean-square.
+    pub force_noise: f64,
+}
+
+/// Draws standard normal numbers.
+pub struct Normal(ChaCha8Rng);
+
+impl Normal {
+    pub fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    pub fn next(&mut self) -> f64 {
+        self.0.sample(StandardNormal)
+    }
+
+    pub fn uniform(&mut self) -> f64 {
+        self.0.random::<f64>()
+    }
+
+    fn complex(&mut self) -> C {
+        C::new(self.next(), self.next())
+    }
+}
+
+impl Case {
+    /// Returns the poles, in rad/s.
+    pub fn poles(&self) -> Vec<C> {
+        let pole = |(hz, z): (&f64, &f64)| C::new(-z, (1.0 - z * z).sqrt()) * TAU * *hz;
+        self.frequency_hz.iter().zip(&self.damping).map(pole).collect()
+    }
+
+    /// Returns the modes inside the band.
+    pub fn in_band(&self) -> Vec<usize> {
+        let inside = |mode: &usize| {
+            let hz = self.frequency_hz[*mode];
+            hz > self.band_hz[0] && hz < self.band_hz[1]
+        };
+        (0..self.frequency_hz.len()).filter(inside).collect()
+    }
+
+    /// Returns the accelerations per force at ω, outputs × inputs.
+    pub fn response(&self, omega: f64, participation: &[Vec<f64>]) -> DMatrix<C> {
+        let s = C::new(0.0, omega);
+        let poles = self.poles();
+        DMatrix::from_fn(self.shape[0].len(), participation[0].len(), |output, input| {
+            let of_mode = |mode: usize| {
+                let scale = C::new(0.0, 2.0 * poles[mode].im);
+                let residue = self.shape[mode][output] * participation[mode][input] / scale;
+                residue / (s - poles[mode]) + residue.conj() / (s - poles[mode].conj())
+            };
+            (0..poles.len()).map(of_mode).sum::<C>() * s * s
+        })
+    }
+
+    /// Returns forces and accelerations of one record.
+    pub fn record(&self, seed: u64) -> (Record, Record) {
+        let mut normal = Normal::new(seed);
+        let period = 4 * self.samples;
+        let sampling = Sampling::from_rate_hz(self.rate_hz, period).unwrap();
+        let inputs = self.participation[0].len();
+        let forces = match self.excitation {
+            Excitation::Random => self.random_lines(&mut normal, sampling, inputs),
+            Excitation::Hammer { hits } => self.hits(&mut normal, sampling, hits),
+        };
+        let hidden = self.hidden(&mut normal);
+        let disturbance = self.random_lines(&mut normal, sampling, 2);
+        let mut motion = DMatrix::zeros(sampling.lines(), self.shape[0].len());
+        for line in 1..sampling.lines() {
+            let omega = TAU * line as f64 * self.rate_hz / period as f64;
+            let mut row = self.response(omega, &self.participation) * forces.row(line).transpose();
+            if self.unmeasured > 0.0 {
+                row += self.response(omega, &hidden) * disturbance.row(line).transpose();
+            }
+            motion.row_mut(line).copy_from(&row.transpose());
+        }
+        let cut = |lines: DMatrix<C>| {
+            let all = Spectrum::from_lines(sampling, lines).unwrap().to_record().unwrap();
+            all.window(period / 3, self.samples).unwrap()
+        };
+        let (forces, motion) = (cut(forces), cut(motion));
+        let noisy = |record: Record, level: f64, normal: &mut Normal| {
+            let (mut data, sampling) = (record.data().clone(), record.sampling());
+            for mut column in data.column_iter_mut() {
+                let spread = column.variance().sqrt();
+                let mut state = normal.next();
+                for value in column.iter_mut() {
+                    *value += level * spread * state;
+                    let fresh = normal.next() * (1.0 - self.colour * self.colour).sqrt();
+                    state = self.colour * state + fresh;
+                }
+            }
+            Record::new(sampling, data).unwrap()
+        };
+        let motion = noisy(motion, self.noise, &mut normal);
+        (noisy(forces, self.force_noise, &mut normal), motion)
+    }
+
+    /// Returns the lines of one record in the band.
+    pub fn lines(&self, seed: u64) -> LineData {
+        let (forces, motion) = self.record(seed);
+        LineData::from_open_record(Some(&forces), &motion, self.band_hz).unwrap()
+    }
+
+    fn hidden(&self, normal: &mut Normal) -> Vec<Vec<f64>> {
+        let all = self.participation.iter().flatten();
+        let power = all.clone().map(|value| value * value).sum::<f64>() / all.count() as f64;
+        let level = self.unmeasured * power.sqrt();
+        self.participation.iter().map(|_| (0..2).map(|_| level * normal.next()).collect()).collect()
+    }
+
+    fn random_lines(&self, normal: &mut Normal, sampling: Sampling, count: usize) -> DMatrix<C> {
+        let last = (0.9 * (sampling.lines() - 1) as f64) as usize;
+        let mut lines = DMatrix::zeros(sampling.lines(), count);
+        for line in 1..=last {
+            for column in 0..count {
+                lines[(line, column)] = normal.complex();
+            }
+        }
+        lines
+    }
+
+    fn hits(&self, normal: &mut Normal, sampling: Sampling, hits: usize) -> DMatrix<C> {
+        const WIDTH: f64 = 2e-3;
+        let length = self.samples as f64 / self.rate_hz;
+        let start = (sampling.len() / 3) as f64 / self.rate_hz;
+        let mut instants = vec![start - 0.3 * length / hits as f64];
+        for hit in 0..hits {
+            let part = hit as f64 + 0.1 + 0.5 * normal.uniform();
+            instants.push(start + part * length / hits as f64);
+        }
+        let mut force = vec![0.0; sampling.len()];
+        for instant in instants {
+            let size = 0.7 + 0.6 * normal.uniform();
+            for (k, value) in force.iter_mut().enumerate() {
+                let x = (k as f64 / self.rate_hz - instant) / WIDTH;
+                if x.abs() < 0.5 {
+                    *value += size * (std::f64::consts::PI * x).cos().powi(2);
+                }
+            }
+        }
+        let record = Record::from_channel(sampling, force).unwrap();
+        Spectrum::of(&record).lines().clone()
+    }
+}
+
+/// Real shapes drawn at random, the same for every seed of a case.
+fn structure(
+    modes: usize,
+    outputs: usize,
+    inputs: usize,
+    seed: u64,
+) -> (Vec<Vec<C>>, Vec<Vec<f64>>) {
+    let mut normal = Normal::new(seed);
+    let shape =
+        (0..modes).map(|_| (0..outputs).map(|_| C::from(normal.next())).collect()).collect();
+    let row = |normal: &mut Normal| -> Vec<f64> {
+        let sign = |normal: &mut Normal| if normal.uniform() < 0.5 { -1.0 } else { 1.0 };
+        (0..inputs).map(|_| sign(normal) * (0.5 + normal.uniform())).collect()
+    };
+    let participation = (0..modes).map(|_| row(&mut normal)).collect();
+    (shape, participation)
+}
+
+fn case(
+    name: &'static str,
+    frequency_hz: &[f64],
+    damping: &[f64],
+    [outputs, inputs]: [usize; 2],
+    samples: usize,
+) -> Case {
+    let (shape, participation) = structure(frequency_hz.len(), outputs, inputs, 44);
+    Case {
+        name,
+        frequency_hz: frequency_hz.to_vec(),
+        damping: damping.to_vec(),
+        shape,
+        participation,
+        band_hz: [20.0, 400.0],
+        rate_hz: 1024.0,
+        samples,
+        excitation: Excitation::Random,
+        noise: 0.02,
+        colour: 0.5,
+        unmeasured: 0.0,
+        force_noise: 0.0,
+    }
+}
+
+/// One accelerometer, one force, five modes in the band and two outside.
+pub fn one_by_one() -> Case {
+    let mut case = case(
+        "1x1, modes outside",
+        &[12.0, 48.0, 90.0, 131.0, 155.0, 210.0, 320.0],
+        &[0.01, 0.008, 0.005, 0.004, 0.006, 0.005, 0.006],
+        [1, 1],
+        8192,
+    );
+    case.shape = [1.0, 0.9, -1.1, 0.8, 1.0, -0.9, 1.2].map(|x| vec![C::from(x)]).to_vec();
+    case.participation = [1.0, 1.1, 0.9, 1.0, -0.8, 1.0, 0.9].map(|x| vec![x]).to_vec();
+    case.band_hz = [25.0, 260.0];
+    case
+}
+
+/// Six modes, two of them 1 % apart, with two forces.
+pub fn pair(outputs: usize) -> Case {
+    case(
+        if outputs == 8 { "8x2, pair 1 % apart" } else { "30x2, pair 1 % apart" },
+        &[52.0, 87.0, 131.0, 132.3, 210.0, 305.0],
+        &[0.008, 0.005, 0.004, 0.004, 0.003, 0.004],
+        [outputs, 2],
+        8192,
+    )
+}
+
+/// Hits at one point, twelve accelerometers.
+pub fn hammer() -> Case {
+    let mut case = case(
+        "12x1 hammer",
+        &[52.0, 87.0, 131.0, 170.0, 210.0, 305.0],
+        &[0.008, 0.005, 0.004, 0.006, 0.003, 0.004],
+        [12, 1],
+        8192,
+    );
+    case.excitation = Excitation::Hammer { hits: 5 };
+    case
+}
+
+/// All cases of the study.
+pub fn cases() -> Vec<Case> {
+    let with = |name, change: &dyn Fn(&mut Case)| {
+        let mut case = pair(8);
+        case.name = name;
+        change(&mut case);
+        case
+    };
+    vec![
+        one_by_one(),
+        hammer(),
+        pair(8),
+        pair(30),
+        with("8x2, unmeasured forces 5 %", &|case| case.unmeasured = 0.05),
+        with("8x2, noise 3 % on the forces", &|case| case.force_noise = 0.03),
+        with("8x2, 2 s instead of 8 s", &|case| case.samples = 2048),
+        with("8x2, pair 0.3 % apart", &|case| case.frequency_hz[3] = 131.4),
+    ]
+}

@@ -1,0 +1,5 @@
+//! Tests of the modal estimator on records with known modes.
+
+mod forced;
+mod generator;
+mod score;

@@ -1,0 +1,168 @@
+//! Errors of identified modes against the truth, over many records.
+
+use std::ops::Range;
+
+use mechid_modal::{IdentifiedMode, ModalSettings, identify_modes};
+
+use crate::generator::Case;
+
+/// Errors and standard errors of one quantity: `[mode][record]`.
+#[derive(Debug, Clone, Default)]
+pub struct Errors(Vec<Vec<(f64, f64)>>);
+
+impl Errors {
+    /// Returns the percentage of 95 % intervals that hold the truth.
+    pub fn coverage(&self) -> f64 {
+        let all: Vec<_> = self.0.iter().flatten().collect();
+        let holds = all.iter().filter(|(error, spread)| error.abs() < 1.96 * spread).count();
+        100.0 * holds as f64 / all.len().max(1) as f64
+    }
+
+    /// Returns scatter over mean standard error of each mode.
+    pub fn scatter(&self) -> Vec<f64> {
+        self.each(|mean, scatter, spread| scatter / spread + 0.0 * mean)
+    }
+
+    /// Returns bias over scatter of each mode.
+    pub fn bias(&self) -> Vec<f64> {
+        self.each(|mean, scatter, _| mean / scatter)
+    }
+
+    fn each(&self, value: impl Fn(f64, f64, f64) -> f64) -> Vec<f64> {
+        let of_mode = |errors: &Vec<(f64, f64)>| {
+            let count = errors.len() as f64;
+            let mean = errors.iter().map(|(error, _)| error).sum::<f64>() / count;
+            let square = errors.iter().map(|(error, _)| (error - mean).powi(2)).sum::<f64>();
+            let spread = errors.iter().map(|(_, spread)| spread * spread).sum::<f64>() / count;
+            value(mean, (square / (count - 1.0)).sqrt(), spread.sqrt())
+        };
+        self.0.iter().filter(|errors| errors.len() > 1).map(of_mode).collect()
+    }
+}
+
+/// Errors of all modes of a case.
+#[derive(Debug, Clone, Default)]
+pub struct Score {
+    pub records: usize,
+    pub frequency: Errors,
+    pub damping: Errors,
+    shape_holds: usize,
+    shape_count: usize,
+    found: usize,
+    wanted: usize,
+    pub false_modes: usize,
+}
+
+impl Score {
+    /// Identifies the records of `seeds` and compares with the truth.
+    pub fn of(case: &Case, seeds: Range<u64>, verbose: bool) -> Self {
+        let modes = case.in_band();
+        let mut score = Self::default();
+        score.frequency.0 = vec![Vec::new(); modes.len()];
+        score.damping.0 = vec![Vec::new(); modes.len()];
+        for seed in seeds {
+            score.records += 1;
+            score.wanted += modes.len();
+            let estimate = match identify_modes(&case.lines(seed), &ModalSettings::default()) {
+                Ok(estimate) => estimate,
+                Err(error) => {
+                    eprintln!("seed {seed}: {error}");
+                    continue;
+                }
+            };
+            let pairs = score.pair(case, &modes, estimate.modes());
+            score.false_modes += estimate.modes().len() - pairs.len();
+            score.found += pairs.len();
+            for &(place, mode) in &pairs {
+                score.add(case, modes[place], place, &estimate.modes()[mode]);
+            }
+            if verbose {
+                report(case, seed, &modes, &pairs, &estimate);
+            }
+        }
+        score
+    }
+
+    /// Pairs true modes with identified ones, the nearest first, within five half-widths.
+    fn pair(&self, case: &Case, modes: &[usize], all: &[IdentifiedMode]) -> Vec<(usize, usize)> {
+        let mut distances = Vec::new();
+        for (place, &truth) in modes.iter().enumerate() {
+            let pole = case.poles()[truth];
+            for (mode, identified) in all.iter().enumerate() {
+                let distance = (identified.pole - pole).norm() / -pole.re;
+                if distance < 5.0 {
+                    distances.push((distance, place, mode));
+                }
+            }
+        }
+        distances.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut pairs: Vec<(usize, usize)> = Vec::new();
+        for (_, place, mode) in distances {
+            if pairs.iter().all(|(p, m)| *p != place && *m != mode) {
+                pairs.push((place, mode));
+            }
+        }
+        pairs.sort_unstable();
+        pairs
+    }
+
+    fn add(&mut self, case: &Case, truth: usize, place: usize, mode: &IdentifiedMode) {
+        let (f, z) = (mode.natural_frequency_hz, mode.damping_ratio);
+        self.frequency.0[place].push((f.value - case.frequency_hz[truth], f.standard_error));
+        self.damping.0[place].push((z.value - case.damping[truth], z.standard_error));
+        let largest = mode.shape.iter().position(|value| (value - 1.0).norm() < 1e-12).unwrap_or(0);
+        let shape = &case.shape[truth];
+        for (output, value) in mode.shape.iter().enumerate().filter(|(k, _)| *k != largest) {
+            let error = value - shape[output] / shape[largest];
+            let spread = mode.shape_standard_error[output];
+            self.shape_count += 2;
+            self.shape_holds += usize::from(error.re.abs() < 1.96 * spread.re);
+            self.shape_holds += usize::from(error.im.abs() < 1.96 * spread.im);
+        }
+    }
+
+    /// Returns the percentage of 95 % intervals of shapes that hold the truth.
+    pub fn shape_coverage(&self) -> f64 {
+        100.0 * self.shape_holds as f64 / self.shape_count.max(1) as f64
+    }
+
+    /// Returns the percentage of modes that were found.
+    pub fn found_share(&self) -> f64 {
+        100.0 * self.found as f64 / self.wanted as f64
+    }
+}
+
+fn report(
+    case: &Case,
+    seed: u64,
+    modes: &[usize],
+    pairs: &[(usize, usize)],
+    estimate: &mechid_modal::ModalEstimate,
+) {
+    for &(place, mode) in pairs {
+        let (truth, mode) = (modes[place], &estimate.modes()[mode]);
+        let (f, z) = (mode.natural_frequency_hz, mode.damping_ratio);
+        eprintln!(
+            "seed {seed} f {:.4} ({:.5}) e {:+.2}  z {:.5} ({:.6}) e {:+.2}  ratio {:?} gain {:.0}",
+            f.value,
+            f.standard_error,
+            (f.value - case.frequency_hz[truth]) / f.standard_error,
+            z.value,
+            z.standard_error,
+            (z.value - case.damping[truth]) / z.standard_error,
+            mode.unmeasured_ratio,
+            mode.gain,
+        );
+    }
+    for mode in estimate.modes() {
+        eprintln!("  {:.3} {:.5}", mode.natural_frequency_hz.value, mode.damping_ratio.value);
+    }
+    let explained = estimate.variance_explained();
+    let least = explained.iter().copied().fold(1.0, f64::min);
+    eprintln!(
+        "  explained {least:.5}, powers {:?}, steps {}, dropped {:?}",
+        estimate.residual_powers().forces,
+        estimate.iterations(),
+        estimate.dropped(),
+    );
+}
