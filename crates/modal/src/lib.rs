@@ -25,3 +25,8 @@ pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode, Uncertain};
 pub use model::ResidualPowers;
+pub mod compare;
+mod decomposition;
+pub mod indicators;
+pub mod plscf;
+pub mod stabilisation;
