@@ -25,6 +25,7 @@ pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode, Uncertain};
 pub use model::ResidualPowers;
+pub mod ambient;
 pub mod compare;
 mod decomposition;
 pub mod indicators;

@@ -3,3 +3,6 @@
 mod forced;
 mod generator;
 mod score;
+//! Tests of the crate through its public interface.
+mod ambient;
+mod ambient_generator;

@@ -1,0 +1,126 @@
+//! Errors of the identification of ambient records.
+
+use mechid_signal::SignalError;
+use mechid_spectra::SpectraError;
+use thiserror::Error;
+
+/// Error of the identification of modes from responses alone.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
+pub enum AmbientError {
+    /// A channel does not change.
+    #[error("channel {}: all {samples} samples are {value}: the sensor is dead or not connected", channel.saturating_add(1))]
+    ConstantChannel {
+        /// Channel, counted from 0.
+        channel: usize,
+        /// Number of samples.
+        samples: usize,
+        /// Their value, in the unit of the channel.
+        value: f64,
+    },
+    /// A channel has next to no signal in the band.
+    #[error(
+        "channel {}: its RMS value in the band is {rms:.2e}, {:.0e} of the strongest channel's: the sensor is dead or in another unit",
+        channel.saturating_add(1), ratio
+    )]
+    DeadChannel {
+        /// Channel, counted from 0.
+        channel: usize,
+        /// RMS value in the band, in the unit of the channel.
+        rms: f64,
+        /// RMS value over that of the strongest channel.
+        ratio: f64,
+    },
+    /// A channel is a multiple of another.
+    #[error(
+        "channels {} and {} are copies of one another: all but {unexplained:.0e} of their power is common; leave one out",
+        first.saturating_add(1), second.saturating_add(1)
+    )]
+    CopiedChannel {
+        /// First channel, counted from 0.
+        first: usize,
+        /// Second channel, counted from 0.
+        second: usize,
+        /// Part of the power that is not common.
+        unexplained: f64,
+    },
+    /// The band has too few lines.
+    #[error(
+        "{lines} spectral lines lie between {from_hz} and {to_hz} Hz; one mode at {outputs} outputs needs {needed}: record longer or widen `band_hz`"
+    )]
+    TooFewLines {
+        /// Number of lines in the band.
+        lines: usize,
+        /// Number of lines needed.
+        needed: usize,
+        /// Number of outputs.
+        outputs: usize,
+        /// Lower end of the band, in Hz.
+        from_hz: f64,
+        /// Upper end of the band, in Hz.
+        to_hz: f64,
+    },
+    /// The record is too short for the subspace method.
+    #[error(
+        "{samples} samples in the band are too few for covariances over {lags} lags: record longer"
+    )]
+    TooShort {
+        /// Number of samples after resampling to the band.
+        samples: usize,
+        /// Number of lags needed.
+        lags: usize,
+    },
+    /// The band is empty or not finite.
+    #[error(
+        "`band_hz` {from_hz} to {to_hz} Hz must rise within 0 to {nyquist_hz} Hz, half the sampling rate"
+    )]
+    Band {
+        /// Lower end given, in Hz.
+        from_hz: f64,
+        /// Upper end given, in Hz.
+        to_hz: f64,
+        /// Half the sampling rate, in Hz.
+        nyquist_hz: f64,
+    },
+    /// A number of modes of zero was asked for.
+    #[error("`modes` and `max_modes` must be at least 1")]
+    NoModesAsked,
+    /// Fewer modes were found than asked for.
+    #[error("{found} of {asked} modes were found between {from_hz} and {to_hz} Hz")]
+    FewerModes {
+        /// Number of modes asked for (`modes`).
+        asked: usize,
+        /// Number of modes found.
+        found: usize,
+        /// Lower end of the band, in Hz.
+        from_hz: f64,
+        /// Upper end of the band, in Hz.
+        to_hz: f64,
+    },
+    /// There is no mode in the band.
+    #[error(
+        "no mode between {from_hz} and {to_hz} Hz: none of {candidates} candidates stands out of the noise"
+    )]
+    NoMode {
+        /// Number of candidates examined.
+        candidates: usize,
+        /// Lower end of the band, in Hz.
+        from_hz: f64,
+        /// Upper end of the band, in Hz.
+        to_hz: f64,
+    },
+    /// A decomposition or a search failed.
+    #[error("{what} of {size} unknowns failed: the record may hold copies of one channel")]
+    Numerics {
+        /// Name of the step.
+        what: &'static str,
+        /// Number of unknowns.
+        size: usize,
+    },
+    /// The lines of the record could not be computed.
+    #[error(transparent)]
+    Spectra(#[from] SpectraError),
+    /// The record is unusable.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+}

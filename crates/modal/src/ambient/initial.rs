@@ -1,0 +1,165 @@
+//! First values of the parameters from poles and shapes of the subspace models.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{Complex, DVector};
+
+use super::likelihood::{noise, positive_factor};
+use super::limits::{NOISE_TERMS, SHORT_SEARCH};
+use super::lines::{BandLines, PooledLines};
+use super::parameters::{Kernel, Layout, Parameters};
+use super::search::search;
+use super::spectrum::Coefficients;
+use crate::indicators::mean_phase;
+use crate::stabilisation::Pole;
+
+/// Part of the sorted periodograms of a sensor that is taken for its noise.
+const NOISE_QUANTILE: f64 = 0.1;
+
+/// Corrections of the amplitudes of the modes, which overlap.
+const AMPLITUDE_STEPS: usize = 3;
+
+/// Half width, in decay rates, of the lines that an amplitude is read from.
+const AMPLITUDE_REACH: f64 = 2.0;
+
+/// Quantities that outputs may be: the kernel, and the phase of ψ of a real mode.
+const QUANTITIES: [(Kernel, f64); 3] =
+    [(Kernel::Static, -FRAC_PI_2), (Kernel::Static, 0.0), (Kernel::Vanishing, FRAC_PI_2)];
+
+/// Returns the start with the quantity (displacement, velocity or acceleration) that explains the lines best
+/// after a few steps; `None` if none has a likelihood.
+pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Parameters> {
+    let poles: Vec<_> = modes.iter().map(|mode| mode.pole).collect();
+    let pooled = band.pooled(&poles, NOISE_TERMS);
+    let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
+        let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
+        search(start, &pooled, band.duration, SHORT_SEARCH)
+    });
+    let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+    Some(best.parameters)
+}
+
+fn start(
+    modes: &[Pole],
+    outputs: usize,
+    pooled: &[PooledLines],
+    band: &BandLines,
+    kernel: Kernel,
+    phase: f64,
+) -> Parameters {
+    let layout = Layout::new(modes.len(), outputs, NOISE_TERMS);
+    let values = DVector::zeros(layout.len());
+    let mut parameters = Parameters { kernel, layout, values };
+    for output in 0..outputs {
+        let mut powers: Vec<f64> =
+            pooled.iter().map(|line| line.periodogram[(output, output)].re).collect();
+        powers.sort_by(f64::total_cmp);
+        let quantile = powers[(NOISE_QUANTILE * powers.len() as f64) as usize];
+        let index = parameters.layout.noise(0, output);
+        parameters.values[index] = quantile.max(f64::MIN_POSITIVE).ln().max(-25.0);
+    }
+    for (r, mode) in modes.iter().enumerate() {
+        let (frequency, damping) = (parameters.layout.frequency(r), parameters.layout.damping(r));
+        parameters.values[frequency] = mode.pole.norm().ln();
+        parameters.values[damping] = mode.damping_ratio().max(1e-6).ln();
+        let turn = Complex::cis(phase - mean_phase(&mode.vector));
+        parameters.set_shape(r, &(&mode.vector * (turn * -mode.pole.re)));
+    }
+    for _ in 0..AMPLITUDE_STEPS {
+        match_amplitudes(&mut parameters, pooled, band.duration, band.spacing());
+    }
+    parameters
+}
+
+/// Scales each shape so that the power along it near its resonance is that of the lines.
+pub(super) fn match_amplitudes(
+    parameters: &mut Parameters,
+    pooled: &[PooledLines],
+    duration: f64,
+    spacing: f64,
+) {
+    let coefficients = Coefficients::new(parameters);
+    let factors: Vec<f64> = (0..parameters.layout.modes)
+        .map(|r| {
+            let pole = parameters.pole(r);
+            let reach = (AMPLITUDE_REACH * -pole.re).max(2.0 * spacing);
+            let direction = parameters.shape(r);
+            let mut powers = [0.0; 2];
+            for line in pooled.iter().filter(|line| (line.omega - pole.im).abs() < reach) {
+                let kernels = coefficients.kernels(line.omega, duration);
+                let model = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
+                for (power, matrix) in powers.iter_mut().zip([&line.periodogram, &model]) {
+                    *power += line.count * direction.dotc(&(matrix * &direction)).re;
+                }
+            }
+            let ratio = powers[0] / powers[1];
+            if ratio.is_finite() && ratio > 0.0 { ratio.sqrt() } else { 1.0 }
+        })
+        .collect();
+    for (r, factor) in factors.into_iter().enumerate() {
+        let shape = parameters.shape(r) * Complex::from(factor);
+        parameters.set_shape(r, &shape);
+    }
+}
+
+/// Strongest sign of a further mode in the whitened lines.
+pub(super) struct Candidate {
+    pub pole: Pole,
+    /// Amplitude along the shape in units of the standard deviation that noise alone gives.
+    pub score: f64,
+}
+
+/// Damping ratios at which further modes are looked for.
+const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
+
+/// Half width of the lines that one place of the scan uses, in decay rates.
+const SCAN_REACH: f64 = 8.0;
+
+/// Returns candidates of further modes by falling score: at each pole of a grid the largest eigenvalue of
+/// Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
+pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
+    let coefficients = Coefficients::new(parameters);
+    let p = band.outputs();
+    let mut whitened = Vec::with_capacity(band.omega.len());
+    for (k, omega) in band.omega.iter().enumerate() {
+        let terms = band.noise_terms(*omega, parameters.layout.noise_terms);
+        let kernels = coefficients.kernels(*omega, band.duration);
+        let factor = positive_factor(coefficients.spectrum(&kernels, &noise(parameters, &terms)))?;
+        let lower = factor.l();
+        let line = lower.solve_lower_triangular(&band.amplitudes.row(k).transpose())?;
+        whitened.push((line, lower));
+    }
+    let first = band.omega.first()?;
+    let last = band.omega.last()?;
+    let mut candidates = Vec::new();
+    for zeta in SCANNED_DAMPING {
+        let mut centre = *first;
+        while centre < *last {
+            let rate = (zeta * centre).max(0.5 * band.spacing());
+            let reach = SCAN_REACH * rate;
+            let from = band.omega.partition_point(|w| *w < centre - reach);
+            let to = band.omega.partition_point(|w| *w <= centre + reach);
+            let mut sum = nalgebra::DMatrix::zeros(p, p);
+            let mut squares = 0.0;
+            for k in from..to {
+                let weight = rate * rate / (rate * rate + (band.omega[k] - centre).powi(2));
+                let line = &whitened[k].0;
+                sum.gerc(weight.into(), line, line, Complex::from(1.0));
+                for i in 0..p {
+                    sum[(i, i)] -= Complex::from(weight);
+                }
+                squares += weight * weight;
+            }
+            let eigen = crate::decomposition::hermitian_eigen(sum)?;
+            let best = eigen.eigenvalues.imax();
+            let score = eigen.eigenvalues[best] / f64::sqrt(squares);
+            let near = band.omega.partition_point(|w| *w < centre).min(band.omega.len() - 1);
+            let shape = &whitened[near].1 * eigen.eigenvectors.column(best);
+            let pole = Pole { pole: Complex::new(-rate, centre), vector: shape.normalize() };
+            candidates.push(Candidate { pole, score });
+            centre += 0.5 * rate;
+        }
+    }
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+    Some(candidates)
+}

@@ -1,0 +1,381 @@
+//! Whittle's likelihood of the lines of a band: cost, gradient and Fisher information.
+
+use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+
+use super::lines::PooledLines;
+use super::parameters::{Kernel, Parameters};
+use super::spectrum::{Coefficients, Direction, Kernels, directions};
+
+/// Pooled lines that one task works on: sums are added in the same order on any number of cores.
+const TASK: usize = 64;
+
+/// Returns the factor of a Hermitian matrix if it is positive definite.
+///
+/// nalgebra takes complex square roots of the pivots, so that those of an indefinite matrix come out
+/// imaginary.
+pub(super) fn positive_factor(
+    matrix: DMatrix<Complex<f64>>,
+) -> Option<Cholesky<Complex<f64>, Dyn>> {
+    let factor = Cholesky::new(matrix)?;
+    let sound = |z: Complex<f64>| z.re > 0.0 && z.re.is_finite() && z.im.abs() < 1e-6 * z.re;
+    factor.l_dirty().diagonal().iter().all(|z| sound(*z)).then_some(factor)
+}
+
+/// Returns the variances of the noise of each sensor where the polynomials are `terms`.
+pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
+    (0..parameters.layout.outputs).map(|i| parameters.log_noise(i, terms).exp()).collect()
+}
+
+/// Returns −log L, Σ (ln det S + Yᴴ S⁻¹ Y) over the lines; infinite where S is not positive definite.
+///
+/// # Source
+/// Whittle (1953), Arkiv för Matematik 2, 423–434.
+pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], duration: f64) -> f64 {
+    let coefficients = Coefficients::new(parameters);
+    let one = |line: &PooledLines| {
+        let kernels = coefficients.kernels(line.omega, duration);
+        let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
+        let Some(factor) = positive_factor(spectrum) else { return f64::INFINITY };
+        let log_determinant = log_determinant(&factor);
+        line.count * (log_determinant + factor.solve(&line.periodogram).trace().re)
+    };
+    let sums: Vec<f64> = lines.par_chunks(TASK).map(|chunk| chunk.iter().map(one).sum()).collect();
+    let total: f64 = sums.iter().sum();
+    if total.is_nan() { f64::INFINITY } else { total }
+}
+
+pub(super) fn log_determinant(factor: &Cholesky<Complex<f64>, Dyn>) -> f64 {
+    2.0 * factor.l_dirty().diagonal().iter().map(|z| z.re.ln()).sum::<f64>()
+}
+
+/// Sums over the lines that the gradient is made of.
+#[derive(Clone)]
+struct GradientSums {
+    /// Σ k Γ + conj Σ k̃ Γ of each mode.
+    shapes: Vec<DMatrix<Complex<f64>>>,
+    /// Σ k′ tr ΓΨ + conj Σ k̃′ tr ΓΨ* of each mode.
+    poles: Vec<Complex<f64>>,
+    /// Re Σ Γ.
+    direct: DMatrix<f64>,
+    /// Derivatives with respect to the noise, terms × outputs.
+    noise: DMatrix<f64>,
+}
+
+impl GradientSums {
+    fn zero(parameters: &Parameters) -> Self {
+        let (m, p) = (parameters.layout.modes, parameters.layout.outputs);
+        Self {
+            shapes: vec![DMatrix::zeros(p, p); m],
+            poles: vec![Complex::default(); m],
+            direct: DMatrix::zeros(p, p),
+            noise: DMatrix::zeros(parameters.layout.noise_terms, p),
+        }
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (sum, part) in self.shapes.iter_mut().zip(&other.shapes) {
+            *sum += part;
+        }
+        for (sum, part) in self.poles.iter_mut().zip(&other.poles) {
+            *sum += part;
+        }
+        self.direct += &other.direct;
+        self.noise += &other.noise;
+    }
+
+    fn add_line(
+        &mut self,
+        coefficients: &Coefficients,
+        kernels: &Kernels,
+        gamma: &DMatrix<Complex<f64>>,
+        variances: &[f64],
+        terms: &[f64],
+    ) {
+        let conjugate = gamma.conjugate();
+        for (r, [value, mirrored]) in kernels.value.iter().enumerate() {
+            self.shapes[r].zip_zip_apply(gamma, &conjugate, |sum, g, c| {
+                *sum += value * g + mirrored.conj() * c;
+            });
+            let (psi, cov) = (coefficients.shapes.column(r), coefficients.covariances.column(r));
+            // tr ΓΨ = γᵀΓψ.
+            let (mut plain, mut mirror) = (Complex::default(), Complex::default());
+            for (j, column) in gamma.column_iter().enumerate() {
+                for (i, g) in column.iter().enumerate() {
+                    plain += cov[i] * g * psi[j];
+                    mirror += cov[i].conj() * g * psi[j].conj();
+                }
+            }
+            let [slope, mirrored_slope] = kernels.derivative[r];
+            self.poles[r] += slope * plain + (mirrored_slope * mirror).conj();
+        }
+        self.direct += gamma.map(|z| z.re);
+        for (i, variance) in variances.iter().enumerate() {
+            for (d, term) in terms.iter().enumerate() {
+                self.noise[(d, i)] += gamma[(i, i)].re * variance * term;
+            }
+        }
+    }
+}
+
+/// Returns the gradient of [`cost`]; `None` where S is not positive definite.
+pub(super) fn gradient(
+    parameters: &Parameters,
+    lines: &[PooledLines],
+    duration: f64,
+) -> Option<DVector<f64>> {
+    let coefficients = Coefficients::new(parameters);
+    let chunk = |chunk: &[PooledLines]| {
+        let mut sums = GradientSums::zero(parameters);
+        for line in chunk {
+            let kernels = coefficients.kernels(line.omega, duration);
+            let variances = noise(parameters, &line.terms);
+            let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
+            // Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹ for each of the lines.
+            let gamma = &inverse - &inverse * &line.periodogram * &inverse;
+            let gamma = gamma * Complex::from(line.count);
+            sums.add_line(&coefficients, &kernels, &gamma, &variances, &line.terms);
+        }
+        Some(sums)
+    };
+    let parts: Option<Vec<GradientSums>> = lines.par_chunks(TASK).map(chunk).collect();
+    let mut sums = GradientSums::zero(parameters);
+    for part in parts? {
+        sums.add(&part);
+    }
+    Some(chained(parameters, &coefficients, &sums))
+}
+
+/// Returns the gradient with respect to the parameters from the sums over the lines.
+fn chained(parameters: &Parameters, c: &Coefficients, sums: &GradientSums) -> DVector<f64> {
+    let layout = &parameters.layout;
+    let (m, p) = (layout.modes, layout.outputs);
+    let mut shape_slopes = DMatrix::<Complex<f64>>::zeros(p, m);
+    let mut pole_slopes = sums.poles.clone();
+    let mut correlation_slopes = DMatrix::zeros(m, m);
+    let weights: Vec<_> = (0..m).map(|r| &sums.shapes[r] * c.shapes.column(r)).collect();
+    for s in 0..m {
+        let own = sums.shapes[s].tr_mul(&c.covariances.column(s));
+        shape_slopes.set_column(s, &own);
+    }
+    for r in 0..m {
+        for s in 0..m {
+            let (q, [g, mirrored]) = (c.correlation[(r, s)], c.transfer(r, s));
+            let along = weights[r].dot(&c.shapes.column(s));
+            let across = weights[r].dot(&c.shapes.column(s).conjugate());
+            for i in 0..p {
+                let weight = weights[r][i];
+                shape_slopes[(i, s)] += (g * weight + (mirrored * weight).conj()) * q;
+            }
+            correlation_slopes[(r, s)] += 2.0 * (along * g + across * mirrored).re;
+            let square = |z: Complex<f64>| (z * z).inv();
+            let near = square(c.poles[r] + c.poles[s]);
+            let far = square(c.poles[r] + c.poles[s].conj());
+            pole_slopes[r] += (along * near + across * far) * q;
+            let (mut own, mut conjugated) = (near, far);
+            if c.kernel == Kernel::Vanishing {
+                own -= square(c.poles[s]);
+                conjugated -= square(c.poles[s].conj());
+            }
+            pole_slopes[s] += (along * own + (across * conjugated).conj()) * q;
+        }
+    }
+    if c.kernel == Kernel::Vanishing {
+        let direct = &sums.direct * &c.direct;
+        correlation_slopes += c.direct.tr_mul(&direct);
+        let direct = direct * &c.correlation * 2.0;
+        for s in 0..m {
+            let pole = c.poles[s];
+            for i in 0..p {
+                shape_slopes[(i, s)] += pole.inv() * direct[(i, s)];
+                pole_slopes[s] -= c.shapes[(i, s)] * direct[(i, s)] / (pole * pole);
+            }
+        }
+    }
+    let mut gradient = DVector::zeros(layout.len());
+    for r in 0..m {
+        let [by_frequency, by_damping] = parameters.pole_derivatives(r);
+        gradient[layout.frequency(r)] = 2.0 * (pole_slopes[r] * by_frequency).re;
+        gradient[layout.damping(r)] = 2.0 * (pole_slopes[r] * by_damping).re;
+        for i in 0..p {
+            gradient[layout.shape(r) + i] = 2.0 * shape_slopes[(i, r)].re;
+            gradient[layout.shape(r) + p + i] = -2.0 * shape_slopes[(i, r)].im;
+        }
+    }
+    add_correlations(parameters, &correlation_slopes, &mut gradient);
+    for d in 0..layout.noise_terms {
+        for i in 0..p {
+            gradient[layout.noise(d, i)] = sums.noise[(d, i)];
+        }
+    }
+    gradient
+}
+
+/// Chain rule from Q = C Cᵀ with rows of unit length to the entries below the diagonal.
+fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &mut DVector<f64>) {
+    let (raw, factor) = (parameters.raw_factor(), parameters.factor());
+    let by_factor = (slopes + slopes.transpose()) * &factor;
+    for (index, &(r, s)) in parameters.layout.pairs.iter().enumerate() {
+        let along = by_factor.row(r).dot(&factor.row(r));
+        let slope = (by_factor[(r, s)] - along * factor[(r, s)]) / raw.row(r).norm();
+        gradient[parameters.layout.correlation(index)] = slope;
+    }
+}
+
+/// Returns the Fisher information of the parameters; `None` where S is not positive definite.
+///
+/// # Source
+/// Entry (a, b) is Σ tr S⁻¹ S_a S⁻¹ S_b over the lines; Zeira & Nehorai (1990), IEEE Transactions on
+/// Acoustics, Speech, and Signal Processing 38, 1031–1036.
+pub(super) fn information(
+    parameters: &Parameters,
+    lines: &[PooledLines],
+    duration: f64,
+) -> Option<DMatrix<f64>> {
+    let coefficients = Coefficients::new(parameters);
+    let directions = directions(parameters);
+    let len = parameters.layout.len();
+    let chunk = |chunk: &[PooledLines]| {
+        let mut sum = DMatrix::zeros(len, len);
+        for line in chunk {
+            let kernels = coefficients.kernels(line.omega, duration);
+            let variances = noise(parameters, &line.terms);
+            let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
+            let task = LineInformation {
+                parameters,
+                coefficients: &coefficients,
+                kernels: &kernels,
+                inverse: &inverse,
+                variances: &variances,
+                line,
+            };
+            task.add(&directions, &mut sum);
+        }
+        Some(sum)
+    };
+    let parts: Option<Vec<DMatrix<f64>>> = lines.par_chunks(TASK).map(chunk).collect();
+    let mut total = DMatrix::zeros(len, len);
+    for part in parts? {
+        total += part;
+    }
+    total.fill_lower_triangle_with_upper_triangle();
+    Some(total)
+}
+
+/// Information of one pooled line.
+struct LineInformation<'a> {
+    parameters: &'a Parameters,
+    coefficients: &'a Coefficients,
+    kernels: &'a Kernels,
+    inverse: &'a DMatrix<Complex<f64>>,
+    variances: &'a [f64],
+    line: &'a PooledLines,
+}
+
+impl LineInformation<'_> {
+    /// Adds to the upper triangle.
+    fn add(&self, directions: &[Direction], sum: &mut DMatrix<f64>) {
+        let x = self.coefficients.shape_directions(self.kernels);
+        let whitened = self.inverse * &x;
+        self.add_shapes(&x, &whitened, sum);
+        let derivatives: Vec<_> =
+            directions.iter().map(|d| self.coefficients.derivative(self.kernels, d)).collect();
+        let sandwiched: Vec<_> =
+            derivatives.iter().map(|s| self.inverse * s * self.inverse).collect();
+        for (a, direction) in directions.iter().enumerate() {
+            for (b, other) in directions.iter().enumerate().skip(a) {
+                let product: f64 = derivatives[a]
+                    .iter()
+                    .zip(sandwiched[b].iter())
+                    .map(|(p, q)| p.re * q.re + p.im * q.im)
+                    .sum();
+                self.put(sum, direction.index, other.index, product);
+            }
+            self.add_dense_and_shapes(direction.index, &(&sandwiched[a] * &x), sum);
+            self.add_noise(direction.index, sum, |i| sandwiched[a][(i, i)].re);
+        }
+        self.add_noise_and_shapes(&whitened, sum);
+        for i in 0..self.variances.len() {
+            for (d, term) in self.line.terms.iter().enumerate() {
+                let index = self.parameters.layout.noise(d, i);
+                let scale = term * self.variances[i];
+                self.add_noise(index, sum, |j| scale * self.inverse[(i, j)].norm_sqr());
+            }
+        }
+    }
+
+    fn put(&self, sum: &mut DMatrix<f64>, a: usize, b: usize, value: f64) {
+        sum[(a.min(b), a.max(b))] += self.line.count * value;
+    }
+
+    fn shape_index(&self, column: usize, output: usize) -> usize {
+        let layout = &self.parameters.layout;
+        layout.shape(column / 2) + (column % 2) * layout.outputs + output
+    }
+
+    /// tr (P S_a P S_b) of S_a = e_i xᴴ + x e_iᵀ and S_b = e_j yᴴ + y e_jᵀ is
+    /// 2 Re [(P x)_j (P y)_i + P_ji xᴴ P y].
+    fn add_shapes(
+        &self,
+        x: &DMatrix<Complex<f64>>,
+        whitened: &DMatrix<Complex<f64>>,
+        sum: &mut DMatrix<f64>,
+    ) {
+        let gram = x.ad_mul(whitened);
+        let (p, columns) = x.shape();
+        for b in 0..columns {
+            for a in 0..=b {
+                for j in 0..p {
+                    let column = self.shape_index(b, j);
+                    let first = self.shape_index(a, 0);
+                    for i in 0..p {
+                        let (row, place) = (first + i, column);
+                        if row > place {
+                            continue;
+                        }
+                        let product = whitened[(j, a)] * whitened[(i, b)]
+                            + self.inverse[(j, i)] * gram[(a, b)];
+                        sum[(row, place)] += self.line.count * 2.0 * product.re;
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_dense_and_shapes(
+        &self,
+        index: usize,
+        products: &DMatrix<Complex<f64>>,
+        sum: &mut DMatrix<f64>,
+    ) {
+        for (column, values) in products.column_iter().enumerate() {
+            for (i, value) in values.iter().enumerate() {
+                self.put(sum, index, self.shape_index(column, i), 2.0 * value.re);
+            }
+        }
+    }
+
+    /// Adds the information of parameter `index` with the noise, of which `value` is that with the
+    /// variance of each output; a pair of noise parameters is added once.
+    fn add_noise(&self, index: usize, sum: &mut DMatrix<f64>, value: impl Fn(usize) -> f64) {
+        for (j, variance) in self.variances.iter().enumerate() {
+            let value = value(j) * variance;
+            for (d, term) in self.line.terms.iter().enumerate() {
+                let other = self.parameters.layout.noise(d, j);
+                if other >= index {
+                    self.put(sum, index, other, value * term);
+                }
+            }
+        }
+    }
+
+    fn add_noise_and_shapes(&self, whitened: &DMatrix<Complex<f64>>, sum: &mut DMatrix<f64>) {
+        for (column, values) in whitened.column_iter().enumerate() {
+            for i in 0..values.len() {
+                let index = self.shape_index(column, i);
+                let at = |j: usize| 2.0 * (self.inverse[(i, j)] * values[j]).re;
+                self.add_noise(index, sum, at);
+            }
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Periodograms of the lines of a band, pooled where the spectrum hardly changes from line to line.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::limits::POOLING;
+
+/// Lines of one record in a band, without the excluded ones.
+#[derive(Debug, Clone)]
+pub(super) struct BandLines {
+    /// Angular frequencies, in rad/s.
+    pub omega: Vec<f64>,
+    /// Unitary amplitudes, lines × outputs, each output over its RMS value in the band.
+    pub amplitudes: DMatrix<Complex<f64>>,
+    /// RMS value of each output in the band.
+    pub scale: Vec<f64>,
+    /// Length of the record, in s.
+    pub duration: f64,
+}
+
+/// Neighbouring lines with their mean periodogram.
+#[derive(Debug, Clone)]
+pub(super) struct PooledLines {
+    /// Mean angular frequency, in rad/s.
+    pub omega: f64,
+    /// Number of lines.
+    pub count: f64,
+    /// Chebyshev polynomials of the noise at this frequency.
+    pub terms: Vec<f64>,
+    /// Mean of Y Yᴴ.
+    pub periodogram: DMatrix<Complex<f64>>,
+}
+
+impl BandLines {
+    pub fn outputs(&self) -> usize {
+        self.amplitudes.ncols()
+    }
+
+    /// Distance of two lines, in rad/s.
+    pub fn spacing(&self) -> f64 {
+        std::f64::consts::TAU / self.duration
+    }
+
+    /// Returns Chebyshev polynomials over the band at `omega`.
+    pub fn noise_terms(&self, omega: f64, count: usize) -> Vec<f64> {
+        let (first, last) = (self.omega[0], self.omega[self.omega.len() - 1]);
+        let x = if last > first { 2.0 * (omega - first) / (last - first) - 1.0 } else { 0.0 };
+        let mut terms = vec![1.0, x];
+        while terms.len() < count {
+            terms.push(2.0 * x * terms[terms.len() - 1] - terms[terms.len() - 2]);
+        }
+        terms.truncate(count);
+        terms
+    }
+
+    /// Pools lines over a fixed part of their distance to the nearest of `poles`.
+    pub fn pooled(&self, poles: &[Complex<f64>], noise_terms: usize) -> Vec<PooledLines> {
+        let distance = |omega: f64| {
+            let to = |pole: &Complex<f64>| (Complex::new(0.0, omega) - pole).norm();
+            poles.iter().map(to).fold(f64::INFINITY, f64::min)
+        };
+        let mut pooled = Vec::new();
+        let mut first = 0;
+        while first < self.omega.len() {
+            let width = POOLING * distance(self.omega[first]);
+            let ahead = self.omega[first..].iter().take_while(|w| **w - self.omega[first] < width);
+            let count = ahead.count().max(1);
+            pooled.push(self.pool(first, count, noise_terms));
+            first += count;
+        }
+        pooled
+    }
+
+    fn pool(&self, first: usize, count: usize, noise_terms: usize) -> PooledLines {
+        let rows = self.amplitudes.rows(first, count);
+        let total = rows.transpose() * rows.conjugate();
+        let omega = self.omega[first..first + count].iter().sum::<f64>() / count as f64;
+        PooledLines {
+            omega,
+            count: count as f64,
+            terms: self.noise_terms(omega, noise_terms),
+            periodogram: total / Complex::from(count as f64),
+        }
+    }
+}

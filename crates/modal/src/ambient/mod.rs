@@ -1,0 +1,164 @@
+//! Modes from responses alone: structures that wind, traffic or their own machinery excites.
+//!
+//! A subspace method ([`ssi_cov`]) gives initial poles and shapes. Poles, shapes, correlated white forces on
+//! the modes and smooth sensor noise then maximise Whittle's likelihood with the expected periodogram, which
+//! includes the leakage of the open record; no window, no averaging, no model order to choose.
+
+mod error;
+pub mod harmonics;
+mod initial;
+mod likelihood;
+mod limits;
+mod lines;
+mod order;
+mod parameters;
+mod prepare;
+mod result;
+mod search;
+mod spectrum;
+mod subspace;
+
+#[cfg(test)]
+mod tests;
+
+pub use error::AmbientError;
+pub use harmonics::Harmonic;
+pub use limits::MIN_DECAY_TIMES;
+pub use result::{
+    AmbientEstimate, AmbientMode, DropReason, DroppedCandidate, ModalValue, Uncertainty,
+};
+pub use subspace::ssi_cov;
+
+use std::f64::consts::TAU;
+
+use mechid_signal::Record;
+
+use limits::{DEFAULT_MAX_MODES, MAX_DAMPING, MIN_SHARE};
+use order::{Chosen, Wanted, choose};
+use prepare::{band_lines, checked_band, subspace_models};
+use result::RecordScale;
+use search::Fit;
+
+use crate::stabilisation::Pole;
+
+/// Settings of the identification from responses alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmbientSettings {
+    /// Band, in Hz; by default from the fourth line to 80 % of half the sampling rate.
+    pub band_hz: Option<[f64; 2]>,
+    /// Number of modes; by default the likelihood decides.
+    pub modes: Option<usize>,
+    /// Largest number of modes if the likelihood decides.
+    pub max_modes: usize,
+    /// Frequencies of sinusoids to leave out, in Hz.
+    pub without_hz: Vec<f64>,
+    /// Whether harmonics that the record shows are left out too.
+    pub exclude_harmonics: bool,
+}
+
+impl Default for AmbientSettings {
+    fn default() -> Self {
+        Self {
+            band_hz: None,
+            modes: None,
+            max_modes: DEFAULT_MAX_MODES,
+            without_hz: Vec::new(),
+            exclude_harmonics: false,
+        }
+    }
+}
+
+/// Identifies the modes of a structure from its responses (samples × sensors, displacements, velocities or
+/// accelerations, in any units) to unmeasured forces that are white over the band.
+///
+/// # Errors
+/// [`AmbientError::ConstantChannel`], [`AmbientError::DeadChannel`], [`AmbientError::CopiedChannel`],
+/// [`AmbientError::Band`], [`AmbientError::TooFewLines`], [`AmbientError::TooShort`],
+/// [`AmbientError::NoModesAsked`], [`AmbientError::NoMode`], [`AmbientError::FewerModes`],
+/// [`AmbientError::Numerics`].
+///
+/// # Source
+/// Whittle (1953), Arkiv för Matematik 2, 423–434; Sykulski et al. (2019), Biometrika 106, 251–266 (expected
+/// periodogram in Whittle's likelihood); Au (2017), *Operational Modal Analysis*; Peeters & De Roeck (1999),
+/// Mechanical Systems and Signal Processing 13, 855–878 (start).
+pub fn identify_ambient(
+    record: &Record,
+    settings: &AmbientSettings,
+) -> Result<AmbientEstimate, AmbientError> {
+    if settings.modes == Some(0) || settings.max_modes == 0 {
+        return Err(AmbientError::NoModesAsked);
+    }
+    let band_hz = checked_band(record, settings.band_hz)?;
+    let sinusoids = harmonics::harmonics(record, band_hz)?;
+    let mut excluded_hz = settings.without_hz.clone();
+    if settings.exclude_harmonics {
+        excluded_hz.extend(sinusoids.iter().map(|harmonic| harmonic.frequency_hz));
+    }
+    let record = harmonics::subtracted(record, &excluded_hz)?;
+    let band = band_lines(&record, band_hz, &excluded_hz)?;
+    let most = settings.modes.unwrap_or(settings.max_modes);
+    let stabilisation = subspace_models(&record, band_hz, &band.scale, most)?;
+    let candidates = candidates(&stabilisation.clusters(MAX_DAMPING, MIN_SHARE), band_hz);
+    let wanted = Wanted { exactly: settings.modes, most: settings.max_modes };
+    let Chosen { fit, dropped } = choose(&candidates, &band, wanted);
+    let [from_hz, to_hz] = band_hz;
+    let none = AmbientError::NoMode { candidates: dropped.len(), from_hz, to_hz };
+    let fit = fit.ok_or(none)?;
+    let found = fit.parameters.layout.modes;
+    if let Some(asked) = settings.modes.filter(|asked| *asked > found) {
+        return Err(AmbientError::FewerModes { asked, found, from_hz, to_hz });
+    }
+    let scale = RecordScale {
+        duration: band.duration,
+        sample_interval: record.sampling().dt(),
+        scale: &band.scale,
+    };
+    let modes = modes_of(&fit, scale, &sinusoids)?;
+    let factor = fit.parameters.factor();
+    Ok(AmbientEstimate {
+        modes,
+        harmonics: sinusoids,
+        dropped,
+        stabilisation,
+        band_hz,
+        lines: band.omega.len(),
+        log_likelihood: -fit.cost,
+        force_correlation: &factor * factor.transpose(),
+    })
+}
+
+/// Returns the clusters in the band, the one with the most orders first.
+fn candidates(clusters: &[crate::stabilisation::PoleCluster], band_hz: [f64; 2]) -> Vec<Pole> {
+    let inside = |pole: &Pole| {
+        let frequency_hz = pole.natural_frequency_hz();
+        frequency_hz > band_hz[0] && frequency_hz < band_hz[1]
+    };
+    let mut clusters: Vec<_> = clusters.iter().filter(|c| inside(&c.pole)).collect();
+    clusters.sort_by(|a, b| b.share.total_cmp(&a.share));
+    clusters.into_iter().map(|cluster| cluster.pole.clone()).collect()
+}
+
+fn modes_of(
+    fit: &Fit,
+    scale: RecordScale<'_>,
+    sinusoids: &[Harmonic],
+) -> Result<Vec<AmbientMode>, AmbientError> {
+    let count = fit.parameters.layout.modes;
+    let failed = AmbientError::Numerics {
+        what: "the covariance of the modes",
+        size: fit.parameters.layout.len(),
+    };
+    let covariance = fit.covariance().ok_or(failed.clone())?;
+    let spacing_hz = 1.0 / scale.duration;
+    let mut modes = Vec::with_capacity(count);
+    for mode in 0..count {
+        let mut one = AmbientMode::new(fit, &covariance, mode, scale).ok_or(failed.clone())?;
+        let frequency_hz = fit.poles()[mode].im / TAU;
+        let width_hz = -fit.poles()[mode].re / TAU + spacing_hz;
+        let at = |h: &Harmonic| (h.frequency_hz - frequency_hz).abs() < width_hz;
+        one.harmonic = sinusoids.iter().position(at);
+        modes.push(one);
+    }
+    modes.sort_by(|a, b| a.natural_frequency_hz.value.total_cmp(&b.natural_frequency_hz.value));
+    Ok(modes)
+}

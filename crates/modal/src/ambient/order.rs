@@ -1,0 +1,200 @@
+//! Number of modes: by the likelihood, with rules for poles that no likelihood decides.
+
+use std::f64::consts::TAU;
+
+use super::initial::{initial_parameters, match_amplitudes, scan};
+use super::limits::{DAMPING_SIGNIFICANCE, ITERATIONS, MAX_DAMPING, REFUSALS};
+use super::lines::BandLines;
+use super::parameters::Parameters;
+use super::result::{DropReason, DroppedCandidate};
+use super::search::{Fit, search_pooled};
+use crate::stabilisation::Pole;
+
+/// Number of modes wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    /// Stated number.
+    pub exactly: Option<usize>,
+    /// Largest number otherwise.
+    pub most: usize,
+}
+
+/// Outcome of the choice.
+pub(super) struct Chosen {
+    pub fit: Option<Fit>,
+    pub dropped: Vec<DroppedCandidate>,
+}
+
+struct Choice<'a> {
+    band: &'a BandLines,
+    wanted: Wanted,
+    dropped: Vec<DroppedCandidate>,
+}
+
+/// Chooses the modes that explain the lines, beginning with `candidates` (the most certain first).
+pub(super) fn choose(candidates: &[Pole], band: &BandLines, wanted: Wanted) -> Chosen {
+    let mut choice = Choice { band, wanted, dropped: Vec::new() };
+    let limit = wanted.exactly.unwrap_or(wanted.most);
+    for pole in candidates.iter().skip(limit) {
+        choice.drop_pole(pole, DropReason::NumberReached { number: limit });
+    }
+    let mut first: Vec<Pole> = candidates.iter().take(limit).cloned().collect();
+    first.sort_by(|a, b| a.pole.norm().total_cmp(&b.pole.norm()));
+    let fit = initial_parameters(&first, band)
+        .and_then(|start| search_pooled(start, band, ITERATIONS))
+        .map(|fit| choice.pruned(fit))
+        .map(|fit| choice.extended(fit, limit))
+        .map(|fit| choice.pruned(fit));
+    Chosen { fit: fit.filter(|fit| fit.parameters.layout.modes > 0), dropped: choice.dropped }
+}
+
+impl Choice<'_> {
+    /// Increase of 2 ln L that a mode must bring: a price per parameter of ln n.
+    ///
+    /// # Source
+    /// Schwarz (1978), Annals of Statistics 6, 461–464.
+    fn price(&self) -> f64 {
+        let parameters = 2.0 * self.band.outputs() as f64 + 2.0;
+        parameters * (2.0 * self.band.omega.len() as f64).ln()
+    }
+
+    fn drop_pole(&mut self, pole: &Pole, reason: DropReason) {
+        self.dropped.push(DroppedCandidate {
+            natural_frequency_hz: pole.natural_frequency_hz(),
+            damping_ratio: pole.damping_ratio(),
+            reason,
+        });
+    }
+
+    fn drop_mode(&mut self, parameters: &Parameters, mode: usize, reason: DropReason) {
+        self.dropped.push(DroppedCandidate {
+            natural_frequency_hz: parameters.omega(mode) / TAU,
+            damping_ratio: parameters.zeta(mode),
+            reason,
+        });
+    }
+
+    /// Removes modes one after another as long as one is refused.
+    fn pruned(&mut self, mut fit: Fit) -> Fit {
+        while fit.parameters.layout.modes > 0 {
+            if self.wanted.exactly.is_some_and(|n| fit.parameters.layout.modes <= n) {
+                break;
+            }
+            let Some((next, mode, reason)) = self.refused(&fit) else { break };
+            self.drop_mode(&fit.parameters, mode, reason);
+            fit = next;
+        }
+        fit
+    }
+
+    /// Returns the fit without the first mode that is refused.
+    fn refused(&self, fit: &Fit) -> Option<(Fit, usize, DropReason)> {
+        let parameters = &fit.parameters;
+        let modes = parameters.layout.modes;
+        for mode in 0..modes {
+            if let Some(reason) = self.broken_rule(fit, mode) {
+                return Some((self.without(fit, mode)?, mode, reason));
+            }
+        }
+        // The likelihood decides about the mode with the least evidence; stronger ones need no test then.
+        let covariance = fit.covariance()?;
+        let evidence = |mode: usize| wald(parameters, &covariance, mode);
+        let weakest = (0..modes).min_by(|a, b| evidence(*a).total_cmp(&evidence(*b)))?;
+        let needed = self.price();
+        if evidence(weakest) > 4.0 * needed {
+            return None;
+        }
+        let next = self.without(fit, weakest)?;
+        let gain = 2.0 * (next.cost - fit.cost);
+        (gain < needed).then_some((next, weakest, DropReason::SmallGain { gain, needed }))
+    }
+
+    fn broken_rule(&self, fit: &Fit, mode: usize) -> Option<DropReason> {
+        let (parameters, layout) = (&fit.parameters, &fit.parameters.layout);
+        let zeta = parameters.zeta(mode);
+        let omega = parameters.omega(mode);
+        let (first, last) = (self.band.omega[0], self.band.omega[self.band.omega.len() - 1]);
+        if zeta > MAX_DAMPING {
+            return Some(DropReason::OverDamped { damping_ratio: zeta });
+        }
+        if omega < first || omega > last {
+            return Some(DropReason::OutsideBand);
+        }
+        let index = layout.damping(mode);
+        let variance = fit.covariance()?[(index, index)];
+        let ratio = 1.0 / variance.max(f64::MIN_POSITIVE).sqrt();
+        (ratio < DAMPING_SIGNIFICANCE).then_some(DropReason::DampingUndetermined { ratio })
+    }
+
+    fn without(&self, fit: &Fit, mode: usize) -> Option<Fit> {
+        let rest: Vec<usize> = (0..fit.parameters.layout.modes).filter(|r| *r != mode).collect();
+        search_pooled(fit.parameters.reordered(&rest), self.band, ITERATIONS)
+    }
+
+    /// Adds modes as long as the likelihood pays for them.
+    fn extended(&mut self, mut fit: Fit, limit: usize) -> Fit {
+        let mut refusals = 0;
+        let mut refused: Vec<f64> = Vec::new();
+        while refusals < REFUSALS {
+            let full = fit.parameters.layout.modes >= limit;
+            let Some(candidates) = scan(&fit.parameters, self.band) else { break };
+            let near = |omega: f64, other: &f64| (omega - other).abs() < 0.01 * omega;
+            let fresh = candidates.into_iter().find(|candidate| {
+                let omega = candidate.pole.pole.norm();
+                !refused.iter().any(|other| near(omega, other))
+            });
+            let Some(candidate) = fresh else { break };
+            // A score of z raises 2 ln L by about z².
+            let promising = candidate.score.powi(2) > 0.5 * self.price();
+            if !promising && self.wanted.exactly.is_none() {
+                break;
+            }
+            if full {
+                if self.wanted.exactly.is_none() {
+                    self.drop_pole(&candidate.pole, DropReason::NumberReached { number: limit });
+                }
+                break;
+            }
+            match self.with(&fit, &candidate.pole) {
+                Ok(next) => fit = next,
+                Err(reason) => {
+                    self.drop_pole(&candidate.pole, reason);
+                    refused.push(candidate.pole.pole.norm());
+                    refusals += 1;
+                }
+            }
+        }
+        fit
+    }
+
+    /// Returns the fit with one more mode, or why there is none.
+    fn with(&self, fit: &Fit, pole: &Pole) -> Result<Fit, DropReason> {
+        let shape = &pole.vector * nalgebra::Complex::from(-pole.pole.re);
+        let mut start = fit.parameters.with_mode(pole.pole, &shape);
+        let mut order: Vec<usize> = (0..start.layout.modes).collect();
+        order.sort_by(|a, b| start.omega(*a).total_cmp(&start.omega(*b)));
+        start = start.reordered(&order);
+        let added = order.iter().position(|r| *r + 1 == order.len()).unwrap_or(0);
+        let pooled = self.band.pooled(&start.poles(), start.layout.noise_terms);
+        let mut matched = start.clone();
+        match_amplitudes(&mut matched, &pooled, self.band.duration, self.band.spacing());
+        start.set_shape(added, &matched.shape(added));
+        let next = search_pooled(start, self.band, ITERATIONS).ok_or(DropReason::NoMaximum)?;
+        let (gain, needed) = (2.0 * (fit.cost - next.cost), self.price());
+        if self.wanted.exactly.is_none() && gain < needed {
+            return Err(DropReason::SmallGain { gain, needed });
+        }
+        match self.broken_rule(&next, added) {
+            Some(reason) => Err(reason),
+            None => Ok(next),
+        }
+    }
+}
+
+/// Wald's statistic of a shape against zero.
+fn wald(parameters: &Parameters, covariance: &nalgebra::DMatrix<f64>, mode: usize) -> f64 {
+    let (first, len) = (parameters.layout.shape(mode), 2 * parameters.layout.outputs);
+    let block = covariance.view((first, first), (len, len)).into_owned();
+    let shape = parameters.values.rows(first, len).into_owned();
+    block.cholesky().map_or(0.0, |factor| shape.dot(&factor.solve(&shape)))
+}

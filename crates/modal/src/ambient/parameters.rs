@@ -1,0 +1,185 @@
+//! Parameters of the spectral matrix of the outputs, and their places in one vector.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::limits::CORRELATED_NEIGHBOURS;
+
+/// What a force at rest leaves of the output.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kernel {
+    /// A static deflection, 1/(s − λ): displacements, and velocities too.
+    Static,
+    /// Nothing, s/(λ(s − λ)): accelerations, and velocities too.
+    Vanishing,
+}
+
+/// Places of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each shape, the
+/// factors of the correlation of the modal forces, and the noise of each sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Layout {
+    pub modes: usize,
+    pub outputs: usize,
+    pub noise_terms: usize,
+    /// Pairs (later, earlier) of modes whose forces may be correlated.
+    pub pairs: Vec<(usize, usize)>,
+}
+
+impl Layout {
+    pub fn new(modes: usize, outputs: usize, noise_terms: usize) -> Self {
+        let near = |r: usize| (r.saturating_sub(CORRELATED_NEIGHBOURS)..r).map(move |s| (r, s));
+        Self { modes, outputs, noise_terms, pairs: (0..modes).flat_map(near).collect() }
+    }
+
+    pub fn len(&self) -> usize {
+        self.noise(0, 0) + self.noise_terms * self.outputs
+    }
+
+    pub fn frequency(&self, mode: usize) -> usize {
+        mode
+    }
+
+    pub fn damping(&self, mode: usize) -> usize {
+        self.modes + mode
+    }
+
+    /// First of the real parts of a shape; the imaginary parts follow them.
+    pub fn shape(&self, mode: usize) -> usize {
+        2 * self.modes + 2 * self.outputs * mode
+    }
+
+    pub fn correlation(&self, pair: usize) -> usize {
+        self.shape(self.modes) + pair
+    }
+
+    pub fn noise(&self, term: usize, output: usize) -> usize {
+        self.correlation(self.pairs.len()) + term * self.outputs + output
+    }
+
+    /// Returns the parameters of poles and correlations: those whose derivatives have no simple form.
+    pub fn dense(&self) -> Vec<usize> {
+        let correlations = self.correlation(0)..self.noise(0, 0);
+        (0..2 * self.modes).chain(correlations).collect()
+    }
+}
+
+/// Values of the parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Parameters {
+    pub kernel: Kernel,
+    pub layout: Layout,
+    pub values: DVector<f64>,
+}
+
+impl Parameters {
+    pub fn omega(&self, mode: usize) -> f64 {
+        self.values[self.layout.frequency(mode)].exp()
+    }
+
+    pub fn zeta(&self, mode: usize) -> f64 {
+        self.values[self.layout.damping(mode)].exp().min(0.99)
+    }
+
+    pub fn pole(&self, mode: usize) -> Complex<f64> {
+        let (omega, zeta) = (self.omega(mode), self.zeta(mode));
+        Complex::new(-zeta * omega, omega * (1.0 - zeta * zeta).sqrt())
+    }
+
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        (0..self.layout.modes).map(|mode| self.pole(mode)).collect()
+    }
+
+    /// Returns ∂λ/∂ ln ω and ∂λ/∂ ln ζ.
+    pub fn pole_derivatives(&self, mode: usize) -> [Complex<f64>; 2] {
+        let (omega, zeta) = (self.omega(mode), self.zeta(mode));
+        let along = -zeta * zeta / (1.0 - zeta * zeta).sqrt();
+        [self.pole(mode), Complex::new(-zeta, along) * omega]
+    }
+
+    pub fn shape(&self, mode: usize) -> DVector<Complex<f64>> {
+        let (first, p) = (self.layout.shape(mode), self.layout.outputs);
+        DVector::from_fn(p, |i, _| Complex::new(self.values[first + i], self.values[first + p + i]))
+    }
+
+    pub fn set_shape(&mut self, mode: usize, shape: &DVector<Complex<f64>>) {
+        let (first, p) = (self.layout.shape(mode), self.layout.outputs);
+        for (i, z) in shape.iter().enumerate() {
+            self.values[first + i] = z.re;
+            self.values[first + p + i] = z.im;
+        }
+    }
+
+    /// Returns the rows c of the factor of the correlation, before they are normalised.
+    pub fn raw_factor(&self) -> DMatrix<f64> {
+        let mut factor = DMatrix::identity(self.layout.modes, self.layout.modes);
+        for (index, &(r, s)) in self.layout.pairs.iter().enumerate() {
+            factor[(r, s)] = self.values[self.layout.correlation(index)];
+        }
+        factor
+    }
+
+    /// Returns the factor C with rows of unit length: the modal forces have the correlation C Cᵀ.
+    pub fn factor(&self) -> DMatrix<f64> {
+        let mut factor = self.raw_factor();
+        for mut row in factor.row_iter_mut() {
+            row.unscale_mut(row.norm());
+        }
+        factor
+    }
+
+    /// Returns the logarithm of the noise of a sensor where the Chebyshev polynomials are `terms`.
+    pub fn log_noise(&self, output: usize, terms: &[f64]) -> f64 {
+        let value = |(d, t): (usize, &f64)| t * self.values[self.layout.noise(d, output)];
+        terms.iter().enumerate().map(value).sum()
+    }
+
+    /// Returns the parameters without a mode, or with its index moved to another place.
+    pub fn reordered(&self, order: &[usize]) -> Self {
+        let layout = Layout::new(order.len(), self.layout.outputs, self.layout.noise_terms);
+        let mut other = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
+        let correlation = self.factor() * self.factor().transpose();
+        let chosen =
+            DMatrix::from_fn(order.len(), order.len(), |i, j| correlation[(order[i], order[j])]);
+        let lower = chosen.cholesky().map(|factor| factor.l());
+        for (to, &from) in order.iter().enumerate() {
+            other.values[to] = self.values[self.layout.frequency(from)];
+            other.values[order.len() + to] = self.values[self.layout.damping(from)];
+            other.set_shape(to, &self.shape(from));
+        }
+        for (index, &(r, s)) in other.layout.pairs.iter().enumerate() {
+            // Rows are normalised again; the diagonal of the raw factor is 1.
+            let value = lower.as_ref().map_or(0.0, |l| l[(r, s)] / l[(r, r)]);
+            other.values[other.layout.correlation(index)] = value;
+        }
+        other.copy_noise(self);
+        other
+    }
+
+    /// Returns the parameters with one more mode, whose force is independent, as the last.
+    pub fn with_mode(&self, pole: Complex<f64>, shape: &DVector<Complex<f64>>) -> Self {
+        let modes = self.layout.modes;
+        let layout = Layout::new(modes + 1, self.layout.outputs, self.layout.noise_terms);
+        let mut other = Self { kernel: self.kernel, values: DVector::zeros(layout.len()), layout };
+        for mode in 0..modes {
+            other.values[mode] = self.values[self.layout.frequency(mode)];
+            other.values[modes + 1 + mode] = self.values[self.layout.damping(mode)];
+            other.set_shape(mode, &self.shape(mode));
+        }
+        other.values[modes] = pole.norm().ln();
+        other.values[2 * modes + 1] = (-pole.re / pole.norm()).ln();
+        other.set_shape(modes, shape);
+        for (index, pair) in other.layout.pairs.iter().enumerate() {
+            let before = self.layout.pairs.iter().position(|old| old == pair);
+            let value = before.map_or(0.0, |old| self.values[self.layout.correlation(old)]);
+            other.values[other.layout.correlation(index)] = value;
+        }
+        other.copy_noise(self);
+        other
+    }
+
+    fn copy_noise(&mut self, from: &Self) {
+        let (first, old) = (self.layout.noise(0, 0), from.layout.noise(0, 0));
+        for i in 0..self.layout.noise_terms * self.layout.outputs {
+            self.values[first + i] = from.values[old + i];
+        }
+    }
+}

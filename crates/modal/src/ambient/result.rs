@@ -1,0 +1,214 @@
+//! Modes of an ambient record with their uncertainty, and what was found besides.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::harmonics::Harmonic;
+use super::limits::MIN_DECAY_TIMES;
+use super::parameters::Parameters;
+use super::search::Fit;
+use crate::indicators::{Indicator, ShapeWithCovariance, mpc_with_error};
+use crate::stabilisation::Stabilisation;
+
+/// Standard normal quantile of a two-sided interval of 95 %.
+const QUANTILE: f64 = 1.959_963_984_540_054;
+
+/// Uncertainty of a frequency or damping ratio.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Uncertainty {
+    /// Standard error and interval of 95 %, symmetric in the logarithm of the value.
+    Known {
+        /// Standard error, in the unit of the value.
+        standard_error: f64,
+        /// Ends of the interval, in the unit of the value.
+        interval: [f64; 2],
+    },
+    /// The record is too short: the distribution of the estimate is not known well enough for an interval.
+    RecordTooShort {
+        /// ζωT, the length of the record in decay times of the mode.
+        decay_times: f64,
+        /// Smallest ζωT for an interval.
+        needed: f64,
+    },
+}
+
+/// Frequency or damping ratio with its uncertainty.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModalValue {
+    /// Estimate.
+    pub value: f64,
+    /// Its uncertainty.
+    pub uncertainty: Uncertainty,
+}
+
+impl ModalValue {
+    /// Takes a value whose logarithm has the standard error `relative`.
+    fn new(value: f64, relative: f64, decay_times: f64) -> Self {
+        let uncertainty = if decay_times < MIN_DECAY_TIMES {
+            Uncertainty::RecordTooShort { decay_times, needed: MIN_DECAY_TIMES }
+        } else {
+            let end = |side: f64| value * (side * QUANTILE * relative).exp();
+            let interval = [end(-1.0), end(1.0)];
+            Uncertainty::Known { standard_error: value * relative, interval }
+        };
+        Self { value, uncertainty }
+    }
+
+    /// Returns the standard error; `None` if the record is too short.
+    pub fn standard_error(&self) -> Option<f64> {
+        match self.uncertainty {
+            Uncertainty::Known { standard_error, .. } => Some(standard_error),
+            Uncertainty::RecordTooShort { .. } => None,
+        }
+    }
+
+    /// Returns the interval of 95 %; `None` if the record is too short.
+    pub fn interval(&self) -> Option<[f64; 2]> {
+        match self.uncertainty {
+            Uncertainty::Known { interval, .. } => Some(interval),
+            Uncertainty::RecordTooShort { .. } => None,
+        }
+    }
+}
+
+/// Mode of an ambient record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmbientMode {
+    /// Natural frequency |λ|/2π, in Hz.
+    pub natural_frequency_hz: ModalValue,
+    /// Damping ratio −Re λ/|λ|.
+    pub damping_ratio: ModalValue,
+    /// Shape in the units of the channels over that of the largest entry, which is 1.
+    pub shape: ShapeWithCovariance,
+    /// Power density of the force on the mode: the output of the largest entry has the one-sided power
+    /// density `force_power`/|jω − λ|² near the resonance, in its unit² (rad/s)²/Hz.
+    pub force_power: f64,
+    /// Modal phase collinearity of the shape.
+    pub mpc: Indicator,
+    /// ζωT, the length of the record in decay times.
+    pub decay_times: f64,
+    /// Index of the harmonic at the frequency of the mode, if there is one: it may be no mode.
+    pub harmonic: Option<usize>,
+}
+
+/// Reason why a candidate is not among the modes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum DropReason {
+    /// The likelihood gains less than the number of parameters costs.
+    SmallGain {
+        /// Increase of 2 ln L by the mode.
+        gain: f64,
+        /// Increase that was needed.
+        needed: f64,
+    },
+    /// The damping ratio is not distinguished from zero, as of a harmonic or a chance peak.
+    DampingUndetermined {
+        /// Damping ratio over its standard error.
+        ratio: f64,
+    },
+    /// The frequency is outside the band.
+    OutsideBand,
+    /// The damping is too large for a mode.
+    OverDamped {
+        /// Damping ratio.
+        damping_ratio: f64,
+    },
+    /// The number of modes was reached.
+    NumberReached {
+        /// Number of modes (`modes` or `max_modes`).
+        number: usize,
+    },
+    /// The likelihood could not be maximised with it.
+    NoMaximum,
+}
+
+/// Candidate that is not among the modes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DroppedCandidate {
+    /// Natural frequency, in Hz.
+    pub natural_frequency_hz: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Reason.
+    pub reason: DropReason,
+}
+
+/// Modes identified from responses alone.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AmbientEstimate {
+    /// Modes by rising frequency.
+    pub modes: Vec<AmbientMode>,
+    /// Sinusoids in the band.
+    pub harmonics: Vec<Harmonic>,
+    /// Candidates that are not among the modes.
+    pub dropped: Vec<DroppedCandidate>,
+    /// Poles of the subspace models of all orders.
+    pub stabilisation: Stabilisation,
+    /// Band, in Hz.
+    pub band_hz: [f64; 2],
+    /// Number of spectral lines used.
+    pub lines: usize,
+    /// ln L of the lines, each output over its RMS value in the band.
+    pub log_likelihood: f64,
+    /// Correlation coefficients of the forces on the modes, modes × modes.
+    pub force_correlation: DMatrix<f64>,
+}
+
+impl AmbientMode {
+    /// Reads a mode from a fit; `None` if its shape is zero or not finite.
+    pub(super) fn new(
+        fit: &Fit,
+        covariance: &DMatrix<f64>,
+        mode: usize,
+        record: RecordScale<'_>,
+    ) -> Option<Self> {
+        let parameters = &fit.parameters;
+        let (omega, zeta) = (parameters.omega(mode), parameters.zeta(mode));
+        let decay_times = zeta * omega * record.duration;
+        let layout = &parameters.layout;
+        let relative = |index: usize| covariance[(index, index)].max(0.0).sqrt();
+        let frequency_hz = omega / std::f64::consts::TAU;
+        let shape = scaled_shape(parameters, covariance, mode, record.scale)?;
+        let largest = shape.shape().camax();
+        let shape = shape.normalised();
+        Some(Self {
+            natural_frequency_hz: ModalValue::new(
+                frequency_hz,
+                relative(layout.frequency(mode)),
+                decay_times,
+            ),
+            damping_ratio: ModalValue::new(zeta, relative(layout.damping(mode)), decay_times),
+            force_power: 2.0 * record.sample_interval * largest * largest,
+            mpc: mpc_with_error(&shape),
+            shape,
+            decay_times,
+            harmonic: None,
+        })
+    }
+}
+
+/// Scales of the record behind a fit.
+#[derive(Clone, Copy)]
+pub(super) struct RecordScale<'a> {
+    pub duration: f64,
+    pub sample_interval: f64,
+    /// Unit of each output of the fit.
+    pub scale: &'a [f64],
+}
+
+fn scaled_shape(
+    parameters: &Parameters,
+    covariance: &DMatrix<f64>,
+    mode: usize,
+    scale: &[f64],
+) -> Option<ShapeWithCovariance> {
+    let (first, p) = (parameters.layout.shape(mode), parameters.layout.outputs);
+    let mut shape = parameters.shape(mode);
+    for (z, unit) in shape.iter_mut().zip(scale) {
+        *z *= Complex::from(*unit);
+    }
+    let block = covariance.view((first, first), (2 * p, 2 * p));
+    let block = DMatrix::from_fn(2 * p, 2 * p, |i, j| block[(i, j)] * scale[i % p] * scale[j % p]);
+    ShapeWithCovariance::new(shape, block).ok()
+}

@@ -1,0 +1,151 @@
+//! Search for the maximum of the likelihood by scoring with Levenberg's damping.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::likelihood::{cost, gradient, information};
+use super::limits::{ENOUGH, LARGEST_STEP};
+use super::lines::{BandLines, PooledLines};
+use super::parameters::Parameters;
+
+/// Damping of the first step, and factors by which a refused and a successful step change it.
+const FIRST_DAMPING: f64 = 1e-2;
+const HARDER: f64 = 8.0;
+const EASIER: f64 = 0.125;
+
+/// Trials of one step before the search gives up.
+const TRIALS: usize = 12;
+
+/// Smallest logarithms of a damping ratio and of a noise variance (over the variance in the band): what is
+/// smaller has no effect on the lines.
+const LEAST_LOG_DAMPING: f64 = -14.0;
+const LEAST_LOG_NOISE: f64 = -28.0;
+
+/// Information that every parameter has, as part of the largest: keeps the covariance finite along phases
+/// that the lines do not determine.
+const LEAST_INFORMATION: f64 = 1e-10;
+
+/// Maximum of the likelihood.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub parameters: Parameters,
+    /// −log L.
+    pub cost: f64,
+    pub information: DMatrix<f64>,
+}
+
+/// Searches from `start` over pooled lines; `None` where the likelihood has no value at the start.
+pub(super) fn search(
+    start: Parameters,
+    lines: &[PooledLines],
+    duration: f64,
+    iterations: usize,
+) -> Option<Fit> {
+    let mut parameters = start;
+    let mut value = cost(&parameters, lines, duration);
+    if !value.is_finite() {
+        return None;
+    }
+    let mut damping = FIRST_DAMPING;
+    let mut matrix = information(&parameters, lines, duration)?;
+    for _ in 0..iterations {
+        let slope = gradient(&parameters, lines, duration)?;
+        let mut improved = false;
+        let mut enough = false;
+        for _ in 0..TRIALS {
+            let Some(step) = damped_step(&matrix, &slope, damping) else {
+                damping *= HARDER;
+                continue;
+            };
+            enough = 0.5 * -step.dot(&slope) < ENOUGH;
+            let candidate = moved(&parameters, &step);
+            let next = cost(&candidate, lines, duration);
+            if next < value {
+                (parameters, value, improved) = (candidate, next, true);
+                damping *= EASIER;
+                break;
+            }
+            if enough {
+                break;
+            }
+            damping *= HARDER;
+        }
+        if improved {
+            matrix = information(&parameters, lines, duration)?;
+        }
+        if enough || !improved {
+            break;
+        }
+    }
+    Some(Fit { parameters, cost: value, information: matrix })
+}
+
+/// Searches from `start`, with lines pooled about the poles of the start and again about those of the end.
+pub(super) fn search_pooled(start: Parameters, band: &BandLines, iterations: usize) -> Option<Fit> {
+    let terms = start.layout.noise_terms;
+    let first =
+        search(start.clone(), &band.pooled(&start.poles(), terms), band.duration, iterations)?;
+    let pooled = band.pooled(&first.parameters.poles(), terms);
+    search(first.parameters, &pooled, band.duration, iterations)
+}
+
+fn damped_step(
+    information: &DMatrix<f64>,
+    gradient: &DVector<f64>,
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let (scaled, scale) = scaled(information, damping);
+    let step = scaled.cholesky()?.solve(&gradient.component_mul(&scale));
+    let step = -step.component_mul(&scale);
+    step.iter().all(|v| v.is_finite()).then_some(step)
+}
+
+/// Returns the matrix with a unit diagonal, `damping` added to it, and the scale of rows and columns.
+fn scaled(information: &DMatrix<f64>, damping: f64) -> (DMatrix<f64>, DVector<f64>) {
+    let largest = information.diagonal().amax().max(f64::MIN_POSITIVE);
+    let floor = LEAST_INFORMATION.powi(2) * largest;
+    let scale = information.diagonal().map(|d| 1.0 / d.max(floor).sqrt());
+    let mut scaled = DMatrix::from_diagonal(&scale) * information * DMatrix::from_diagonal(&scale);
+    for i in 0..scale.len() {
+        scaled[(i, i)] += damping;
+    }
+    (scaled, scale)
+}
+
+/// Returns the parameters after a step, which is limited where the likelihood is far from quadratic.
+fn moved(parameters: &Parameters, step: &DVector<f64>) -> Parameters {
+    let layout = &parameters.layout;
+    let mut next = parameters.clone();
+    for index in 0..layout.len() {
+        let shape = (layout.shape(0)..layout.shape(layout.modes)).contains(&index);
+        let limit = if index < layout.modes {
+            (3.0 * parameters.zeta(index)).max(0.002)
+        } else if shape {
+            f64::INFINITY
+        } else {
+            LARGEST_STEP
+        };
+        next.values[index] += step[index].clamp(-limit, limit);
+    }
+    for mode in 0..layout.modes {
+        let index = layout.damping(mode);
+        next.values[index] = next.values[index].clamp(LEAST_LOG_DAMPING, -0.05);
+    }
+    for output in 0..layout.outputs {
+        let index = layout.noise(0, output);
+        next.values[index] = next.values[index].max(LEAST_LOG_NOISE);
+    }
+    next
+}
+
+impl Fit {
+    /// Returns the covariance of the parameters, the inverse of the information.
+    pub fn covariance(&self) -> Option<DMatrix<f64>> {
+        let (scaled, scale) = scaled(&self.information, LEAST_INFORMATION);
+        let inverse = scaled.cholesky()?.inverse();
+        Some(DMatrix::from_diagonal(&scale) * inverse * DMatrix::from_diagonal(&scale))
+    }
+
+    pub fn poles(&self) -> Vec<Complex<f64>> {
+        self.parameters.poles()
+    }
+}

@@ -1,0 +1,233 @@
+//! Expected periodogram of outputs that white, unmeasured forces drive through the modes.
+//!
+//! The outputs are y = Σ_r H_r w_r + n with H_r(s) = Σ ψ g(s, λ) over the pair (ψ, λ), (ψ*, λ*); the forces w
+//! on the modes are white with correlation Q, the noise n of each sensor is smooth. The covariance function
+//! is Σ ψ γᵀ exp(λτ) for τ > 0 with γ_r = Σ_s Q_rs H_s(−λ_r), and its expected periodogram over a record
+//! of length T follows exactly:
+//!
+//! ```text
+//! S(ω) = A + Aᴴ + D Q Dᵀ + N,   A = Σ_λ k(ω, λ) ψ γᵀ,
+//! k = 1/(jω − λ) − (1 − exp λT)/(T (jω − λ)²)
+//! ```
+//!
+//! The second term of k is the leakage of the open record; D is the value of H at high frequency.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::parameters::{Kernel, Parameters};
+
+/// Step of central differences of the coefficients, relative to parameters of unit scale.
+const DIFFERENCE_STEP: f64 = 1e-5;
+
+/// Coefficients of the spectral matrix that do not depend on the line.
+#[derive(Debug, Clone)]
+pub(super) struct Coefficients {
+    pub poles: Vec<Complex<f64>>,
+    /// ψ, outputs × modes.
+    pub shapes: DMatrix<Complex<f64>>,
+    /// γ, outputs × modes.
+    pub covariances: DMatrix<Complex<f64>>,
+    /// Q, modes × modes.
+    pub correlation: DMatrix<f64>,
+    /// D, outputs × modes.
+    pub direct: DMatrix<f64>,
+    /// D Q Dᵀ.
+    pub direct_power: DMatrix<f64>,
+    pub kernel: Kernel,
+}
+
+/// Derivative of the coefficients with respect to one parameter of the poles or correlations.
+#[derive(Debug, Clone)]
+pub(super) struct Direction {
+    /// Parameter.
+    pub index: usize,
+    /// Mode whose pole moves, and ∂λ.
+    pub pole: Option<(usize, Complex<f64>)>,
+    pub covariances: DMatrix<Complex<f64>>,
+    pub direct_power: DMatrix<f64>,
+}
+
+/// Values of k and ∂k/∂λ at one line for (λ, λ*) of each mode.
+pub(super) struct Kernels {
+    pub value: Vec<[Complex<f64>; 2]>,
+    pub derivative: Vec<[Complex<f64>; 2]>,
+}
+
+impl Coefficients {
+    pub fn new(parameters: &Parameters) -> Self {
+        let (modes, outputs) = (parameters.layout.modes, parameters.layout.outputs);
+        let poles = parameters.poles();
+        let columns: Vec<_> = (0..modes).map(|mode| parameters.shape(mode)).collect();
+        let shapes = columns_of(outputs, &columns);
+        let factor = parameters.factor();
+        let correlation = &factor * factor.transpose();
+        let kernel = parameters.kernel;
+        let direct = match kernel {
+            Kernel::Static => DMatrix::zeros(outputs, modes),
+            Kernel::Vanishing => {
+                DMatrix::from_fn(outputs, modes, |i, r| 2.0 * (shapes[(i, r)] / poles[r]).re)
+            }
+        };
+        let direct_power = &direct * &correlation * direct.transpose();
+        let covariances = DMatrix::zeros(outputs, modes);
+        let mut new =
+            Self { poles, shapes, covariances, correlation, direct, direct_power, kernel };
+        for r in 0..modes {
+            for s in 0..modes {
+                let [g, mirrored] = new.transfer(r, s);
+                let q = new.correlation[(r, s)];
+                for i in 0..outputs {
+                    let shape = new.shapes[(i, s)];
+                    new.covariances[(i, r)] += (shape * g + shape.conj() * mirrored) * q;
+                }
+            }
+        }
+        new
+    }
+
+    /// Returns g(−λ_r, λ_s) and g(−λ_r, λ_s*).
+    pub fn transfer(&self, r: usize, s: usize) -> [Complex<f64>; 2] {
+        let one = |pole: Complex<f64>| {
+            let proper = -(self.poles[r] + pole).inv();
+            match self.kernel {
+                Kernel::Static => proper,
+                Kernel::Vanishing => proper + pole.inv(),
+            }
+        };
+        [one(self.poles[s]), one(self.poles[s].conj())]
+    }
+
+    pub fn kernels(&self, omega: f64, duration: f64) -> Kernels {
+        let s = Complex::new(0.0, omega);
+        let at = |pole: Complex<f64>| {
+            let inverse = (s - pole).inv();
+            let decay = (pole * duration).exp();
+            let lost = (Complex::from(1.0) - decay) / duration;
+            let square = inverse * inverse;
+            let value = inverse - lost * square;
+            (value, square - lost * square * inverse * 2.0 + decay * square)
+        };
+        let pairs = self.poles.iter().map(|pole| [at(*pole), at(pole.conj())]);
+        let (value, derivative) = pairs.map(|[a, b]| ([a.0, b.0], [a.1, b.1])).unzip();
+        Kernels { value, derivative }
+    }
+
+    /// Returns the spectral matrix at a line where the noise of the sensors has the variances `noise`.
+    pub fn spectrum(&self, kernels: &Kernels, noise: &[f64]) -> DMatrix<Complex<f64>> {
+        let outputs = self.shapes.nrows();
+        let mut half = DMatrix::zeros(outputs, outputs);
+        for (r, [value, mirrored]) in kernels.value.iter().enumerate() {
+            add_pair(
+                &mut half,
+                self.shapes.column(r),
+                self.covariances.column(r),
+                *value,
+                *mirrored,
+            );
+        }
+        let mut spectrum = hermitian_sum(&half, &self.direct_power);
+        for (i, variance) in noise.iter().enumerate() {
+            spectrum[(i, i)] += Complex::from(*variance);
+        }
+        spectrum
+    }
+
+    /// Returns the derivative of the spectral matrix at a line along a direction.
+    pub fn derivative(&self, kernels: &Kernels, direction: &Direction) -> DMatrix<Complex<f64>> {
+        let outputs = self.shapes.nrows();
+        let mut half = DMatrix::zeros(outputs, outputs);
+        for (r, [value, mirrored]) in kernels.value.iter().enumerate() {
+            let change = direction.covariances.column(r);
+            add_pair(&mut half, self.shapes.column(r), change, *value, *mirrored);
+        }
+        if let Some((r, step)) = direction.pole {
+            let [value, mirrored] = kernels.derivative[r];
+            let (value, mirrored) = (value * step, mirrored * step.conj());
+            add_pair(&mut half, self.shapes.column(r), self.covariances.column(r), value, mirrored);
+        }
+        hermitian_sum(&half, &direction.direct_power)
+    }
+
+    /// Returns the vectors x with ∂S/∂ψ_i = e_i xᴴ + x e_iᵀ, for the real and the imaginary part of each
+    /// mode's shape: outputs × 2 modes.
+    pub fn shape_directions(&self, kernels: &Kernels) -> DMatrix<Complex<f64>> {
+        let (outputs, modes) = self.shapes.shape();
+        let direct = &self.direct * &self.correlation;
+        let mut directions = DMatrix::zeros(outputs, 2 * modes);
+        for s in 0..modes {
+            let [value, mirrored] = kernels.value[s];
+            for (part, unit) in [Complex::from(1.0), Complex::i()].into_iter().enumerate() {
+                let mut x = directions.column_mut(2 * s + part);
+                let gain = match self.kernel {
+                    Kernel::Static => 0.0,
+                    Kernel::Vanishing => 2.0 * (unit / self.poles[s]).re,
+                };
+                for i in 0..outputs {
+                    let gamma = self.covariances[(i, s)];
+                    let own = value * unit * gamma + mirrored * unit.conj() * gamma.conj();
+                    x[i] += own.conj() + gain * direct[(i, s)];
+                }
+                for r in 0..modes {
+                    let [g, g_mirrored] = self.transfer(r, s);
+                    let weight = (unit * g + unit.conj() * g_mirrored) * self.correlation[(r, s)];
+                    let [value, mirrored] = kernels.value[r];
+                    for i in 0..outputs {
+                        let shape = self.shapes[(i, r)];
+                        x[i] += value * weight * shape + mirrored * (weight * shape).conj();
+                    }
+                }
+            }
+        }
+        directions
+    }
+}
+
+/// Returns the derivatives of the coefficients with respect to poles and correlations.
+pub(super) fn directions(parameters: &Parameters) -> Vec<Direction> {
+    let layout = &parameters.layout;
+    let at = |index: usize, step: f64| {
+        let mut moved = parameters.clone();
+        moved.values[index] += step;
+        Coefficients::new(&moved)
+    };
+    let direction = |index: usize| {
+        let (above, below) = (at(index, DIFFERENCE_STEP), at(index, -DIFFERENCE_STEP));
+        let half = 0.5 / DIFFERENCE_STEP;
+        let mode = index % layout.modes;
+        let moves = index < 2 * layout.modes;
+        let pole = || (mode, parameters.pole_derivatives(mode)[index / layout.modes]);
+        Direction {
+            index,
+            pole: moves.then(pole),
+            covariances: (above.covariances - below.covariances) * Complex::from(half),
+            direct_power: (above.direct_power - below.direct_power) * half,
+        }
+    };
+    layout.dense().into_iter().map(direction).collect()
+}
+
+/// Adds k ψ γᵀ + k̃ ψ* γᴴ.
+fn add_pair(
+    half: &mut DMatrix<Complex<f64>>,
+    shape: nalgebra::DVectorView<'_, Complex<f64>>,
+    covariance: nalgebra::DVectorView<'_, Complex<f64>>,
+    value: Complex<f64>,
+    mirrored: Complex<f64>,
+) {
+    for (gamma, mut column) in covariance.iter().zip(half.column_iter_mut()) {
+        let (first, second) = (value * gamma, mirrored * gamma.conj());
+        for (entry, psi) in column.iter_mut().zip(shape.iter()) {
+            *entry += first * psi + second * psi.conj();
+        }
+    }
+}
+
+/// Returns A + Aᴴ + B of a real symmetric B.
+fn hermitian_sum(half: &DMatrix<Complex<f64>>, real: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+    let (rows, columns) = half.shape();
+    DMatrix::from_fn(rows, columns, |i, j| half[(i, j)] + half[(j, i)].conj() + real[(i, j)])
+}
+
+fn columns_of(rows: usize, columns: &[nalgebra::DVector<Complex<f64>>]) -> DMatrix<Complex<f64>> {
+    if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(columns) }
+}

@@ -1,0 +1,162 @@
+//! Derivatives and the expected periodogram, against differences and direct sums.
+
+use nalgebra::{Complex, DMatrix, DVector};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::likelihood::{cost, gradient, information, noise};
+use super::lines::{BandLines, PooledLines};
+use super::parameters::{Kernel, Layout, Parameters};
+use super::spectrum::Coefficients;
+
+const DURATION: f64 = 60.0;
+
+/// Three modes, two of them close together, at three outputs.
+fn parameters(kernel: Kernel, outputs: usize) -> Parameters {
+    let layout = Layout::new(3, outputs, 3);
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    let mut values = DVector::from_fn(layout.len(), |_, _| random.random_range(-0.5..0.5));
+    for (mode, (f, zeta)) in [(2.0f64, 0.02f64), (2.1, 0.03), (4.0, 0.01)].into_iter().enumerate() {
+        values[layout.frequency(mode)] = (f * std::f64::consts::TAU).ln();
+        values[layout.damping(mode)] = zeta.ln();
+    }
+    for output in 0..outputs {
+        values[layout.noise(0, output)] = -3.0;
+    }
+    Parameters { kernel, layout, values }
+}
+
+/// Lines whose periodogram is the one that is expected, times a factor.
+fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
+    let omega: Vec<f64> =
+        (40..400).map(|k| std::f64::consts::TAU * f64::from(k) / DURATION).collect();
+    let amplitudes = DMatrix::zeros(omega.len(), parameters.layout.outputs);
+    let scale = vec![1.0; parameters.layout.outputs];
+    let band = BandLines { omega, amplitudes, scale, duration: DURATION };
+    let coefficients = Coefficients::new(parameters);
+    let mut pooled = band.pooled(&[], 3);
+    pooled = (0..360)
+        .map(|k| PooledLines { omega: band.omega[k], count: 1.0, ..pooled[0].clone() })
+        .collect();
+    for line in &mut pooled {
+        line.terms = band.noise_terms(line.omega, 3);
+        let kernels = coefficients.kernels(line.omega, DURATION);
+        let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
+        line.periodogram = spectrum * Complex::from(factor);
+    }
+    pooled
+}
+
+#[test]
+fn gradients_are_the_differences_of_the_cost() {
+    for kernel in [Kernel::Static, Kernel::Vanishing] {
+        let parameters = parameters(kernel, 3);
+        let lines = expected_lines(&parameters, 1.3);
+        let exact = gradient(&parameters, &lines, DURATION).unwrap();
+        let size = exact.amax();
+        for index in 0..parameters.layout.len() {
+            let side = |sign: f64| {
+                let mut moved = parameters.clone();
+                moved.values[index] += sign * 1e-5;
+                cost(&moved, &lines, DURATION)
+            };
+            let difference = (side(1.0) - side(-1.0)) / 2e-5;
+            let gap = (difference - exact[index]).abs();
+            assert!(gap < 1e-6 * size, "{kernel:?} {index}: {difference} {}", exact[index]);
+        }
+    }
+}
+
+/// Judge: where the periodogram is the expected one, the information is the derivative of the gradient.
+#[test]
+fn the_information_is_the_curvature_at_the_expectation() {
+    for kernel in [Kernel::Static, Kernel::Vanishing] {
+        let parameters = parameters(kernel, 2);
+        let lines = expected_lines(&parameters, 1.0);
+        let exact = information(&parameters, &lines, DURATION).unwrap();
+        let scale = exact.diagonal().map(|d| d.sqrt());
+        for index in 0..parameters.layout.len() {
+            let side = |sign: f64| {
+                let mut moved = parameters.clone();
+                moved.values[index] += sign * 1e-5;
+                gradient(&moved, &lines, DURATION).unwrap()
+            };
+            let difference = (side(1.0) - side(-1.0)) / 2e-5;
+            for other in 0..parameters.layout.len() {
+                let gap = (difference[other] - exact[(index, other)]).abs();
+                let size = scale[index] * scale[other];
+                assert!(gap < 1e-5 * size, "{kernel:?} {index} {other}: {gap} {size}");
+            }
+        }
+    }
+}
+
+/// Judge: Σ (1 − |τ|/T) R(τ) exp(−jωτ) with the covariance function of the state equations, sampled finely.
+#[test]
+fn the_expected_periodogram_is_the_sum_of_the_covariances() {
+    let mut parameters = parameters(Kernel::Static, 2);
+    for output in 0..2 {
+        parameters.values[parameters.layout.noise(0, output)] = -60.0;
+    }
+    let poles = parameters.poles();
+    let factor = parameters.factor();
+    let correlation = &factor * factor.transpose();
+    // Stationary covariance of the modal states (z, z*) under unit white forces: −Q/(λ_a + λ_b*).
+    let all: Vec<_> =
+        poles.iter().map(|l| (*l, false)).chain(poles.iter().map(|l| (l.conj(), true))).collect();
+    let shape = |a: usize| {
+        let shape = parameters.shape(a % 3);
+        if all[a].1 { shape.conjugate() } else { shape }
+    };
+    let covariance = |tau: f64| {
+        let mut sum = DMatrix::<Complex<f64>>::zeros(2, 2);
+        for a in 0..6 {
+            for b in 0..6 {
+                let state =
+                    -Complex::from(correlation[(a % 3, b % 3)]) / (all[a].0 + all[b].0.conj());
+                sum += shape(a) * shape(b).adjoint() * (state * (all[a].0 * tau).exp());
+            }
+        }
+        sum
+    };
+    let steps = 60_000;
+    let dt = DURATION / f64::from(steps);
+    let coefficients = Coefficients::new(&parameters);
+    let duration_lines = [100, 120, 126, 240, 300];
+    let mut sums = vec![DMatrix::<Complex<f64>>::zeros(2, 2); duration_lines.len()];
+    for k in 0..steps {
+        let tau = f64::from(k) * dt;
+        let weight = (1.0 - tau / DURATION) * dt * if k == 0 { 0.5 } else { 1.0 };
+        let matrix = covariance(tau) * Complex::from(weight);
+        for (sum, line) in sums.iter_mut().zip(duration_lines) {
+            let omega = std::f64::consts::TAU * f64::from(line) / DURATION;
+            let turned = &matrix * Complex::cis(-omega * tau);
+            *sum += &turned + turned.adjoint();
+        }
+    }
+    for (sum, line) in sums.iter().zip(duration_lines) {
+        let omega = std::f64::consts::TAU * f64::from(line) / DURATION;
+        let kernels = coefficients.kernels(omega, DURATION);
+        let spectrum = coefficients.spectrum(&kernels, &[0.0; 2]);
+        let gap = (sum - &spectrum).norm() / spectrum.norm();
+        assert!(gap < 1e-4, "line {line}: {gap:.1e}");
+    }
+}
+
+#[test]
+fn modes_keep_their_values_when_others_come_and_go() {
+    let parameters = parameters(Kernel::Vanishing, 2);
+    let pole = Complex::new(-0.3, 18.0);
+    let shape = DVector::from_element(2, Complex::new(0.1, 0.2));
+    let more = parameters.with_mode(pole, &shape);
+    assert!((more.pole(3) - pole).norm() < 1e-12);
+    let back = more.reordered(&[0, 1, 2]);
+    assert!((&back.values - &parameters.values).amax() < 1e-9);
+    let swapped = parameters.reordered(&[1, 0, 2]).reordered(&[1, 0, 2]);
+    assert!(
+        (swapped.factor() * swapped.factor().transpose()
+            - parameters.factor() * parameters.factor().transpose())
+        .amax()
+            < 1e-12
+    );
+}
