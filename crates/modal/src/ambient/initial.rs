@@ -5,10 +5,10 @@ use std::f64::consts::FRAC_PI_2;
 use nalgebra::{Complex, DVector};
 
 use super::likelihood::{noise, positive_factor};
-use super::limits::{NOISE_TERMS, SHORT_SEARCH};
+use super::limits::NOISE_TERMS;
 use super::lines::{BandLines, PooledLines};
-use super::parameters::{Kernel, Layout, Parameters};
-use super::search::search;
+use super::parameters::{Kernel, Layout, Parameters, Span};
+use super::search::{Effort, search};
 use super::spectrum::Coefficients;
 use crate::indicators::mean_phase;
 use crate::stabilisation::Pole;
@@ -23,8 +23,13 @@ const AMPLITUDE_STEPS: usize = 3;
 const AMPLITUDE_REACH: f64 = 2.0;
 
 /// Quantities that outputs may be: the kernel, and the phase of ψ of a real mode.
-const QUANTITIES: [(Kernel, f64); 3] =
-    [(Kernel::Static, -FRAC_PI_2), (Kernel::Static, 0.0), (Kernel::Vanishing, FRAC_PI_2)];
+const QUANTITIES: [(Kernel, f64); 5] = [
+    (Kernel::Static, -FRAC_PI_2),
+    (Kernel::Static, 0.0),
+    (Kernel::Sampled, -FRAC_PI_2),
+    (Kernel::Sampled, 0.0),
+    (Kernel::Vanishing, FRAC_PI_2),
+];
 
 /// Returns the start with the quantity (displacement, velocity or acceleration) that explains the lines best
 /// after a few steps; `None` if none has a likelihood.
@@ -33,7 +38,7 @@ pub(super) fn initial_parameters(modes: &[Pole], band: &BandLines) -> Option<Par
     let pooled = band.pooled(&poles, NOISE_TERMS);
     let fits = QUANTITIES.iter().filter_map(|&(kernel, phase)| {
         let start = start(modes, band.outputs(), &pooled, band, kernel, phase);
-        search(start, &pooled, band.duration, SHORT_SEARCH)
+        search(start, &pooled, band.span, Effort::SHORT)
     });
     let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
     Some(best.parameters)
@@ -66,7 +71,7 @@ fn start(
         parameters.set_shape(r, &(&mode.vector * (turn * -mode.pole.re)));
     }
     for _ in 0..AMPLITUDE_STEPS {
-        match_amplitudes(&mut parameters, pooled, band.duration, band.spacing());
+        match_amplitudes(&mut parameters, pooled, band.span, band.spacing());
     }
     parameters
 }
@@ -75,7 +80,7 @@ fn start(
 pub(super) fn match_amplitudes(
     parameters: &mut Parameters,
     pooled: &[PooledLines],
-    duration: f64,
+    span: Span,
     spacing: f64,
 ) {
     let coefficients = Coefficients::new(parameters);
@@ -86,7 +91,7 @@ pub(super) fn match_amplitudes(
             let direction = parameters.shape(r);
             let mut powers = [0.0; 2];
             for line in pooled.iter().filter(|line| (line.omega - pole.im).abs() < reach) {
-                let kernels = coefficients.kernels(line.omega, duration);
+                let kernels = coefficients.kernels(line.omega, span);
                 let model = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
                 for (power, matrix) in powers.iter_mut().zip([&line.periodogram, &model]) {
                     *power += line.count * direction.dotc(&(matrix * &direction)).re;
@@ -105,8 +110,8 @@ pub(super) fn match_amplitudes(
 /// Strongest sign of a further mode in the whitened lines.
 pub(super) struct Candidate {
     pub pole: Pole,
-    /// Amplitude along the shape in units of the standard deviation that noise alone gives.
-    pub score: f64,
+    /// Increase of 2 ln L that a mode there promises.
+    pub gain: f64,
 }
 
 /// Damping ratios at which further modes are looked for.
@@ -115,7 +120,7 @@ const SCANNED_DAMPING: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 /// Half width of the lines that one place of the scan uses, in decay rates.
 const SCAN_REACH: f64 = 8.0;
 
-/// Returns candidates of further modes by falling score: at each pole of a grid the largest eigenvalue of
+/// Returns candidates of further modes by falling gain: at each pole of a grid the largest eigenvalue of
 /// Σ |h|² (e eᴴ − I), with the whitened lines e and the resonance h.
 pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Candidate>> {
     let coefficients = Coefficients::new(parameters);
@@ -123,7 +128,7 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
     let mut whitened = Vec::with_capacity(band.omega.len());
     for (k, omega) in band.omega.iter().enumerate() {
         let terms = band.noise_terms(*omega, parameters.layout.noise_terms);
-        let kernels = coefficients.kernels(*omega, band.duration);
+        let kernels = coefficients.kernels(*omega, band.span);
         let factor = positive_factor(coefficients.spectrum(&kernels, &noise(parameters, &terms)))?;
         let lower = factor.l();
         let line = lower.solve_lower_triangular(&band.amplitudes.row(k).transpose())?;
@@ -140,7 +145,7 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
             let from = band.omega.partition_point(|w| *w < centre - reach);
             let to = band.omega.partition_point(|w| *w <= centre + reach);
             let mut sum = nalgebra::DMatrix::zeros(p, p);
-            let mut squares = 0.0;
+            let (mut total, mut squares) = (0.0, 0.0);
             for k in from..to {
                 let weight = rate * rate / (rate * rate + (band.omega[k] - centre).powi(2));
                 let line = &whitened[k].0;
@@ -148,18 +153,21 @@ pub(super) fn scan(parameters: &Parameters, band: &BandLines) -> Option<Vec<Cand
                 for i in 0..p {
                     sum[(i, i)] -= Complex::from(weight);
                 }
+                total += weight;
                 squares += weight * weight;
             }
             let eigen = crate::decomposition::hermitian_eigen(sum)?;
             let best = eigen.eigenvalues.imax();
-            let score = eigen.eigenvalues[best] / f64::sqrt(squares);
+            // Likelihood ratio of a power of 1 + excess along one direction against 1.
+            let excess: f64 = eigen.eigenvalues[best] / total;
+            let gain = 2.0 * (excess - excess.ln_1p()) * total * total / squares;
             let near = band.omega.partition_point(|w| *w < centre).min(band.omega.len() - 1);
             let shape = &whitened[near].1 * eigen.eigenvectors.column(best);
             let pole = Pole { pole: Complex::new(-rate, centre), vector: shape.normalize() };
-            candidates.push(Candidate { pole, score });
+            candidates.push(Candidate { pole, gain });
             centre += 0.5 * rate;
         }
     }
-    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+    candidates.sort_by(|a, b| b.gain.total_cmp(&a.gain));
     Some(candidates)
 }

@@ -4,7 +4,7 @@ use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 
 use super::lines::PooledLines;
-use super::parameters::{Kernel, Parameters};
+use super::parameters::{Kernel, Parameters, Span};
 use super::spectrum::{Coefficients, Direction, Kernels, directions};
 
 /// Pooled lines that one task works on: sums are added in the same order on any number of cores.
@@ -31,10 +31,10 @@ pub(super) fn noise(parameters: &Parameters, terms: &[f64]) -> Vec<f64> {
 ///
 /// # Source
 /// Whittle (1953), Arkiv för Matematik 2, 423–434.
-pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], duration: f64) -> f64 {
+pub(super) fn cost(parameters: &Parameters, lines: &[PooledLines], span: Span) -> f64 {
     let coefficients = Coefficients::new(parameters);
     let one = |line: &PooledLines| {
-        let kernels = coefficients.kernels(line.omega, duration);
+        let kernels = coefficients.kernels(line.omega, span);
         let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
         let Some(factor) = positive_factor(spectrum) else { return f64::INFINITY };
         let log_determinant = log_determinant(&factor);
@@ -122,13 +122,13 @@ impl GradientSums {
 pub(super) fn gradient(
     parameters: &Parameters,
     lines: &[PooledLines],
-    duration: f64,
+    span: Span,
 ) -> Option<DVector<f64>> {
     let coefficients = Coefficients::new(parameters);
     let chunk = |chunk: &[PooledLines]| {
         let mut sums = GradientSums::zero(parameters);
         for line in chunk {
-            let kernels = coefficients.kernels(line.omega, duration);
+            let kernels = coefficients.kernels(line.omega, span);
             let variances = noise(parameters, &line.terms);
             let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
             // Γ = S⁻¹ − S⁻¹ Ŝ S⁻¹ for each of the lines.
@@ -230,7 +230,7 @@ fn add_correlations(parameters: &Parameters, slopes: &DMatrix<f64>, gradient: &m
 pub(super) fn information(
     parameters: &Parameters,
     lines: &[PooledLines],
-    duration: f64,
+    span: Span,
 ) -> Option<DMatrix<f64>> {
     let coefficients = Coefficients::new(parameters);
     let directions = directions(parameters);
@@ -238,7 +238,7 @@ pub(super) fn information(
     let chunk = |chunk: &[PooledLines]| {
         let mut sum = DMatrix::zeros(len, len);
         for line in chunk {
-            let kernels = coefficients.kernels(line.omega, duration);
+            let kernels = coefficients.kernels(line.omega, span);
             let variances = noise(parameters, &line.terms);
             let inverse = positive_factor(coefficients.spectrum(&kernels, &variances))?.inverse();
             let task = LineInformation {

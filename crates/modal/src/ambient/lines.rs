@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::limits::POOLING;
+use super::parameters::Span;
 
 /// Lines of one record in a band, without the excluded ones.
 #[derive(Debug, Clone)]
@@ -13,8 +14,8 @@ pub(super) struct BandLines {
     pub amplitudes: DMatrix<Complex<f64>>,
     /// RMS value of each output in the band.
     pub scale: Vec<f64>,
-    /// Length of the record, in s.
-    pub duration: f64,
+    /// Time axis of the record.
+    pub span: Span,
 }
 
 /// Neighbouring lines with their mean periodogram.
@@ -37,7 +38,7 @@ impl BandLines {
 
     /// Distance of two lines, in rad/s.
     pub fn spacing(&self) -> f64 {
-        std::f64::consts::TAU / self.duration
+        std::f64::consts::TAU / self.span.duration
     }
 
     /// Returns Chebyshev polynomials over the band at `omega`.

@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use super::initial::{initial_parameters, match_amplitudes, scan};
-use super::limits::{DAMPING_SIGNIFICANCE, ITERATIONS, MAX_DAMPING, REFUSALS};
+use super::limits::{DAMPING_SIGNIFICANCE, MAX_DAMPING, REFUSALS};
 use super::lines::BandLines;
 use super::parameters::Parameters;
 use super::result::{DropReason, DroppedCandidate};
-use super::search::{Fit, search_pooled};
+use super::search::{Effort, Fit, search_pooled};
 use crate::stabilisation::Pole;
 
 /// Number of modes wanted.
@@ -41,10 +41,11 @@ pub(super) fn choose(candidates: &[Pole], band: &BandLines, wanted: Wanted) -> C
     let mut first: Vec<Pole> = candidates.iter().take(limit).cloned().collect();
     first.sort_by(|a, b| a.pole.norm().total_cmp(&b.pole.norm()));
     let fit = initial_parameters(&first, band)
-        .and_then(|start| search_pooled(start, band, ITERATIONS))
+        .and_then(|start| search_pooled(start, band, Effort::TEST))
         .map(|fit| choice.pruned(fit))
         .map(|fit| choice.extended(fit, limit))
-        .map(|fit| choice.pruned(fit));
+        .map(|fit| choice.pruned(fit))
+        .and_then(|fit| search_pooled(fit.parameters, band, Effort::FULL));
     Chosen { fit: fit.filter(|fit| fit.parameters.layout.modes > 0), dropped: choice.dropped }
 }
 
@@ -128,7 +129,7 @@ impl Choice<'_> {
 
     fn without(&self, fit: &Fit, mode: usize) -> Option<Fit> {
         let rest: Vec<usize> = (0..fit.parameters.layout.modes).filter(|r| *r != mode).collect();
-        search_pooled(fit.parameters.reordered(&rest), self.band, ITERATIONS)
+        search_pooled(fit.parameters.reordered(&rest), self.band, Effort::TEST)
     }
 
     /// Adds modes as long as the likelihood pays for them.
@@ -144,8 +145,8 @@ impl Choice<'_> {
                 !refused.iter().any(|other| near(omega, other))
             });
             let Some(candidate) = fresh else { break };
-            // A score of z raises 2 ln L by about z².
-            let promising = candidate.score.powi(2) > 0.5 * self.price();
+            // The gain that the scan promises is that of one direction at a rough pole.
+            let promising = candidate.gain > 0.5 * self.price();
             if !promising && self.wanted.exactly.is_none() {
                 break;
             }
@@ -177,9 +178,9 @@ impl Choice<'_> {
         let added = order.iter().position(|r| *r + 1 == order.len()).unwrap_or(0);
         let pooled = self.band.pooled(&start.poles(), start.layout.noise_terms);
         let mut matched = start.clone();
-        match_amplitudes(&mut matched, &pooled, self.band.duration, self.band.spacing());
+        match_amplitudes(&mut matched, &pooled, self.band.span, self.band.spacing());
         start.set_shape(added, &matched.shape(added));
-        let next = search_pooled(start, self.band, ITERATIONS).ok_or(DropReason::NoMaximum)?;
+        let next = search_pooled(start, self.band, Effort::TEST).ok_or(DropReason::NoMaximum)?;
         let (gain, needed) = (2.0 * (fit.cost - next.cost), self.price());
         if self.wanted.exactly.is_none() && gain < needed {
             return Err(DropReason::SmallGain { gain, needed });

@@ -9,8 +9,20 @@ use super::limits::CORRELATED_NEIGHBOURS;
 pub(super) enum Kernel {
     /// A static deflection, 1/(s − λ): displacements, and velocities too.
     Static,
+    /// The same without an anti-aliasing filter: frequencies above half the sampling rate fold into the
+    /// band.
+    Sampled,
     /// Nothing, s/(λ(s − λ)): accelerations, and velocities too.
     Vanishing,
+}
+
+/// Time axis of the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    /// Length, in s.
+    pub duration: f64,
+    /// Time between two samples, in s.
+    pub sample_interval: f64,
 }
 
 /// Places of the parameters: ln ω and ln ζ of each mode, the real and imaginary parts of each shape, the

@@ -12,6 +12,7 @@ use super::limits::{
     EXTRA_ORDERS, MIN_BLOCK_ROWS, MIN_LINES_PER_UNKNOWN, RESAMPLING,
 };
 use super::lines::BandLines;
+use super::parameters::Span;
 use super::subspace::ssi_cov;
 use crate::stabilisation::Stabilisation;
 
@@ -71,7 +72,8 @@ pub(super) fn band_lines(
     }
     check_copies(&amplitudes)?;
     let omega = kept.iter().map(|k| data.omega()[*k]).collect();
-    Ok(BandLines { omega, amplitudes, scale, duration })
+    let span = Span { duration, sample_interval: record.sampling().dt() };
+    Ok(BandLines { omega, amplitudes, scale, span })
 }
 
 fn check_copies(amplitudes: &DMatrix<Complex<f64>>) -> Result<(), AmbientError> {

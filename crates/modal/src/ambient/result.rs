@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::harmonics::Harmonic;
 use super::limits::MIN_DECAY_TIMES;
-use super::parameters::Parameters;
+use super::parameters::{Parameters, Span};
 use super::search::Fit;
 use crate::indicators::{Indicator, ShapeWithCovariance, mpc_with_error};
 use crate::stabilisation::Stabilisation;
@@ -165,7 +165,7 @@ impl AmbientMode {
     ) -> Option<Self> {
         let parameters = &fit.parameters;
         let (omega, zeta) = (parameters.omega(mode), parameters.zeta(mode));
-        let decay_times = zeta * omega * record.duration;
+        let decay_times = zeta * omega * record.span.duration;
         let layout = &parameters.layout;
         let relative = |index: usize| covariance[(index, index)].max(0.0).sqrt();
         let frequency_hz = omega / std::f64::consts::TAU;
@@ -179,7 +179,7 @@ impl AmbientMode {
                 decay_times,
             ),
             damping_ratio: ModalValue::new(zeta, relative(layout.damping(mode)), decay_times),
-            force_power: 2.0 * record.sample_interval * largest * largest,
+            force_power: 2.0 * record.span.sample_interval * largest * largest,
             mpc: mpc_with_error(&shape),
             shape,
             decay_times,
@@ -191,8 +191,7 @@ impl AmbientMode {
 /// Scales of the record behind a fit.
 #[derive(Clone, Copy)]
 pub(super) struct RecordScale<'a> {
-    pub duration: f64,
-    pub sample_interval: f64,
+    pub span: Span,
     /// Unit of each output of the fit.
     pub scale: &'a [f64],
 }

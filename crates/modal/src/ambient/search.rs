@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::likelihood::{cost, gradient, information};
 use super::limits::{ENOUGH, LARGEST_STEP};
 use super::lines::{BandLines, PooledLines};
-use super::parameters::Parameters;
+use super::parameters::{Parameters, Span};
 
 /// Damping of the first step, and factors by which a refused and a successful step change it.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -15,6 +15,9 @@ const EASIER: f64 = 0.125;
 /// Trials of one step before the search gives up.
 const TRIALS: usize = 12;
 
+/// Slow steps in a row that end a search.
+const SLOW_STEPS: usize = 2;
+
 /// Smallest logarithms of a damping ratio and of a noise variance (over the variance in the band): what is
 /// smaller has no effect on the lines.
 const LEAST_LOG_DAMPING: f64 = -14.0;
@@ -23,6 +26,24 @@ const LEAST_LOG_NOISE: f64 = -28.0;
 /// Information that every parameter has, as part of the largest: keeps the covariance finite along phases
 /// that the lines do not determine.
 const LEAST_INFORMATION: f64 = 1e-10;
+
+/// Effort of a search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effort {
+    /// Largest number of steps.
+    pub iterations: usize,
+    /// Gain of the logarithm of the likelihood of a slow step; two in a row end the search.
+    pub slow: f64,
+}
+
+impl Effort {
+    /// Compares starts.
+    pub const SHORT: Self = Self { iterations: 8, slow: 0.5 };
+    /// Tests a mode, whose price is a gain of several tens.
+    pub const TEST: Self = Self { iterations: 40, slow: 0.5 };
+    /// What remains moves no parameter by a tenth of its standard error.
+    pub const FULL: Self = Self { iterations: 60, slow: 0.005 };
+}
 
 /// Maximum of the likelihood.
 #[derive(Debug, Clone)]
@@ -37,55 +58,61 @@ pub(super) struct Fit {
 pub(super) fn search(
     start: Parameters,
     lines: &[PooledLines],
-    duration: f64,
-    iterations: usize,
+    span: Span,
+    effort: Effort,
 ) -> Option<Fit> {
-    let mut parameters = start;
-    let mut value = cost(&parameters, lines, duration);
-    if !value.is_finite() {
+    let cost = cost(&start, lines, span);
+    if !cost.is_finite() {
         return None;
     }
-    let mut damping = FIRST_DAMPING;
-    let mut matrix = information(&parameters, lines, duration)?;
-    for _ in 0..iterations {
-        let slope = gradient(&parameters, lines, duration)?;
-        let mut improved = false;
-        let mut enough = false;
-        for _ in 0..TRIALS {
-            let Some(step) = damped_step(&matrix, &slope, damping) else {
-                damping *= HARDER;
-                continue;
-            };
-            enough = 0.5 * -step.dot(&slope) < ENOUGH;
-            let candidate = moved(&parameters, &step);
-            let next = cost(&candidate, lines, duration);
-            if next < value {
-                (parameters, value, improved) = (candidate, next, true);
-                damping *= EASIER;
-                break;
-            }
-            if enough {
-                break;
-            }
-            damping *= HARDER;
-        }
-        if improved {
-            matrix = information(&parameters, lines, duration)?;
-        }
-        if enough || !improved {
+    let information = information(&start, lines, span)?;
+    let mut fit = Fit { parameters: start, cost, information };
+    let (mut damping, mut slow) = (FIRST_DAMPING, 0);
+    for _ in 0..effort.iterations {
+        let gain = step(&mut fit, lines, span, &mut damping)?;
+        slow = if gain < effort.slow { slow + 1 } else { 0 };
+        if gain < ENOUGH || slow >= SLOW_STEPS {
             break;
         }
     }
-    Some(Fit { parameters, cost: value, information: matrix })
+    log::debug!(
+        "{} lines, {} unknowns: cost {:.4}",
+        lines.len(),
+        fit.parameters.layout.len(),
+        fit.cost
+    );
+    Some(fit)
+}
+
+/// Makes one step and returns its gain of the logarithm of the likelihood, 0 if there is none.
+fn step(fit: &mut Fit, lines: &[PooledLines], span: Span, damping: &mut f64) -> Option<f64> {
+    let slope = gradient(&fit.parameters, lines, span)?;
+    for _ in 0..TRIALS {
+        if let Some(step) = damped_step(&fit.information, &slope, *damping) {
+            let candidate = moved(&fit.parameters, &step);
+            let next = cost(&candidate, lines, span);
+            if next < fit.cost {
+                let gain = fit.cost - next;
+                fit.information = information(&candidate, lines, span)?;
+                (fit.parameters, fit.cost) = (candidate, next);
+                *damping *= EASIER;
+                return Some(gain);
+            }
+            if -0.5 * step.dot(&slope) < ENOUGH {
+                break;
+            }
+        }
+        *damping *= HARDER;
+    }
+    Some(0.0)
 }
 
 /// Searches from `start`, with lines pooled about the poles of the start and again about those of the end.
-pub(super) fn search_pooled(start: Parameters, band: &BandLines, iterations: usize) -> Option<Fit> {
+pub(super) fn search_pooled(start: Parameters, band: &BandLines, effort: Effort) -> Option<Fit> {
     let terms = start.layout.noise_terms;
-    let first =
-        search(start.clone(), &band.pooled(&start.poles(), terms), band.duration, iterations)?;
+    let first = search(start.clone(), &band.pooled(&start.poles(), terms), band.span, effort)?;
     let pooled = band.pooled(&first.parameters.poles(), terms);
-    search(first.parameters, &pooled, band.duration, iterations)
+    search(first.parameters, &pooled, band.span, effort)
 }
 
 fn damped_step(

@@ -10,11 +10,13 @@
 //! k = 1/(jω − λ) − (1 − exp λT)/(T (jω − λ)²)
 //! ```
 //!
-//! The second term of k is the leakage of the open record; D is the value of H at high frequency.
+//! The second term of k is the leakage of the open record; D is the value of H at high frequency. Of a record
+//! without an anti-aliasing filter, Δ coth((jω − λ)Δ)  and Δ/sinh((jω − λ)Δ) take the place of 1/(jω − λ), with
+//! half the time between two samples Δ: sums over all frequencies that fold onto ω.
 
 use nalgebra::{Complex, DMatrix};
 
-use super::parameters::{Kernel, Parameters};
+use super::parameters::{Kernel, Parameters, Span};
 
 /// Step of central differences of the coefficients, relative to parameters of unit scale.
 const DIFFERENCE_STEP: f64 = 1e-5;
@@ -63,7 +65,7 @@ impl Coefficients {
         let correlation = &factor * factor.transpose();
         let kernel = parameters.kernel;
         let direct = match kernel {
-            Kernel::Static => DMatrix::zeros(outputs, modes),
+            Kernel::Static | Kernel::Sampled => DMatrix::zeros(outputs, modes),
             Kernel::Vanishing => {
                 DMatrix::from_fn(outputs, modes, |i, r| 2.0 * (shapes[(i, r)] / poles[r]).re)
             }
@@ -90,20 +92,30 @@ impl Coefficients {
         let one = |pole: Complex<f64>| {
             let proper = -(self.poles[r] + pole).inv();
             match self.kernel {
-                Kernel::Static => proper,
+                Kernel::Static | Kernel::Sampled => proper,
                 Kernel::Vanishing => proper + pole.inv(),
             }
         };
         [one(self.poles[s]), one(self.poles[s].conj())]
     }
 
-    pub fn kernels(&self, omega: f64, duration: f64) -> Kernels {
+    pub fn kernels(&self, omega: f64, span: Span) -> Kernels {
         let s = Complex::new(0.0, omega);
+        let half = 0.5 * span.sample_interval;
         let at = |pole: Complex<f64>| {
-            let inverse = (s - pole).inv();
-            let decay = (pole * duration).exp();
-            let lost = (Complex::from(1.0) - decay) / duration;
-            let square = inverse * inverse;
+            let distance = s - pole;
+            let (inverse, square) = match self.kernel {
+                Kernel::Static | Kernel::Vanishing => {
+                    let inverse = distance.inv();
+                    (inverse, inverse * inverse)
+                }
+                Kernel::Sampled => {
+                    let sine = (distance * half).sinh().inv() * half;
+                    ((distance * half).cosh() * sine, sine * sine)
+                }
+            };
+            let decay = (pole * span.duration).exp();
+            let lost = (Complex::from(1.0) - decay) / span.duration;
             let value = inverse - lost * square;
             (value, square - lost * square * inverse * 2.0 + decay * square)
         };
@@ -159,7 +171,7 @@ impl Coefficients {
             for (part, unit) in [Complex::from(1.0), Complex::i()].into_iter().enumerate() {
                 let mut x = directions.column_mut(2 * s + part);
                 let gain = match self.kernel {
-                    Kernel::Static => 0.0,
+                    Kernel::Static | Kernel::Sampled => 0.0,
                     Kernel::Vanishing => 2.0 * (unit / self.poles[s]).re,
                 };
                 for i in 0..outputs {

@@ -6,10 +6,12 @@ use rand_chacha::ChaCha8Rng;
 
 use super::likelihood::{cost, gradient, information, noise};
 use super::lines::{BandLines, PooledLines};
-use super::parameters::{Kernel, Layout, Parameters};
+use super::parameters::{Kernel, Layout, Parameters, Span};
 use super::spectrum::Coefficients;
 
 const DURATION: f64 = 60.0;
+
+const SPAN: Span = Span { duration: DURATION, sample_interval: 0.05 };
 
 /// Three modes, two of them close together, at three outputs.
 fn parameters(kernel: Kernel, outputs: usize) -> Parameters {
@@ -32,7 +34,7 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
         (40..400).map(|k| std::f64::consts::TAU * f64::from(k) / DURATION).collect();
     let amplitudes = DMatrix::zeros(omega.len(), parameters.layout.outputs);
     let scale = vec![1.0; parameters.layout.outputs];
-    let band = BandLines { omega, amplitudes, scale, duration: DURATION };
+    let band = BandLines { omega, amplitudes, scale, span: SPAN };
     let coefficients = Coefficients::new(parameters);
     let mut pooled = band.pooled(&[], 3);
     pooled = (0..360)
@@ -40,7 +42,7 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
         .collect();
     for line in &mut pooled {
         line.terms = band.noise_terms(line.omega, 3);
-        let kernels = coefficients.kernels(line.omega, DURATION);
+        let kernels = coefficients.kernels(line.omega, SPAN);
         let spectrum = coefficients.spectrum(&kernels, &noise(parameters, &line.terms));
         line.periodogram = spectrum * Complex::from(factor);
     }
@@ -49,16 +51,16 @@ fn expected_lines(parameters: &Parameters, factor: f64) -> Vec<PooledLines> {
 
 #[test]
 fn gradients_are_the_differences_of_the_cost() {
-    for kernel in [Kernel::Static, Kernel::Vanishing] {
+    for kernel in [Kernel::Static, Kernel::Sampled, Kernel::Vanishing] {
         let parameters = parameters(kernel, 3);
         let lines = expected_lines(&parameters, 1.3);
-        let exact = gradient(&parameters, &lines, DURATION).unwrap();
+        let exact = gradient(&parameters, &lines, SPAN).unwrap();
         let size = exact.amax();
         for index in 0..parameters.layout.len() {
             let side = |sign: f64| {
                 let mut moved = parameters.clone();
                 moved.values[index] += sign * 1e-5;
-                cost(&moved, &lines, DURATION)
+                cost(&moved, &lines, SPAN)
             };
             let difference = (side(1.0) - side(-1.0)) / 2e-5;
             let gap = (difference - exact[index]).abs();
@@ -70,16 +72,16 @@ fn gradients_are_the_differences_of_the_cost() {
 /// Judge: where the periodogram is the expected one, the information is the derivative of the gradient.
 #[test]
 fn the_information_is_the_curvature_at_the_expectation() {
-    for kernel in [Kernel::Static, Kernel::Vanishing] {
+    for kernel in [Kernel::Static, Kernel::Sampled, Kernel::Vanishing] {
         let parameters = parameters(kernel, 2);
         let lines = expected_lines(&parameters, 1.0);
-        let exact = information(&parameters, &lines, DURATION).unwrap();
+        let exact = information(&parameters, &lines, SPAN).unwrap();
         let scale = exact.diagonal().map(|d| d.sqrt());
         for index in 0..parameters.layout.len() {
             let side = |sign: f64| {
                 let mut moved = parameters.clone();
                 moved.values[index] += sign * 1e-5;
-                gradient(&moved, &lines, DURATION).unwrap()
+                gradient(&moved, &lines, SPAN).unwrap()
             };
             let difference = (side(1.0) - side(-1.0)) / 2e-5;
             for other in 0..parameters.layout.len() {
@@ -136,7 +138,7 @@ fn the_expected_periodogram_is_the_sum_of_the_covariances() {
     }
     for (sum, line) in sums.iter().zip(duration_lines) {
         let omega = std::f64::consts::TAU * f64::from(line) / DURATION;
-        let kernels = coefficients.kernels(omega, DURATION);
+        let kernels = coefficients.kernels(omega, SPAN);
         let spectrum = coefficients.spectrum(&kernels, &[0.0; 2]);
         let gap = (sum - &spectrum).norm() / spectrum.norm();
         assert!(gap < 1e-4, "line {line}: {gap:.1e}");

@@ -1,0 +1,284 @@
+//! Coverage and errors of modes from responses alone, beside covariance-driven subspace models (SSI-cov) at
+//! the order that is best with the truth in hand.
+//!
+//! `cargo run --release -p mechid-modal --example ambient_study -- SEEDS [CASE]`
+
+#![allow(clippy::print_stdout, reason = "a study prints its table")]
+
+#[path = "../tests/suite/ambient_generator.rs"]
+mod ambient_generator;
+
+use std::time::Instant;
+
+use ambient_generator::{Quantity, Structure};
+use mechid_modal::ambient::{AmbientSettings, identify_ambient, ssi_cov};
+use mechid_modal::stabilisation::Stabilisation;
+use mechid_signal::Record;
+use nalgebra::{Complex, dmatrix};
+
+/// Structure, quantity, sampling rate, number of samples and noise of a case.
+struct Case {
+    name: &'static str,
+    structure: Structure,
+    quantity: Quantity,
+    rate_hz: f64,
+    len: usize,
+    noise: f64,
+}
+
+impl Case {
+    fn record(&self, seed: u64) -> Record {
+        match self.quantity {
+            Quantity::Acceleration => {
+                self.structure.accelerations(self.rate_hz, self.len, self.noise, seed)
+            }
+            quantity => self.structure.record(quantity, self.rate_hz, self.len, self.noise, seed),
+        }
+    }
+}
+
+fn cases() -> Vec<Case> {
+    let tower = Structure {
+        frequencies_hz: vec![1.1, 3.2, 3.3, 6.0],
+        dampings: vec![0.015, 0.01, 0.012, 0.01],
+        shapes: dmatrix![
+            0.3, 0.4, -0.8, 0.9;
+            0.6, 0.9, -0.6, -0.6;
+            0.8, -0.6, 0.5, -0.5;
+            1.0, -0.9, 0.9, 0.8
+        ]
+        .map(Complex::from),
+        forces: dmatrix![1.0, 0.2, -0.4; 0.5, 3.0, 1.0; -1.0, 1.0, 3.0; 6.0, -2.0, 5.0],
+    };
+    let mut turned = tower.clone();
+    for (index, entry) in turned.shapes.iter_mut().enumerate() {
+        *entry *= Complex::cis(0.3 * (index as f64).sin());
+    }
+    let single = Structure {
+        frequencies_hz: vec![2.0, 4.7, 8.1],
+        dampings: vec![0.02, 0.01, 0.01],
+        shapes: dmatrix![1.0, 0.8, -0.9].map(Complex::from),
+        forces: dmatrix![1.0, 0.3; 2.0, -2.0; -3.0, 6.0],
+    };
+    let case = |name, structure: &Structure, quantity, rate_hz, seconds: f64, noise| Case {
+        name,
+        structure: structure.clone(),
+        quantity,
+        rate_hz,
+        len: (rate_hz * seconds) as usize,
+        noise,
+    };
+    vec![
+        case("tower, velocities", &tower, Quantity::Velocity, 25.0, 300.0, 0.05),
+        case("tower, accelerations", &tower, Quantity::Acceleration, 20.0, 300.0, 0.1),
+        case("complex shapes, displacements", &turned, Quantity::Displacement, 20.0, 400.0, 0.02),
+        case("one sensor, velocities", &single, Quantity::Velocity, 30.0, 200.0, 0.05),
+        case("tower, ten times as long", &tower, Quantity::Acceleration, 20.0, 3000.0, 0.1),
+    ]
+}
+
+/// Estimates of one mode over the seeds.
+#[derive(Clone, Default)]
+struct Tally {
+    found: usize,
+    covered: [usize; 2],
+    intervals: usize,
+    squares: [f64; 2],
+    sums: [f64; 2],
+    predicted: [f64; 2],
+    shapes: [usize; 2],
+}
+
+fn main() {
+    let mut arguments = std::env::args().skip(1).map(|a| a.parse::<usize>());
+    let seeds = arguments.next().and_then(Result::ok).unwrap_or(4) as u64;
+    let chosen = arguments.next().and_then(Result::ok);
+    for (index, case) in cases().iter().enumerate() {
+        if chosen.is_none_or(|chosen| chosen == index) {
+            study(case, seeds);
+        }
+    }
+}
+
+fn study(case: &Case, seeds: u64) {
+    let truth = &case.structure;
+    let modes = truth.frequencies_hz.len();
+    let mut tallies = vec![Tally::default(); modes];
+    let mut subspace = SubspaceErrors::new(modes);
+    let (mut spurious, mut failed) = (0, 0);
+    let mut seconds = 0.0;
+    for seed in 0..seeds {
+        let record = case.record(1000 + seed);
+        let clock = Instant::now();
+        let estimate = identify_ambient(&record, &AmbientSettings::default());
+        seconds += clock.elapsed().as_secs_f64();
+        let Ok(estimate) = estimate else {
+            failed += 1;
+            continue;
+        };
+        subspace.add(0, &estimate.stabilisation, truth);
+        for (row, block_rows) in [20, 40, 80].into_iter().enumerate() {
+            let orders: Vec<usize> = (1..=20).map(|half| 2 * half).collect();
+            let samples = record.without_mean().into_data();
+            if let Some(models) = ssi_cov(&samples, 1.0 / case.rate_hz, block_rows, &orders) {
+                subspace.add(row + 1, &models, truth);
+            }
+        }
+        let mut taken = vec![false; estimate.modes.len()];
+        for (r, tally) in tallies.iter_mut().enumerate() {
+            let (f, zeta) = (truth.frequencies_hz[r], truth.dampings[r]);
+            let shape = truth.shapes.column(r).into_owned();
+            let distance = |index: &usize| {
+                let mode = &estimate.modes[*index];
+                let gap = (mode.natural_frequency_hz.value / f - 1.0).abs();
+                gap + 0.02 * (1.0 - mechid_modal::indicators::mac(mode.shape.shape(), &shape))
+            };
+            let free = (0..taken.len()).filter(|index| !taken[*index]);
+            let Some(best) = free.min_by(|a, b| distance(a).total_cmp(&distance(b))) else {
+                continue;
+            };
+            let mode = &estimate.modes[best];
+            if (mode.natural_frequency_hz.value / f - 1.0).abs() > 2.0 * zeta {
+                continue;
+            }
+            taken[best] = true;
+            tally.add(mode, [f, zeta], &shape);
+        }
+        spurious += taken.iter().filter(|taken| !**taken).count();
+    }
+    let mean = seconds / seeds as f64;
+    println!(
+        "\n{}: {seeds} seeds, {spurious} false modes, {failed} failed, {mean:.2} s each",
+        case.name
+    );
+    println!(
+        "  f Hz    ζ %   ζωT | found  cover f  ζ  shape % | scatter/s.e. f  ζ | bias/s.d. f  ζ | RMS % f  ζ | SSI best order/ours f  ζ (order, rows)"
+    );
+    for (r, tally) in tallies.iter().enumerate() {
+        let duration = case.len as f64 / case.rate_hz;
+        let decay_times =
+            truth.dampings[r] * truth.frequencies_hz[r] * std::f64::consts::TAU * duration;
+        tally.print([truth.frequencies_hz[r], truth.dampings[r]], decay_times, subspace.best(r));
+    }
+}
+
+impl Tally {
+    fn add(
+        &mut self,
+        mode: &mechid_modal::ambient::AmbientMode,
+        truth: [f64; 2],
+        shape: &nalgebra::DVector<Complex<f64>>,
+    ) {
+        self.found += 1;
+        let values = [mode.natural_frequency_hz, mode.damping_ratio];
+        for (k, value) in values.into_iter().enumerate() {
+            let error = value.value / truth[k] - 1.0;
+            self.squares[k] += error * error;
+            self.sums[k] += error;
+            if let Some([low, high]) = value.interval() {
+                self.intervals += usize::from(k == 0);
+                self.covered[k] += usize::from(low <= truth[k] && truth[k] <= high);
+                self.predicted[k] += (value.standard_error().unwrap_or(0.0) / truth[k]).powi(2);
+            }
+        }
+        let reference = mode.shape.shape().icamax();
+        let exact = shape / shape[reference];
+        let p = shape.len();
+        for i in (0..p).filter(|i| *i != reference) {
+            let gap = mode.shape.shape()[i] - exact[i];
+            for (part, row) in [(gap.re, i), (gap.im, p + i)] {
+                let error = mode.shape.covariance()[(row, row)].sqrt();
+                self.shapes[0] += usize::from(part.abs() < 1.96 * error);
+                self.shapes[1] += 1;
+            }
+        }
+    }
+
+    fn print(&self, truth: [f64; 2], decay_times: f64, subspace: [(f64, usize, usize); 2]) {
+        let n = self.found.max(1) as f64;
+        let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+        let mean = self.sums.map(|sum| sum / n);
+        let rms = self.squares.map(|sum| (sum / n).sqrt());
+        let scatter = [0, 1].map(|k| (self.squares[k] / n - mean[k] * mean[k]).max(0.0).sqrt());
+        let predicted = self.predicted.map(|sum| (sum / self.intervals.max(1) as f64).sqrt());
+        println!(
+            "{:6.2} {:6.2} {:5.0} | {:4}  {:6.1} {:6.1} {:6.1} | {:6.2} {:6.2} | {:6.2} {:6.2} | {:7.4} {:6.2} | {:5.2} {:5.2} ({}, {}) ({}, {})",
+            truth[0],
+            100.0 * truth[1],
+            decay_times,
+            self.found,
+            percent(self.covered[0], self.intervals),
+            percent(self.covered[1], self.intervals),
+            percent(self.shapes[0], self.shapes[1]),
+            scatter[0] / predicted[0],
+            scatter[1] / predicted[1],
+            mean[0] / scatter[0],
+            mean[1] / scatter[1],
+            100.0 * rms[0],
+            100.0 * rms[1],
+            subspace[0].0 / rms[0],
+            subspace[1].0 / rms[1],
+            subspace[0].1,
+            subspace[0].2,
+            subspace[1].1,
+            subspace[1].2,
+        );
+    }
+}
+
+/// Block rows of the subspace models: those of the estimate, then three others.
+const ROWS: usize = 4;
+
+/// Largest half order of a subspace model.
+const HALF_ORDERS: usize = 24;
+
+/// Squared relative errors of f and ζ by mode, setting and half order, with their number.
+struct SubspaceErrors {
+    sums: Vec<[[[f64; 3]; HALF_ORDERS]; ROWS]>,
+    records: usize,
+}
+
+impl SubspaceErrors {
+    fn new(modes: usize) -> Self {
+        Self { sums: vec![[[[0.0; 3]; HALF_ORDERS]; ROWS]; modes], records: 0 }
+    }
+
+    /// Adds for each true mode the pole of each order that is nearest to it.
+    fn add(&mut self, row: usize, models: &Stabilisation, truth: &Structure) {
+        self.records += usize::from(row == 0);
+        for (r, exact) in truth.poles().into_iter().enumerate() {
+            for half in 0..HALF_ORDERS {
+                let poles = models.poles().iter().filter(|p| p.order == 2 * half + 2);
+                let distance = |p: Complex<f64>| (p - exact).norm();
+                let nearest = poles
+                    .map(|p| &p.pole)
+                    .min_by(|a, b| distance(a.pole).total_cmp(&distance(b.pole)));
+                // A pole further away is no estimate of this mode.
+                let Some(pole) = nearest.filter(|p| distance(p.pole) < 3.0 * -exact.re) else {
+                    continue;
+                };
+                let sums = &mut self.sums[r][row][half];
+                sums[0] += (pole.pole.norm() / exact.norm() - 1.0).powi(2);
+                sums[1] += (pole.damping_ratio() / truth.dampings[r] - 1.0).powi(2);
+                sums[2] += 1.0;
+            }
+        }
+    }
+
+    /// Returns the smallest RMS errors of f and ζ of one mode over orders and settings that see it in 90 %
+    /// of the records, with order and row.
+    fn best(&self, mode: usize) -> [(f64, usize, usize); 2] {
+        [0, 1].map(|k| {
+            let mut best = (f64::INFINITY, 0, 0);
+            for (row, halves) in self.sums[mode].iter().enumerate() {
+                for (half, sums) in halves.iter().enumerate() {
+                    let rms = (sums[k] / sums[2]).sqrt();
+                    if sums[2] > 0.9 * self.records as f64 && rms < best.0 {
+                        best = (rms, 2 * half + 2, [0, 20, 40, 80][row]);
+                    }
+                }
+            }
+            best
+        })
+    }
+}
