@@ -39,6 +39,7 @@
 mod closed_form;
 mod discretisation;
 mod divided_exp;
+pub mod elements;
 mod error;
 mod frequency_response;
 mod initial_state;

@@ -1,0 +1,159 @@
+//! Terms, sensors, inputs and unknowns of a machine by index.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::channels::{InputColumn, SensorRow, unbalance};
+use super::{Power, Prior, Speed, Term};
+use crate::{Matrix, ModelError, SecondOrderSystem};
+
+/// An unknown of a machine.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MachineParameter {
+    /// Name: that of the shared parameter, or of the element and the coefficient.
+    pub name: String,
+    /// First value of the search.
+    pub start: f64,
+    /// Lower bound; −∞ without one.
+    pub min: f64,
+    /// Upper bound; ∞ without one.
+    pub max: f64,
+    /// Knowledge from elsewhere.
+    pub prior: Option<Prior>,
+}
+
+/// Unknown load: forces of an unbalance per unit of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OwnLoad {
+    pub(super) at: [usize; 2],
+    pub(super) scale: Complex<f64>,
+    /// `None` for a known unbalance.
+    pub(super) parameter: Option<usize>,
+}
+
+/// Load (N) of an unknown unbalance per unit of its parameter, by degree of freedom; known loads have no
+/// parameter.
+pub type ParameterLoad = (Option<usize>, Vec<(usize, Complex<f64>)>);
+
+/// A machine that was checked: its dynamic stiffness is Σ of [`Term`]s.
+///
+/// ```text
+/// D(ω) x = F − D_g(ω) x_g
+/// ```
+///
+/// with the motion x_g of the support.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assembly {
+    pub(super) dofs: Vec<String>,
+    pub(super) terms: Vec<Term>,
+    pub(super) sensors: Vec<SensorRow>,
+    pub(super) inputs: Vec<InputColumn>,
+    pub(super) loads: Vec<OwnLoad>,
+    pub(super) parameters: Vec<MachineParameter>,
+    pub(super) speed: Speed,
+    pub(super) measured: Vec<usize>,
+}
+
+impl Assembly {
+    /// Returns the number of degrees of freedom.
+    pub fn dof(&self) -> usize {
+        self.dofs.len()
+    }
+
+    /// Returns the names of the degrees of freedom.
+    pub fn dofs(&self) -> &[String] {
+        &self.dofs
+    }
+
+    /// Returns the terms of the dynamic stiffness.
+    pub fn terms(&self) -> &[Term] {
+        &self.terms
+    }
+
+    /// Returns the sensors.
+    pub fn sensors(&self) -> &[SensorRow] {
+        &self.sensors
+    }
+
+    /// Returns the inputs.
+    pub fn inputs(&self) -> &[InputColumn] {
+        &self.inputs
+    }
+
+    /// Returns the unknowns.
+    pub fn parameters(&self) -> &[MachineParameter] {
+        &self.parameters
+    }
+
+    /// Returns the speed of the rotor.
+    pub fn speed(&self) -> Speed {
+        self.speed
+    }
+
+    /// Returns the degrees of freedom of the part whose receptance was measured.
+    pub fn measured(&self) -> &[usize] {
+        &self.measured
+    }
+
+    /// Returns the first values of the search.
+    pub fn start(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.start).collect()
+    }
+
+    /// Returns whether any element has unbalance of its own.
+    pub fn has_own_loads(&self) -> bool {
+        !self.loads.is_empty()
+    }
+
+    /// Returns the loads of unbalance that no input measures, at `omega` (rad/s).
+    pub fn own_loads(&self, omega: f64) -> Vec<ParameterLoad> {
+        let load = |own: &OwnLoad| {
+            let forces = unbalance(own.at, omega, self.speed);
+            (own.parameter, forces.map(|(at, force)| (at, force * own.scale)).to_vec())
+        };
+        self.loads.iter().map(load).collect()
+    }
+
+    /// Returns D(ω) (n × n, N/m) and the column D_g of the support as the last one, n × (n + 1), summed over
+    /// the terms that `included` accepts.
+    pub fn dynamic_stiffness(
+        &self,
+        parameters: &[f64],
+        omega: f64,
+        included: impl Fn(&Term) -> bool,
+    ) -> DMatrix<Complex<f64>> {
+        let n = self.dof();
+        let mut sum = DMatrix::zeros(n, n + 1);
+        for term in self.terms.iter().filter(|term| included(term)) {
+            let factor = term.power.factor(omega, self.speed.at(omega)) * term.value(parameters);
+            term.for_each_entry(n, |row, column, value| sum[(row, column)] += factor * value);
+        }
+        sum
+    }
+
+    /// Returns M, C + Ω G and K at a speed (rad/s) of the rotor; hysteresis has no place in them.
+    ///
+    /// # Errors
+    /// [`ModelError::SingularMass`] and whatever else [`SecondOrderSystem::new`] refuses.
+    pub fn system(&self, parameters: &[f64], speed: f64) -> Result<SecondOrderSystem, ModelError> {
+        let n = self.dof();
+        let mut sums = Matrix::ALL.map(|_| DMatrix::zeros(n, n + 1));
+        for term in &self.terms {
+            let (matrix, factor) = match term.power {
+                Power::Stiffness => (Matrix::Stiffness, 1.0),
+                Power::Damping => (Matrix::Damping, 1.0),
+                Power::Gyroscopic => (Matrix::Damping, speed),
+                Power::Mass => (Matrix::Mass, 1.0),
+                Power::Hysteresis => continue,
+            };
+            let (sum, value) = (&mut sums[matrix as usize], factor * term.value(parameters));
+            term.for_each_entry(n, |row, column, entry| sum[(row, column)] += value * entry);
+        }
+        let [mass, damping, stiffness] = sums.map(|sum| sum.columns(0, n).into_owned());
+        SecondOrderSystem::new(mass, damping, stiffness)
+    }
+
+    /// Returns whether any term is hysteretic.
+    pub fn has_hysteresis(&self) -> bool {
+        self.terms.iter().any(|term| term.power == Power::Hysteresis)
+    }
+}

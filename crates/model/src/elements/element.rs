@@ -1,0 +1,137 @@
+//! Elements of a machine.
+
+use nalgebra::DMatrix;
+
+use super::Coefficient;
+
+/// Name that stands for the ground or the moving support in place of a degree of freedom.
+pub const SUPPORT: &str = "support";
+
+/// A part of a machine; degrees of freedom are given by name, and [`SUPPORT`] stands for the ground.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Element {
+    /// A mass (kg), or a moment of inertia (kg·m²) at a rotation.
+    Mass {
+        /// Degree of freedom.
+        at: String,
+        /// Mass.
+        mass: Coefficient,
+    },
+    /// A spring, a damper or both between two degrees of freedom, or one and the support.
+    Link {
+        /// Both ends.
+        between: [String; 2],
+        /// Stiffness k, in N/m.
+        stiffness: Coefficient,
+        /// Damping c, in N·s/m.
+        damping: Coefficient,
+        /// Loss factor η of the stiffness: k (1 + iη).
+        loss_factor: Coefficient,
+    },
+    /// A general 2 × 2 block between two directions at one place and at another: a bearing.
+    Bearing(Box<Bearing>),
+    /// Known matrices of a part of the machine, each times a factor.
+    Matrices(Box<MatrixElement>),
+    /// Unknown residual unbalance, m e, of a rotor at speed Ω: the force Ω² U in x and −iΩ² U in y.
+    Unbalance {
+        /// Degrees of freedom of x and y; the rotor turns from x to y.
+        at: [String; 2],
+        /// Real part of U, in kg·m.
+        real: Coefficient,
+        /// Imaginary part of U, in kg·m.
+        imaginary: Coefficient,
+    },
+}
+
+/// Coefficients of a bearing or of any other 2 × 2 block, in the order xx, xy, yx, yy.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bearing {
+    /// Degrees of freedom of x and y.
+    pub at: [String; 2],
+    /// Degrees of freedom of x and y of the housing; the support without them.
+    pub to: Option<[String; 2]>,
+    /// k, in N/m.
+    pub stiffness: [Coefficient; 4],
+    /// c, in N·s/m.
+    pub damping: [Coefficient; 4],
+    /// Fluid mass m, in kg.
+    pub mass: [Coefficient; 4],
+}
+
+/// Matrices over some degrees of freedom, d × d; those not given are zero.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MatrixElement {
+    /// Degrees of freedom of the rows and columns.
+    pub dofs: Vec<String>,
+    /// M, in kg, and its factor.
+    pub mass: Option<(DMatrix<f64>, Coefficient)>,
+    /// C, in N·s/m, and its factor.
+    pub damping: Option<(DMatrix<f64>, Coefficient)>,
+    /// K, in N/m, and its factor.
+    pub stiffness: Option<(DMatrix<f64>, Coefficient)>,
+    /// G of the gyroscopic force Ω G ẋ, in kg·m² (kg), and its factor.
+    pub gyroscopic: Option<(DMatrix<f64>, Coefficient)>,
+}
+
+impl MatrixElement {
+    /// Takes known matrices M (kg), C (N·s/m) and K (N/m) over these degrees of freedom.
+    pub fn new(
+        dofs: Vec<String>,
+        mass: DMatrix<f64>,
+        damping: DMatrix<f64>,
+        stiffness: DMatrix<f64>,
+    ) -> Self {
+        let known = |matrix| Some((matrix, Coefficient::Known(1.0)));
+        let (mass, damping, stiffness) = (known(mass), known(damping), known(stiffness));
+        Self { dofs, mass, damping, stiffness, gyroscopic: None }
+    }
+
+    /// Returns the same with a known gyroscopic matrix G of the force Ω G ẋ.
+    #[must_use]
+    pub fn with_gyroscopic(self, gyroscopic: DMatrix<f64>) -> Self {
+        Self { gyroscopic: Some((gyroscopic, Coefficient::Known(1.0))), ..self }
+    }
+}
+
+impl Element {
+    /// Returns a mass at a degree of freedom, in kg.
+    pub fn mass(at: &str, mass: impl Into<Coefficient>) -> Self {
+        Self::Mass { at: at.to_owned(), mass: mass.into() }
+    }
+
+    /// Returns a spring between two degrees of freedom, in N/m.
+    pub fn spring(between: [&str; 2], stiffness: impl Into<Coefficient>) -> Self {
+        Self::spring_damper(between, stiffness, 0.0)
+    }
+
+    /// Returns a damper between two degrees of freedom, in N·s/m.
+    pub fn damper(between: [&str; 2], damping: impl Into<Coefficient>) -> Self {
+        Self::spring_damper(between, 0.0, damping)
+    }
+
+    /// Returns a spring (N/m) beside a damper (N·s/m) between two degrees of freedom.
+    pub fn spring_damper(
+        between: [&str; 2],
+        stiffness: impl Into<Coefficient>,
+        damping: impl Into<Coefficient>,
+    ) -> Self {
+        Self::Link {
+            between: between.map(str::to_owned),
+            stiffness: stiffness.into(),
+            damping: damping.into(),
+            loss_factor: Coefficient::default(),
+        }
+    }
+
+    /// Returns a bearing to the support with stiffness (N/m) and damping (N·s/m) in the order xx, xy, yx,
+    /// yy.
+    pub fn bearing(at: [&str; 2], stiffness: [Coefficient; 4], damping: [Coefficient; 4]) -> Self {
+        Self::Bearing(Box::new(Bearing {
+            at: at.map(str::to_owned),
+            to: None,
+            stiffness,
+            damping,
+            mass: [0.0; 4].map(Coefficient::Known),
+        }))
+    }
+}

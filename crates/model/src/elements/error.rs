@@ -1,0 +1,166 @@
+//! Errors in the description of a machine.
+
+use mechid_signal::message;
+
+use crate::ModelError;
+
+/// A description of a machine that does not make sense; every variant names the element, the sensor or
+/// the parameter concerned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MachineError {
+    /// No degree of freedom has a name.
+    #[error("the machine has no degrees of freedom")]
+    NoDof,
+    /// A name appears twice.
+    #[error("the {what} {name:?} appears twice")]
+    Repeated {
+        /// Kind of thing with this name.
+        what: &'static str,
+        /// Name concerned.
+        name: String,
+    },
+    /// The name is reserved for the support.
+    #[error("\"support\" is the ground and cannot be the name of a degree of freedom")]
+    Reserved,
+    /// An element, a sensor or an input is at a degree of freedom that the machine does not have.
+    #[error("{what} {name:?} is at {dof:?}, which is none of the degrees of freedom ({known})")]
+    UnknownDof {
+        /// `"element"`, `"sensor"` or `"input"`.
+        what: &'static str,
+        /// Name of the element, the sensor or the input.
+        name: String,
+        /// Degree of freedom that it names.
+        dof: String,
+        /// Degrees of freedom of the machine.
+        known: String,
+    },
+    /// An element or a sensor has twice the same end.
+    #[error("{what} {name:?} has both ends at {dof:?}")]
+    SameEnds {
+        /// `"element"` or `"sensor"`.
+        what: &'static str,
+        /// Name of the element or the sensor.
+        name: String,
+        /// Degree of freedom of both ends.
+        dof: String,
+    },
+    /// The fields of an element do not fit its kind.
+    #[error("element {name:?}: {problem}")]
+    Element {
+        /// Name of the element.
+        name: String,
+        /// What does not fit.
+        problem: String,
+    },
+    /// A coefficient refers to a parameter that is not described.
+    #[error("{name:?} refers to the parameter {parameter:?}, which `parameters` does not describe")]
+    UnknownParameter {
+        /// Name of the coefficient.
+        name: String,
+        /// Parameter that it names.
+        parameter: String,
+    },
+    /// No coefficient uses the parameter.
+    #[error("no element uses the parameter {name:?}")]
+    UnusedParameter {
+        /// Name of the parameter.
+        name: String,
+    },
+    /// A number is NaN or infinite.
+    #[error("{name:?} has the value {}, which is not a finite number", message::number(*value))]
+    NotFinite {
+        /// Name of the coefficient, sensor or matrix.
+        name: String,
+        /// Value given.
+        value: f64,
+    },
+    /// The lower bound is not below the upper one.
+    #[error(
+        "the bounds of {name:?} contradict each other: `min` {} is not below `max` {}",
+        message::number(*min),
+        message::number(*max)
+    )]
+    Bounds {
+        /// Name of the coefficient.
+        name: String,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// The search would start outside the bounds.
+    #[error(
+        "`start` {} of {name:?} is outside its bounds, {} to {}",
+        message::number(*start),
+        message::number(*min),
+        message::number(*max)
+    )]
+    StartOutside {
+        /// Name of the coefficient.
+        name: String,
+        /// First value.
+        start: f64,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// An unknown has no value from which the search could start.
+    #[error("{name:?} is unknown: give `start`, both `min` and `max`, or `prior`")]
+    NoStart {
+        /// Name of the coefficient.
+        name: String,
+    },
+    /// The standard deviation of a prior is not positive.
+    #[error(
+        "the standard deviation of the prior of {name:?} must be positive, not {}",
+        message::number(*standard_deviation)
+    )]
+    PriorDeviation {
+        /// Name of the coefficient.
+        name: String,
+        /// Standard deviation given.
+        standard_deviation: f64,
+    },
+    /// A degree of freedom has no mass.
+    #[error(
+        "degree of freedom {dof:?} has no mass (it belongs to {elements}); add a mass there, \
+         0 if it really has none"
+    )]
+    NoMass {
+        /// Degree of freedom.
+        dof: String,
+        /// Elements that touch it.
+        elements: String,
+    },
+    /// No element touches a degree of freedom.
+    #[error("no element is at degree of freedom {dof:?}")]
+    Detached {
+        /// Degree of freedom.
+        dof: String,
+    },
+    /// There is no sensor.
+    #[error("the machine has no {what}")]
+    NoInstrument {
+        /// `"sensors"` or `"inputs"`.
+        what: &'static str,
+    },
+    /// A gain of a sensor is zero.
+    #[error("the gain of sensor {name:?} is 0")]
+    NoGain {
+        /// Name of the sensor.
+        name: String,
+    },
+    /// Unbalance or gyroscopic terms need a speed.
+    #[error("{what} {name:?} needs the speed of the rotor: give `speed`")]
+    NoSpeed {
+        /// `"element"` or `"input"`.
+        what: &'static str,
+        /// Name of the element or the input.
+        name: String,
+    },
+    /// A matrix of the identified machine cannot be used.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

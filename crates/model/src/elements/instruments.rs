@@ -1,0 +1,136 @@
+//! Sensors and inputs of a machine.
+
+use super::SUPPORT;
+use crate::ResponseQuantity;
+
+/// A sensor at a degree of freedom.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Sensor {
+    /// Name, that of the channel.
+    pub name: String,
+    /// Degree of freedom.
+    pub at: String,
+    /// Degree of freedom whose motion is subtracted: a probe on a housing, or [`SUPPORT`] for a response
+    /// relative to the moving support.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub relative_to: Option<String>,
+    /// Quantity measured.
+    pub quantity: ResponseQuantity,
+    /// Reading per unit of the quantity.
+    #[cfg_attr(feature = "serde", serde(default = "one"))]
+    pub gain: f64,
+}
+
+/// A measured input.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case", tag = "kind"))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub enum Input {
+    /// A force (N), or a moment (N·m) at a rotation.
+    Force {
+        /// Name, that of the channel.
+        name: String,
+        /// Degree of freedom.
+        at: String,
+        /// Degree of freedom that the opposite force acts on: a shaker between two of them.
+        #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+        against: Option<String>,
+    },
+    /// Prescribed motion of the support, the same for all that is connected to it.
+    Support {
+        /// Name, that of the channel.
+        name: String,
+        /// Quantity measured.
+        quantity: ResponseQuantity,
+    },
+    /// Trial unbalance m e (kg·m) with its phase: the force Ω² U in x and −iΩ² U in y.
+    Unbalance {
+        /// Name, that of the channel.
+        name: String,
+        /// Degrees of freedom of x and y; the rotor turns from x to y.
+        at: [String; 2],
+    },
+}
+
+/// Speed of the rotor on each line.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum Speed {
+    /// Nothing turns.
+    #[default]
+    None,
+    /// The same on all lines, in rad/s.
+    Constant(f64),
+    /// Each line is the synchronous response at its own speed, Ω = ω.
+    Synchronous,
+}
+
+/// Sensors and inputs in the order of the channels of outputs and inputs.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Instruments {
+    /// Sensors, one per output.
+    pub sensors: Vec<Sensor>,
+    /// Inputs, one per measured input; none for an unbalance that is unknown.
+    pub inputs: Vec<Input>,
+    /// Speed of the rotor.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub speed: Speed,
+}
+
+#[cfg(feature = "serde")]
+fn one() -> f64 {
+    1.0
+}
+
+impl Sensor {
+    /// Takes a sensor of unit gain with the name of its degree of freedom.
+    pub fn new(at: &str, quantity: ResponseQuantity) -> Self {
+        let name = at.to_owned();
+        Self { at: name.clone(), name, relative_to: None, quantity, gain: 1.0 }
+    }
+
+    /// Returns the same, reading the motion relative to another degree of freedom.
+    #[must_use]
+    pub fn relative_to(self, dof: &str) -> Self {
+        Self { relative_to: Some(dof.to_owned()), ..self }
+    }
+
+    /// Returns the same, reading the motion relative to the support.
+    #[must_use]
+    pub fn relative_to_support(self) -> Self {
+        self.relative_to(SUPPORT)
+    }
+}
+
+impl Input {
+    /// Returns a force with the name of its degree of freedom.
+    pub fn force(at: &str) -> Self {
+        Self::Force { name: at.to_owned(), at: at.to_owned(), against: None }
+    }
+
+    /// Returns the name, that of the channel.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Force { name, .. }
+            | Self::Support { name, .. }
+            | Self::Unbalance { name, .. } => name,
+        }
+    }
+}
+
+impl Speed {
+    /// Returns the speed Ω on a line at `omega`, both in rad/s; 0 if nothing turns.
+    pub fn at(self, omega: f64) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Constant(speed) => speed,
+            Self::Synchronous => omega,
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! A machine as its engineer draws it: degrees of freedom with names, elements between them, sensors and
+//! inputs anywhere, every coefficient known or unknown.
+//!
+//! ```
+//! use mechid_model::ResponseQuantity;
+//! use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
+//!
+//! // Two masses on a spring of unknown stiffness; a force on the first, an accelerometer on the second.
+//! let k = FreeCoefficient::from_start(3e4).at_least(0.0);
+//! let machine = Machine::new(["x1", "x2"])
+//!     .with("m1", Element::mass("x1", 2.0))
+//!     .with("m2", Element::mass("x2", 1.5))
+//!     .with("foot", Element::spring_damper(["x1", "support"], 4e4, 6.0))
+//!     .with("k2", Element::spring(["x1", "x2"], k));
+//! let instruments = Instruments {
+//!     sensors: vec![Sensor::new("x2", ResponseQuantity::Acceleration)],
+//!     inputs: vec![Input::force("x1")],
+//!     ..Instruments::default()
+//! };
+//! let assembly = machine.assembly(&instruments)?;
+//! assert_eq!(assembly.parameters()[0].name, "k2");
+//! # Ok::<(), mechid_model::elements::MachineError>(())
+//! ```
+
+mod assembly;
+mod build;
+mod channels;
+mod coefficient;
+mod element;
+mod error;
+mod instruments;
+mod machine;
+#[cfg(feature = "serde")]
+mod serde_form;
+mod term;
+
+pub use assembly::{Assembly, MachineParameter};
+pub use channels::{InputColumn, SensorRow};
+pub use coefficient::{Coefficient, FreeCoefficient, Prior};
+pub use element::{Bearing, Element, MatrixElement, SUPPORT};
+pub use error::MachineError;
+pub use instruments::{Input, Instruments, Sensor, Speed};
+pub use machine::{Machine, ProportionalDamping};
+pub use term::{Pattern, Power, Term};

@@ -1,0 +1,127 @@
+//! Terms of the dynamic stiffness K + iωC − ω²M of a machine.
+
+use nalgebra::{Complex, DMatrix};
+
+/// Frequency factor of a term of the dynamic stiffness.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Power {
+    /// 1.
+    Stiffness,
+    /// i.
+    Hysteresis,
+    /// iω.
+    Damping,
+    /// iωΩ.
+    Gyroscopic,
+    /// −ω².
+    Mass,
+}
+
+impl Power {
+    /// Returns the factor at `omega` and the rotor's speed `speed`, both in rad/s.
+    pub fn factor(self, omega: f64, speed: f64) -> Complex<f64> {
+        match self {
+            Self::Stiffness => Complex::new(1.0, 0.0),
+            Self::Hysteresis => Complex::new(0.0, 1.0),
+            Self::Damping => Complex::new(0.0, omega),
+            Self::Gyroscopic => Complex::new(0.0, omega * speed),
+            Self::Mass => Complex::new(-omega * omega, 0.0),
+        }
+    }
+
+    /// Returns the derivative of the factor with respect to s, at the eigenvalue `s` (rad/s), and the factor
+    /// itself: a term of D(s).
+    pub fn at_eigenvalue(self, s: Complex<f64>, speed: f64) -> [Complex<f64>; 2] {
+        let one = Complex::new(1.0, 0.0);
+        match self {
+            Self::Stiffness => [one, Complex::default()],
+            Self::Hysteresis => [Complex::new(0.0, s.im.signum()), Complex::default()],
+            Self::Damping => [s, one],
+            Self::Gyroscopic => [s * speed, one * speed],
+            Self::Mass => [s * s, s * 2.0],
+        }
+    }
+}
+
+/// Entries of the dynamic stiffness that a term fills. Index n, one beyond the degrees of freedom, is the
+/// support, whose motion is prescribed.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Pattern {
+    /// a bᵀ, by the non-zero entries of a and b.
+    Dyad {
+        /// Entries of a.
+        left: Vec<(usize, f64)>,
+        /// Entries of b.
+        right: Vec<(usize, f64)>,
+    },
+    /// A d × d matrix over some degrees of freedom.
+    Block {
+        /// Degrees of freedom of the rows and columns.
+        dofs: Vec<usize>,
+        /// Entries.
+        matrix: DMatrix<f64>,
+        /// Column of the support, d entries.
+        support: Vec<f64>,
+    },
+}
+
+/// Pattern × frequency factor × scale × product of parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// Entries that it fills.
+    pub pattern: Pattern,
+    /// Frequency factor.
+    pub power: Power,
+    /// Known factor.
+    pub scale: f64,
+    /// Parameters whose product is the unknown factor; none of a term that is known.
+    pub parameters: Vec<usize>,
+}
+
+impl Term {
+    /// Returns scale × product of parameters.
+    pub fn value(&self, parameters: &[f64]) -> f64 {
+        self.parameters.iter().fold(self.scale, |product, at| product * parameters[*at])
+    }
+
+    /// Returns each parameter with the derivative of [`Term::value`] with respect to it.
+    pub fn derivatives<'a>(
+        &'a self,
+        parameters: &'a [f64],
+    ) -> impl Iterator<Item = (usize, f64)> + 'a {
+        self.parameters.iter().enumerate().map(move |(place, at)| {
+            let others =
+                self.parameters.iter().enumerate().filter(move |(other, _)| *other != place);
+            (*at, others.fold(self.scale, |product, (_, other)| product * parameters[*other]))
+        })
+    }
+
+    /// Returns whether no parameter is in it.
+    pub fn is_known(&self) -> bool {
+        self.parameters.is_empty()
+    }
+
+    /// Calls `add` with every entry (row, column, value) of the pattern; column n is the support's, and rows
+    /// of the support are left out, for its motion is prescribed.
+    pub fn for_each_entry(&self, dof: usize, mut add: impl FnMut(usize, usize, f64)) {
+        match &self.pattern {
+            Pattern::Dyad { left, right } => {
+                for (row, a) in left.iter().filter(|(row, _)| *row < dof) {
+                    right.iter().for_each(|(column, b)| add(*row, *column, a * b));
+                }
+            }
+            Pattern::Block { dofs, matrix, support } => {
+                for (i, row) in dofs.iter().enumerate() {
+                    for (j, column) in dofs.iter().enumerate() {
+                        if matrix[(i, j)] != 0.0 {
+                            add(*row, *column, matrix[(i, j)]);
+                        }
+                    }
+                    if support[i] != 0.0 {
+                        add(*row, dof, support[i]);
+                    }
+                }
+            }
+        }
+    }
+}
