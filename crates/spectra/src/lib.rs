@@ -21,6 +21,7 @@ pub mod open_record;
 mod periods;
 pub mod sinusoids;
 pub mod transient;
+mod line_noise;
 
 pub use error::SpectraError;
 pub use frequency_data::FrequencyData;
@@ -30,3 +31,4 @@ pub use noise::pooling::{NoiseModel, Pooling};
 pub use noise::spectrum::NoiseSpectrum;
 pub use periods::RepeatedPeriods;
 pub use sinusoids::Sinusoid;
+pub use line_noise::LineNoise;

@@ -6,7 +6,7 @@ use std::ops::Range;
 use mechid_signal::{Record, Spectrum};
 use nalgebra::{Complex, DMatrix};
 
-use crate::SpectraError;
+use crate::{LineNoise, SpectraError};
 
 /// Effect of the two ends of a record on its lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +36,7 @@ pub struct LineData {
     inputs: DMatrix<Complex<f64>>,
     outputs: DMatrix<Complex<f64>>,
     records: Vec<(Range<usize>, Transient)>,
+    noise: Option<LineNoise>,
 }
 
 impl LineData {
@@ -68,7 +69,7 @@ impl LineData {
             }
         }
         let records = vec![(0..omega.len(), transient)];
-        Ok(Self { omega, inputs, outputs, records })
+        Ok(Self { omega, inputs, outputs, records, noise: None })
     }
 
     /// Takes the lines of an open record that lie in `band_hz` (Hz), without a window; the lines at zero
@@ -107,7 +108,27 @@ impl LineData {
         Self::new(omega, inputs, read(outputs), transient)
     }
 
-    /// Returns these lines followed by those of further records.
+    /// Returns the same lines with the covariance of their noise.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] unless there is one covariance per line with one row and column per output
+    /// and input.
+    pub fn with_noise(self, noise: LineNoise) -> Result<Self, SpectraError> {
+        let channels = self.outputs.ncols() + self.inputs.ncols();
+        let size = noise.covariance().first().map_or(channels, DMatrix::nrows);
+        let sizes = [
+            ("covariances", self.len(), noise.covariance().len()),
+            ("channels of a covariance", channels, size),
+        ];
+        for (what, expected, got) in sizes {
+            if expected != got {
+                return Err(SpectraError::Size { what, expected, got });
+            }
+        }
+        Ok(Self { noise: Some(noise), ..self })
+    }
+
+    /// Returns these lines followed by those of further records; the noise is kept if it is known of both.
     ///
     /// # Errors
     /// [`SpectraError::Size`] if the number of inputs or outputs differs.
@@ -132,6 +153,8 @@ impl LineData {
             (rows.start + before..rows.end + before, *transient)
         };
         self.records.extend(other.records.iter().map(moved));
+        let noise = self.noise.take().zip(other.noise.as_ref());
+        self.noise = noise.map(|(one, other)| one.followed_by(other));
         Ok(self)
     }
 
@@ -158,6 +181,11 @@ impl LineData {
     /// Returns the outputs, lines × p.
     pub fn outputs(&self) -> &DMatrix<Complex<f64>> {
         &self.outputs
+    }
+
+    /// Returns the covariance of the noise of outputs and inputs, if it is known.
+    pub fn noise(&self) -> Option<&LineNoise> {
+        self.noise.as_ref()
     }
 
     /// Returns the rows of each record and the effect of its ends.

@@ -1,0 +1,281 @@
+//! What a fit says: parameters with intervals, priors, minima, and what is not determined.
+
+use std::fmt;
+
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::fit::Fit;
+use super::limits::WEAK;
+use super::profile;
+use super::response_model::ResponseModel;
+
+/// How an interval was found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum IntervalKind {
+    /// Value ± quantile × standard error.
+    Wald,
+    /// Where the profile of the likelihood has fallen: of a weakly determined parameter, or near a bound.
+    Profile,
+    /// From the bound at which the estimate lies to the one-sided limit of the profile.
+    OneSided,
+    /// The data leave the parameter open: everything between its bounds.
+    Open,
+}
+
+/// What a prior contributed to a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct PriorReport {
+    /// Mean, in the unit of the parameter.
+    pub mean: f64,
+    /// Standard deviation, in the unit of the parameter.
+    pub standard_deviation: f64,
+    /// Share of the information on the parameter that comes from its prior, 0 to 1.
+    pub share: f64,
+    /// Probability of an estimate so far from the mean if prior and data agree; `None` where the data say
+    /// nothing of their own.
+    pub p_value: Option<f64>,
+}
+
+/// An unknown that was identified.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ParameterEstimate {
+    /// Name.
+    pub name: String,
+    /// Most likely value.
+    pub value: f64,
+    /// Standard error; `None` if it is at a bound or not determined.
+    pub standard_error: Option<f64>,
+    /// Interval of the confidence asked for.
+    pub interval: [f64; 2],
+    /// How the interval was found.
+    pub interval_kind: IntervalKind,
+    /// Whether the estimate lies at a bound beyond which the data would have it.
+    pub at_bound: bool,
+    /// Prior, if there is one.
+    pub prior: Option<PriorReport>,
+}
+
+/// Parameters of which the data determine combinations only.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Combination {
+    /// Names of the parameters.
+    pub parameters: Vec<String>,
+    /// Their values, any that agree with the combinations.
+    pub values: Vec<f64>,
+    /// Coefficients of the parameters in the change of each combination that is determined; the largest
+    /// is 1.
+    pub determined: Vec<Vec<f64>>,
+}
+
+impl fmt::Display for Combination {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (last, first) = match self.parameters.split_last() {
+            Some(parts) => parts,
+            None => return Ok(()),
+        };
+        let all = match first.is_empty() {
+            true => last.clone(),
+            false => format!("{} and {last}", first.join(", ")),
+        };
+        if self.determined.is_empty() {
+            return write!(f, "the data do not determine {all}");
+        }
+        let sums = self.determined.iter().map(|coefficients| self.combination(coefficients));
+        let sums: Vec<String> = sums.collect();
+        write!(f, "the data determine {all} only by {}", sums.join(" and "))
+    }
+}
+
+impl Combination {
+    /// The combination in words where it has a name.
+    fn combination(&self, coefficients: &[f64]) -> String {
+        let close = |a: f64, b: f64| (a - b).abs() <= 1e-3 * a.abs().max(b.abs());
+        let inverse_squares: Vec<f64> = self.values.iter().map(|v| v.powi(-2)).collect();
+        let largest = inverse_squares.iter().copied().fold(0.0, f64::max);
+        let equal = coefficients.iter().all(|c| close(*c, 1.0));
+        let series = coefficients.iter().zip(&inverse_squares).all(|(c, i)| close(*c, i / largest));
+        let of_both = equal && series;
+        if equal && !of_both {
+            return format!("their sum {}", self.parameters.join(" + "));
+        }
+        if series && !of_both {
+            let parts: Vec<String> = self.parameters.iter().map(|p| format!("1/{p}")).collect();
+            return format!("their series sum 1/({})", parts.join(" + "));
+        }
+        let terms = coefficients.iter().zip(&self.parameters);
+        let terms: Vec<String> =
+            terms.map(|(coefficient, name)| format!("{coefficient:.4}·δ{name}")).collect();
+        format!("the combination {}", terms.join(" + "))
+    }
+}
+
+/// A minimum that one or more searches ended at.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FoundMinimum {
+    /// Values of the parameters.
+    pub parameters: Vec<f64>,
+    /// Sum of squares, those of the priors included: minus twice the logarithm of the likelihood, up to a
+    /// constant.
+    pub sum_of_squares: f64,
+    /// Number of searches that ended here.
+    pub searches: usize,
+}
+
+/// Common part of the estimate of any model.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct LikelihoodEstimate {
+    /// Unknowns, in the order of the model.
+    pub parameters: Vec<ParameterEstimate>,
+    /// Covariance of the parameters; 0 for those at a bound, without what is not determined.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub covariance: DMatrix<f64>,
+    /// Logarithm of the likelihood.
+    pub log_likelihood: f64,
+    /// Sum of squares in units of the noise over its expectation: 1 for a right model; `None` where the
+    /// noise comes from the residual.
+    pub misfit_ratio: Option<f64>,
+    /// Probability of a larger misfit if model and noise are right; `None` where it is unknown.
+    pub misfit_p_value: Option<f64>,
+    /// Whether the noise of all outputs was found white; `None` where it is stated.
+    pub white_noise: Option<bool>,
+    /// Root mean square of the residual over that of the output, per output.
+    pub relative_residual: Vec<f64>,
+    /// Minima found, the lowest first.
+    pub minima: Vec<FoundMinimum>,
+    /// Number of searches.
+    pub searches: usize,
+    /// Ratio of the best to the worst determined direction of the scaled parameters.
+    pub condition: f64,
+    /// Parameters of which combinations alone are determined.
+    pub combinations: Vec<Combination>,
+    /// Degrees of freedom of the level of the noise; infinite for known noise.
+    pub degrees_of_freedom: f64,
+}
+
+impl LikelihoodEstimate {
+    /// Returns the value of a parameter by its name.
+    pub fn parameter(&self, name: &str) -> Option<&ParameterEstimate> {
+        self.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Returns the values of the parameters.
+    pub fn values(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.value).collect()
+    }
+
+    /// Returns the number of searches that ended at the lowest minimum.
+    pub fn agreeing(&self) -> usize {
+        self.minima.first().map_or(0, |minimum| minimum.searches)
+    }
+
+    pub(super) fn new<M: ResponseModel>(
+        fit: &Fit<'_, M>,
+        names: &[String],
+        confidence: f64,
+    ) -> Self {
+        let parameter = |at: usize| estimated(fit, names, at, confidence);
+        let combinations = fit.information.combinations().into_iter();
+        let combinations = combinations.map(|(members, determined)| Combination {
+            parameters: members.iter().map(|at| names[*at].clone()).collect(),
+            values: members.iter().map(|at| fit.minimum.parameters[*at]).collect(),
+            determined,
+        });
+        let minima = fit.minima.ends.iter().map(|end| FoundMinimum {
+            parameters: end.minimum.parameters.clone(),
+            sum_of_squares: end.minimum.cost,
+            searches: end.searches,
+        });
+        Self {
+            parameters: (0..names.len()).map(parameter).collect(),
+            covariance: fit.information.covariance.clone(),
+            log_likelihood: fit.log_likelihood().unwrap_or(f64::NAN),
+            misfit_ratio: fit.misfit_ratio,
+            misfit_p_value: fit.misfit_p_value,
+            white_noise: fit.is_white,
+            relative_residual: fit.relative_errors().unwrap_or_default(),
+            minima: minima.collect(),
+            searches: fit.minima.searches,
+            condition: fit.information.condition(),
+            combinations: combinations.collect(),
+            degrees_of_freedom: fit.degrees_of_freedom,
+        }
+    }
+}
+
+fn estimated<M: ResponseModel>(
+    fit: &Fit<'_, M>,
+    names: &[String],
+    at: usize,
+    confidence: f64,
+) -> ParameterEstimate {
+    let value = fit.minimum.parameters[at];
+    let at_bound = fit.minimum.at_bound[at];
+    let standard_error = fit.information.standard_error(at).filter(|_| !at_bound);
+    let (interval, interval_kind) = interval(fit, at, standard_error, confidence);
+    ParameterEstimate {
+        name: names[at].clone(),
+        value,
+        standard_error,
+        interval,
+        interval_kind,
+        at_bound,
+        prior: prior(fit, at, standard_error),
+    }
+}
+
+fn interval<M: ResponseModel>(
+    fit: &Fit<'_, M>,
+    at: usize,
+    standard_error: Option<f64>,
+    confidence: f64,
+) -> ([f64; 2], IntervalKind) {
+    let value = fit.minimum.parameters[at];
+    let (min, max) = (fit.space.bounds.min[at], fit.space.bounds.max[at]);
+    if fit.minimum.at_bound[at] {
+        let rise = fit.quantile(confidence).powi(2);
+        let first = (fit.space.start[at] - value).abs().max(1e-6 * value.abs());
+        let end = |direction| profile::end(fit, at, direction, 0.01 * first, rise);
+        let interval = if value <= min { [value, end(1.0)] } else { [end(-1.0), value] };
+        return (interval, IntervalKind::OneSided);
+    }
+    let Some(error) = standard_error else { return ([min, max], IntervalKind::Open) };
+    let quantile = fit.quantile(0.5 + 0.5 * confidence);
+    let wald = [value - quantile * error, value + quantile * error];
+    if error <= WEAK * value.abs() && wald[0] >= min && wald[1] <= max {
+        return (wald, IntervalKind::Wald);
+    }
+    let end = |direction| profile::end(fit, at, direction, quantile * error, quantile.powi(2));
+    ([end(-1.0), end(1.0)], IntervalKind::Profile)
+}
+
+/// Share of a prior and its test: with the prior's variance s² and the posterior's v, the difference of the
+/// estimate from the mean has the variance s² − v if data and prior agree.
+fn prior<M: ResponseModel>(
+    fit: &Fit<'_, M>,
+    at: usize,
+    standard_error: Option<f64>,
+) -> Option<PriorReport> {
+    let prior = fit.space.priors.iter().find(|prior| prior.parameter == at)?;
+    let variance = prior.deviation * prior.deviation;
+    let posterior = standard_error.map_or(0.0, |error| error * error);
+    let difference = variance - posterior;
+    // The share of the data is what rounding leaves of the difference.
+    let p_value = (difference > 1e-9 * variance).then(|| {
+        let z = (fit.minimum.parameters[at] - prior.mean).abs() / difference.sqrt();
+        Normal::standard().sf(z) * 2.0
+    });
+    Some(PriorReport {
+        mean: prior.mean,
+        standard_deviation: prior.deviation,
+        share: (posterior / variance).min(1.0),
+        p_value,
+    })
+}

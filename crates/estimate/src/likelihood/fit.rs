@@ -1,0 +1,247 @@
+//! The fit of a model to line data by maximum likelihood.
+
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DMatrix};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use super::covariance::Information;
+use super::limits::{FIRST_RELATIVE_NOISE, PLAUSIBLE};
+use super::multi_start::{self, Minima, starts};
+use super::residual::{PriorRow, Residual};
+use super::response_model::ResponseModel;
+use super::search::{Bounds, Minimum};
+use super::unknown_noise::{UnknownNoise, WeightedMinimum};
+use super::weights::Weights;
+use super::{LikelihoodError, NoiseSource, Settings};
+
+/// First values, bounds and priors of the parameters of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ParameterSpace {
+    pub(super) start: Vec<f64>,
+    pub(super) bounds: Bounds,
+    pub(super) priors: Vec<PriorRow>,
+}
+
+/// A fit with everything that judging it needs.
+pub(super) struct Fit<'a, M> {
+    pub(super) model: &'a M,
+    pub(super) data: &'a LineData,
+    pub(super) space: &'a ParameterSpace,
+    pub(super) weights: Weights,
+    pub(super) minimum: Minimum,
+    pub(super) minima: Minima,
+    /// Information of data and priors in the parameters that no bound holds.
+    pub(super) information: Information,
+    /// Degrees of freedom of the level of the noise; ∞ for known noise.
+    pub(super) degrees_of_freedom: f64,
+    /// Sum of squares of the data over its expectation; `None` if the noise comes from the residual.
+    pub(super) misfit_ratio: Option<f64>,
+    /// Probability of a larger misfit under a right model with known noise.
+    pub(super) misfit_p_value: Option<f64>,
+    pub(super) is_white: Option<bool>,
+}
+
+/// Fits `model` to `data`.
+///
+/// # Errors
+/// [`LikelihoodError`].
+pub(super) fn fit<'a, M: ResponseModel>(
+    model: &'a M,
+    data: &'a LineData,
+    space: &'a ParameterSpace,
+    settings: &Settings,
+) -> Result<Fit<'a, M>, LikelihoodError> {
+    check(model, data, space)?;
+    let noise = match settings.noise {
+        NoiseSource::Automatic => data.noise(),
+        _ => None,
+    };
+    match noise {
+        Some(noise) => {
+            let weights = Weights::new(noise.covariance().to_vec(), data.outputs().ncols());
+            weights.check(data)?;
+            with_known_noise(model, data, space, weights, settings)
+        }
+        None => with_unknown_noise(model, data, space, settings),
+    }
+}
+
+fn check<M: ResponseModel>(
+    model: &M,
+    data: &LineData,
+    space: &ParameterSpace,
+) -> Result<(), LikelihoodError> {
+    let dimensions = model.dimensions();
+    for (what, expected, got) in [
+        ("outputs of the data, one per sensor", dimensions.outputs, data.outputs().ncols()),
+        ("inputs of the data, one per input", dimensions.inputs, data.inputs().ncols()),
+        ("lines of the data", model.omega().len(), data.len()),
+    ] {
+        if expected != got {
+            return Err(LikelihoodError::Size { what, expected, got });
+        }
+    }
+    if space.start.is_empty() {
+        return Err(LikelihoodError::NoParameter);
+    }
+    let none = Weights::new(Vec::new(), dimensions.outputs);
+    let residual = Residual { model, data, weights: &none, priors: &[] };
+    let transient = residual.transient_unknowns();
+    let unknowns = space.start.len() + transient;
+    let numbers = residual.len();
+    // A line alone determines nothing about its noise.
+    if numbers + space.priors.len() <= unknowns {
+        return Err(LikelihoodError::TooFewLines { numbers, unknowns });
+    }
+    Ok(())
+}
+
+fn with_known_noise<'a, M: ResponseModel>(
+    model: &'a M,
+    data: &'a LineData,
+    space: &'a ParameterSpace,
+    weights: Weights,
+    settings: &Settings,
+) -> Result<Fit<'a, M>, LikelihoodError> {
+    let outputs = data.outputs().ncols();
+    let freedom = data.noise().map_or(f64::INFINITY, |noise| noise.degrees_of_freedom());
+    let [inflation, mean_ratio] = sampled_weights(freedom, outputs)?;
+    let residual = Residual { model, data, weights: &weights, priors: &space.priors };
+    let spare = (residual.len() + space.priors.len())
+        .saturating_sub(space.start.len() + residual.transient_unknowns());
+    let expected = spare as f64 * mean_ratio;
+    let total = freedom * data.len() as f64;
+    let spread = (2.0 / spare.max(1) as f64 + 2.0 / total).sqrt();
+    let explains = |cost: f64| cost <= expected * (1.0 + PLAUSIBLE * spread);
+    let minima = searched(&residual, space, settings, explains)?;
+    let minimum = minima.best().minimum.clone();
+    let information = Information::new(&residual, &minimum, inflation)?;
+    let chi_squared = ChiSquared::new(spare.max(1) as f64).ok();
+    let p_value = chi_squared.map(|law| law.sf(minimum.cost / mean_ratio));
+    Ok(Fit {
+        model,
+        data,
+        space,
+        misfit_ratio: Some(minimum.cost / expected),
+        misfit_p_value: p_value.filter(|_| freedom.is_infinite()),
+        weights,
+        minimum,
+        minima,
+        information,
+        degrees_of_freedom: total,
+        is_white: None,
+    })
+}
+
+fn with_unknown_noise<'a, M: ResponseModel>(
+    model: &'a M,
+    data: &'a LineData,
+    space: &'a ParameterSpace,
+    settings: &Settings,
+) -> Result<Fit<'a, M>, LikelihoodError> {
+    let unknown = UnknownNoise { model, data, priors: &space.priors, bounds: &space.bounds };
+    let weights = unknown.first_weights();
+    let residual = Residual { model, data, weights: &weights, priors: &space.priors };
+    let mut minima = searched(&residual, space, settings, |_| false)?;
+    let white = unknown.white(&minima.best().minimum)?;
+    let smooth = match settings.noise {
+        NoiseSource::WhiteResidual => None,
+        _ => unknown.smooth(&white)?,
+    };
+    let WeightedMinimum { minimum, weights, is_white, .. } = smooth.unwrap_or(white);
+    minima.ends[0].minimum = minimum.clone();
+    let residual = Residual { model, data, weights: &weights, priors: &space.priors };
+    let information = Information::new(&residual, &minimum, 1.0)?;
+    let unknowns = space.start.len() + residual.transient_unknowns();
+    let spare = residual.len().saturating_sub(unknowns).max(1);
+    Ok(Fit {
+        model,
+        data,
+        space,
+        weights,
+        minimum,
+        minima,
+        information,
+        degrees_of_freedom: spare as f64,
+        misfit_ratio: None,
+        misfit_p_value: None,
+        is_white: Some(is_white),
+    })
+}
+
+fn searched<M: ResponseModel>(
+    residual: &Residual<'_, M>,
+    space: &ParameterSpace,
+    settings: &Settings,
+    explains: impl Fn(f64) -> bool,
+) -> Result<Minima, LikelihoodError> {
+    let relative = residual.weights.with_relative(residual.data, FIRST_RELATIVE_NOISE);
+    let rough = Residual { weights: &relative, ..*residual };
+    let starts = starts(
+        &space.start,
+        &space.bounds,
+        settings.starts.max(1),
+        settings.spread,
+        settings.seed,
+    );
+    multi_start::search(&rough, residual, &space.bounds, &starts, explains)
+}
+
+/// Covariance of an estimate over the inverse of the Fisher information, and mean of a squared residual, for
+/// weights Ŝ⁻¹ of sample covariances Ŝ with ν degrees of freedom: ν²/((ν − p)² − 1) and ν/(ν − p).
+fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodError> {
+    if freedom.is_infinite() {
+        return Ok([1.0, 1.0]);
+    }
+    let p = outputs as f64;
+    if freedom <= p + 1.0 {
+        return Err(LikelihoodError::FewDegreesOfFreedom {
+            degrees_of_freedom: freedom,
+            outputs,
+        });
+    }
+    let rest = freedom - p;
+    Ok([freedom * freedom / (rest * rest - 1.0), freedom / rest])
+}
+
+impl<'a, M: ResponseModel> Fit<'a, M> {
+    pub(super) fn residual(&self) -> Residual<'_, M> {
+        Residual {
+            model: self.model,
+            data: self.data,
+            weights: &self.weights,
+            priors: &self.space.priors,
+        }
+    }
+
+    /// Quantile of the deviation of an estimate in units of its standard error.
+    pub(super) fn quantile(&self, probability: f64) -> f64 {
+        let freedom = self.degrees_of_freedom.clamp(1.0, 1e6);
+        StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |law| law.inverse_cdf(probability))
+    }
+
+    /// Logarithm of the likelihood: −½ Σ r² − Σ ln det(π S) over the lines, the errors of the inputs
+    /// averaged out.
+    pub(super) fn log_likelihood(&self) -> Option<f64> {
+        let p = self.data.outputs().ncols() as f64;
+        let mut log_determinant = 0.0;
+        for row in 0..self.data.len() {
+            let line = self.model.at(&self.minimum.parameters, row)?;
+            let input = self.data.inputs().row(row).transpose();
+            let weighted = self.weights.line(row, super::LineResponse::receptance(&line), |c| {
+                self.model.add_covariance(row, &line, &input, c);
+            })?;
+            let roots: f64 = weighted.lower.diagonal().iter().map(|z| z.re.ln()).sum();
+            log_determinant += 2.0 * roots + p * std::f64::consts::PI.ln();
+        }
+        Some(-0.5 * self.minimum.cost - log_determinant)
+    }
+
+    /// Errors y − G u of every line and output over the outputs, root mean squares per output.
+    pub(super) fn relative_errors(&self) -> Option<Vec<f64>> {
+        let (errors, _) = self.residual().errors(&self.minimum.parameters)?;
+        let norm = |of: &DMatrix<Complex<f64>>, at: usize| of.column(at).norm();
+        let ratio = |at: usize| norm(&errors, at) / norm(self.data.outputs(), at);
+        Some((0..errors.ncols()).map(ratio).collect())
+    }
+}

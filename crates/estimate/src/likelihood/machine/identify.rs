@@ -1,0 +1,180 @@
+//! Identification of the unknowns of a machine.
+
+use mechid_model::elements::{Assembly, Instruments, Machine};
+use mechid_spectra::{LineData, Transient};
+use nalgebra::{Complex, DMatrix};
+
+use super::{MachineModel, MeasuredPart};
+use crate::likelihood::estimate::LikelihoodEstimate;
+use crate::likelihood::fit::{ParameterSpace, fit};
+use crate::likelihood::limits::OPEN_DOFS;
+use crate::likelihood::residual::PriorRow;
+use crate::likelihood::search::Bounds;
+use crate::likelihood::{LikelihoodError, Settings};
+
+/// Measured receptance of the part of a machine whose degrees of freedom are [`Machine::measured`], in their
+/// order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredReceptance {
+    /// Receptance, d × d, in m/N, one for each line of the data.
+    pub receptance: Vec<DMatrix<Complex<f64>>>,
+    /// E|ΔH|² of each entry, in m²/N², if it is known.
+    pub variance: Option<Vec<DMatrix<f64>>>,
+}
+
+/// Unknowns of a machine that were identified.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MachineEstimate {
+    /// Parameters, intervals, minima and what is not determined.
+    pub likelihood: LikelihoodEstimate,
+    /// The machine by index.
+    pub assembly: Assembly,
+    /// Variance of the noise of each output, lines × p.
+    pub(super) variance: DMatrix<f64>,
+}
+
+/// Identifies the unknown coefficients of a machine from line data whose outputs are the readings of its
+/// sensors and whose inputs are its inputs, in this order.
+///
+/// ```
+/// use mechid_estimate::likelihood::{Settings, machine::identify_machine};
+/// use mechid_model::ResponseQuantity;
+/// use mechid_model::elements::{Element, FreeCoefficient, Input, Instruments, Machine, Sensor};
+/// use mechid_spectra::{LineData, Transient};
+/// use nalgebra::{Complex, DMatrix};
+///
+/// // A mass of 2 kg on a spring and a damper, with an exact receptance up to a disturbance.
+/// let omega: Vec<f64> = (1..40).map(|line| 5.0 * line as f64).collect();
+/// let response = |w: f64| Complex::new(2e4 - 2.0 * w * w, 8.0 * w).inv();
+/// let disturbed = |at: usize| response(omega[at]) + Complex::cis((at * at) as f64) * 1e-7;
+/// let outputs = DMatrix::from_fn(omega.len(), 1, |at, _| disturbed(at));
+/// let inputs = DMatrix::from_element(omega.len(), 1, Complex::new(1.0, 0.0));
+/// let data = LineData::new(omega, inputs, outputs, Transient::None)?;
+///
+/// let machine = Machine::new(["x"]).with("m", Element::mass("x", 2.0)).with(
+///     "foot",
+///     Element::spring_damper(
+///         ["x", "support"],
+///         FreeCoefficient::from_start(3e4).at_least(0.0),
+///         FreeCoefficient::from_start(5.0).at_least(0.0),
+///     ),
+/// );
+/// let instruments = Instruments {
+///     sensors: vec![Sensor::new("x", ResponseQuantity::Displacement)],
+///     inputs: vec![Input::force("x")],
+///     ..Instruments::default()
+/// };
+/// let estimate = identify_machine(&data, &machine, &instruments, &Settings::default())?;
+/// let stiffness = estimate.likelihood.parameter("foot.k").unwrap();
+/// assert!((stiffness.value - 2e4).abs() < 4.0 * stiffness.standard_error.unwrap());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`LikelihoodError::Machine`] if the machine does not make sense, and what else keeps data and machine
+/// from leading to an estimate.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapter 9
+/// (maximum likelihood); Mottershead & Friswell (1993), J. Sound and Vibration 167, 347–375 (updating of the
+/// parameters of a model).
+pub fn identify_machine(
+    data: &LineData,
+    machine: &Machine,
+    instruments: &Instruments,
+    settings: &Settings,
+) -> Result<MachineEstimate, LikelihoodError> {
+    identify(data, machine, instruments, None, settings)
+}
+
+/// Identifies a machine of which one part, with the degrees of freedom [`Machine::measured`], is known by its
+/// measured receptance.
+///
+/// # Errors
+/// As [`identify_machine`]; [`LikelihoodError::Size`] unless there is one receptance per line with one row
+/// and column per degree of freedom of the part.
+///
+/// # Source
+/// de Klerk, Rixen & Voormeeren (2008), AIAA Journal 46, 1169–1181 (coupling of measured parts).
+pub fn identify_joined(
+    data: &LineData,
+    machine: &Machine,
+    instruments: &Instruments,
+    part: &MeasuredReceptance,
+    settings: &Settings,
+) -> Result<MachineEstimate, LikelihoodError> {
+    identify(data, machine, instruments, Some(part), settings)
+}
+
+fn identify(
+    data: &LineData,
+    machine: &Machine,
+    instruments: &Instruments,
+    part: Option<&MeasuredReceptance>,
+    settings: &Settings,
+) -> Result<MachineEstimate, LikelihoodError> {
+    let assembly = machine.assembly(instruments)?;
+    let part = match part {
+        Some(part) => Some(checked_part(data, &assembly, part)?),
+        None if assembly.measured().is_empty() => None,
+        None => {
+            let what = "measured receptances of the part `measured`";
+            return Err(LikelihoodError::Size { what, expected: data.len(), got: 0 });
+        }
+    };
+    let open = data.records().iter().any(|(_, kind)| *kind != Transient::None);
+    if open && assembly.dof() > OPEN_DOFS {
+        return Err(LikelihoodError::LargeOpen { dof: assembly.dof(), most: OPEN_DOFS });
+    }
+    let model = MachineModel::new(&assembly, data.omega(), part.as_ref(), open)?;
+    let space = parameter_space(&assembly);
+    let fit = fit(&model, data, &space, settings)?;
+    let names: Vec<String> = assembly.parameters().iter().map(|p| p.name.clone()).collect();
+    let likelihood = LikelihoodEstimate::new(&fit, &names, settings.confidence);
+    let variance = DMatrix::from_fn(data.len(), data.outputs().ncols(), |row, output| {
+        fit.weights.variance(row, output)
+    });
+    Ok(MachineEstimate { likelihood, assembly, variance })
+}
+
+fn parameter_space(assembly: &Assembly) -> ParameterSpace {
+    let parameters = assembly.parameters();
+    let priors = parameters.iter().enumerate().filter_map(|(parameter, described)| {
+        let prior = described.prior?;
+        Some(PriorRow { parameter, mean: prior.mean, deviation: prior.standard_deviation })
+    });
+    ParameterSpace {
+        start: assembly.start(),
+        bounds: Bounds {
+            min: parameters.iter().map(|parameter| parameter.min).collect(),
+            max: parameters.iter().map(|parameter| parameter.max).collect(),
+        },
+        priors: priors.collect(),
+    }
+}
+
+fn checked_part(
+    data: &LineData,
+    assembly: &Assembly,
+    part: &MeasuredReceptance,
+) -> Result<MeasuredPart, LikelihoodError> {
+    let size = |what, expected, got| match expected == got {
+        true => Ok(()),
+        false => Err(LikelihoodError::Size { what, expected, got }),
+    };
+    let dofs = assembly.measured().to_vec();
+    size("measured receptances, one per line", data.len(), part.receptance.len())?;
+    for matrix in &part.receptance {
+        size("rows of a measured receptance", dofs.len(), matrix.nrows())?;
+        size("columns of a measured receptance", dofs.len(), matrix.ncols())?;
+    }
+    if let Some(variance) = &part.variance {
+        size("variances of receptances, one per line", data.len(), variance.len())?;
+        for matrix in variance {
+            size("rows of a variance of receptances", dofs.len(), matrix.nrows())?;
+            size("columns of a variance of receptances", dofs.len(), matrix.ncols())?;
+        }
+    }
+    let (receptance, variance) = (part.receptance.clone(), part.variance.clone());
+    Ok(MeasuredPart { dofs, receptance, variance })
+}

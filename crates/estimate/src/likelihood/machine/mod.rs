@@ -1,0 +1,29 @@
+//! A machine of named elements as a model of line data.
+
+mod banded;
+mod identify;
+mod model;
+mod modes;
+mod nominal;
+
+use nalgebra::{Complex, DMatrix};
+
+use super::LikelihoodError;
+
+pub use identify::{MachineEstimate, MeasuredReceptance, identify_joined, identify_machine};
+pub use model::{MachineLine, MachineModel};
+pub use modes::MachineMode;
+
+/// A part of a machine that is known by its measured receptance instead of a model.
+///
+/// Errors of the table count as independent from line to line; where several records have the same
+/// frequencies, they count as independent from record to record, too.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredPart {
+    /// Degrees of freedom of rows and columns, by their index in the machine.
+    pub dofs: Vec<usize>,
+    /// Receptance, d × d, in m/N, one for each line of the data.
+    pub receptance: Vec<DMatrix<Complex<f64>>>,
+    /// E|ΔH|² of each entry, in m²/N², if it is known.
+    pub variance: Option<Vec<DMatrix<f64>>>,
+}

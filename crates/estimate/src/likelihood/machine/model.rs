@@ -1,0 +1,397 @@
+//! The response of a machine: what is known, coupled to what is not by a small solve on every line.
+
+use std::ops::AddAssign;
+
+use mechid_model::ResponseQuantity;
+use mechid_model::elements::{Assembly, Pattern, Power};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::nominal::{NominalLine, Places, is_coupled, nominal_coefficient, prepare};
+use super::{LikelihoodError, MeasuredPart};
+use crate::likelihood::{Dimensions, LineResponse, ResponseModel};
+
+/// A term of the dynamic stiffness between the joints; index j is the support.
+#[derive(Debug, Clone)]
+struct JointTerm {
+    entries: JointPattern,
+    power: Power,
+    /// Coefficient in the nominal machine.
+    nominal: Complex<f64>,
+    /// Index among the terms of the assembly.
+    term: usize,
+}
+
+#[derive(Debug, Clone)]
+enum JointPattern {
+    Dyad { left: Vec<(usize, f64)>, right: Vec<(usize, f64)> },
+    Block { dofs: Vec<usize>, matrix: DMatrix<f64>, support: Vec<f64> },
+}
+
+/// The [`ResponseModel`] of a machine.
+///
+/// With the receptance H₀ of the nominal machine and the change Δ of the dynamic stiffness at the joints,
+/// the response is x = x₀ − H (Δ x₀ + Δ_g x_g) with H = H₀ (I + Δ H₀)⁻¹, of the order of the number of
+/// joints however many degrees of freedom are known.
+///
+/// # Source
+/// Hager (1989), SIAM Review 31, 221–239 (updating an inverse); Gordis, Bielawa & Flannelly (1991), J. Sound
+/// and Vibration 150, 139–158 (structural synthesis in the frequency domain).
+#[derive(Debug, Clone)]
+pub struct MachineModel {
+    assembly: Assembly,
+    omega: Vec<f64>,
+    places: Places,
+    terms: Vec<JointTerm>,
+    lines: Vec<NominalLine>,
+    line_of: Vec<usize>,
+    /// Sensors: weights of places and of the support, index r, and the quantity measured.
+    sensors: Vec<(Vec<(usize, f64)>, ResponseQuantity)>,
+    states: usize,
+    measured: Option<MeasuredPart>,
+}
+
+/// Response of a machine at one line.
+#[derive(Debug, Clone)]
+pub struct MachineLine<'a> {
+    model: &'a MachineModel,
+    /// G, p × q.
+    receptance: DMatrix<Complex<f64>>,
+    /// Response of the sensors to each own load, p × loads, and to all of them.
+    own_response: DMatrix<Complex<f64>>,
+    own: Option<DVector<Complex<f64>>>,
+    /// Own loads in units of those that are known.
+    own_values: Vec<f64>,
+    /// S H from the joints, p × j.
+    from_joints: DMatrix<Complex<f64>>,
+    /// Motion of joints and support (j + 1) per unit of each input and own load.
+    joints: DMatrix<Complex<f64>>,
+    /// H between the joints, if there are state loads.
+    internal: Option<DMatrix<Complex<f64>>>,
+    /// Frequency factor of each term between the joints.
+    factors: Vec<Complex<f64>>,
+    /// Of a measured part: S (I − H Δ) at its degrees of freedom, and the forces on it per input.
+    part: Option<[DMatrix<Complex<f64>>; 2]>,
+}
+
+impl MachineModel {
+    /// Prepares a machine for lines at `omega` (rad/s); with `open` records all degrees of freedom become
+    /// joints, for the difference between the initial and the final state acts on each of them.
+    ///
+    /// # Errors
+    /// [`LikelihoodError::NoResponse`] if the machine has no response at its first values.
+    pub fn new(
+        assembly: &Assembly,
+        omega: &[f64],
+        measured: Option<&MeasuredPart>,
+        open: bool,
+    ) -> Result<Self, LikelihoodError> {
+        let places = Places::new(assembly, measured, open);
+        let (lines, line_of) = prepare(assembly, measured, &places, omega)?;
+        let n = assembly.dof();
+        let joint = |dof: usize| match dof == n {
+            true => places.joints,
+            false => places.place(dof).unwrap_or(places.joints),
+        };
+        let start = assembly.start();
+        let coupled = assembly.terms().iter().enumerate();
+        let coupled = coupled.filter(|(_, term)| is_coupled(term, measured));
+        let terms = coupled.map(|(at, term)| {
+            let indexed = |entries: &[(usize, f64)]| -> Vec<(usize, f64)> {
+                entries.iter().map(|(dof, value)| (joint(*dof), *value)).collect()
+            };
+            let entries = match &term.pattern {
+                Pattern::Dyad { left, right } => {
+                    // The support has no equation of its own.
+                    let moving: Vec<_> = left.iter().filter(|(dof, _)| *dof < n).copied().collect();
+                    JointPattern::Dyad { left: indexed(&moving), right: indexed(right) }
+                }
+                Pattern::Block { dofs, matrix, support } => JointPattern::Block {
+                    dofs: dofs.iter().map(|dof| joint(*dof)).collect(),
+                    matrix: matrix.clone(),
+                    support: support.clone(),
+                },
+            };
+            let nominal = nominal_coefficient(term, &start, measured);
+            JointTerm { entries, power: term.power, nominal, term: at }
+        });
+        let terms = terms.collect();
+        let sensors = assembly.sensors().iter().map(|sensor| {
+            let place = |dof: usize| places.place(dof).unwrap_or(places.dofs.len());
+            let entries = sensor.entries.iter().map(|(dof, weight)| (place(*dof), *weight));
+            (entries.collect(), sensor.quantity)
+        });
+        let sensors = sensors.collect();
+        Ok(Self {
+            sensors,
+            terms,
+            lines,
+            line_of,
+            states: if open { places.joints } else { 0 },
+            places,
+            omega: omega.to_vec(),
+            assembly: assembly.clone(),
+            measured: measured.cloned(),
+        })
+    }
+
+    /// Returns the machine by index.
+    pub fn assembly(&self) -> &Assembly {
+        &self.assembly
+    }
+
+    /// Δ, j × (j + 1), and the frequency factors of its terms.
+    fn change(&self, parameters: &[f64], omega: f64) -> (DMatrix<Complex<f64>>, Vec<Complex<f64>>) {
+        let joints = self.places.joints;
+        let speed = self.assembly.speed().at(omega);
+        let mut change = DMatrix::zeros(joints, joints + 1);
+        let mut factors = Vec::with_capacity(self.terms.len());
+        for term in &self.terms {
+            let factor = term.power.factor(omega, speed);
+            factors.push(factor);
+            let value = self.assembly.terms()[term.term].value(parameters);
+            let coefficient = factor * (Complex::from(value) - term.nominal);
+            match &term.entries {
+                JointPattern::Dyad { left, right } => {
+                    for (row, a) in left {
+                        for (column, b) in right {
+                            change[(*row, *column)] += coefficient * (a * b);
+                        }
+                    }
+                }
+                JointPattern::Block { dofs, matrix, support } => {
+                    for (i, row) in dofs.iter().enumerate() {
+                        for (j, column) in dofs.iter().enumerate() {
+                            change[(*row, *column)] += coefficient * matrix[(i, j)];
+                        }
+                        change[(*row, joints)] += coefficient * support[i];
+                    }
+                }
+            }
+        }
+        (change, factors)
+    }
+
+    /// Readings of the sensors under motions of the places, r × m, and of the support, in one column each.
+    fn read(
+        &self,
+        omega: f64,
+        places: &DMatrix<Complex<f64>>,
+        support: Option<&[Complex<f64>]>,
+    ) -> DMatrix<Complex<f64>> {
+        let mut readings = DMatrix::zeros(self.sensors.len(), places.ncols());
+        for (row, (entries, quantity)) in self.sensors.iter().enumerate() {
+            let factor = quantity.per_displacement(omega);
+            for column in 0..places.ncols() {
+                let motion = entries.iter().map(|(place, weight)| match *place < places.nrows() {
+                    true => places[(*place, column)] * *weight,
+                    false => support.map_or(Complex::default(), |of| of[column]) * *weight,
+                });
+                readings[(row, column)] = factor * motion.sum::<Complex<f64>>();
+            }
+        }
+        readings
+    }
+
+    /// S (I − H Δ) at the degrees of freedom of a measured part, and the forces f − Δ x on it per input.
+    fn part(
+        &self,
+        omega: f64,
+        change: &DMatrix<Complex<f64>>,
+        from_joints: &DMatrix<Complex<f64>>,
+        joints: &DMatrix<Complex<f64>>,
+    ) -> Option<[DMatrix<Complex<f64>>; 2]> {
+        let part = self.measured.as_ref().filter(|part| part.variance.is_some())?;
+        let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
+        let coupled = from_joints * change.columns(0, j);
+        let reaction = change * joints.columns(0, inputs);
+        let n = self.assembly.dof();
+        let mut readings = DMatrix::zeros(self.sensors.len(), part.dofs.len());
+        let mut forces = DMatrix::zeros(part.dofs.len(), inputs);
+        for (at, dof) in part.dofs.iter().enumerate() {
+            let place = self.places.place(*dof)?;
+            for (row, (entries, quantity)) in self.sensors.iter().enumerate() {
+                let direct: f64 = entries.iter().filter(|(of, _)| *of == place).map(|e| e.1).sum();
+                readings[(row, at)] = quantity.per_displacement(omega) * direct;
+                if place < j {
+                    readings[(row, at)] -= coupled[(row, place)];
+                }
+            }
+            for (column, input) in self.assembly.inputs().iter().enumerate() {
+                let loads = input.load(n, omega, self.assembly.speed());
+                let direct = loads.iter().filter(|(of, _)| of == dof).map(|(_, value)| value);
+                forces[(at, column)] = direct.sum();
+                if place < j {
+                    forces[(at, column)] -= reaction[(place, column)];
+                }
+            }
+        }
+        Some([readings, forces])
+    }
+}
+
+impl ResponseModel for MachineModel {
+    type Line<'a> = MachineLine<'a>;
+
+    fn dimensions(&self) -> Dimensions {
+        Dimensions {
+            outputs: self.sensors.len(),
+            inputs: self.assembly.inputs().len(),
+            parameters: self.assembly.parameters().len(),
+            states: self.states,
+        }
+    }
+
+    fn omega(&self) -> &[f64] {
+        &self.omega
+    }
+
+    fn at(&self, parameters: &[f64], row: usize) -> Option<MachineLine<'_>> {
+        let (omega, nominal) = (self.omega[row], &self.lines[self.line_of[row]]);
+        let (j, inputs) = (self.places.joints, self.assembly.inputs().len());
+        let (change, factors) = self.change(parameters, omega);
+        let all = nominal.loads.ncols();
+        let mut from_joints = nominal.from_joints.clone();
+        let mut loads = nominal.loads.clone();
+        if j > 0 {
+            let within = change.columns(0, j) * nominal.from_joints.rows(0, j);
+            let coupled = (DMatrix::identity(j, j) + within).transpose();
+            from_joints = coupled.lu().solve(&nominal.from_joints.transpose())?.transpose();
+            let mut reaction = change.columns(0, j) * nominal.loads.rows(0, j);
+            for (mut column, motion) in reaction.column_iter_mut().zip(&nominal.support) {
+                column.axpy(*motion, &change.column(j), Complex::new(1.0, 0.0));
+            }
+            loads -= &from_joints * reaction;
+        }
+        let mut joints = loads.rows(0, j).into_owned().insert_row(j, Complex::default());
+        joints.row_mut(j).iter_mut().zip(&nominal.support).for_each(|(to, from)| *to = *from);
+        let responses = self.read(omega, &loads, Some(&nominal.support));
+        let internal = (self.states > 0).then(|| from_joints.rows(0, j).into_owned());
+        let own_loads = self.assembly.own_loads(omega);
+        let value = |parameter: &Option<usize>| parameter.map_or(1.0, |at| parameters[at]);
+        let own_values: Vec<f64> = own_loads.iter().map(|(of, _)| value(of)).collect();
+        let own_response = responses.columns(inputs, all - inputs).into_owned();
+        let values = DVector::from_iterator(own_values.len(), own_values.iter().map(|v| v.into()));
+        let own = (!own_values.is_empty()).then(|| &own_response * values);
+        let from_joints = self.read(omega, &from_joints, None);
+        let receptance = responses.columns(0, inputs).into_owned();
+        receptance.iter().all(|z| z.is_finite()).then_some(())?;
+        let part = self.part(omega, &change, &from_joints, &joints);
+        Some(MachineLine {
+            model: self,
+            receptance,
+            own_response,
+            own,
+            own_values,
+            from_joints,
+            joints,
+            internal,
+            factors,
+            part,
+        })
+    }
+
+    /// Adds what the errors of a measured receptance make of the outputs: Σ var_ij |g_j|² P_i P_iᴴ with the
+    /// forces g on the part and the readings P of its motions.
+    fn add_covariance(
+        &self,
+        row: usize,
+        line: &MachineLine<'_>,
+        input: &DVector<Complex<f64>>,
+        covariance: &mut DMatrix<Complex<f64>>,
+    ) {
+        let variance = self.measured.as_ref().and_then(|part| part.variance.as_ref());
+        let (Some(variance), Some([readings, forces])) = (variance, &line.part) else { return };
+        let forces = forces * input;
+        let power = forces.map(|force| force.norm_sqr());
+        let by_row = &variance[row] * power;
+        for (at, weight) in by_row.iter().enumerate() {
+            let reading = readings.column(at);
+            *covariance += reading * reading.adjoint() * Complex::from(*weight);
+        }
+    }
+}
+
+impl LineResponse for MachineLine<'_> {
+    fn receptance(&self) -> &DMatrix<Complex<f64>> {
+        &self.receptance
+    }
+
+    fn own_response(&self) -> Option<&DVector<Complex<f64>>> {
+        self.own.as_ref()
+    }
+
+    fn state_response(&self) -> Option<&DMatrix<Complex<f64>>> {
+        (self.model.states > 0).then_some(&self.from_joints)
+    }
+
+    /// ∂y = −S H ∂D x for every term, and the response to a unit of each own load.
+    fn sensitivity(
+        &self,
+        parameters: &[f64],
+        input: &DVector<Complex<f64>>,
+        states: &DVector<Complex<f64>>,
+        to: &mut DMatrix<Complex<f64>>,
+    ) {
+        to.fill(Complex::default());
+        let inputs = input.len();
+        let mut motion = self.joints.columns(0, inputs) * input;
+        for (value, column) in self.own_values.iter().zip(inputs..) {
+            motion.axpy(Complex::from(*value), &self.joints.column(column), Complex::new(1.0, 0.0));
+        }
+        if let Some(internal) = self.internal.as_ref().filter(|_| !states.is_empty()) {
+            let moved = internal * states;
+            motion.rows_mut(0, moved.len()).add_assign(&moved);
+        }
+        let assembly = &self.model.assembly;
+        for (term, factor) in self.model.terms.iter().zip(&self.factors) {
+            let source = &assembly.terms()[term.term];
+            if source.is_known() {
+                continue;
+            }
+            let response = self.response_to(&term.entries, &motion) * -*factor;
+            for (parameter, slope) in source.derivatives(parameters) {
+                to.column_mut(parameter).axpy(
+                    Complex::from(slope),
+                    &response,
+                    Complex::new(1.0, 0.0),
+                );
+            }
+        }
+        for (column, (parameter, _)) in assembly.own_loads(1.0).iter().enumerate() {
+            if let Some(parameter) = parameter {
+                to.column_mut(*parameter).add_assign(&self.own_response.column(column));
+            }
+        }
+    }
+}
+
+impl MachineLine<'_> {
+    /// Readings under the forces of a term of unit coefficient that moves with `motion` (j + 1).
+    fn response_to(
+        &self,
+        entries: &JointPattern,
+        motion: &DVector<Complex<f64>>,
+    ) -> DVector<Complex<f64>> {
+        let one = Complex::new(1.0, 0.0);
+        let mut response = DVector::zeros(self.from_joints.nrows());
+        match entries {
+            JointPattern::Dyad { left, right } => {
+                let stretch: Complex<f64> = right.iter().map(|(at, b)| motion[*at] * *b).sum();
+                for (at, a) in left {
+                    response.axpy(stretch * *a, &self.from_joints.column(*at), one);
+                }
+            }
+            JointPattern::Block { dofs, matrix, support } => {
+                let ground = motion[motion.len() - 1];
+                for (i, row) in dofs.iter().enumerate() {
+                    let moved = dofs.iter().enumerate();
+                    let force: Complex<f64> =
+                        moved.map(|(j, column)| motion[*column] * matrix[(i, j)]).sum();
+                    let force = force + ground * support[i];
+                    response.axpy(force, &self.from_joints.column(*row), one);
+                }
+            }
+        }
+        response
+    }
+}

@@ -1,0 +1,123 @@
+//! Modes of an identified machine, with the uncertainty of its parameters.
+
+use mechid_model::elements::{Assembly, Power, Speed};
+use mechid_model::{Mode, SecondOrderSystem};
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::MachineEstimate;
+use crate::likelihood::LikelihoodError;
+
+/// A mode with standard errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MachineMode {
+    /// Eigenvalue and shape.
+    pub mode: Mode,
+    /// Standard error of the natural frequency |λ|, in rad/s.
+    pub natural_frequency_error: f64,
+    /// Standard error of the damping ratio.
+    pub damping_ratio_error: f64,
+}
+
+/// Relative distance from an eigenvalue at which its vectors are found by inverse iteration.
+const SHIFT: f64 = 1e-7;
+
+impl MachineEstimate {
+    /// Returns M, C + Ω G and K with the parameters identified, at the constant speed of the instruments.
+    ///
+    /// # Errors
+    /// What [`Assembly::system`] refuses: a degree of freedom without mass.
+    pub fn system(&self) -> Result<SecondOrderSystem, LikelihoodError> {
+        let speed = match self.assembly.speed() {
+            Speed::Constant(speed) => speed,
+            Speed::None | Speed::Synchronous => 0.0,
+        };
+        let system = self.assembly.system(&self.likelihood.values(), speed);
+        system.map_err(|error| LikelihoodError::Machine(error.into()))
+    }
+
+    /// Returns the modes of [`MachineEstimate::system`] by rising frequency; structural damping is not in
+    /// them.
+    ///
+    /// # Errors
+    /// As [`MachineEstimate::system`], and if the eigenvalues are not found.
+    ///
+    /// # Source
+    /// Adhikari (1999), AIAA Journal 37, 1452–1458 (derivatives of the eigenvalues of damped systems).
+    pub fn modes(&self) -> Result<Vec<MachineMode>, LikelihoodError> {
+        let system = self.system()?;
+        let modes = system.modes().map_err(|error| LikelihoodError::Machine(error.into()))?;
+        Ok(modes.into_iter().map(|mode| self.mode(&system, mode)).collect())
+    }
+
+    fn mode(&self, system: &SecondOrderSystem, mode: Mode) -> MachineMode {
+        let lambda = mode.eigenvalue();
+        let slopes = slopes(&self.assembly, &self.likelihood.values(), system, &mode);
+        let size = lambda.norm();
+        let error = |gradient: DVector<f64>| {
+            gradient.dot(&(&self.likelihood.covariance * &gradient)).max(0.0).sqrt()
+        };
+        // ∂|λ| = Re(λ̄ ∂λ)/|λ| and ζ = −Re λ/|λ|.
+        let of_size = |slope: &Complex<f64>| (lambda.conj() * slope).re / size;
+        let (frequency_error, damping_error) = match slopes {
+            None => (f64::NAN, f64::NAN),
+            Some(slopes) => (
+                error(slopes.map(|slope| of_size(&slope))),
+                error(slopes.map(|slope| {
+                    -slope.re / size + lambda.re * of_size(&slope) / (size * size)
+                })),
+            ),
+        };
+        MachineMode {
+            mode,
+            natural_frequency_error: frequency_error,
+            damping_ratio_error: damping_error,
+        }
+    }
+}
+
+/// ∂λ/∂θ = −ψᵀ ∂D φ / ψᵀ D′ φ with the left and right vectors of D(λ); `None` for eigenvalues that coincide.
+fn slopes(
+    assembly: &Assembly,
+    values: &[f64],
+    system: &SecondOrderSystem,
+    mode: &Mode,
+) -> Option<DVector<Complex<f64>>> {
+    let (lambda, n) = (mode.eigenvalue(), system.dof());
+    let near = lambda * (1.0 + SHIFT);
+    let complex = |matrix: &DMatrix<f64>| matrix.map(Complex::from);
+    let dynamic = complex(system.mass()) * (near * near)
+        + complex(system.damping()) * near
+        + complex(system.stiffness());
+    let right = mode.shape();
+    let factors = dynamic.transpose().lu();
+    let mut left = DVector::from_fn(n, |at, _| Complex::new(1.0 + 0.3 * (at % 7) as f64, 0.1));
+    for _ in 0..3 {
+        left = factors.solve(&left)?;
+        let norm = left.norm();
+        (norm.is_finite() && norm > 0.0).then_some(())?;
+        left.unscale_mut(norm);
+    }
+    let slope = complex(system.mass()) * (lambda * 2.0) + complex(system.damping());
+    let denominator = left.dot(&(slope * right));
+    let mut slopes = DVector::<Complex<f64>>::zeros(values.len());
+    let speed = match assembly.speed() {
+        Speed::Constant(speed) => speed,
+        _ => 0.0,
+    };
+    for term in assembly.terms().iter().filter(|term| term.power != Power::Hysteresis) {
+        if term.is_known() {
+            continue;
+        }
+        let [factor, _] = term.power.at_eigenvalue(lambda, speed);
+        let mut work = Complex::default();
+        term.for_each_entry(n, |row, column, value| {
+            if column < n {
+                work += left[row] * right[column] * value;
+            }
+        });
+        for (parameter, by) in term.derivatives(values) {
+            slopes[parameter] -= factor * work * by / denominator;
+        }
+    }
+    slopes.iter().all(|slope| slope.is_finite()).then_some(slopes)
+}

@@ -1,0 +1,28 @@
+//! One likelihood for line data of every record and every model.
+//!
+//! Records come as [`LineData`](mechid_spectra::LineData): inputs, outputs and the covariance of their noise
+//! line by line. A model comes as a [`ResponseModel`]. Between them there is one residual with one
+//! derivative, one bounded search, and one covariance.
+
+mod covariance;
+mod error;
+mod estimate;
+mod fit;
+mod limits;
+pub mod machine;
+mod multi_start;
+mod profile;
+mod residual;
+mod response_model;
+mod search;
+mod settings;
+mod transient;
+mod unknown_noise;
+mod weights;
+
+pub use error::LikelihoodError;
+pub use estimate::{
+    Combination, FoundMinimum, IntervalKind, LikelihoodEstimate, ParameterEstimate, PriorReport,
+};
+pub use response_model::{Dimensions, LineResponse, ResponseModel};
+pub use settings::{NoiseSource, Settings};

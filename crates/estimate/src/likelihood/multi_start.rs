@@ -1,0 +1,97 @@
+//! Searches from several first values, and all minima that they lead to.
+
+use mechid_signal::{Sampling, noise};
+
+use super::LikelihoodError;
+use super::limits::{FIRST_STEPS, SAME_MINIMUM, STEPS};
+use super::search::{Bounds, LeastSquaresProblem, Minimum, minimise};
+
+/// A minimum with the number of searches that ended there.
+#[derive(Debug, Clone)]
+pub(super) struct SearchEnd {
+    pub(super) minimum: Minimum,
+    pub(super) searches: usize,
+}
+
+/// All minima found, the lowest first.
+#[derive(Debug, Clone)]
+pub(super) struct Minima {
+    pub(super) ends: Vec<SearchEnd>,
+    /// Number of searches, those without an end included.
+    pub(super) searches: usize,
+}
+
+/// First values of every search: the given ones, then each times a log-normal factor, within the bounds.
+pub(super) fn starts(
+    given: &[f64],
+    bounds: &Bounds,
+    count: usize,
+    spread: f64,
+    seed: u64,
+) -> Vec<Vec<f64>> {
+    let mut starts = vec![given.to_vec()];
+    let drawn = Sampling::new(1.0, count.max(2)).ok();
+    let drawn = drawn.and_then(|rows| noise::white(rows, given.len().max(1), 1.0, seed).ok());
+    for row in 1..count {
+        let Some(drawn) = &drawn else { break };
+        let factor = |at: usize| (spread.ln() * drawn.data()[(row, at)]).exp();
+        let value = |at: usize| (given[at] * factor(at)).clamp(bounds.min[at], bounds.max[at]);
+        starts.push((0..given.len()).map(value).collect());
+    }
+    starts
+}
+
+/// Searches from one start after the other, first with weights relative to the response, then with those of
+/// the noise. It ends early when two searches have ended at one minimum that the noise explains.
+///
+/// # Errors
+/// [`LikelihoodError::NotConverged`] if no search ends at a minimum.
+pub(super) fn search(
+    rough: &impl LeastSquaresProblem,
+    problem: &impl LeastSquaresProblem,
+    bounds: &Bounds,
+    starts: &[Vec<f64>],
+    explains: impl Fn(f64) -> bool,
+) -> Result<Minima, LikelihoodError> {
+    let mut minima = Minima { ends: Vec::new(), searches: 0 };
+    for start in starts {
+        minima.searches += 1;
+        let near = minimise(rough, bounds, start, FIRST_STEPS);
+        let from = near.map_or_else(|| start.clone(), |near| near.parameters);
+        if let Some(minimum) = minimise(problem, bounds, &from, STEPS).filter(|m| m.converged) {
+            log::debug!("search {} ended at {:.6e}", minima.searches, minimum.cost);
+            minima.push(minimum);
+        }
+        let agreed = |best: &SearchEnd| best.searches >= 2 && explains(best.minimum.cost);
+        if minima.ends.first().is_some_and(agreed) {
+            break;
+        }
+    }
+    if minima.ends.is_empty() {
+        return Err(LikelihoodError::NotConverged { searches: minima.searches, steps: STEPS });
+    }
+    Ok(minima)
+}
+
+impl Minima {
+    fn push(&mut self, minimum: Minimum) {
+        let same = |end: &&mut SearchEnd| {
+            let (a, b) = (minimum.cost, end.minimum.cost);
+            (a - b).abs() <= SAME_MINIMUM * a.max(b) + f64::MIN_POSITIVE
+        };
+        if let Some(end) = self.ends.iter_mut().find(same) {
+            end.searches += 1;
+            if minimum.cost < end.minimum.cost {
+                end.minimum = minimum;
+            }
+            return;
+        }
+        let place = self.ends.partition_point(|end| end.minimum.cost < minimum.cost);
+        self.ends.insert(place, SearchEnd { minimum, searches: 1 });
+    }
+
+    /// The lowest minimum.
+    pub(super) fn best(&self) -> &SearchEnd {
+        &self.ends[0]
+    }
+}

@@ -1,0 +1,289 @@
+//! Bounded Gauss–Newton steps, damped where they do not descend.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// A sum of squares with its derivative.
+pub(super) trait LeastSquaresProblem {
+    /// The residual, `None` where it does not exist.
+    fn residual(&self, parameters: &[f64]) -> Option<DVector<f64>>;
+
+    /// The residual and its derivative, `None` where one of them does not exist.
+    fn linearise(&self, parameters: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)>;
+}
+
+/// Bounds of the parameters; infinite where there are none.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Bounds {
+    pub(super) min: Vec<f64>,
+    pub(super) max: Vec<f64>,
+}
+
+impl Bounds {
+    fn clamp(&self, parameters: &mut [f64]) {
+        for (value, (min, max)) in parameters.iter_mut().zip(self.min.iter().zip(&self.max)) {
+            *value = value.clamp(*min, *max);
+        }
+    }
+
+    /// Whether a parameter lies at a bound that descent would push it through.
+    fn blocks(&self, at: usize, value: f64, gradient: f64) -> bool {
+        let is_fixed = self.min[at] == self.max[at];
+        let below = value <= self.min[at] && gradient > 0.0;
+        is_fixed || below || (value >= self.max[at] && gradient < 0.0)
+    }
+}
+
+/// End of a search.
+#[derive(Debug, Clone)]
+pub(super) struct Minimum {
+    pub(super) parameters: Vec<f64>,
+    pub(super) cost: f64,
+    pub(super) steps: usize,
+    pub(super) converged: bool,
+    /// Whether each parameter is at a bound beyond which the sum of squares would fall.
+    pub(super) at_bound: Vec<bool>,
+}
+
+/// Promised decrease, relative to the cost, that ends a search: about 10⁻⁶·√(residuals) standard errors.
+const COST_TOLERANCE: f64 = 1e-12;
+/// Length of a step relative to the parameters, both in units of their columns, that ends it, too, for data
+/// without noise.
+const STEP_TOLERANCE: f64 = 1e-12;
+/// First damping, against a Gram matrix of unit diagonal.
+const FIRST_DAMPING: f64 = 1e-8;
+/// Damping below which there is none.
+const LEAST_DAMPING: f64 = 1e-13;
+/// Damping beyond which rounding decides.
+const MAX_DAMPING: f64 = 1e12;
+/// Largest part of a step that its correction for curvature may be.
+const MAX_CORRECTION: f64 = 0.75;
+/// Part of a step over which the curvature is measured.
+const CURVATURE_STEP: f64 = 0.1;
+
+/// Normal equations in the parameters that no bound blocks, of columns of unit length.
+struct Local<'a> {
+    residual: &'a DVector<f64>,
+    jacobian: &'a DMatrix<f64>,
+    free: Vec<usize>,
+    /// Lengths of the free columns.
+    scale: DVector<f64>,
+    gram: DMatrix<f64>,
+    gradient: DVector<f64>,
+}
+
+impl<'a> Local<'a> {
+    fn new(
+        residual: &'a DVector<f64>,
+        jacobian: &'a DMatrix<f64>,
+        parameters: &[f64],
+        bounds: &Bounds,
+    ) -> Self {
+        let all = jacobian.tr_mul(residual);
+        let free = |at: &usize| !bounds.blocks(*at, parameters[*at], all[*at]);
+        let free: Vec<usize> = (0..parameters.len()).filter(free).collect();
+        let length = |at: &usize| match jacobian.column(*at).norm() {
+            length if length > 0.0 => length,
+            _ => 1.0,
+        };
+        let scale = DVector::from_iterator(free.len(), free.iter().map(length));
+        let mut columns = jacobian.select_columns(&free);
+        for (mut column, scale) in columns.column_iter_mut().zip(scale.iter()) {
+            column.unscale_mut(*scale);
+        }
+        let gram = columns.tr_mul(&columns);
+        let gradient = columns.tr_mul(residual);
+        Self { residual, jacobian, free, scale, gram, gradient }
+    }
+
+    fn factor(&self, damping: f64) -> Option<Cholesky<f64, Dyn>> {
+        let mut damped = self.gram.clone();
+        for at in 0..self.free.len() {
+            damped[(at, at)] += damping;
+        }
+        damped.cholesky()
+    }
+
+    /// A change of all parameters from one of the scaled free ones.
+    fn change(&self, scaled: &DVector<f64>, count: usize) -> DVector<f64> {
+        let mut change = DVector::zeros(count);
+        for (at, place) in self.free.iter().enumerate() {
+            change[*place] = scaled[at] / self.scale[at];
+        }
+        change
+    }
+
+    /// Decrease of the sum of squares that the linearisation promises for a change.
+    fn promise(&self, change: &DVector<f64>) -> f64 {
+        let moved = self.jacobian * change;
+        -(2.0 * self.residual.dot(&moved) + moved.norm_squared())
+    }
+}
+
+/// Local minimum within `bounds` reached from `start` in at most `max_steps`; `None` where the residual does
+/// not exist.
+///
+/// A step v and its correction a for the curvature r″ of the residual along v solve
+/// (JᵀJ + λI) v = −Jᵀr and (JᵀJ + λI) a = −½ Jᵀr″(v) in the parameters that no bound blocks; the step is
+/// projected onto the bounds.
+///
+/// # Source
+/// Nocedal & Wright, *Numerical Optimization*, 2nd ed. (2006), sections 10.3 and 16.7 (projected steps);
+/// Nielsen (1999), IMM-REP-1999-05 (damping); Transtrum & Sethna (2012), arXiv:1201.5885 (correction).
+pub(super) fn minimise(
+    problem: &impl LeastSquaresProblem,
+    bounds: &Bounds,
+    start: &[f64],
+    max_steps: usize,
+) -> Option<Minimum> {
+    let mut parameters = start.to_vec();
+    bounds.clamp(&mut parameters);
+    let mut damping = 0.0_f64;
+    let (mut residual, mut jacobian) = problem.linearise(&parameters)?;
+    let mut cost = residual.norm_squared();
+    for steps in 0..max_steps {
+        let local = Local::new(&residual, &jacobian, &parameters, bounds);
+        let newton = local.factor(damping.max(LEAST_DAMPING)).map(|f| f.solve(&-&local.gradient));
+        if let Some(newton) = &newton {
+            let size = local.free.iter().zip(local.scale.iter());
+            let size = size.map(|(at, scale)| (parameters[*at] * scale).powi(2)).sum::<f64>().sqrt();
+            let small = newton.norm() <= STEP_TOLERANCE * size;
+            let full = -local.gradient.dot(newton) <= COST_TOLERANCE * cost;
+            if local.free.is_empty() || ((small || full) && damping <= FIRST_DAMPING) {
+                let end = Minimum { steps, converged: true, ..ended(&local, &parameters, cost) };
+                return Some(polished(problem, bounds, &local, newton, end));
+            }
+        }
+        let Some(next) = descend(problem, bounds, &local, &parameters, cost, &mut damping) else {
+            // No descent in any direction: a minimum to within rounding.
+            return Some(Minimum { steps, converged: true, ..ended(&local, &parameters, cost) });
+        };
+        parameters = next;
+        (residual, jacobian) = problem.linearise(&parameters)?;
+        cost = residual.norm_squared();
+    }
+    let local = Local::new(&residual, &jacobian, &parameters, bounds);
+    Some(Minimum { steps: max_steps, ..ended(&local, &parameters, cost) })
+}
+
+fn ended(local: &Local<'_>, parameters: &[f64], cost: f64) -> Minimum {
+    let at_bound = (0..parameters.len()).map(|at| !local.free.contains(&at)).collect();
+    Minimum { parameters: parameters.to_vec(), cost, steps: 0, converged: false, at_bound }
+}
+
+/// The last step, too small to matter for the sum of squares, is still taken if it does not raise it.
+fn polished(
+    problem: &impl LeastSquaresProblem,
+    bounds: &Bounds,
+    local: &Local<'_>,
+    newton: &DVector<f64>,
+    end: Minimum,
+) -> Minimum {
+    let change = local.change(newton, end.parameters.len());
+    let mut next: Vec<f64> =
+        end.parameters.iter().zip(change.iter()).map(|(value, by)| value + by).collect();
+    bounds.clamp(&mut next);
+    match problem.residual(&next).map(|residual| residual.norm_squared()) {
+        Some(cost) if cost <= end.cost => Minimum { parameters: next, cost, ..end },
+        _ => end,
+    }
+}
+
+/// The next parameters, with a lower sum of squares; `None` if no damping leads to one.
+fn descend(
+    problem: &impl LeastSquaresProblem,
+    bounds: &Bounds,
+    local: &Local<'_>,
+    parameters: &[f64],
+    cost: f64,
+    damping: &mut f64,
+) -> Option<Vec<f64>> {
+    let mut growth = 2.0;
+    loop {
+        if let Some(step) = step(problem, local, parameters, *damping) {
+            let mut next: Vec<f64> =
+                parameters.iter().zip(step.iter()).map(|(value, by)| value + by).collect();
+            bounds.clamp(&mut next);
+            let change = DVector::from_fn(next.len(), |at, _| next[at] - parameters[at]);
+            let promise = local.promise(&change);
+            let lower = problem.residual(&next).map(|residual| residual.norm_squared());
+            if let Some(lower) = lower.filter(|lower| *lower < cost) {
+                let gain = if promise > 0.0 { (cost - lower) / promise } else { 0.0 };
+                *damping *= f64::max(0.1, 1.0 - (2.0 * gain - 1.0).powi(3));
+                *damping = if *damping < LEAST_DAMPING { 0.0 } else { *damping };
+                return Some(next);
+            }
+        }
+        *damping = f64::max(growth * *damping, FIRST_DAMPING);
+        growth *= 2.0;
+        if *damping > MAX_DAMPING {
+            return None;
+        }
+    }
+}
+
+/// A damped step with its correction for curvature.
+fn step(
+    problem: &impl LeastSquaresProblem,
+    local: &Local<'_>,
+    parameters: &[f64],
+    damping: f64,
+) -> Option<DVector<f64>> {
+    let factor = local.factor(damping)?;
+    let scaled = factor.solve(&-&local.gradient);
+    if scaled.iter().any(|value| !value.is_finite()) {
+        return None;
+    }
+    let change = local.change(&scaled, parameters.len());
+    let ahead: Vec<f64> =
+        parameters.iter().zip(change.iter()).map(|(v, by)| v + CURVATURE_STEP * by).collect();
+    let Some(moved) = problem.residual(&ahead) else { return Some(change) };
+    let slope = (moved - local.residual) / CURVATURE_STEP;
+    let curvature = (slope - local.jacobian * &change) * (2.0 / CURVATURE_STEP);
+    let mut projected = local.jacobian.select_columns(&local.free).tr_mul(&curvature);
+    projected.component_div_assign(&local.scale);
+    let correction = factor.solve(&projected) * -0.5;
+    let bounded = correction.norm() <= MAX_CORRECTION * scaled.norm();
+    Some(if bounded { local.change(&(scaled + correction), parameters.len()) } else { change })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rosenbrock's valley, 10(y − x²) and 1 − x.
+    struct Valley;
+
+    impl LeastSquaresProblem for Valley {
+        fn residual(&self, p: &[f64]) -> Option<DVector<f64>> {
+            Some(nalgebra::dvector![10.0 * (p[1] - p[0] * p[0]), 1.0 - p[0]])
+        }
+
+        fn linearise(&self, p: &[f64]) -> Option<(DVector<f64>, DMatrix<f64>)> {
+            Some((self.residual(p)?, nalgebra::dmatrix![-20.0 * p[0], 10.0; -1.0, 0.0]))
+        }
+    }
+
+    fn bounds(min: [f64; 2], max: [f64; 2]) -> Bounds {
+        Bounds { min: min.to_vec(), max: max.to_vec() }
+    }
+
+    #[test]
+    fn the_valley_is_followed_to_its_end() {
+        let free = bounds([f64::NEG_INFINITY; 2], [f64::INFINITY; 2]);
+        let minimum = minimise(&Valley, &free, &[-1.2, 1.0], 60).unwrap();
+        assert!(minimum.converged, "{minimum:?}");
+        assert!(minimum.parameters.iter().all(|value| (value - 1.0).abs() < 1e-10));
+        assert_eq!(minimum.at_bound, [false, false]);
+    }
+
+    /// With x ≤ ½ the minimum is at y = ¼.
+    #[test]
+    fn a_bound_holds_and_is_reported() {
+        let half = bounds([f64::NEG_INFINITY; 2], [0.5, f64::INFINITY]);
+        let minimum = minimise(&Valley, &half, &[-1.2, 1.0], 60).unwrap();
+        assert!(minimum.converged, "{minimum:?}");
+        assert_eq!(minimum.parameters[0], 0.5);
+        assert!((minimum.parameters[1] - 0.25).abs() < 1e-9);
+        assert_eq!(minimum.at_bound, [true, false]);
+    }
+}

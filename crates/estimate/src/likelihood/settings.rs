@@ -1,0 +1,45 @@
+//! Choices of a fit.
+
+/// Where the noise of the outputs is known from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum NoiseSource {
+    /// The covariance that the data state; the residual if they state none.
+    #[default]
+    Automatic,
+    /// The residual: white noise of unknown level in every output.
+    WhiteResidual,
+    /// The residual: noise with a smooth unknown spectrum in every output.
+    SmoothResidual,
+}
+
+/// Choices of a fit.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct Settings {
+    /// Where the noise of the outputs is known from.
+    pub noise: NoiseSource,
+    /// Maximum number of searches: one from the given values, the others from random ones.
+    pub starts: usize,
+    /// Factor by which random first values differ from the given ones, as a standard deviation of their
+    /// logarithm.
+    pub spread: f64,
+    /// Seed of the random first values.
+    pub seed: u64,
+    /// Probability with which the intervals contain the parameters.
+    pub confidence: f64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            noise: NoiseSource::Automatic,
+            starts: 12,
+            spread: 2.0,
+            seed: 0,
+            confidence: 0.95,
+        }
+    }
+}

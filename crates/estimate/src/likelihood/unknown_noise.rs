@@ -1,0 +1,196 @@
+//! Noise of the outputs that is known from the residual alone: levels, then spectra, in turn with the
+//! parameters.
+
+use mechid_spectra::LineData;
+use nalgebra::DMatrix;
+
+use super::LikelihoodError;
+use super::limits::{
+    COLOURED_ROUNDS, LEAST_KEPT, LEAST_POWER, NOISE_LEVEL_CHANGE, NOISE_ROUNDS, STEPS,
+};
+use super::residual::{PriorRow, Residual};
+use super::response_model::ResponseModel;
+use super::search::{Bounds, Minimum, minimise};
+use super::weights::Weights;
+use crate::frequency_domain::motion_level;
+use crate::noise_shape;
+
+/// Parameters with the weights that belong to them.
+pub(super) struct WeightedMinimum {
+    pub(super) minimum: Minimum,
+    pub(super) weights: Weights,
+    /// Whether every spectrum is white.
+    pub(super) is_white: bool,
+    /// Functions that the log powers of each record were fitted with; empty for white noise.
+    pub(super) bases: Vec<DMatrix<f64>>,
+}
+
+/// What stays the same from round to round.
+pub(super) struct UnknownNoise<'a, M> {
+    pub(super) model: &'a M,
+    pub(super) data: &'a LineData,
+    pub(super) priors: &'a [PriorRow],
+    pub(super) bounds: &'a Bounds,
+}
+
+impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
+    fn residual<'b>(&'b self, weights: &'b Weights) -> Residual<'b, M> {
+        Residual { model: self.model, data: self.data, weights, priors: self.priors }
+    }
+
+    /// Weights for a first search: white noise of a tenth of each output.
+    pub(super) fn first_weights(&self) -> Weights {
+        let (lines, outputs) = self.data.outputs().shape();
+        let power = |column: usize| {
+            let sum: f64 = self.data.outputs().column(column).iter().map(|y| y.norm_sqr()).sum();
+            (0.01 * sum / lines as f64).max(f64::MIN_POSITIVE)
+        };
+        let powers: Vec<f64> = (0..outputs).map(power).collect();
+        let variance = DMatrix::from_fn(lines, outputs, |_, output| powers[output]);
+        Weights::from_variances(self.data, &variance)
+    }
+
+    fn minimise(&self, weights: &Weights, from: &[f64]) -> Option<Minimum> {
+        let residual = self.residual(weights);
+        minimise(&residual, self.bounds, from, STEPS).filter(|minimum| minimum.converged)
+    }
+
+    /// White noise of the levels that make the residual most likely, in turn with the parameters. A level is
+    /// larger than the root mean square of its residual by what the fit took up.
+    ///
+    /// # Errors
+    /// [`LikelihoodError::NotConverged`].
+    pub(super) fn white(&self, from: &Minimum) -> Result<WeightedMinimum, LikelihoodError> {
+        let mut weights = self.first_weights();
+        let mut minimum = from.clone();
+        let mut before: Vec<f64> = Vec::new();
+        for _ in 0..NOISE_ROUNDS {
+            let levels = self.levels(&weights, &minimum)?;
+            let variance = DMatrix::from_fn(self.data.len(), levels.len(), |_, at| levels[at]);
+            weights = Weights::from_variances(self.data, &variance);
+            let failed = LikelihoodError::NotConverged { searches: 1, steps: STEPS };
+            minimum = self.minimise(&weights, &minimum.parameters).ok_or(failed)?;
+            let settled = levels.iter().zip(&before).all(|(now, before)| {
+                (now - before).abs() <= NOISE_LEVEL_CHANGE * now
+            });
+            if settled && !before.is_empty() {
+                break;
+            }
+            before = levels;
+        }
+        Ok(WeightedMinimum { minimum, weights, is_white: true, bases: Vec::new() })
+    }
+
+    /// Real numbers over what the unknowns leave of them.
+    fn taken_up(&self, minimum: &Minimum, residual: &Residual<'_, M>) -> f64 {
+        let free = minimum.at_bound.iter().filter(|at_bound| !**at_bound).count();
+        let unknowns = (free + residual.transient_unknowns()).saturating_sub(self.priors.len());
+        residual.len() as f64 / residual.len().saturating_sub(unknowns).max(1) as f64
+    }
+
+    /// Variance of the noise of each output.
+    fn levels(&self, weights: &Weights, minimum: &Minimum) -> Result<Vec<f64>, LikelihoodError> {
+        let residual = self.residual(weights);
+        let failed = LikelihoodError::NoResponse { at: "a minimum" };
+        let (errors, receptances) = residual.errors(&minimum.parameters).ok_or(failed)?;
+        let factor = self.taken_up(minimum, &residual);
+        let level = |output: usize| {
+            let of_line = |row: usize| {
+                let by_inputs = weights.variance_by_inputs(row, output, &receptances[row]);
+                (factor * errors[(row, output)].norm_sqr(), by_inputs)
+            };
+            motion_level((0..self.data.len()).map(of_line)).powi(2)
+        };
+        let levels: Vec<f64> = (0..errors.ncols()).map(level).collect();
+        // An output without any residual must not take all the weight.
+        let size = |output: usize| {
+            let column = self.data.outputs().column(output);
+            column.iter().map(|y| y.norm_sqr()).sum::<f64>() / column.len() as f64
+        };
+        let floor = |(output, level): (usize, f64)| level.max(1e-30 * size(output));
+        Ok(levels.into_iter().enumerate().map(floor).collect())
+    }
+
+    /// Noise with the smooth spectra that the residual shows, one of each output and record; `None` where
+    /// all of them are white.
+    ///
+    /// # Errors
+    /// [`LikelihoodError::NoResponse`].
+    pub(super) fn smooth(
+        &self,
+        white: &WeightedMinimum,
+    ) -> Result<Option<WeightedMinimum>, LikelihoodError> {
+        let mut last: Option<WeightedMinimum> = None;
+        for _ in 0..COLOURED_ROUNDS {
+            let before = last.as_ref().unwrap_or(white);
+            let (variance, bases) = self.spectra(before)?;
+            if bases.iter().all(|basis| basis.ncols() <= 1) {
+                return Ok(None);
+            }
+            let weights = Weights::from_variances(self.data, &variance);
+            let Some(minimum) = self.minimise(&weights, &before.minimum.parameters) else { break };
+            last = Some(WeightedMinimum { minimum, weights, is_white: false, bases });
+        }
+        Ok(last)
+    }
+
+    /// Variances, lines × p, and the functions of every record that describe their logarithms.
+    fn spectra(
+        &self,
+        before: &WeightedMinimum,
+    ) -> Result<(DMatrix<f64>, Vec<DMatrix<f64>>), LikelihoodError> {
+        let residual = self.residual(&before.weights);
+        let failed = || LikelihoodError::NoResponse { at: "a minimum" };
+        let (errors, receptances) =
+            residual.errors(&before.minimum.parameters).ok_or_else(failed)?;
+        let kept = self.kept(before).ok_or_else(failed)?;
+        let power = DMatrix::from_fn(errors.nrows(), errors.ncols(), |row, output| {
+            let level = before.weights.variance(row, output);
+            let by_inputs =
+                before.weights.variance_by_inputs(row, output, &receptances[row]);
+            let share = level / (level + by_inputs);
+            let power = (share * errors[(row, output)].norm_sqr()).max(LEAST_POWER * level);
+            power / kept[(row, output)]
+        });
+        let mut variance = power.clone();
+        let mut bases = Vec::new();
+        for (rows, _) in self.data.records() {
+            let mut order: Vec<usize> = rows.clone().collect();
+            order.sort_by(|a, b| self.data.omega()[*a].total_cmp(&self.data.omega()[*b]));
+            let omega: Vec<f64> = order.iter().map(|row| self.data.omega()[*row]).collect();
+            let smooth = noise_shape::choose(&omega, &power.select_rows(&order), 1.0);
+            for (at, row) in order.iter().enumerate() {
+                let values = smooth.log_power.row(at).map(f64::exp);
+                variance.row_mut(*row).copy_from(&values);
+            }
+            let mut basis = smooth.basis.clone();
+            for (at, row) in order.iter().enumerate() {
+                basis.row_mut(row - rows.start).copy_from(&smooth.basis.row(at));
+            }
+            bases.push(basis);
+        }
+        Ok((variance, bases))
+    }
+
+    /// Part of the noise that the residual keeps beside the parameters, lines × p.
+    fn kept(&self, before: &WeightedMinimum) -> Option<DMatrix<f64>> {
+        let residual = self.residual(&before.weights);
+        let linearisation = residual.linearise(&before.minimum.parameters)?;
+        let free: Vec<usize> =
+            (0..before.minimum.at_bound.len()).filter(|at| !before.minimum.at_bound[*at]).collect();
+        let mut jacobian = linearisation.jacobian.select_columns(&free);
+        for mut column in jacobian.column_iter_mut() {
+            let length = column.norm();
+            if length > 0.0 {
+                column.unscale_mut(length);
+            }
+        }
+        let q = jacobian.qr().q();
+        let outputs = self.data.outputs().ncols();
+        Some(DMatrix::from_fn(self.data.len(), outputs, |row, output| {
+            let at = 2 * (outputs * row + output);
+            let leverage = 0.5 * (q.row(at).norm_squared() + q.row(at + 1).norm_squared());
+            (1.0 - leverage).max(LEAST_KEPT)
+        }))
+    }
+}

@@ -1,0 +1,149 @@
+//! Covariance of the noise by which residuals are weighted.
+
+use mechid_spectra::LineData;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::LikelihoodError;
+
+/// Covariance of outputs and inputs, outputs first, at each line.
+#[derive(Debug, Clone)]
+pub(super) struct Weights {
+    covariance: Vec<DMatrix<Complex<f64>>>,
+    outputs: usize,
+    inputs_are_exact: bool,
+}
+
+/// e, its covariance L Lᴴ and the part of it that the inputs account for.
+pub(super) struct WeightedLine {
+    /// L.
+    pub(super) lower: DMatrix<Complex<f64>>,
+    /// S_uy − S_uu Gᴴ, by which e shows the error of the inputs; empty for exact ones.
+    cross: DMatrix<Complex<f64>>,
+}
+
+impl Weights {
+    pub(super) fn new(covariance: Vec<DMatrix<Complex<f64>>>, outputs: usize) -> Self {
+        let exact = |matrix: &DMatrix<Complex<f64>>| {
+            let inputs = matrix.columns(outputs, matrix.ncols() - outputs);
+            inputs.iter().all(|z| *z == Complex::default())
+        };
+        let inputs_are_exact = covariance.iter().all(exact);
+        Self { covariance, outputs, inputs_are_exact }
+    }
+
+    /// Covariance of the outputs alone, diagonal, lines × p, beside that of the inputs which the data state.
+    pub(super) fn from_variances(data: &LineData, variance: &DMatrix<f64>) -> Self {
+        let (outputs, inputs) = (data.outputs().ncols(), data.inputs().ncols());
+        let all = outputs + inputs;
+        let covariance = (0..data.len()).map(|row| {
+            let mut matrix = DMatrix::zeros(all, all);
+            if let Some(noise) = data.noise() {
+                let of_inputs =
+                    noise.covariance()[row].view((outputs, outputs), (inputs, inputs));
+                matrix.view_mut((outputs, outputs), (inputs, inputs)).copy_from(&of_inputs);
+            }
+            for output in 0..outputs {
+                matrix[(output, output)] = Complex::from(variance[(row, output)]);
+            }
+            matrix
+        });
+        Self::new(covariance.collect(), outputs)
+    }
+
+    /// The same with a share of the power of every output added: noise relative to the response.
+    pub(super) fn with_relative(&self, data: &LineData, share: f64) -> Self {
+        let mut covariance = self.covariance.clone();
+        for (row, matrix) in covariance.iter_mut().enumerate() {
+            for output in 0..self.outputs {
+                let power = data.outputs()[(row, output)].norm_sqr();
+                matrix[(output, output)] += Complex::from(share * share * power);
+            }
+        }
+        Self { covariance, ..*self }
+    }
+
+    pub(super) fn inputs_are_exact(&self) -> bool {
+        self.inputs_are_exact
+    }
+
+    /// Variance of an output at a line.
+    pub(super) fn variance(&self, row: usize, output: usize) -> f64 {
+        self.covariance[row][(output, output)].re
+    }
+
+    /// Variance that the noise of the inputs makes of an output.
+    pub(super) fn variance_by_inputs(
+        &self,
+        row: usize,
+        output: usize,
+        receptance: &DMatrix<Complex<f64>>,
+    ) -> f64 {
+        let inputs = receptance.ncols();
+        let of_inputs =
+            self.covariance[row].view((self.outputs, self.outputs), (inputs, inputs));
+        let gain = receptance.row(output);
+        (gain * of_inputs * gain.adjoint())[(0, 0)].re
+    }
+
+    /// L of S_yy − S_yu Gᴴ − G S_uy + G S_uu Gᴴ + `more`; `None` if that is singular.
+    pub(super) fn line(
+        &self,
+        row: usize,
+        receptance: &DMatrix<Complex<f64>>,
+        more: impl FnOnce(&mut DMatrix<Complex<f64>>),
+    ) -> Option<WeightedLine> {
+        let (p, q) = receptance.shape();
+        let covariance = &self.covariance[row];
+        let block = |at: (usize, usize), size: (usize, usize)| covariance.view(at, size);
+        let mut total = block((0, 0), (p, p)).into_owned();
+        let mut cross = DMatrix::zeros(0, 0);
+        if !self.inputs_are_exact {
+            let adjoint = receptance.adjoint();
+            cross = block((p, 0), (q, p)) - block((p, p), (q, q)) * &adjoint;
+            total -= block((0, p), (p, q)) * &adjoint + receptance * &cross;
+        }
+        more(&mut total);
+        Some(WeightedLine { lower: cholesky(total)?, cross })
+    }
+
+    /// Checks that the outputs have noise at every line where the inputs are exact.
+    pub(super) fn check(&self, data: &LineData) -> Result<(), LikelihoodError> {
+        if !self.inputs_are_exact {
+            return Ok(());
+        }
+        let p = self.outputs;
+        for (covariance, omega) in self.covariance.iter().zip(data.omega()) {
+            if cholesky(covariance.view((0, 0), (p, p)).into_owned()).is_none() {
+                let frequency_hz = omega / std::f64::consts::TAU;
+                return Err(LikelihoodError::SingularNoise { frequency_hz });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl WeightedLine {
+    /// Input û = u − Q (L Lᴴ)⁻¹ e that, within its noise, agrees best with the outputs; `white` is L⁻¹e.
+    pub(super) fn likely_input(
+        &self,
+        input: DVector<Complex<f64>>,
+        white: &DVector<Complex<f64>>,
+    ) -> DVector<Complex<f64>> {
+        if self.cross.is_empty() {
+            return input;
+        }
+        let mut twice = white.clone();
+        if !self.lower.ad_solve_lower_triangular_mut(&mut twice) {
+            return input;
+        }
+        input - &self.cross * twice
+    }
+}
+
+/// L of a Hermitian positive definite matrix L Lᴴ, `None` for any other.
+fn cholesky(matrix: DMatrix<Complex<f64>>) -> Option<DMatrix<Complex<f64>>> {
+    // nalgebra takes complex roots of negative pivots, so they have to be looked for.
+    let lower = matrix.cholesky()?.unpack();
+    let positive = |z: &Complex<f64>| z.re > 0.0 && z.im.abs() <= 1e-8 * z.re;
+    lower.diagonal().iter().all(positive).then_some(lower)
+}

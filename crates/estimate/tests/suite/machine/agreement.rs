@@ -1,0 +1,116 @@
+//! Where all degrees of freedom are measured the likelihood is that of the estimator of M, C and K.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::Unknowns;
+use mechid_estimate::frequency_domain::{FrequencyData, NoiseSpectrum, output_error};
+use mechid_estimate::likelihood::machine::identify_machine;
+use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
+use mechid_model::ResponseQuantity;
+use mechid_model::elements::{
+    Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine, Sensor,
+};
+use mechid_spectra::{LineData, LineNoise, Transient};
+use nalgebra::{Complex, DMatrix, dmatrix};
+
+use super::generator::{complex_noise, random_phases, responses};
+
+/// Two degrees of freedom, nothing symmetric.
+fn truth() -> [DMatrix<f64>; 3] {
+    [
+        dmatrix![10.0, 0.5; 0.2, 8.0],
+        dmatrix![30.0, -8.0; -12.0, 25.0],
+        dmatrix![2.5e5, -0.9e5; -1.1e5, 3.0e5],
+    ]
+}
+
+/// All twelve entries of M, C and K as one block, starting nearby.
+fn machine() -> Machine {
+    let start = |matrix: &DMatrix<f64>| {
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|at: (usize, usize)| {
+            Coefficient::Free(FreeCoefficient::from_start(1.1 * matrix[at]))
+        })
+    };
+    let [mass, damping, stiffness] = truth();
+    Machine::new(["x", "y"])
+        .with("zero x", Element::mass("x", 0.0))
+        .with("zero y", Element::mass("y", 0.0))
+        .with(
+            "all",
+            Element::Bearing(Box::new(Bearing {
+                at: ["x", "y"].map(str::to_owned),
+                to: None,
+                stiffness: start(&stiffness),
+                damping: start(&damping),
+                mass: start(&mass),
+            })),
+        )
+}
+
+fn identified(data: &LineData) -> LikelihoodEstimate {
+    let instruments = Instruments {
+        sensors: ["x", "y"].map(|dof| Sensor::new(dof, ResponseQuantity::Displacement)).to_vec(),
+        inputs: vec![Input::force("x"), Input::force("y")],
+        ..Instruments::default()
+    };
+    let settings = Settings::default();
+    identify_machine(data, &machine(), &instruments, &settings).unwrap().likelihood
+}
+
+/// Values and standard errors agree to `tolerance` of the standard errors, and relatively.
+fn check(data: &FrequencyData, likelihood: &LikelihoodEstimate, tolerance: f64) {
+    let before = output_error(data, &Unknowns::unknown_mass(2).unwrap()).unwrap();
+    let places = [("xx", 0, 0), ("xy", 0, 1), ("yx", 1, 0), ("yy", 1, 1)];
+    for old in before.estimate.parameters() {
+        let letter = old.parameter.matrix().letter();
+        let (row, column) = (old.parameter.row(), old.parameter.column());
+        let place = places.iter().find(|(_, r, c)| (*r, *c) == (row, column)).unwrap().0;
+        let new = likelihood.parameter(&format!("all.{letter}{place}")).unwrap();
+        let error = new.standard_error.unwrap();
+        let gap = (new.value - old.value).abs() / error;
+        assert!(gap < tolerance, "{}: {gap:e} standard errors", old.parameter);
+        let gap = (error / old.standard_error - 1.0).abs();
+        assert!(gap < tolerance, "{}: standard error off by {gap:e}", old.parameter);
+    }
+}
+
+/// The same noisy amplitudes for both, with noise on the forces or none.
+fn both(force_noise: f64, seed: u64) -> (FrequencyData, LineData) {
+    let omega: Vec<f64> = (10..=90).map(|line| TAU * 0.5 * f64::from(line)).collect();
+    let lines = omega.len();
+    let exact = random_phases(lines, 2, seed) * Complex::from(100.0);
+    let [m, c, k] = truth();
+    let all = responses([&m, &c, &k], &omega, &exact);
+    let level = 0.01 * all.norm() / ((2 * lines) as f64).sqrt();
+    let noise = complex_noise(lines, 4, seed + 500);
+    let outputs = &all + noise.columns(0, 2) * Complex::from(level);
+    let inputs = &exact + noise.columns(2, 2) * Complex::from(force_noise);
+    let variances = [level, level, force_noise, force_noise].map(|s| Complex::from(s * s));
+    let covariance = vec![DMatrix::from_diagonal(&variances.to_vec().into()); lines];
+    let spectrum = NoiseSpectrum::new(omega.clone(), covariance.clone()).unwrap();
+    let old = FrequencyData::from_amplitudes(
+        omega.clone(),
+        inputs.clone(),
+        outputs.clone(),
+        ResponseQuantity::Displacement,
+    );
+    let new = LineData::new(omega, inputs, outputs, Transient::None).unwrap();
+    let new = new.with_noise(LineNoise::new(covariance).unwrap()).unwrap();
+    (old.unwrap().with_noise(spectrum).unwrap(), new)
+}
+
+#[test]
+fn known_noise_on_the_response() {
+    for seed in 0..3 {
+        let (old, new) = both(0.0, seed);
+        check(&old, &identified(&new), 1e-6);
+    }
+}
+
+#[test]
+fn known_noise_on_forces_and_responses() {
+    for seed in 0..3 {
+        let (old, new) = both(2.0, seed);
+        check(&old, &identified(&new), 1e-6);
+    }
+}

@@ -1,0 +1,60 @@
+//! Exact responses by dense elimination line by line, with noise.
+
+use mechid_signal::{Sampling, noise};
+use mechid_spectra::{LineData, LineNoise, Transient};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Complex circular numbers of unit variance, rows × columns.
+pub fn complex_noise(rows: usize, columns: usize, seed: u64) -> DMatrix<Complex<f64>> {
+    let sampling = Sampling::new(1.0, rows).unwrap();
+    let drawn = noise::white(sampling, 2 * columns, 0.5_f64.sqrt(), seed).unwrap();
+    DMatrix::from_fn(rows, columns, |row, column| {
+        Complex::new(drawn.data()[(row, 2 * column)], drawn.data()[(row, 2 * column + 1)])
+    })
+}
+
+/// Inputs of unit size with random phases, lines × q.
+pub fn random_phases(lines: usize, inputs: usize, seed: u64) -> DMatrix<Complex<f64>> {
+    complex_noise(lines, inputs, seed).map(|z| z / z.norm())
+}
+
+/// Responses D(ω)⁻¹ F, lines × n, of forces lines × n.
+pub fn responses(
+    [m, c, k]: [&DMatrix<f64>; 3],
+    omega: &[f64],
+    force: &DMatrix<Complex<f64>>,
+) -> DMatrix<Complex<f64>> {
+    let mut all = DMatrix::zeros(omega.len(), m.nrows());
+    for (row, w) in omega.iter().enumerate() {
+        let dynamic = k.zip_zip_map(c, m, |k, c, m| Complex::new(k - w * w * m, w * c));
+        let load: DVector<Complex<f64>> = force.row(row).transpose();
+        all.row_mut(row).copy_from(&dynamic.lu().solve(&load).unwrap().transpose());
+    }
+    all
+}
+
+/// Outputs with noise of a share of their root mean square, and data that know its covariance.
+pub fn measured(
+    omega: &[f64],
+    inputs: DMatrix<Complex<f64>>,
+    mut outputs: DMatrix<Complex<f64>>,
+    share: f64,
+    seed: u64,
+) -> LineData {
+    let (lines, p) = outputs.shape();
+    let q = inputs.ncols();
+    let level = |at: usize| share * outputs.column(at).norm() / (lines as f64).sqrt();
+    let levels: Vec<f64> = (0..p).map(level).collect();
+    let drawn = complex_noise(lines, p, seed);
+    for (at, level) in levels.iter().enumerate() {
+        let by = drawn.column(at) * Complex::from(*level);
+        let sum = outputs.column(at) + by;
+        outputs.column_mut(at).copy_from(&sum);
+    }
+    let variances = DVector::from_fn(p + q, |at, _| {
+        Complex::from(if at < p { levels[at] * levels[at] } else { 0.0 })
+    });
+    let covariance = vec![DMatrix::from_diagonal(&variances); lines];
+    let data = LineData::new(omega.to_vec(), inputs, outputs, Transient::None).unwrap();
+    data.with_noise(LineNoise::new(covariance).unwrap()).unwrap()
+}

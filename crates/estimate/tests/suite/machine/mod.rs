@@ -1,0 +1,5 @@
+//! Machines of named elements, judged by generators of their own: exact receptances line by line.
+
+mod agreement;
+mod chain;
+mod generator;

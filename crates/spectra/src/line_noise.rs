@@ -1,0 +1,66 @@
+//! Covariance of the noise of outputs and inputs, line by line.
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::SpectraError;
+
+/// Covariance E[z zᴴ] of the noise z of outputs and inputs, outputs first, (p + q) × (p + q), one per row
+/// of line data and in the products of the units of its amplitudes.
+///
+/// The noise is circular: real and imaginary part are independent and equally large.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), section
+/// 12.2 (noise on input and output).
+#[derive(Debug, Clone, PartialEq)]
+pub struct LineNoise {
+    covariance: Vec<DMatrix<Complex<f64>>>,
+    degrees_of_freedom: f64,
+}
+
+impl LineNoise {
+    /// Takes known covariances.
+    ///
+    /// # Errors
+    /// [`SpectraError::Size`] if they differ in size, [`SpectraError::NotFinite`] for an entry that is not
+    /// finite or a variance that is negative.
+    pub fn new(covariance: Vec<DMatrix<Complex<f64>>>) -> Result<Self, SpectraError> {
+        let expected = covariance.first().map_or(0, DMatrix::nrows);
+        for (row, matrix) in covariance.iter().enumerate() {
+            if let Some(got) = [matrix.nrows(), matrix.ncols()].into_iter().find(|s| *s != expected) {
+                return Err(SpectraError::Size { what: "channels of a covariance", expected, got });
+            }
+            let sums = matrix.iter().map(|z| z.re + z.im).find(|sum| !sum.is_finite());
+            let negative = matrix.diagonal().iter().map(|z| z.re).find(|variance| *variance < 0.0);
+            if let Some(value) = sums.or(negative) {
+                return Err(SpectraError::NotFinite { row, value });
+            }
+        }
+        Ok(Self { covariance, degrees_of_freedom: f64::INFINITY })
+    }
+
+    /// Returns the same as sample covariances of so many degrees of freedom each.
+    #[must_use]
+    pub fn with_degrees_of_freedom(self, degrees_of_freedom: f64) -> Self {
+        Self { degrees_of_freedom, ..self }
+    }
+
+    /// Returns the covariance of each row.
+    pub fn covariance(&self) -> &[DMatrix<Complex<f64>>] {
+        &self.covariance
+    }
+
+    /// Returns the degrees of freedom of each covariance; ∞ of known ones.
+    pub fn degrees_of_freedom(&self) -> f64 {
+        self.degrees_of_freedom
+    }
+
+    /// Returns these rows followed by those of another record.
+    #[must_use]
+    pub(crate) fn followed_by(mut self, other: &Self) -> Self {
+        self.covariance.extend_from_slice(&other.covariance);
+        // The more uncertain of the two decides how far the weights can be trusted.
+        self.degrees_of_freedom = self.degrees_of_freedom.min(other.degrees_of_freedom);
+        self
+    }
+}
