@@ -27,7 +27,8 @@ impl LineNoise {
     pub fn new(covariance: Vec<DMatrix<Complex<f64>>>) -> Result<Self, SpectraError> {
         let expected = covariance.first().map_or(0, DMatrix::nrows);
         for (row, matrix) in covariance.iter().enumerate() {
-            if let Some(got) = [matrix.nrows(), matrix.ncols()].into_iter().find(|s| *s != expected) {
+            if let Some(got) = [matrix.nrows(), matrix.ncols()].into_iter().find(|s| *s != expected)
+            {
                 return Err(SpectraError::Size { what: "channels of a covariance", expected, got });
             }
             let sums = matrix.iter().map(|z| z.re + z.im).find(|sum| !sum.is_finite());

@@ -119,9 +119,10 @@ impl Information {
                 if *value > 0.5 {
                     let gradient = vector.iter().zip(group).map(|(v, at)| v * self.scale[*at]);
                     let gradient: Vec<f64> = gradient.collect();
-                    let largest = gradient.iter().copied().fold(0.0, |a: f64, b| {
-                        if b.abs() > a.abs() { b } else { a }
-                    });
+                    let largest = gradient
+                        .iter()
+                        .copied()
+                        .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
                     combinations.push(gradient.iter().map(|g| g / largest).collect());
                 }
             }

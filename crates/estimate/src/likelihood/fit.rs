@@ -177,13 +177,8 @@ fn searched<M: ResponseModel>(
 ) -> Result<Minima, LikelihoodError> {
     let relative = residual.weights.with_relative(residual.data, FIRST_RELATIVE_NOISE);
     let rough = Residual { weights: &relative, ..*residual };
-    let starts = starts(
-        &space.start,
-        &space.bounds,
-        settings.starts.max(1),
-        settings.spread,
-        settings.seed,
-    );
+    let starts =
+        starts(&space.start, &space.bounds, settings.starts.max(1), settings.spread, settings.seed);
     multi_start::search(&rough, residual, &space.bounds, &starts, explains)
 }
 
@@ -195,10 +190,7 @@ fn sampled_weights(freedom: f64, outputs: usize) -> Result<[f64; 2], LikelihoodE
     }
     let p = outputs as f64;
     if freedom <= p + 1.0 {
-        return Err(LikelihoodError::FewDegreesOfFreedom {
-            degrees_of_freedom: freedom,
-            outputs,
-        });
+        return Err(LikelihoodError::FewDegreesOfFreedom { degrees_of_freedom: freedom, outputs });
     }
     let rest = freedom - p;
     Ok([freedom * freedom / (rest * rest - 1.0), freedom / rest])

@@ -100,8 +100,7 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
             write_real(white.iter(), &mut residual.as_mut_slice()[part.clone()]);
             if unknowns > 0 {
                 let omega = self.data.omega()[row];
-                let mut of_line =
-                    transient::columns(omega, reference, p, line.state_response());
+                let mut of_line = transient::columns(omega, reference, p, line.state_response());
                 weighted.lower.solve_lower_triangular_mut(&mut of_line).then_some(())?;
                 for (column, mut to) in of_line.column_iter().zip(columns.column_iter_mut()) {
                     write_real(column.iter(), &mut to.as_mut_slice()[part.clone()]);
@@ -201,7 +200,8 @@ impl<'a, M: ResponseModel> Residual<'a, M> {
         for (rows, kind) in self.data.records() {
             let record = self.record(parameters, rows, *kind)?;
             for (at, (line, weighted)) in record.lines.iter().enumerate() {
-                let pairs = record.residual.as_slice()[2 * p * at..2 * p * (at + 1)].chunks_exact(2);
+                let pairs =
+                    record.residual.as_slice()[2 * p * at..2 * p * (at + 1)].chunks_exact(2);
                 let white = pairs.map(|pair| Complex::new(pair[0], pair[1]) / SQRT_2);
                 let error = &weighted.lower * DVector::from_iterator(p, white);
                 errors.row_mut(rows.start + at).copy_from(&error.transpose());

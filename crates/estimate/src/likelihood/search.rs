@@ -145,7 +145,8 @@ pub(super) fn minimise(
         let newton = local.factor(damping.max(LEAST_DAMPING)).map(|f| f.solve(&-&local.gradient));
         if let Some(newton) = &newton {
             let size = local.free.iter().zip(local.scale.iter());
-            let size = size.map(|(at, scale)| (parameters[*at] * scale).powi(2)).sum::<f64>().sqrt();
+            let size =
+                size.map(|(at, scale)| (parameters[*at] * scale).powi(2)).sum::<f64>().sqrt();
             let small = newton.norm() <= STEP_TOLERANCE * size;
             let full = -local.gradient.dot(newton) <= COST_TOLERANCE * cost;
             if local.free.is_empty() || ((small || full) && damping <= FIRST_DAMPING) {

@@ -34,12 +34,6 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self {
-            noise: NoiseSource::Automatic,
-            starts: 12,
-            spread: 2.0,
-            seed: 0,
-            confidence: 0.95,
-        }
+        Self { noise: NoiseSource::Automatic, starts: 12, spread: 2.0, seed: 0, confidence: 0.95 }
     }
 }

@@ -70,9 +70,10 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
             weights = Weights::from_variances(self.data, &variance);
             let failed = LikelihoodError::NotConverged { searches: 1, steps: STEPS };
             minimum = self.minimise(&weights, &minimum.parameters).ok_or(failed)?;
-            let settled = levels.iter().zip(&before).all(|(now, before)| {
-                (now - before).abs() <= NOISE_LEVEL_CHANGE * now
-            });
+            let settled = levels
+                .iter()
+                .zip(&before)
+                .all(|(now, before)| (now - before).abs() <= NOISE_LEVEL_CHANGE * now);
             if settled && !before.is_empty() {
                 break;
             }
@@ -146,8 +147,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
         let kept = self.kept(before).ok_or_else(failed)?;
         let power = DMatrix::from_fn(errors.nrows(), errors.ncols(), |row, output| {
             let level = before.weights.variance(row, output);
-            let by_inputs =
-                before.weights.variance_by_inputs(row, output, &receptances[row]);
+            let by_inputs = before.weights.variance_by_inputs(row, output, &receptances[row]);
             let share = level / (level + by_inputs);
             let power = (share * errors[(row, output)].norm_sqr()).max(LEAST_POWER * level);
             power / kept[(row, output)]

@@ -38,8 +38,7 @@ impl Weights {
         let covariance = (0..data.len()).map(|row| {
             let mut matrix = DMatrix::zeros(all, all);
             if let Some(noise) = data.noise() {
-                let of_inputs =
-                    noise.covariance()[row].view((outputs, outputs), (inputs, inputs));
+                let of_inputs = noise.covariance()[row].view((outputs, outputs), (inputs, inputs));
                 matrix.view_mut((outputs, outputs), (inputs, inputs)).copy_from(&of_inputs);
             }
             for output in 0..outputs {
@@ -79,8 +78,7 @@ impl Weights {
         receptance: &DMatrix<Complex<f64>>,
     ) -> f64 {
         let inputs = receptance.ncols();
-        let of_inputs =
-            self.covariance[row].view((self.outputs, self.outputs), (inputs, inputs));
+        let of_inputs = self.covariance[row].view((self.outputs, self.outputs), (inputs, inputs));
         let gain = receptance.row(output);
         (gain * of_inputs * gain.adjoint())[(0, 0)].re
     }

@@ -58,15 +58,16 @@ impl MachineEstimate {
         };
         // ∂|λ| = Re(λ̄ ∂λ)/|λ| and ζ = −Re λ/|λ|.
         let of_size = |slope: &Complex<f64>| (lambda.conj() * slope).re / size;
-        let (frequency_error, damping_error) = match slopes {
-            None => (f64::NAN, f64::NAN),
-            Some(slopes) => (
-                error(slopes.map(|slope| of_size(&slope))),
-                error(slopes.map(|slope| {
-                    -slope.re / size + lambda.re * of_size(&slope) / (size * size)
-                })),
-            ),
-        };
+        let (frequency_error, damping_error) =
+            match slopes {
+                None => (f64::NAN, f64::NAN),
+                Some(slopes) => (
+                    error(slopes.map(|slope| of_size(&slope))),
+                    error(slopes.map(|slope| {
+                        -slope.re / size + lambda.re * of_size(&slope) / (size * size)
+                    })),
+                ),
+            };
         MachineMode {
             mode,
             natural_frequency_error: frequency_error,
