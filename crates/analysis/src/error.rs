@@ -18,6 +18,12 @@ pub enum AnalysisError {
     /// A file cannot be read or understood.
     #[error(transparent)]
     Io(#[from] mechid_io::IoError),
+    /// The lines of the records cannot be taken.
+    #[error(transparent)]
+    Spectra(#[from] mechid_spectra::SpectraError),
+    /// No modes can be identified.
+    #[error(transparent)]
+    Modal(#[from] mechid_modal::ModalError),
     /// The record does not have all samples of the window.
     #[error(
         "the window needs samples {first} to {last} (counted from 1), {file} has {len}: choose \

@@ -33,6 +33,7 @@
 //! | Does it predict another record? | [`Identified::validate`] | [`Window`] | [`Validation`](identify::Validation) |
 //! | What does it do under this force? | [`predict()`] | [`Predict`] | [`Predicted`] |
 //! | What force drove it? | [`reconstruct()`] | [`Reconstruct`] | [`Reconstructed`] |
+//! | What are the modes of this structure? | [`modes()`] | [`ModesSettings`] | [`Modes`] |
 //! | How does the structure vibrate when left alone? | [`decay()`] | [`DecaySettings`] | [`Decayed`] |
 //! | Which sampling step suits the estimator? | [`sweep_record()`], [`sweep_experiment()`] | [`SweepSettings`] | [`SweepSummary`] |
 //! | What are the coefficients of this bearing? | [`identify_bearing()`] | [`IdentifyBearing`] | [`IdentifiedBearing`] |
@@ -56,6 +57,7 @@ pub mod inspect;
 mod machine;
 pub mod measurement;
 pub mod modal;
+pub mod modes;
 pub mod predict;
 pub mod reconstruct;
 pub mod review;
@@ -76,6 +78,7 @@ pub use measurement::{Channels, Detrend, Measurement, Reading, RecordPlan, Windo
 pub use mechid_model::ResponseQuantity;
 pub use mechid_signal::HitRule;
 pub use modal::ModalSummary;
+pub use modes::{Modes, ModesSettings, modes, modes_of_responses};
 pub use predict::{Predict, Predicted, predict};
 pub use reconstruct::{Reconstruct, Reconstructed, reconstruct};
 pub use sweep::{SweepSettings, SweepSummary, sweep_experiment, sweep_record};

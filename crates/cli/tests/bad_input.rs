@@ -343,7 +343,7 @@ fn descriptions_that_describe_nothing() {
 
 #[test]
 fn a_free_decay_that_is_none() {
-    let common = "decay a.csv --displacement x --plot out.svg";
+    let common = "modes a.csv --displacement x --plot out.svg";
     let fit = |more: &str, parts: &[&str]| refused(&good(), &format!("{common} {more}"), parts);
     fit("--from 1", &["--from: 1 s is not in the window of 0.128 s"]);
     fit("--from 0.1 --to 0.05", &["--to: it must be after --from"]);
@@ -354,13 +354,13 @@ fn a_free_decay_that_is_none() {
     fit("--modes 0", &["--modes"]);
     fit("--modes 99", &["99 modes cannot be fitted: from 1 to 40"]);
     fit("--from 0 --modes 5", &["the record has 32 samples where at least 61 are needed"]);
-    refused(&good(), "decay a.csv", &["the response is missing"]);
+    refused(&good(), "modes a.csv", &["the response is missing"]);
     let still = record(|k| (0.004 * f64::from(k), 1.0, 2.5));
-    refused(&still, "decay a.csv --displacement x --from 0", &["channel 1 is constant at 2.5"]);
+    refused(&still, "modes a.csv --displacement x --from 0", &["channel 1 is constant at 2.5"]);
     let growing = record(|k| {
         let t = f64::from(k);
         (0.004 * t, 0.0, (0.1 * t).exp() * (0.7 * t).sin() + 0.01 * (3.0 * t * t).sin())
     });
     let grows = ["grows, at", "an unstable system"];
-    refused(&growing, "decay a.csv --displacement x --from 0", &grows);
+    refused(&growing, "modes a.csv --displacement x --from 0", &grows);
 }

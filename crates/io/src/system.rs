@@ -101,7 +101,7 @@ impl Described {
 pub(crate) fn too_many(file: &str, dof: usize) -> IoError {
     let what = format!(
         "the machine has {dof} degrees of freedom in sparse matrices, too many for what needs all entries \
-         of the matrices: simulate finds its response, stability the largest steps, and modal --modes COUNT \
+         of the matrices: simulate finds its response, stability the largest steps, and modes --modes COUNT \
          some of its modes; for the rest reduce it to the degrees of freedom that are measured"
     );
     IoError::Description { file: file.into(), what }

@@ -33,13 +33,13 @@
 //! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
 //! | [`excitation`] | multisines for a test with one or several inputs, and how good they are |
 //! | [`simulation`] | the record that a described experiment gives, and its summary |
-//! | [`modes`] | some of the modes of a large machine |
+//! | [`selected_modes`] | some of the modes of a large machine |
 //! | [`stability`] | time-stepping schemes side by side |
 //! | `plot` | figures as SVG and PNG (feature `report`, on by default) |
 //! | `report` | figures and HTML pages of results (the same feature) |
 
 pub mod excitation;
-pub mod modes;
+pub mod selected_modes;
 pub mod simulation;
 pub mod stability;
 
@@ -70,9 +70,9 @@ pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, Ma
 pub use mechid_analysis::{
     BearingData, Channels, DecaySettings, Decayed, Detrend, FrfSettings, Identified,
     IdentifiedBearing, IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses,
-    InspectSettings, Machine, Measurement, Predict, Predicted, Reading, Reconstruct, Reconstructed,
+    InspectSettings, Machine, Measurement, Modes, ModesSettings, Predict, Predicted, Reading, Reconstruct, Reconstructed,
     ResultRow, SavedAnalysis, Segmentation, Window, decay, frf, frf_of_records, identify,
-    identify_bearing, identify_responses, inspect, predict, reconstruct,
+    identify_bearing, identify_responses, inspect, modes, modes_of_responses, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -7,7 +7,7 @@ use mechid::analysis::{AnalysisError, ModalSummary};
 use mechid::integrate::ModeSearch;
 use mechid::io::parse_sparse_system;
 use mechid::model::{SecondOrderSystem, StateTransition};
-use mechid::modes::SelectedModes;
+use mechid::selected_modes::SelectedModes;
 use mechid::report::{ReportError, ToFigure as _};
 use nalgebra::{Complex, DMatrix};
 use numpy::{PyArray2, PyReadonlyArray2};

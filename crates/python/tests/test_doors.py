@@ -61,7 +61,7 @@ def test_a_free_decay_is_that_of_the_program(program: Callable[..., str], option
     file = "examples/decay.csv"
     channels = {"acceleration": ["a1", "a2", "a3"]}
     spelled = {name.removesuffix("_s"): value for name, value in options.items()}
-    told = program("decay", file, *words({**channels, **spelled}), "--json")
+    told = program("modes", file, *words({**channels, **spelled}), "--json")
     found = mechid.decay(file, **channels, **options)
     assert found.to_json() + "\n" == told
     assert len(found.modes) == options.get("modes", 3) == len(found.amplitudes) == len(found.decays)
@@ -225,8 +225,8 @@ def test_an_inventory_is_that_of_the_program(program: Callable[..., str]) -> Non
 
 def test_modes_are_those_of_the_program(program: Callable[..., str]) -> None:
     machine = mechid.Machine.read(EXPERIMENT)
-    assert machine.to_json() + "\n" == program("modal", EXPERIMENT, "--json")
-    assert str(machine) == program("modal", EXPERIMENT)
+    assert machine.to_json() + "\n" == program("modes", EXPERIMENT, "--json")
+    assert str(machine) == program("modes", EXPERIMENT)
 
 
 def test_modes_of_a_machine_that_is_not_symmetric_are_those_of_numpy() -> None:

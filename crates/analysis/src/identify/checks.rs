@@ -112,8 +112,8 @@ fn unmeasured_force(fitted: &Fitted, unexplained: Option<f64>) -> Option<Finding
     unexplained.filter(|_| is_seen).map(|fraction| Finding::UnmeasuredForce { fraction })
 }
 
-/// Faults of the channels themselves, whatever is fitted to them.
-pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
+/// Returns the faults of each channel by itself.
+pub(crate) fn of_sensors(measured: &Block) -> Vec<Finding> {
     let mut findings = clipped_channels(Quantity::Force, &measured.force);
     for (kind, motion) in measured.responses() {
         findings.extend(clipped_channels(Quantity::Response(kind), motion));
@@ -121,6 +121,12 @@ pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisErro
         findings.extend(quantised_channels(Quantity::Response(kind), motion));
         findings.extend(spiked_channels(Quantity::Response(kind), motion, &measured.force));
     }
+    findings
+}
+
+/// Faults of the channels themselves, whatever is fitted to them.
+pub(crate) fn of_channels(measured: &Block) -> Result<Vec<Finding>, AnalysisError> {
+    let mut findings = of_sensors(measured);
     findings.extend(kinematics(&measured.responses())?);
     // A velocity gives the power without differentiation.
     let (motion, kind) = match &measured.velocity {
@@ -178,7 +184,7 @@ impl CheckRow {
 }
 
 /// Returns a finding as a sentence that calls the channels by their names.
-pub(super) fn sentence(finding: &Finding, names: &Channels) -> String {
+pub(crate) fn sentence(finding: &Finding, names: &Channels) -> String {
     let name = |Channel { quantity, index }| match quantity {
         Quantity::Force => names.force_name(index),
         Quantity::Response(kind) => names.response_name(kind, index),

@@ -374,6 +374,16 @@ impl Measurement {
     }
 }
 
+impl Measurement {
+    /// Reads the whole window of any numbers of forces and responses and holds it.
+    ///
+    /// # Errors
+    /// As [`Measurement::hold`].
+    pub(crate) fn hold_any(&self) -> Result<Windowed, AnalysisError> {
+        Windowed::of_any_layout(self, Hold::Whole)
+    }
+}
+
 fn offsets(detrend: Detrend, means: Vec<f64>) -> Vec<f64> {
     match detrend {
         Detrend::Mean => means,

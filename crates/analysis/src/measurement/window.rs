@@ -92,8 +92,16 @@ pub struct Windowed {
 
 impl Windowed {
     pub(super) fn new(measurement: &Measurement, hold: Hold) -> Result<Self, AnalysisError> {
+        measurement.source().channels.check_pairs()?;
+        Self::of_any_layout(measurement, hold)
+    }
+
+    /// Reads a window whose forces and responses need not belong to the same degrees of freedom.
+    pub(super) fn of_any_layout(
+        measurement: &Measurement,
+        hold: Hold,
+    ) -> Result<Self, AnalysisError> {
         let source = Arc::clone(measurement.source());
-        source.channels.check_pairs()?;
         let (start, len) = measurement.span()?;
         let period = measurement.window_settings().period.unwrap_or(len);
         let samples = hold.samples(len, period);

@@ -6,10 +6,10 @@ use mechid::analysis::{Channels, HitRule};
 use super::at_least_one;
 use crate::error::CliError;
 
-/// Hits of a hammer.
+/// Rule by which hits of a hammer are found.
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Hammer tests")]
-pub struct HitArgs {
+pub struct HitRuleArgs {
     /// The records are hammer tests: the hits are found in the force, and bad ones (double hits, overloads,
     /// weak hits, too little room) are left out
     #[arg(long)]
@@ -33,6 +33,14 @@ pub struct HitArgs {
     /// Samples of a hit, those before it included [default: up to the next hit]
     #[arg(long, value_name = "SAMPLES", value_parser = at_least_one, requires = "hits")]
     hit_samples: Option<usize>,
+}
+
+/// Hits of a hammer, and where it strikes.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Hammer tests")]
+pub struct HitArgs {
+    #[command(flatten)]
+    rule: HitRuleArgs,
     /// Degree of freedom that is struck in each record, counted from 1, where one --force column serves
     /// them all
     #[arg(long, value_name = "DOF,…", value_delimiter = ',', value_parser = at_least_one)]
@@ -54,6 +62,13 @@ impl HitArgs {
         Ok(of_records)
     }
 
+    /// Returns the rule by which hits are found, if the records are hammer tests.
+    pub fn rule(&self) -> Option<HitRule> {
+        self.rule.rule()
+    }
+}
+
+impl HitRuleArgs {
     /// Returns the rule by which hits are found, if the records are hammer tests.
     pub fn rule(&self) -> Option<HitRule> {
         let usual = HitRule::default();

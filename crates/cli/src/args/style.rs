@@ -10,7 +10,7 @@ pub struct StyleArgs {
     /// Phase in the picture: between -180° and 180°, or without jumps
     #[arg(long, value_name = "PHASE", value_enum, default_value_t, requires = "plot")]
     plot_phase: PlotPhase,
-    /// Frequency axis of the picture [default: logarithmic for mechid modal, linear otherwise]
+    /// Frequency axis of the picture [default: logarithmic for mechid modes, linear otherwise]
     #[arg(long, value_name = "SCALE", value_enum, requires = "plot")]
     plot_frequency: Option<PlotFrequency>,
     /// Magnitude axis of the picture

@@ -7,13 +7,12 @@
 
 mod bearing;
 mod completions;
-mod decay;
 mod fleet;
 mod force;
 mod frf;
 mod identify;
 mod info;
-mod modal;
+mod modes;
 mod multisine;
 mod predict;
 mod report;
@@ -53,13 +52,12 @@ pub struct Cli {
 pub enum Command {
     Bearing(bearing::BearingArgs),
     Completions(completions::CompletionsArgs),
-    Decay(decay::DecayArgs),
     Fleet(fleet::FleetArgs),
     Force(force::ForceArgs),
     Frf(frf::FrfArgs),
     Identify(identify::IdentifyArgs),
     Info(info::InfoArgs),
-    Modal(modal::ModalArgs),
+    Modes(modes::ModesArgs),
     Multisine(multisine::MultisineArgs),
     Predict(predict::PredictArgs),
     Report(report::PageArgs),
@@ -76,13 +74,12 @@ impl Command {
         match self {
             Command::Bearing(args) => args.run(),
             Command::Completions(args) => args.run(),
-            Command::Decay(args) => args.run(),
             Command::Fleet(args) => args.run(),
             Command::Force(args) => args.run(),
             Command::Frf(args) => args.run(),
             Command::Identify(args) => args.run(),
             Command::Info(args) => args.run(),
-            Command::Modal(args) => args.run(),
+            Command::Modes(args) => args.run(),
             Command::Multisine(args) => args.run(),
             Command::Predict(args) => args.run(),
             Command::Report(args) => args.run(words),
@@ -98,13 +95,12 @@ impl Command {
         match self {
             Command::Bearing(args) => args.files(),
             Command::Completions(_) => Files::default(),
-            Command::Decay(args) => args.files(),
             Command::Fleet(args) => args.files(),
             Command::Force(args) => args.files(),
             Command::Frf(args) => args.files(),
             Command::Identify(args) => args.files(),
             Command::Info(args) => args.files(),
-            Command::Modal(args) => args.files(),
+            Command::Modes(args) => args.files(),
             Command::Multisine(args) => args.files(),
             Command::Predict(args) => args.files(),
             Command::Report(args) => args.files(),
@@ -134,13 +130,12 @@ impl Command {
         match self {
             Command::Bearing(args) => &args.report,
             Command::Completions(args) => &args.report,
-            Command::Decay(args) => &args.report,
             Command::Fleet(args) => &args.report,
             Command::Force(args) => &args.report,
             Command::Frf(args) => &args.report,
             Command::Identify(args) => &args.report,
             Command::Info(args) => &args.report,
-            Command::Modal(args) => &args.report,
+            Command::Modes(args) => &args.report,
             Command::Multisine(args) => &args.report,
             Command::Predict(args) => &args.report,
             Command::Report(args) => &args.report,

@@ -32,7 +32,7 @@ fn channels_keep_their_names_and_the_picture_has_the_coherence() {
         assert!(picture.contains(&format!(">{words}<")), "no {words}");
     }
     fs::write(folder.join("found.json"), found).unwrap();
-    let modes = mechid(folder, "modal found.json --plot modes.svg");
+    let modes = mechid(folder, "modes found.json --plot modes.svg");
     for row in ["\n1 a1 ", "\n1 a2 ", "\n2 a1 ", "\n2 a2 "] {
         assert!(modes.contains(row), "{modes}");
     }

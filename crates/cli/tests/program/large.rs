@@ -125,11 +125,11 @@ fn some_modes_of_a_large_machine_are_found() {
     let n = 3000;
     chain(home.path(), n, "");
     let exact = |r: usize| 60.0 * (r as f64 * PI / (2.0 * (n + 1) as f64)).sin();
-    let told = mechid(home.path(), "modal chain/chain.json --modes 3");
+    let told = mechid(home.path(), "modes chain/chain.json --modes 3");
     assert!(told.contains("3000 degrees of freedom, 3 modes of lowest frequency"), "{told}");
     let hz = exact(1000) / TAU;
-    let command = format!("modal chain/chain.json --modes 1 --near-hz {hz} --json");
-    for (command, number) in [("modal chain/chain.json --modes 3 --json", 1), (&command, 1000)] {
+    let command = format!("modes chain/chain.json --modes 1 --near-hz {hz} --json");
+    for (command, number) in [("modes chain/chain.json --modes 3 --json", 1), (&command, 1000)] {
         let told: serde_json::Value = serde_json::from_str(&mechid(home.path(), command)).unwrap();
         let mode = &told["modes"][0];
         let frequency = mode["natural_frequency_hz"].as_f64().unwrap() * TAU;
@@ -145,7 +145,7 @@ fn some_modes_of_a_large_machine_are_found() {
         ("--modes 2 --near-hz nan", "a positive number is needed, got NaN"),
         ("--modes 2 --plot x.svg", "--plot"),
     ] {
-        let refused = refused(home.path(), &format!("modal chain/chain.json {rest}"));
+        let refused = refused(home.path(), &format!("modes chain/chain.json {rest}"));
         assert!(refused.contains(expected), "{rest}: {refused}");
     }
 }
@@ -189,9 +189,9 @@ fn what_a_large_machine_does_not_have_is_refused() {
     }
     fs::write(home.path().join("chain/chain.json"), described).unwrap();
     chain(home.path(), 400, "");
-    let refused = refused(home.path(), "modal chain/chain.json");
+    let refused = refused(home.path(), "modes chain/chain.json");
     assert!(refused.contains("400 degrees of freedom in sparse matrices"), "{refused}");
-    assert!(refused.contains("modal --modes"), "{refused}");
+    assert!(refused.contains("modes --modes"), "{refused}");
     assert!(!home.path().join("x.csv").exists());
 }
 

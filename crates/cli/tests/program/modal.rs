@@ -1,4 +1,4 @@
-//! `mechid modal` on known machines and on what `mechid identify` found.
+//! `mechid modes` on known machines and on what `mechid identify` found.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ const STEFFEN_RADE: &str = r#"{"system": {
 fn a_known_machine_has_its_published_modes() {
     let place = tempfile::tempdir().unwrap();
     std::fs::write(place.path().join("machine.json"), STEFFEN_RADE).unwrap();
-    let report = json(place.path(), &["modal", "machine.json", "--json"]);
+    let report = json(place.path(), &["modes", "machine.json", "--json"]);
     for (mode, (frequency, ratio)) in [(3.1157, 0.1869), (3.9384, 0.4275)].iter().enumerate() {
         let mode = &report["modes"][mode];
         assert!((mode["damped_frequency_hz"]["value"].as_f64().unwrap() - frequency).abs() < 1e-4);
@@ -33,7 +33,7 @@ fn a_known_machine_has_its_published_modes() {
         assert!(mode["damping_ratio"]["standard_error"].is_null());
         assert_eq!(mode["shape"].as_array().unwrap().len(), 2);
     }
-    let text = mechid(place.path(), &["modal", "machine.json"]).stdout;
+    let text = mechid(place.path(), &["modes", "machine.json"]).stdout;
     let text = String::from_utf8(text).unwrap();
     assert!(text.starts_with("machine.json: 2 degrees of freedom, 2 modes\n"), "{text}");
     assert!(text.contains("1 damped frequency") && text.contains("2 direction 2"), "{text}");
@@ -46,7 +46,7 @@ fn standard_errors_follow_from_the_covariance() {
     let text = r#"{"system": {"mass": 2, "damping": 0.4, "stiffness": 800},
         "covariance": {"parameters": ["k"], "matrix": [[64.0]], "degrees_of_freedom": 50}}"#;
     std::fs::write(place.path().join("found.json"), text).unwrap();
-    let report = json(place.path(), &["modal", "found.json", "--json"]);
+    let report = json(place.path(), &["modes", "found.json", "--json"]);
     let mode = &report["modes"][0];
     // ωn = 20 rad/s and dωn/ωn = dk/2k: ±8 N/m in 800 make ±0.5 %.
     let error = mode["natural_frequency_hz"]["standard_error"].as_f64().unwrap();
@@ -54,7 +54,7 @@ fn standard_errors_follow_from_the_covariance() {
     // ζ = c/(2√(km)) falls by the same share.
     let error = mode["damping_ratio"]["standard_error"].as_f64().unwrap();
     assert!((error - 0.005 * 0.4 / (2.0 * 1600f64.sqrt())).abs() < 1e-14);
-    let text = String::from_utf8(mechid(place.path(), &["modal", "found.json"]).stdout).unwrap();
+    let text = String::from_utf8(mechid(place.path(), &["modes", "found.json"]).stdout).unwrap();
     assert!(text.contains("1 degree of freedom, 1 mode\n"), "{text}");
 }
 
@@ -81,7 +81,7 @@ fn what_identify_found_is_read_back_with_its_uncertainty() {
     assert!(found.status.success(), "{}", String::from_utf8_lossy(&found.stderr));
     std::fs::write(place.path().join("found.json"), &found.stdout).unwrap();
     let found: Value = serde_json::from_slice(&found.stdout).unwrap();
-    let modal = json(place.path(), &["modal", "found.json", "--json"]);
+    let modal = json(place.path(), &["modes", "found.json", "--json"]);
     for quantity in ["natural_frequency_hz", "damping_ratio"] {
         for part in ["value", "standard_error"] {
             let [a, b] = [&found, &modal].map(|r| r["modes"][0][quantity][part].as_f64().unwrap());
@@ -105,7 +105,7 @@ fn what_is_no_machine_is_refused_with_exit_code_2() {
         ("empty.json", "system"),
         ("absent.json", "cannot read absent.json"),
     ] {
-        let output = mechid(place.path(), &["modal", file]);
+        let output = mechid(place.path(), &["modes", file]);
         assert_eq!(output.status.code(), Some(2));
         let told = String::from_utf8_lossy(&output.stderr);
         assert!(told.contains(message), "{told}");

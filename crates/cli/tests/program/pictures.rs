@@ -96,7 +96,7 @@ fn near(value: f64, truth: f64) {
 fn a_resonance_is_marked_and_stands_where_it_belongs() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("one.json"), MACHINE).unwrap();
-    let svg = drawn(folder.path(), "modal one.json");
+    let svg = drawn(folder.path(), "modes one.json");
     has(&svg, &["Receptance (m/N)", "Phase (°)", "Frequency (Hz)", "natural frequency, 12 Hz"]);
     let document = Document::parse(&svg).unwrap();
     let panels = of_class(document.root(), "panel");
@@ -129,11 +129,11 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
     write("two.json", chain(2, true));
     write("eight.json", chain(8, true));
     write("free.json", chain(2, false));
-    let svg = drawn(folder.path(), "modal two.json");
+    let svg = drawn(folder.path(), "modes two.json");
     // sqrt(k/m) and sqrt(3 k/m) of two equal masses on three equal springs.
     let marks = "natural frequencies, 5.0329, 8.7173 Hz";
     has(&svg, &["x1 / F1", "x1 / F2 = x2 / F1", "x2 / F2", marks]);
-    let svg = drawn(folder.path(), "modal eight.json");
+    let svg = drawn(folder.path(), "modes eight.json");
     has(
         &svg,
         &["eight.json, driving points 1 to 6 of 8", "x1 / F1", "x6 / F6", "natural frequencies"],
@@ -144,7 +144,7 @@ fn every_pair_of_two_and_the_driving_points_of_many_are_drawn() {
         assert_eq!(of_class(panel, "reference").len(), 8);
     }
     // Without damping and walls: the phase turns over between 0 and −180°.
-    let svg = drawn(folder.path(), "modal free.json");
+    let svg = drawn(folder.path(), "modes free.json");
     has(&svg, &["natural frequency, 7.1176 Hz", "0", "−180"]);
     let texts = texts(&Document::parse(&svg).unwrap());
     assert!(!texts.iter().any(|t| t == "180" || t == "−360"), "{texts:?}");
@@ -267,19 +267,19 @@ fn what_cannot_be_drawn_is_refused_and_nothing_is_written() {
     write("time.csv", "time\n0\n1\n2\n3\n");
     let before = fs::read_dir(folder.path()).unwrap().count();
     for (arguments, words) in [
-        ("modal one.json --plot x.txt", "must end in .svg or .png"),
+        ("modes one.json --plot x.txt", "must end in .svg or .png"),
         ("simulate one.json --output y.csv --plot x.txt", "must end in .svg or .png"),
         ("info time.csv --plot x.txt", "must end in .svg or .png"),
-        ("modal free.json --plot x.svg", "free.json: nothing to plot: the machine has no natural"),
+        ("modes free.json --plot x.svg", "free.json: nothing to plot: the machine has no natural"),
         ("info time.csv --plot x.svg", "time.csv: nothing to plot: no column other than time"),
         ("simulate one.json --output y.csv --plot missing/x.svg", "missing/x.svg"),
-        ("modal one.json --plot missing/x.svg", "missing/x.svg"),
+        ("modes one.json --plot missing/x.svg", "missing/x.svg"),
     ] {
         let message = refused(folder.path(), arguments);
         assert!(message.contains(words), "{arguments}: {message}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), before, "{arguments}");
     }
-    for command in ["modal one.json", "simulate one.json --output y.csv"] {
+    for command in ["modes one.json", "simulate one.json --output y.csv"] {
         mechid(folder.path(), &format!("{command} --plot a.PNG"));
         let png = fs::read(folder.path().join("a.PNG")).unwrap();
         assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"), "{command}");

@@ -96,16 +96,16 @@ fn every_field_of_every_report_is_in_the_reference() {
          --displacement dx,dy --stator-mass 20 --rotation-hz 50 --period 256 --load 2500 --clearance \
          100e-6 --diameter 0.1 --length 0.05 --viscosity 0.02"
             .into(),
-        "decay decay.csv --acceleration a1,a2,a3".into(),
+        "modes decay.csv --acceleration a1,a2,a3".into(),
         format!("info {data}"),
         "info machine.csv --sample-rate 128".into(),
-        "modal found.json".into(),
-        "modal nonlinear.json".into(),
+        "modes found.json".into(),
+        "modes nonlinear.json".into(),
         "predict found.json machine.csv --force force --displacement displacement --settle 64"
             .into(),
         "predict nonlinear.json machine.csv --force force --displacement displacement --period 256"
             .into(),
-        "modal machine.json".into(),
+        "modes machine.json".into(),
         "multisine --samples 64 --rate 64 --inputs 2 --output force.csv".into(),
         "simulate machine.json --output record.csv".into(),
         "stability machine.json".into(),

@@ -139,7 +139,7 @@ fn a_description_may_come_from_standard_input() {
                     --period 256 --json";
     shell(folder.path(), &format!("{identify} > found.json"));
     for line in [
-        "mechid modal FILE",
+        "mechid modes FILE",
         "mechid force machine.csv --system FILE --displacement 3 --period 256",
     ] {
         let named = shell(folder.path(), &line.replace("FILE", "found.json"));

@@ -6,14 +6,13 @@ use std::process::Command;
 
 use super::{mechid, refused, run};
 
-const SUBCOMMANDS: [&str; 12] = [
+const SUBCOMMANDS: [&str; 11] = [
     "completions",
-    "decay",
     "force",
     "frf",
     "identify",
     "info",
-    "modal",
+    "modes",
     "multisine",
     "report",
     "simulate",

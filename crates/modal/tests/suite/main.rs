@@ -1,8 +1,7 @@
-//! Tests of the modal estimator on records with known modes.
+//! Tests of the crate through its public interface.
 
+mod ambient;
+mod ambient_generator;
 mod forced;
 mod generator;
 mod score;
-//! Tests of the crate through its public interface.
-mod ambient;
-mod ambient_generator;

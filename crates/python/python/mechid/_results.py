@@ -767,7 +767,7 @@ class Machine(Bare, Drawn):
         return Predicted(_mechid.predict_record(found._inner, self._inner, settings))
 
     def to_json(self) -> str:
-        """Return the modes and the system as ``mechid modal --json`` prints them."""
+        """Return the modes and the system as ``mechid modes --json`` prints them."""
         return self._modal[0]
 
     def __str__(self) -> str:
@@ -822,7 +822,7 @@ class SelectedModes(Bare):
         return np.array([mode[field] for mode in self._told["modes"]], dtype=np.float64)
 
     def to_json(self) -> str:
-        """Return the modes as ``mechid modal --modes COUNT --json`` prints them."""
+        """Return the modes as ``mechid modes --modes COUNT --json`` prints them."""
         return self._found[0]
 
     def __str__(self) -> str:

@@ -5,6 +5,7 @@ mod bearing;
 mod force;
 mod frf;
 pub mod modal;
+mod modes;
 mod motion;
 pub mod receptance;
 mod record;
@@ -20,7 +21,7 @@ use mechid_analysis::bearing::BearingTable;
 use mechid_analysis::fleet::Trends;
 use mechid_analysis::{
     AnalysisError, Channels, Decayed, FrfTable, Identified, IdentifiedBearing, IdentifiedResponses,
-    Inspected, Machine, Reconstructed, SweepSummary,
+    Inspected, Machine, Modes, Reconstructed, SweepSummary,
 };
 use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_plot::Figure;
@@ -141,6 +142,13 @@ impl ToFigure for Decayed {
     fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
         let title = format!("{}: free decay", self.summary().file);
         Ok(motion::motion(&title, self.compared(), "fitted"))
+    }
+}
+
+impl ToFigure for Modes {
+    /// Draws the responses of the first record over frequency, measured and explained by the modes.
+    fn styled_figure(&self, _: FigureStyle) -> Result<Figure, ReportError> {
+        Ok(modes::figure(self))
     }
 }
 

@@ -51,7 +51,7 @@ impl SelectedModes {
     ///
     /// ```
     /// use mechid::integrate::ModeSearch;
-    /// use mechid::modes::SelectedModes;
+    /// use mechid::selected_modes::SelectedModes;
     /// use mechid::model::{SparseSystem, band};
     ///
     /// // A chain of 1,000 masses.

@@ -1,0 +1,123 @@
+//! Modes of a structure from records under measured forces, from tables of frequency responses, and
+//! from ambient records.
+
+mod checks;
+mod forced;
+mod settings;
+mod sources;
+mod summary;
+mod tables;
+
+use std::fmt;
+
+use mechid_io::FrequencyResponses;
+use serde::{Serialize, Serializer};
+
+use self::forced::Test;
+pub use self::settings::{ModalTest, ModesSettings, Places};
+use self::sources::Recorded;
+pub use self::summary::{
+    DroppedRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+};
+use self::tables::Tables;
+use crate::AnalysisError;
+use crate::identify::rows::WindowRow;
+use crate::measurement::Measurement;
+
+/// Modes of a structure with their uncertainty, and how well they explain the records.
+#[derive(Debug)]
+pub struct Modes {
+    summary: ModesSummary,
+    spectrum: ModesSpectrum,
+}
+
+/// Responses over frequency, measured and explained: root of the sum over all responses, each over its
+/// own RMS in the band.
+#[derive(Debug, Clone, Default)]
+pub struct ModesSpectrum {
+    /// Frequencies of the first record or force, in Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Measured, a ratio.
+    pub measured: Vec<f64>,
+    /// Explained by modes and residual terms, a ratio.
+    pub modelled: Vec<f64>,
+    /// Difference of the two, a ratio.
+    pub residual: Vec<f64>,
+}
+
+/// Finds the modes of a structure from records of one test, which are fitted together.
+///
+/// With measured forces any number of forces and responses, of any kinds, is possible: a shaker, several
+/// of them, a hammer at one point or at a different one in each record. Frequencies, damping ratios and
+/// shapes are those of maximum likelihood on the spectral lines of the open records, without a window;
+/// what the ends of the records add is part of the model, and so are unmeasured forces and the modes
+/// outside of the band.
+///
+/// # Errors
+/// [`AnalysisError::NoRecord`], [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`],
+/// [`AnalysisError::Setting`] for places that do not belong to the columns,
+/// [`AnalysisError::Modal`] if nothing can be fitted, and if a file cannot be read.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 9
+/// and 12; Golub & Pereyra (1973), SIAM Journal on Numerical Analysis 10, 413–432.
+pub fn modes(
+    measurements: &[Measurement],
+    settings: &ModesSettings,
+) -> Result<Modes, AnalysisError> {
+    settings.check()?;
+    let ModalTest::Forced { hits } = &settings.test else {
+        return Err(settings.refused("test", "ambient records have `ambient_modes`".into()));
+    };
+    let recorded = Recorded::from_forced(measurements, hits.as_ref(), &settings.places)?;
+    let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());
+    let records = measurements.iter().map(|measurement| {
+        let block = measurement.whole_block()?;
+        Ok(RecordRow { file: block.file.clone(), window: WindowRow::of(&block) })
+    });
+    let records = records.collect::<Result<Vec<_>, AnalysisError>>()?;
+    let checks = checks::of_channels(measurements)?;
+    Test { recorded, band_hz }.modes(records, checks, settings)
+}
+
+/// Finds the modes of a structure from tables of its frequency responses, which are fitted together;
+/// any number of points and references is possible.
+///
+/// # Errors
+/// As [`modes`], and [`AnalysisError::NoResponse`] if a response is missing.
+///
+/// # Source
+/// That of [`modes`].
+pub fn modes_of_responses(
+    tables: &[FrequencyResponses],
+    settings: &ModesSettings,
+) -> Result<Modes, AnalysisError> {
+    settings.check()?;
+    let tables = Tables::new(tables)?;
+    let band_hz = settings.band_hz.unwrap_or_else(|| tables.range_hz());
+    forced::of_tables(&tables, band_hz, settings)
+}
+
+impl Modes {
+    /// Returns the numbers, checks and notes.
+    pub fn summary(&self) -> &ModesSummary {
+        &self.summary
+    }
+
+    /// Returns the responses over frequency, measured and explained.
+    pub fn spectrum(&self) -> &ModesSpectrum {
+        &self.spectrum
+    }
+}
+
+impl fmt::Display for Modes {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.summary.fmt(f)
+    }
+}
+
+impl Serialize for Modes {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(serializer)
+    }
+}

@@ -1,0 +1,226 @@
+//! Spectral lines of modal tests: records as a whole, hits of a hammer, a struck point per record.
+
+use mechid_model::ResponseQuantity;
+use mechid_signal::{Record, Spectrum};
+use mechid_spectra::LineData;
+use nalgebra::DMatrix;
+
+use super::settings::Places;
+use crate::AnalysisError;
+use crate::hits::{self, HitRow};
+use crate::measurement::{Block, Channels, Measurement};
+use mechid_signal::HitRule;
+
+/// Number of lines whose mean power decides whether a force drives them.
+const BAND_LINES: usize = 16;
+
+/// Power of a force over its largest, in the mean of some lines, below which these are not driven: at
+/// −40 dB the response to the force drowns in the noise of usual sensors.
+const DRIVEN: f64 = 1e-4;
+
+/// Records of one test: the inputs and outputs of each, and what they are called.
+#[derive(Debug)]
+pub(super) struct Recorded {
+    /// Forces (N, samples × inputs) and responses (samples × outputs) of each record or hit.
+    pub parts: Vec<Part>,
+    /// Names of the forces.
+    pub inputs: Vec<String>,
+    /// Responses.
+    pub outputs: Vec<Output>,
+    /// Input and output at the same place, counted from 0.
+    pub driving_points: Vec<(usize, usize)>,
+    /// Hits, where the records were cut.
+    pub hits: Vec<HitRow>,
+}
+
+/// One record, or one hit of it.
+#[derive(Debug)]
+pub(super) struct Part {
+    /// Forces, samples × inputs, in N; `None` without forces.
+    pub forces: Option<Record>,
+    /// Responses, samples × outputs.
+    pub responses: Record,
+}
+
+/// A response.
+#[derive(Debug, Clone)]
+pub(super) struct Output {
+    pub name: String,
+    /// Measured quantity; `None` if a table does not state it.
+    pub quantity: Option<ResponseQuantity>,
+}
+
+impl Recorded {
+    /// Takes the records of a test with measured forces, cut into hits if there is a rule.
+    pub fn from_forced(
+        measurements: &[Measurement],
+        rule: Option<&HitRule>,
+        places: &Places,
+    ) -> Result<Self, AnalysisError> {
+        let first = measurements.first().ok_or(AnalysisError::NoRecord)?;
+        if first.channels().force.is_empty() {
+            return Err(AnalysisError::NoForce);
+        }
+        let outputs = outputs_of(first.channels());
+        if outputs.is_empty() {
+            return Err(AnalysisError::NoMotion);
+        }
+        let columns = Columns::new(measurements, places)?;
+        let mut hits = Vec::new();
+        let mut parts = Vec::new();
+        for (at, measurement) in measurements.iter().enumerate() {
+            let blocks = match rule {
+                None => vec![measurement.whole_block()?],
+                Some(rule) => {
+                    let cut = hits::cut(&[measurement.hold_any()?], rule)?;
+                    hits.extend(cut.rows);
+                    cut.hits.into_iter().map(|hit| hit.into_held()).collect()
+                }
+            };
+            for block in &blocks {
+                let forces = Some(columns.forces(at, block)?);
+                parts.push(Part { forces, responses: responses_of(block)? });
+            }
+        }
+        let responses = places.response_places(outputs.len())?;
+        let driving_points = columns.driving_points(&responses);
+        Ok(Self { parts, inputs: columns.names, outputs, driving_points, hits })
+    }
+
+    /// Lines of all records in a band (Hz).
+    pub fn lines(&self, band_hz: [f64; 2]) -> Result<LineData, AnalysisError> {
+        let mut all: Option<LineData> = None;
+        for part in &self.parts {
+            let one = LineData::from_open_record(part.forces.as_ref(), &part.responses, band_hz)?;
+            all = Some(match all {
+                None => one,
+                Some(before) => before.followed_by(&one)?,
+            });
+        }
+        all.ok_or(AnalysisError::NoRecord)
+    }
+
+    /// Band, in Hz, that the forces drive: from the first to the last group of lines in which one of
+    /// them has a power worth mentioning.
+    pub fn driven_band(&self) -> [f64; 2] {
+        let [mut low, mut high] = [f64::INFINITY, 0.0_f64];
+        for forces in self.parts.iter().filter_map(|part| part.forces.as_ref()) {
+            let spacing_hz = forces.sampling().line_spacing_hz();
+            let spectrum = Spectrum::of(forces);
+            let lines = forces.len().div_ceil(2).saturating_sub(1);
+            for column in spectrum.lines().column_iter() {
+                let powers: Vec<f64> = column.rows(1, lines).iter().map(|z| z.norm_sqr()).collect();
+                let mean = |group: &[f64]| group.iter().sum::<f64>() / group.len() as f64;
+                let means: Vec<f64> = powers.chunks(BAND_LINES).map(mean).collect();
+                let largest = means.iter().copied().fold(0.0, f64::max);
+                let is_driven = |power: &f64| largest > 0.0 && *power >= DRIVEN * largest;
+                if let (Some(first), Some(last)) =
+                    (means.iter().position(is_driven), means.iter().rposition(is_driven))
+                {
+                    low = low.min((1 + first * BAND_LINES) as f64 * spacing_hz);
+                    let end = ((last + 1) * BAND_LINES).min(lines);
+                    high = high.max(end as f64 * spacing_hz);
+                }
+            }
+        }
+        [low, high]
+    }
+}
+
+/// Input that each force column of each record belongs to.
+struct Columns {
+    /// Names of the inputs.
+    names: Vec<String>,
+    /// Place of each input, if it is stated.
+    places: Vec<Option<String>>,
+    /// Input of each force column, record by record.
+    input: Vec<Vec<usize>>,
+}
+
+impl Columns {
+    fn new(measurements: &[Measurement], places: &Places) -> Result<Self, AnalysisError> {
+        let columns: Vec<&[String]> =
+            measurements.iter().map(|m| m.channels().force.as_slice()).collect();
+        let count = columns[0].len();
+        let stated = &places.forces;
+        let roves = count == 1 && measurements.len() > 1 && stated.len() == measurements.len();
+        if roves {
+            let mut names: Vec<String> = Vec::new();
+            let index = |place: &String| {
+                names.iter().position(|name| name == place).unwrap_or_else(|| {
+                    names.push(place.clone());
+                    names.len() - 1
+                })
+            };
+            let input = stated.iter().map(index).map(|at| vec![at]).collect();
+            let places = names.iter().cloned().map(Some).collect();
+            return Ok(Self { names, places, input });
+        }
+        if !stated.is_empty() && stated.len() != count {
+            let why = format!(
+                "{} places for {count} force columns in {} records: name one for each column, or, of \
+                 a hammer that roves, one for each record",
+                stated.len(),
+                measurements.len()
+            );
+            return Err(AnalysisError::Setting { setting: "force_places", why });
+        }
+        let names = measurements[0].source().names.force.clone();
+        let places = (0..count).map(|at| stated.get(at).cloned()).collect();
+        Ok(Self { names, places, input: vec![(0..count).collect(); measurements.len()] })
+    }
+
+    /// Forces of a record, samples × inputs.
+    fn forces(&self, record: usize, block: &Block) -> Result<Record, AnalysisError> {
+        let mut data = DMatrix::zeros(block.force.len(), self.names.len());
+        for (column, input) in self.input[record].iter().enumerate() {
+            data.column_mut(*input).copy_from_slice(block.force.channel(column));
+        }
+        Ok(Record::new(block.force.sampling(), data)?)
+    }
+
+    /// Pairs of an input and an output at the same place.
+    fn driving_points(&self, responses: &[Option<String>]) -> Vec<(usize, usize)> {
+        let mut pairs = Vec::new();
+        for (input, place) in self.places.iter().enumerate() {
+            let output = responses.iter().position(|other| other.is_some() && other == place);
+            pairs.extend(output.map(|output| (input, output)));
+        }
+        pairs
+    }
+}
+
+impl Places {
+    fn response_places(&self, outputs: usize) -> Result<Vec<Option<String>>, AnalysisError> {
+        if self.responses.is_empty() {
+            return Ok(vec![None; outputs]);
+        }
+        if self.responses.len() != outputs {
+            let why = format!("{} places for {outputs} responses", self.responses.len());
+            return Err(AnalysisError::Setting { setting: "response_places", why });
+        }
+        Ok(self.responses.iter().cloned().map(Some).collect())
+    }
+}
+
+/// Responses of all kinds, in the order of [`responses_of`].
+pub(super) fn outputs_of(channels: &Channels) -> Vec<Output> {
+    let of_kind = |quantity| {
+        let named = move |at| Output {
+            name: channels.response_name(quantity, at),
+            quantity: Some(quantity),
+        };
+        (0..channels.response(quantity).len()).map(named)
+    };
+    ResponseQuantity::ALL.into_iter().flat_map(of_kind).collect()
+}
+
+/// All responses of a record, samples × outputs.
+pub(super) fn responses_of(block: &Block) -> Result<Record, AnalysisError> {
+    let kinds = block.responses();
+    let columns: Vec<&[f64]> = kinds
+        .iter()
+        .flat_map(|(_, record)| (0..record.channels()).map(|at| record.channel(at)))
+        .collect();
+    Ok(Record::from_channels(block.force.sampling(), &columns)?)
+}

@@ -1,0 +1,238 @@
+//! Result of a modal test with measured forces.
+
+use std::fmt;
+
+use mechid_signal::message;
+use serde::Serialize;
+
+use super::settings::ModesSettings;
+use crate::hits::{self, HitRow};
+use crate::identify::rows::{CONFIDENCE, Uncertain, WindowRow};
+use crate::modal::ShapeEntry;
+use crate::text::{compact, paged_table, significant, text_table};
+
+/// Decimal places of a phase, in degrees.
+const PHASE_DECIMALS: usize = 0;
+
+/// Modes of a structure under measured forces: numbers, checks and notes.
+#[derive(Debug, Serialize)]
+pub struct ModesSummary {
+    /// Records, in the order in which they were given.
+    pub records: Vec<RecordRow>,
+    /// Hits of the records, where these were cut into hits.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub hits: Vec<HitRow>,
+    /// Names of the forces, by their place where it was stated.
+    pub inputs: Vec<String>,
+    /// Responses.
+    pub outputs: Vec<OutputRow>,
+    /// Lowest and highest frequency used, in Hz.
+    pub band_hz: [f64; 2],
+    /// Number of spectral lines of all records together.
+    pub lines: usize,
+    /// Level of the confidence intervals, a pure number such as 0.95.
+    pub confidence: f64,
+    /// Modes by rising frequency.
+    pub modes: Vec<ModalModeRow>,
+    /// Modal assurance criterion of every pair of shapes, a pure number from 0 to 1; rows of modes.
+    pub mac: Vec<Vec<f64>>,
+    /// Candidates for modes that were left out.
+    pub dropped: Vec<DroppedRow>,
+    /// Share of the variance of all outputs, each over its own, that the model explains.
+    pub variance_explained: f64,
+    /// Share that a fit to the first part of the records explains of the rest, where it was tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance_predicted: Option<f64>,
+    /// Checks of the data and of the fit.
+    pub checks: Vec<ModalCheck>,
+    /// Notes to read before using the numbers.
+    pub notes: Vec<String>,
+    /// The settings, which repeat the analysis.
+    pub analysis: ModesSettings,
+}
+
+/// A record of a modal test.
+#[derive(Debug, Serialize)]
+pub struct RecordRow {
+    /// Name of the record.
+    pub file: String,
+    /// Samples used.
+    #[serde(flatten)]
+    pub window: WindowRow,
+}
+
+/// One response.
+#[derive(Debug, Serialize)]
+pub struct OutputRow {
+    /// Name of the column.
+    pub column: String,
+    /// SI unit; `None` if a table does not state the quantity.
+    pub unit: Option<&'static str>,
+    /// Share of the variance that the model explains in the band, a ratio.
+    pub variance_explained: f64,
+    /// Share that a fit to the first part of the records explains of the rest, where it was tried.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance_predicted: Option<f64>,
+    /// RMS of the sensor noise in the band over that of the response, a ratio.
+    pub noise_share: f64,
+}
+
+/// One mode.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModalModeRow {
+    /// Natural frequency |λ|/2π, in Hz.
+    pub natural_frequency_hz: Uncertain,
+    /// Damping ratio −Re λ/|λ|, a pure number.
+    pub damping_ratio: Uncertain,
+    /// Real and imaginary part of the pole λ, in rad/s.
+    pub eigenvalue: [f64; 2],
+    /// One entry per response; the largest is 1.
+    pub shape: Vec<ShapeEntry>,
+    /// One entry per force; the largest is 1.
+    pub participation: Vec<ShapeEntry>,
+    /// Modal phase collinearity of the shape: 1 if all entries have one phase or its opposite.
+    pub phase_collinearity: f64,
+    /// Share of the power of this mode that the measured forces drive; the rest answers forces that
+    /// were not measured.
+    pub driven_share: Option<f64>,
+    /// Modal mass for the shape scaled to 1 at its largest entry, in kg, where a force acts at the
+    /// place of a response.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_mass: Option<f64>,
+}
+
+/// A candidate that did not become a mode.
+#[derive(Debug, Clone, Serialize)]
+pub struct DroppedRow {
+    /// Its frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Its damping ratio, a pure number.
+    pub damping_ratio: f64,
+    /// Reason, in a sentence.
+    pub reason: String,
+}
+
+/// One check of a modal test.
+#[derive(Debug, Clone, Serialize)]
+pub struct ModalCheck {
+    /// Name of the check, in snake case.
+    pub code: &'static str,
+    /// `true` if it passed.
+    pub passed: bool,
+    /// Number that decides, a ratio or a probability.
+    pub value: f64,
+    /// The finding, in a sentence.
+    pub text: String,
+}
+
+impl ModesSummary {
+    fn heading(&self) -> String {
+        let rate = self.records.first().map_or(0.0, |record| record.window.sample_rate_hz);
+        let rate = compact(rate, 6);
+        let mut text = String::new();
+        if self.hits.is_empty() {
+            for RecordRow { file, window } in &self.records {
+                let (first, last) = (window.first_sample, window.last_sample);
+                text += &format!("{file}: samples {first} to {last}, {rate} Hz\n");
+            }
+        } else {
+            text += &hits::heading(&self.hits, &rate);
+        }
+        let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
+        text + &format!(
+            "{}, {}; maximum likelihood, {} lines, {low} to {high} Hz\n",
+            message::count(self.inputs.len(), "force"),
+            message::count(self.outputs.len(), "response"),
+            self.lines
+        )
+    }
+
+    fn mode_table(&self) -> String {
+        let header = [
+            "mode",
+            "frequency (Hz)",
+            "±",
+            "95 % interval",
+            "damping ratio (%)",
+            "±",
+            "95 % interval",
+            "driven (%)",
+        ];
+        let mut rows = vec![header.map(String::from).to_vec()];
+        for (number, mode) in (1..).zip(&self.modes) {
+            let mut row = vec![number.to_string()];
+            row.extend(mode.natural_frequency_hz.cells());
+            row.extend(mode.damping_ratio.percent().cells());
+            row.push(mode.driven_share.map_or("–".into(), |s| significant(100.0 * s, 4)));
+            rows.push(row);
+        }
+        text_table(&rows)
+    }
+
+    /// Modulus and phase of every entry: of shapes by response, of participations by force.
+    fn entries(&self, what: &str, names: &[String], of: fn(&ModalModeRow) -> &[ShapeEntry]) -> String {
+        let mut header = vec![what.to_owned()];
+        header.extend((1..=self.modes.len()).map(|number| format!("mode {number}")));
+        let mut rows = vec![header];
+        for (at, name) in names.iter().enumerate() {
+            let cell = |mode: &ModalModeRow| {
+                let [re, im] = of(mode)[at].value;
+                let phase = im.atan2(re).to_degrees();
+                // No minus sign before a zero.
+                let phase = if phase.abs() < 0.5 { 0.0 } else { phase };
+                format!("{} ∠{phase:.PHASE_DECIMALS$}°", significant(re.hypot(im), 3))
+            };
+            rows.push([vec![name.clone()], self.modes.iter().map(cell).collect()].concat());
+        }
+        paged_table(&rows, 1)
+    }
+
+    fn output_table(&self) -> String {
+        let predicted = self.variance_predicted.is_some();
+        let mut header = vec!["response", "explained (%)", "noise (%)"];
+        if predicted {
+            header.insert(2, "predicted (%)");
+        }
+        let mut rows = vec![header.into_iter().map(String::from).collect::<Vec<_>>()];
+        for output in &self.outputs {
+            let mut row = vec![output.column.clone()];
+            row.push(significant(100.0 * output.variance_explained, 4));
+            row.extend(output.variance_predicted.map(|share| significant(100.0 * share, 4)));
+            row.push(significant(100.0 * output.noise_share, 3));
+            rows.push(row);
+        }
+        text_table(&rows)
+    }
+
+    fn check_lines(&self) -> String {
+        let passed = self.checks.iter().filter(|check| check.passed).count();
+        let mut text = format!("{passed} of {} passed\n", message::count(self.checks.len(), "check"));
+        for check in self.checks.iter().filter(|check| !check.passed) {
+            text += &format!("  warning: {}\n", check.text);
+        }
+        text
+    }
+}
+
+impl fmt::Display for ModesSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let outputs: Vec<String> = self.outputs.iter().map(|output| output.column.clone()).collect();
+        write!(f, "{}\n{}", self.heading(), self.mode_table())?;
+        if self.outputs.len() > 1 {
+            write!(f, "\n{}", self.entries("shape", &outputs, |mode| &mode.shape))?;
+        }
+        if self.inputs.len() > 1 {
+            let inputs = self.entries("participation", &self.inputs, |mode| &mode.participation);
+            write!(f, "\n{inputs}")?;
+        }
+        write!(f, "\n{}\n{}", self.output_table(), self.check_lines())?;
+        for row in &self.dropped {
+            let (hz, ratio) = (significant(row.frequency_hz, 5), significant(100.0 * row.damping_ratio, 3));
+            writeln!(f, "left out: {hz} Hz, {ratio} %: {}", row.reason)?;
+        }
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
+    }
+}
+
+/// Level of the intervals of this result.
+pub(super) const LEVEL: f64 = CONFIDENCE;

@@ -1,0 +1,218 @@
+//! `mechid modes`: natural frequencies, damping ratios and shapes, of whatever tells them.
+
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use mechid::analysis::identify::Band;
+use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
+use mechid::analysis::{AnalysisError, Machine, ModalSummary};
+use mechid::integrate::ModeSearch;
+use mechid::io::{input_name, read_sparse_system};
+use mechid::selected_modes::SelectedModes;
+use mechid::report::ToFigure as _;
+use mechid::{DecaySettings, Measurement};
+
+use crate::args::hits::HitRuleArgs;
+use crate::args::{
+    ChannelArgs, PlotArgs, RecordArgs, ReportArgs, StyleArgs, at_least_one, positive,
+};
+use crate::error::CliError;
+use crate::outcome::{Files, Outcome};
+
+/// Find the modes: of a test with forces, of a free decay, of an ambient record, of a machine
+///
+/// With --force, any number of forces and of responses: shakers, a hammer (--hits leaves bad hits
+/// out), a hammer that roves from point to point (a record for each, --force-at). Frequencies,
+/// damping ratios and shapes are those of maximum likelihood on the spectral lines of the whole
+/// records, without windows; the number of modes is found, too. Without --force the record is taken
+/// for a free decay, or with --ambient for the response to forces that nobody measured. Without any
+/// response the file is the description of a machine, or what `mechid identify --json` printed.
+///
+/// A large machine, up to some 100,000 degrees of freedom in sparse matrices, has too many modes
+/// to find all: --modes takes those of lowest frequency, --near-hz those around a frequency.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  mechid modes beam.csv --force hammer --acceleration a1 --band-hz 5:1200
+  mechid modes frame.csv --force f1,f2 --acceleration a1,a2,a3,a4 --validate-percent 40
+  mechid modes p1.csv p2.csv p3.csv --force f --force-at 1,2,3 --acceleration a --response-at 3 --hits
+  mechid modes examples/decay.csv --acceleration a1,a2,a3
+  mechid modes bridge.csv --acceleration a1,a2,a3 --ambient --band-hz 0.5:20
+  mechid modes examples/machine.json --plot modes.svg
+  mechid modes casing.json --modes 4 --near-hz 50")]
+pub struct ModesArgs {
+    #[command(flatten)]
+    input: RecordArgs,
+    /// More records of the same structure, with the same columns and window: all are fitted together
+    #[arg(value_name = "RECORD")]
+    more: Vec<PathBuf>,
+    #[command(flatten)]
+    channels: ChannelArgs,
+    /// Place of each force column, such as 3 or 12+Z; where one column of several records is that of a
+    /// hammer, the place that it strikes in each of them
+    #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
+    force_at: Vec<String>,
+    /// Place of each response column; where a force acts at the place of a response, modal masses follow
+    #[arg(long, value_name = "PLACE,…", value_delimiter = ',')]
+    response_at: Vec<String>,
+    /// Frequencies to use, in Hz [default: those that the forces drive]
+    #[arg(long, value_name = "LOW:HIGH")]
+    band_hz: Option<Band>,
+    /// Number of modes [default: as many as the record shows; of a machine all]
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one)]
+    modes: Option<usize>,
+    /// Largest number of modes to look for
+    #[arg(long, value_name = "COUNT", value_parser = at_least_one, conflicts_with = "modes")]
+    max_modes: Option<usize>,
+    /// Frequencies, in Hz, near which a mode is looked for whatever the start shows; of a machine with
+    /// --modes, the frequency that the modes are nearest to
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
+          allow_negative_numbers = true)]
+    near_hz: Vec<f64>,
+    /// Shapes are real: the damping is proportional
+    #[arg(long)]
+    real_shapes: bool,
+    /// Keep this part of each record, at its end, out of a second fit, and predict it
+    #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
+    validate_percent: Option<f64>,
+    #[command(flatten)]
+    hits: HitRuleArgs,
+    #[command(flatten)]
+    unmeasured: UnmeasuredArgs,
+    #[command(flatten)]
+    plot: PlotArgs,
+    #[command(flatten)]
+    style: StyleArgs,
+    #[command(flatten)]
+    pub report: ReportArgs,
+}
+
+/// Records without measured forces.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Records without forces")]
+struct UnmeasuredArgs {
+    /// Forces act that are not measured, such as wind or traffic
+    #[arg(long, conflicts_with_all = ["force", "from", "to", "no_offset"])]
+    ambient: bool,
+    /// Frequencies of machines nearby, in Hz, whose lines are left out
+    #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
+          requires = "ambient", allow_negative_numbers = true)]
+    without_hz: Vec<f64>,
+    /// Leave out the harmonics that are found
+    #[arg(long, requires = "ambient")]
+    without_harmonics: bool,
+    /// Beginning of a free decay, in seconds from the first sample of the window [default: found]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    from: Option<f64>,
+    /// End of what is used of a free decay, in seconds from the first sample of the window
+    /// [default: its end]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    to: Option<f64>,
+    /// The channels of a free decay have no constant
+    #[arg(long)]
+    no_offset: bool,
+}
+
+impl ModesArgs {
+    /// Returns the files that the arguments name.
+    pub fn files(&self) -> Files<'_> {
+        Files::default().reads([&self.input.record]).reads(&self.more).writes(&self.plot.plot)
+    }
+
+    /// Reads what there is, finds the modes, and reports.
+    pub fn run(&self) -> Result<Outcome, CliError> {
+        let channels = self.channels.channels();
+        if channels.first_response().is_none() && channels.force.is_empty() {
+            return self.of_machine(&self.input.record);
+        }
+        if channels.force.is_empty() && !self.unmeasured.ambient {
+            self.refuse("a free decay", &self.of_forces())?;
+            let decayed = mechid::decay(&self.input.open(&channels)?, &self.decay())?;
+            return Outcome::new(decayed.to_string(), &decayed)?
+                .with_plot(&self.plot, || Ok(decayed.styled_figure(self.style.style())?));
+        }
+        let mut records = vec![self.input.open(&channels)?];
+        for record in &self.more {
+            records.push(self.input.open_other(record, &channels, self.input.window())?);
+        }
+        self.of_records(&records)
+    }
+
+    fn of_records(&self, records: &[Measurement]) -> Result<Outcome, CliError> {
+        let modes = mechid::modes(records, &self.settings())?;
+        Outcome::new(modes.to_string(), &modes)?
+            .with_plot(&self.plot, || Ok(modes.styled_figure(self.style.style())?))
+    }
+
+    /// Refuses the first of some options that was given.
+    fn refuse(&self, what: &str, options: &[(&'static str, bool)]) -> Result<(), CliError> {
+        let Some(&(setting, _)) = options.iter().find(|(_, given)| *given) else { return Ok(()) };
+        let why = format!("it means nothing to {what}");
+        Err(AnalysisError::Setting { setting, why }.into())
+    }
+
+    /// Options of tests with forces, and whether they were given.
+    fn of_forces(&self) -> [(&'static str, bool); 7] {
+        [
+            ("force_at", !self.force_at.is_empty()),
+            ("response_at", !self.response_at.is_empty()),
+            ("band_hz", self.band_hz.is_some()),
+            ("near_hz", !self.near_hz.is_empty()),
+            ("real_shapes", self.real_shapes),
+            ("validate_percent", self.validate_percent.is_some()),
+            ("hits", self.hits.rule().is_some()),
+        ]
+    }
+
+    fn of_machine(&self, path: &Path) -> Result<Outcome, CliError> {
+        let of_forces = self.of_forces().into_iter().filter(|(name, _)| *name != "near_hz");
+        self.refuse("a machine", &of_forces.collect::<Vec<_>>())?;
+        if self.modes.is_none() && !self.near_hz.is_empty() {
+            let why = "of a machine it needs `modes`, the number to find".into();
+            return Err(AnalysisError::Setting { setting: "near_hz", why }.into());
+        }
+        if let Some(count) = self.modes {
+            self.refuse("some modes of a large machine", &[("plot", self.plot.plot.is_some())])?;
+            let machine = read_sparse_system(path)?;
+            let near = self.near_hz.first();
+            let search = near.map_or(ModeSearch::Lowest, |hz| ModeSearch::NearOmega(TAU * hz));
+            let selected = SelectedModes::of(input_name(path), &machine, search, count)?;
+            return Outcome::new(selected.to_string(), &selected);
+        }
+        let machine = Machine::read(path)?;
+        let modes = ModalSummary::of(&machine)?;
+        Outcome::new(modes.to_string(), &modes)?
+            .with_plot(&self.plot, || Ok(machine.styled_figure(self.style.style())?))
+    }
+
+    fn settings(&self) -> ModesSettings {
+        let UnmeasuredArgs { ambient, without_hz, without_harmonics, .. } = &self.unmeasured;
+        let test = if *ambient {
+            let (without_hz, without_harmonics) = (without_hz.clone(), *without_harmonics);
+            ModalTest::Ambient { without_hz, without_harmonics }
+        } else {
+            ModalTest::Forced { hits: self.hits.rule() }
+        };
+        ModesSettings {
+            test,
+            band_hz: self.band_hz.map(|band| [band.low_hz, band.high_hz]),
+            modes: self.modes,
+            max_modes: self.max_modes,
+            near_hz: self.near_hz.clone(),
+            real_shapes: self.real_shapes,
+            places: Places { forces: self.force_at.clone(), responses: self.response_at.clone() },
+            validate: self.validate_percent.unwrap_or(0.0) / 100.0,
+        }
+    }
+
+    fn decay(&self) -> DecaySettings {
+        let usual = DecaySettings::default();
+        DecaySettings {
+            from_s: self.unmeasured.from,
+            to_s: self.unmeasured.to,
+            modes: self.modes,
+            max_modes: self.max_modes.unwrap_or(usual.max_modes),
+            offset: !self.unmeasured.no_offset,
+        }
+    }
+}
