@@ -8,7 +8,7 @@ use mechid_modal::{
     indicators,
 };
 use mechid_spectra::LineData;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, DVectorView};
 
 use super::checks;
 use super::settings::ModesSettings;
@@ -91,7 +91,6 @@ fn engine_settings(settings: &ModesSettings) -> ModalSettings {
         modes: settings.modes,
         max_modes: settings.max_modes.unwrap_or(usual.max_modes),
         near_hz: settings.near_hz.clone(),
-        real_shapes: settings.real_shapes,
         ..usual
     }
 }
@@ -126,7 +125,11 @@ fn predicted(
         &engine_settings(settings),
     )?;
     let rest = part(1.0 - share, 1.0)?.lines(band_hz)?;
-    Ok(fitted.variance_predicted(&rest)?)
+    let model = fitted.synthesis(&rest)?;
+    let share = |(measured, model): (DVectorView<'_, Complex<f64>>, DVectorView<'_, Complex<f64>>)| {
+        1.0 - (measured - model).norm_squared() / measured.norm_squared()
+    };
+    Ok(rest.outputs().column_iter().zip(model.column_iter()).map(share).collect())
 }
 
 impl Told {
@@ -151,7 +154,7 @@ impl Told {
             unit: output.quantity.map(|quantity| quantity.unit()),
             variance_explained: explained[at],
             variance_predicted: self.predicted.as_ref().map(|shares| shares[at]),
-            noise_share: estimate.noise_share()[at],
+            noise_share: estimate.noise_levels()[at] / rms(data, at),
         });
         let summary = ModesSummary {
             records: self.records,
@@ -194,7 +197,9 @@ fn row(mode: &IdentifiedMode, outputs: &[Output], points: &[(usize, usize)]) -> 
     let modal_mass = modal_mass.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, mass)| mass);
     ModalModeRow {
         natural_frequency_hz: uncertain(&mode.natural_frequency_hz),
+        damped_frequency_hz: damped_frequency(mode),
         damping_ratio: uncertain(&mode.damping_ratio),
+        oscillates: true,
         eigenvalue: [mode.pole.re, mode.pole.im],
         shape: entries(&mode.shape, &mode.shape_standard_error, Complex::from(1.0)),
         participation: entries(&mode.participation, &mode.participation_standard_error, scale),
@@ -204,10 +209,25 @@ fn row(mode: &IdentifiedMode, outputs: &[Output], points: &[(usize, usize)]) -> 
     }
 }
 
+/// f√(1 − ζ²), with its standard error to first order.
+fn damped_frequency(mode: &IdentifiedMode) -> Uncertain {
+    let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
+    let root = (1.0 - zeta.value * zeta.value).sqrt();
+    let slope = -f.value * zeta.value / root;
+    let variance = (root * f.standard_error).powi(2)
+        + (slope * zeta.standard_error).powi(2)
+        + 2.0 * root * slope * mode.frequency_damping_covariance;
+    normal(root * f.value, variance.max(0.0).sqrt())
+}
+
 /// Value with a normal interval: the noise is averaged over many lines.
 fn uncertain(value: &mechid_modal::Uncertain) -> Uncertain {
-    let half = NORMAL_95 * value.standard_error;
-    Uncertain::new(value.value, value.standard_error, [value.value - half, value.value + half])
+    normal(value.value, value.standard_error)
+}
+
+fn normal(value: f64, standard_error: f64) -> Uncertain {
+    let half = NORMAL_95 * standard_error;
+    Uncertain::new(value, standard_error, [value - half, value + half])
 }
 
 /// Half width of the 95 % interval of a normal distribution, in standard deviations.
@@ -277,13 +297,18 @@ fn notes(estimate: &ModalEstimate) -> Vec<String> {
     notes
 }
 
+/// RMS of an output over the lines, which is not zero.
+fn rms(data: &LineData, output: usize) -> f64 {
+    let power = data.outputs().column(output).norm_squared() / data.len() as f64;
+    power.sqrt().max(f64::MIN_POSITIVE)
+}
+
 /// Measured and explained responses of the first record, all outputs together.
 fn spectrum(data: &LineData, estimate: &ModalEstimate) -> Result<ModesSpectrum, AnalysisError> {
     let modelled: DMatrix<Complex<f64>> = estimate.synthesis(data)?;
     let outputs = data.outputs();
     let rows = data.records().first().map_or(0..0, |(rows, _)| rows.clone());
-    let rms = |at: usize| (outputs.column(at).norm_squared() / data.len() as f64).sqrt();
-    let scale: Vec<f64> = (0..outputs.ncols()).map(|at| rms(at).max(f64::MIN_POSITIVE)).collect();
+    let scale: Vec<f64> = (0..outputs.ncols()).map(|at| rms(data, at)).collect();
     let sum = |value: &dyn Fn(usize) -> f64| {
         scale.iter().enumerate().map(|(at, s)| value(at) / (s * s)).sum::<f64>().sqrt()
     };

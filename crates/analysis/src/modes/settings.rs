@@ -22,8 +22,6 @@ pub struct ModesSettings {
     pub max_modes: Option<usize>,
     /// Frequencies, in Hz, near which a mode is looked for whatever the start shows.
     pub near_hz: Vec<f64>,
-    /// `true` for real shapes (proportional damping).
-    pub real_shapes: bool,
     /// Places of the forces, one each (of a roving hammer one per record), and of the responses, by
     /// which a driving point is known; empty: not stated.
     pub places: Places,

@@ -82,8 +82,12 @@ pub struct OutputRow {
 pub struct ModalModeRow {
     /// Natural frequency |λ|/2π, in Hz.
     pub natural_frequency_hz: Uncertain,
+    /// Damped frequency Im λ/2π, in Hz.
+    pub damped_frequency_hz: Uncertain,
     /// Damping ratio −Re λ/|λ|, a pure number.
     pub damping_ratio: Uncertain,
+    /// `true`: only modes that oscillate are found.
+    pub oscillates: bool,
     /// Real and imaginary part of the pole λ, in rad/s.
     pub eigenvalue: [f64; 2],
     /// One entry per response; the largest is 1.

@@ -69,9 +69,6 @@ pub struct ModesArgs {
     #[arg(long, value_name = "HZ,…", value_delimiter = ',', value_parser = positive,
           allow_negative_numbers = true)]
     near_hz: Vec<f64>,
-    /// Shapes are real: the damping is proportional
-    #[arg(long)]
-    real_shapes: bool,
     /// Keep this part of each record, at its end, out of a second fit, and predict it
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     validate_percent: Option<f64>,
@@ -152,13 +149,12 @@ impl ModesArgs {
     }
 
     /// Options of tests with forces, and whether they were given.
-    fn of_forces(&self) -> [(&'static str, bool); 7] {
+    fn of_forces(&self) -> [(&'static str, bool); 6] {
         [
             ("force_at", !self.force_at.is_empty()),
             ("response_at", !self.response_at.is_empty()),
             ("band_hz", self.band_hz.is_some()),
             ("near_hz", !self.near_hz.is_empty()),
-            ("real_shapes", self.real_shapes),
             ("validate_percent", self.validate_percent.is_some()),
             ("hits", self.hits.rule().is_some()),
         ]
@@ -199,7 +195,6 @@ impl ModesArgs {
             modes: self.modes,
             max_modes: self.max_modes,
             near_hz: self.near_hz.clone(),
-            real_shapes: self.real_shapes,
             places: Places { forces: self.force_at.clone(), responses: self.response_at.clone() },
             validate: self.validate_percent.unwrap_or(0.0) / 100.0,
         }
