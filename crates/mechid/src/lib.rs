@@ -70,9 +70,10 @@ pub use mechid_analysis::identify::Method::{self, Instrumental, LeastSquares, Ma
 pub use mechid_analysis::{
     BearingData, Channels, DecaySettings, Decayed, Detrend, FrfSettings, Identified,
     IdentifiedBearing, IdentifiedResponses, Identify, IdentifyBearing, IdentifyResponses,
-    InspectSettings, Machine, Measurement, Modes, ModesSettings, Predict, Predicted, Reading, Reconstruct, Reconstructed,
-    ResultRow, SavedAnalysis, Segmentation, Window, decay, frf, frf_of_records, identify,
-    identify_bearing, identify_responses, inspect, modes, modes_of_responses, predict, reconstruct,
+    InspectSettings, Machine, Measurement, Modes, ModesSettings, Predict, Predicted, Reading,
+    Reconstruct, Reconstructed, ResultRow, SavedAnalysis, Segmentation, Window, decay, frf,
+    frf_of_records, identify, identify_bearing, identify_responses, inspect, modes,
+    modes_of_responses, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
 pub use mechid_estimate as estimate;

@@ -120,15 +120,14 @@ fn predicted(
             hits: Vec::new(),
         })
     };
-    let fitted = identify_modes(
-        &part(0.0, 1.0 - share)?.lines(band_hz)?,
-        &engine_settings(settings),
-    )?;
+    let fitted =
+        identify_modes(&part(0.0, 1.0 - share)?.lines(band_hz)?, &engine_settings(settings))?;
     let rest = part(1.0 - share, 1.0)?.lines(band_hz)?;
     let model = fitted.synthesis(&rest)?;
-    let share = |(measured, model): (DVectorView<'_, Complex<f64>>, DVectorView<'_, Complex<f64>>)| {
-        1.0 - (measured - model).norm_squared() / measured.norm_squared()
-    };
+    let share =
+        |(measured, model): (DVectorView<'_, Complex<f64>>, DVectorView<'_, Complex<f64>>)| {
+            1.0 - (measured - model).norm_squared() / measured.norm_squared()
+        };
     Ok(rest.outputs().column_iter().zip(model.column_iter()).map(share).collect())
 }
 

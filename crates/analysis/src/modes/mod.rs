@@ -16,9 +16,7 @@ use serde::{Serialize, Serializer};
 use self::forced::Test;
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
-pub use self::summary::{
-    DroppedRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
-};
+pub use self::summary::{DroppedRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
 use self::tables::Tables;
 use crate::AnalysisError;
 use crate::identify::rows::WindowRow;

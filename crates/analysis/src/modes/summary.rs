@@ -174,7 +174,12 @@ impl ModesSummary {
     }
 
     /// Modulus and phase of every entry: of shapes by response, of participations by force.
-    fn entries(&self, what: &str, names: &[String], of: fn(&ModalModeRow) -> &[ShapeEntry]) -> String {
+    fn entries(
+        &self,
+        what: &str,
+        names: &[String],
+        of: fn(&ModalModeRow) -> &[ShapeEntry],
+    ) -> String {
         let mut header = vec![what.to_owned()];
         header.extend((1..=self.modes.len()).map(|number| format!("mode {number}")));
         let mut rows = vec![header];
@@ -210,7 +215,8 @@ impl ModesSummary {
 
     fn check_lines(&self) -> String {
         let passed = self.checks.iter().filter(|check| check.passed).count();
-        let mut text = format!("{passed} of {} passed\n", message::count(self.checks.len(), "check"));
+        let mut text =
+            format!("{passed} of {} passed\n", message::count(self.checks.len(), "check"));
         for check in self.checks.iter().filter(|check| !check.passed) {
             text += &format!("  warning: {}\n", check.text);
         }
@@ -220,7 +226,8 @@ impl ModesSummary {
 
 impl fmt::Display for ModesSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let outputs: Vec<String> = self.outputs.iter().map(|output| output.column.clone()).collect();
+        let outputs: Vec<String> =
+            self.outputs.iter().map(|output| output.column.clone()).collect();
         write!(f, "{}\n{}", self.heading(), self.mode_table())?;
         if self.outputs.len() > 1 {
             write!(f, "\n{}", self.entries("shape", &outputs, |mode| &mode.shape))?;
@@ -231,7 +238,8 @@ impl fmt::Display for ModesSummary {
         }
         write!(f, "\n{}\n{}", self.output_table(), self.check_lines())?;
         for row in &self.dropped {
-            let (hz, ratio) = (significant(row.frequency_hz, 5), significant(100.0 * row.damping_ratio, 3));
+            let (hz, ratio) =
+                (significant(row.frequency_hz, 5), significant(100.0 * row.damping_ratio, 3));
             writeln!(f, "left out: {hz} Hz, {ratio} %: {}", row.reason)?;
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))

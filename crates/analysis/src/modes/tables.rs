@@ -42,9 +42,9 @@ impl<'a> Tables<'a> {
     /// Lowest and highest frequency above zero, in Hz.
     pub fn range_hz(&self) -> [f64; 2] {
         let frequencies = self.tables.iter().flat_map(|table| &table.frequency_hz);
-        frequencies.filter(|hz| **hz > 0.0).fold([f64::INFINITY, 0.0], |[low, high], hz| {
-            [low.min(*hz), high.max(*hz)]
-        })
+        frequencies
+            .filter(|hz| **hz > 0.0)
+            .fold([f64::INFINITY, 0.0], |[low, high], hz| [low.min(*hz), high.max(*hz)])
     }
 
     /// Responses, with the quantities that the tables state.
@@ -113,8 +113,9 @@ impl<'a> Tables<'a> {
         let omega = rows.iter().map(|row| TAU * table.frequency_hz[*row]).collect();
         let mut inputs = DMatrix::zeros(rows.len(), self.forces.len());
         inputs.column_mut(input).fill(Complex::from(1.0));
-        let outputs =
-            DMatrix::from_fn(rows.len(), functions.len(), |row, at| functions[at].values[rows[row]]);
+        let outputs = DMatrix::from_fn(rows.len(), functions.len(), |row, at| {
+            functions[at].values[rows[row]]
+        });
         Ok(LineData::new(omega, inputs, outputs, Transient::None)?)
     }
 }

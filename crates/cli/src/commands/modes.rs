@@ -9,8 +9,8 @@ use mechid::analysis::modes::{ModalTest, ModesSettings, Places};
 use mechid::analysis::{AnalysisError, Machine, ModalSummary};
 use mechid::integrate::ModeSearch;
 use mechid::io::{input_name, read_sparse_system};
-use mechid::selected_modes::SelectedModes;
 use mechid::report::ToFigure as _;
+use mechid::selected_modes::SelectedModes;
 use mechid::{DecaySettings, Measurement};
 
 use crate::args::hits::HitRuleArgs;

@@ -13,7 +13,6 @@ mod extremes;
 mod free_decay;
 mod frequency_invariance;
 mod frf;
-mod logarithm;
 mod machine;
 mod modal;
 mod monte_carlo;

@@ -56,9 +56,7 @@ fn machine() -> Machine {
 
 fn instruments() -> Instruments {
     Instruments {
-        sensors: ["x1", "x5"]
-            .map(|dof| Sensor::new(dof, ResponseQuantity::Displacement))
-            .to_vec(),
+        sensors: ["x1", "x5"].map(|dof| Sensor::new(dof, ResponseQuantity::Displacement)).to_vec(),
         inputs: vec![Input::force("x1")],
         ..Instruments::default()
     }
@@ -71,8 +69,7 @@ fn fit(seed: u64, settings: &Settings) -> MachineEstimate {
 /// Share of intervals that hold, and the root mean square of the errors over the standard errors, over all
 /// parameters and seeds.
 fn judge(seeds: u64, settings: &Settings) -> (f64, f64) {
-    let truth: Vec<f64> =
-        (0..5).flat_map(|at| [STIFFNESSES[at], DAMPINGS[at]]).collect();
+    let truth: Vec<f64> = (0..5).flat_map(|at| [STIFFNESSES[at], DAMPINGS[at]]).collect();
     let all: Vec<(f64, f64)> = (0..seeds)
         .into_par_iter()
         .flat_map_iter(|seed| {
