@@ -12,8 +12,8 @@ use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
 use super::search::{Bounds, Minimum, minimise};
 use super::weights::Weights;
-use crate::frequency_domain::motion_level;
-use crate::noise_shape;
+use mechid_spectra::noise::level::motion_level;
+use mechid_spectra::noise::smooth;
 
 /// Parameters with the weights that belong to them.
 pub(super) struct WeightedMinimum {
@@ -158,7 +158,7 @@ impl<'a, M: ResponseModel> UnknownNoise<'a, M> {
             let mut order: Vec<usize> = rows.clone().collect();
             order.sort_by(|a, b| self.data.omega()[*a].total_cmp(&self.data.omega()[*b]));
             let omega: Vec<f64> = order.iter().map(|row| self.data.omega()[*row]).collect();
-            let smooth = noise_shape::choose(&omega, &power.select_rows(&order), 1.0);
+            let smooth = smooth::choose(&omega, &power.select_rows(&order), 1.0);
             for (at, row) in order.iter().enumerate() {
                 let values = smooth.log_power.row(at).map(f64::exp);
                 variance.row_mut(*row).copy_from(&values);
