@@ -436,6 +436,9 @@ pub enum AnalysisError {
     /// The identification failed.
     #[error(transparent)]
     Estimate(#[from] EstimateError),
+    /// A free decay cannot be identified.
+    #[error(transparent)]
+    FreeDecay(#[from] mechid_modal::free_decay::FreeDecayError),
     /// Spectral lines are unusable.
     #[error(transparent)]
     Spectra(#[from] mechid_spectra::SpectraError),

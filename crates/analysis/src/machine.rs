@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_estimate::{Estimate, IdentifiedMode, Unknowns, identified_modes};
 use mechid_io::{
     ParameterCovariance, input_name, read_covariance, read_json, read_nonlinear, read_system,
@@ -11,6 +10,7 @@ use mechid_model::{
     NonlinearParameter, NonlinearSystem, Parameter, SecondOrderSystem, Terms,
     UncertainNonlinearSystem, UncertainSystem,
 };
+use mechid_nonlinear::ChannelPhase;
 use nalgebra::DMatrix;
 use serde::Deserialize;
 

@@ -3,8 +3,9 @@
 use std::fmt;
 
 use mechid_estimate::EstimateError;
-use mechid_estimate::nonlinear::{self, ChannelPhase};
 use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity};
+use mechid_nonlinear as nonlinear;
+use mechid_nonlinear::ChannelPhase;
 use mechid_signal::{Extent, measures, message};
 use serde::{Deserialize, Serialize, Serializer};
 

@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 /// Covariance of parameters θ.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Covariance {
+pub enum Covariance {
     /// Every entry.
     Full(DMatrix<f64>),
     /// Of equations that were solved one by one: n equations of 3n unknowns each have (3n²)² covariances,
@@ -15,15 +15,15 @@ pub(crate) enum Covariance {
 /// Cov(θ_p, θ_q) = S_ij h_p·h_q, with S the residual covariance between the equations i and j of the two
 /// parameters and h the rows of the pseudo-inverses, which equations of the same regressors share.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Product {
+pub struct Product {
     /// S, equations × equations.
-    pub(crate) residual: DMatrix<f64>,
+    pub residual: DMatrix<f64>,
     /// The different rows h, one below the other.
-    pub(crate) rows: DMatrix<f64>,
+    pub rows: DMatrix<f64>,
     /// For every parameter the number of its equation, and that of its row h.
-    pub(crate) places: Vec<(usize, usize)>,
+    pub places: Vec<(usize, usize)>,
     /// Whether the data leave it open.
-    pub(crate) open: Vec<bool>,
+    pub open: Vec<bool>,
 }
 
 impl From<DMatrix<f64>> for Covariance {
@@ -34,7 +34,7 @@ impl From<DMatrix<f64>> for Covariance {
 
 impl Covariance {
     /// The variance of one parameter.
-    pub(crate) fn of(&self, at: usize) -> f64 {
+    pub fn of(&self, at: usize) -> f64 {
         match self {
             Self::Product(product) if product.open[at] => f64::INFINITY,
             _ => self.between(at, at),
@@ -42,7 +42,7 @@ impl Covariance {
     }
 
     /// The covariance of two parameters; NaN if the data leave one open.
-    pub(crate) fn between(&self, p: usize, q: usize) -> f64 {
+    pub fn between(&self, p: usize, q: usize) -> f64 {
         match self {
             Self::Full(all) => all[(p, q)],
             Self::Product(product) if product.open[p] || product.open[q] => f64::NAN,
@@ -54,7 +54,7 @@ impl Covariance {
     }
 
     /// Says that the data leave a parameter open: its variance is infinite, its covariances are NaN.
-    pub(crate) fn leave_open(&mut self, at: usize) {
+    pub fn leave_open(&mut self, at: usize) {
         match self {
             Self::Full(all) => {
                 all.row_mut(at).fill(f64::NAN);
@@ -66,7 +66,7 @@ impl Covariance {
     }
 
     /// All entries, parameters × parameters.
-    pub(crate) fn full(&self) -> DMatrix<f64> {
+    pub fn full(&self) -> DMatrix<f64> {
         match self {
             Self::Full(all) => all.clone(),
             Self::Product(Product { residual, rows, places, open }) => {
@@ -85,12 +85,7 @@ impl Covariance {
     }
 
     /// The covariance of sums f_i = Σ w_p θ_p over the parameters p of equation i: 2n×2n, real parts first.
-    pub(crate) fn of_sums(
-        &self,
-        weights: &[Complex<f64>],
-        equations: &[usize],
-        n: usize,
-    ) -> DMatrix<f64> {
+    pub fn of_sums(&self, weights: &[Complex<f64>], equations: &[usize], n: usize) -> DMatrix<f64> {
         let parts = || weights.iter().map(|w| [w.re, w.im]).zip(equations).enumerate();
         match self {
             Self::Full(all) => {
@@ -128,7 +123,7 @@ impl Covariance {
     }
 
     /// gᵀ Σ g, the variance of gᵀθ.
-    pub(crate) fn variance(&self, gradient: &DVector<f64>) -> f64 {
+    pub fn variance(&self, gradient: &DVector<f64>) -> f64 {
         match self {
             Self::Full(all) => gradient.dot(&(all * gradient)),
             Self::Product(Product { residual, rows, places, .. }) => {

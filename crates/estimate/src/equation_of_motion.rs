@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::covariance::{Covariance, Product};
 use crate::error::NAMED_PARAMETERS;
-use crate::estimate::Findings;
+use crate::estimate::EstimateParts;
 use crate::related_equations::RelatedEquations;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
@@ -131,7 +131,7 @@ impl EquationOfMotion {
     pub(crate) fn findings(
         &self,
         unknowns: &Unknowns,
-    ) -> Result<(Findings, Product), EstimateError> {
+    ) -> Result<(EstimateParts, Product), EstimateError> {
         let free = unknowns.free();
         self.check(unknowns, &free)?;
         let groups = self.groups(unknowns, &free)?;
@@ -145,7 +145,7 @@ impl EquationOfMotion {
             }
         }
         let product = product(&groups, &places, self.dof);
-        let findings = Findings {
+        let findings = EstimateParts {
             values: values.collect(),
             covariance: Covariance::Product(product.clone()),
             degrees_of_freedom: minimum(&groups),
@@ -334,7 +334,8 @@ impl Group {
     }
 }
 
-pub(crate) fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
+/// Returns the error of an equation of motion, counted from 0, that has neither a force nor a known entry.
+pub fn only_ratios(unknowns: &Unknowns, equation: usize) -> EstimateError {
     let of_equation = unknowns.free().into_iter().filter(|p| p.row() == equation);
     let parameters = message::list(of_equation, ", ", NAMED_PARAMETERS);
     EstimateError::OnlyRatios { dof: equation + 1, parameters }

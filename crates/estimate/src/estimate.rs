@@ -29,14 +29,21 @@ pub struct Estimate {
 }
 
 /// Results from which an estimator makes an [`Estimate`]; values in the order of `unknowns.free()`.
-pub(crate) struct Findings {
-    pub(crate) unknowns: Unknowns,
-    pub(crate) values: Vec<f64>,
-    pub(crate) covariance: Covariance,
-    pub(crate) degrees_of_freedom: usize,
-    pub(crate) residual_nrmse: Vec<f64>,
-    pub(crate) condition: f64,
-    pub(crate) undetermined: Vec<Undetermined>,
+pub struct EstimateParts {
+    /// What was unknown.
+    pub unknowns: Unknowns,
+    /// Values, in the SI unit of each.
+    pub values: Vec<f64>,
+    /// Covariance of the values.
+    pub covariance: Covariance,
+    /// Degrees of freedom of the residual variance.
+    pub degrees_of_freedom: usize,
+    /// Ratio of residual to right-hand side of each fitted equation.
+    pub residual_nrmse: Vec<f64>,
+    /// Condition number of the regressors with columns of unit length.
+    pub condition: f64,
+    /// Combinations of parameters on which the data say nothing.
+    pub undetermined: Vec<Undetermined>,
 }
 
 /// One estimated entry of M, C or K.
@@ -65,34 +72,33 @@ impl Estimate {
     /// # Errors
     /// [`EstimateError::Unbounded`] if numbers beyond the largest one leave a parameter without a
     /// finite value or standard error, though there are equations enough for both.
-    pub(crate) fn new(mut findings: Findings) -> Result<Self, EstimateError> {
-        let parameters = findings.unknowns.free();
-        for undetermined in &findings.undetermined {
+    pub fn new(mut parts: EstimateParts) -> Result<Self, EstimateError> {
+        let parameters = parts.unknowns.free();
+        for undetermined in &parts.undetermined {
             for (parameter, _) in &undetermined.terms {
                 let Some(at) = parameters.iter().position(|p| p == parameter) else { continue };
-                findings.values[at] = f64::NAN;
-                findings.covariance.leave_open(at);
+                parts.values[at] = f64::NAN;
+                parts.covariance.leave_open(at);
             }
         }
         let open = |p: &Parameter| {
-            findings.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
+            parts.undetermined.iter().any(|u| u.terms.iter().any(|(term, _)| term == p))
         };
         for (at, p) in parameters.iter().enumerate().filter(|(_, p)| !open(p)) {
-            let unbounded =
-                !findings.values[at].is_finite() || !findings.covariance.of(at).is_finite();
-            if unbounded && findings.degrees_of_freedom > 0 {
+            let unbounded = !parts.values[at].is_finite() || !parts.covariance.of(at).is_finite();
+            if unbounded && parts.degrees_of_freedom > 0 {
                 return Err(EstimateError::Unbounded { parameter: p.to_string() });
             }
         }
         Ok(Self {
-            unknowns: findings.unknowns,
+            unknowns: parts.unknowns,
             parameters,
-            values: findings.values,
-            covariance: findings.covariance,
-            degrees_of_freedom: findings.degrees_of_freedom,
-            residual_nrmse: findings.residual_nrmse,
-            condition: findings.condition,
-            undetermined: findings.undetermined,
+            values: parts.values,
+            covariance: parts.covariance,
+            degrees_of_freedom: parts.degrees_of_freedom,
+            residual_nrmse: parts.residual_nrmse,
+            condition: parts.condition,
+            undetermined: parts.undetermined,
         })
     }
 
@@ -112,7 +118,7 @@ impl Estimate {
     }
 
     /// The same of a change of the parameters.
-    pub(crate) fn squared_length(&self, change: &DVector<f64>) -> Option<f64> {
+    pub fn squared_length(&self, change: &DVector<f64>) -> Option<f64> {
         let errors = self.parameters().map(|p| p.standard_error);
         let scale = DVector::from_iterator(self.values.len(), errors);
         if !scale.iter().all(|error| *error > 0.0 && error.is_finite()) {
@@ -127,13 +133,13 @@ impl Estimate {
     }
 
     /// The same fit at other values, in the order of [`Unknowns::free`], with another covariance.
-    pub(crate) fn moved(
+    pub fn moved(
         &self,
         values: Vec<f64>,
         covariance: DMatrix<f64>,
         degrees_of_freedom: usize,
     ) -> Result<Self, EstimateError> {
-        Self::new(Findings {
+        Self::new(EstimateParts {
             unknowns: self.unknowns.clone(),
             values,
             covariance: covariance.into(),
@@ -191,7 +197,7 @@ impl Estimate {
         };
         let values = self.parameters.iter().map(value).collect();
         let covariance = &change * self.covariance() * change.transpose();
-        Self::new(Findings {
+        Self::new(EstimateParts {
             unknowns,
             values,
             covariance: covariance.into(),
@@ -246,7 +252,7 @@ impl Estimate {
     }
 
     /// Covariance in the form that the estimator found it in.
-    pub(crate) fn spread(&self) -> &Covariance {
+    pub fn spread(&self) -> &Covariance {
         &self.covariance
     }
 
@@ -308,7 +314,7 @@ impl Estimate {
     ///
     /// # Errors
     /// [`EstimateError::Undetermined`].
-    pub(crate) fn check_determined(&self) -> Result<(), EstimateError> {
+    pub fn check_determined(&self) -> Result<(), EstimateError> {
         if !self.undetermined.is_empty() {
             let open = self.parameters().filter(|p| p.value.is_nan());
             return Err(EstimateError::Undetermined {

@@ -24,18 +24,15 @@
 //! Matrices are those of `nalgebra`, which a program that uses this crate depends on, too; the spectra
 //! and records are those of `mechid-signal`.
 
-pub mod checks;
 mod covariance;
 pub mod derivatives;
 mod equation_of_motion;
 mod error;
 mod estimate;
-mod free_decay;
 pub mod frequency_domain;
 mod frequency_responses;
 pub mod likelihood;
 mod modal;
-pub mod nonlinear;
 mod prediction;
 mod related_equations;
 mod relations;
@@ -43,14 +40,15 @@ mod sweep;
 pub mod time_domain;
 mod unknowns;
 
-pub use equation_of_motion::EquationOfMotion;
-pub use error::EstimateError;
-pub use estimate::{Estimate, Estimated, Undetermined};
-pub use free_decay::{DecayChannel, DecayMode, FreeDecay, FreeDecayEstimate, Onset, free_decay};
+pub use covariance::{Covariance, Product};
+pub use equation_of_motion::{EquationOfMotion, only_ratios};
+pub use error::{EstimateError, NAMED_DIRECTIONS, NAMED_PARAMETERS};
+pub use estimate::{Estimate, EstimateParts, Estimated, Undetermined};
 pub use frequency_responses::{ResponseEstimate, output_error_of_responses};
 pub use modal::{IdentifiedMode, identified_modes};
 pub use prediction::{
     StartFit, fit_percent, fitted_start, missing_force, predict, predict_periodic,
 };
+pub use relations::Relations;
 pub use sweep::{Sweep, SweepPoint, sweep};
 pub use unknowns::Unknowns;

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::covariance::Covariance;
 use crate::equation_of_motion::only_ratios;
-use crate::estimate::Findings;
+use crate::estimate::EstimateParts;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Undetermined, Unknowns};
 
@@ -202,7 +202,7 @@ impl RelatedEquations<'_> {
                 terms: terms.map(|(entry, p)| (*p, of_entries[entry])).collect(),
             }
         });
-        Estimate::new(Findings {
+        Estimate::new(EstimateParts {
             unknowns: self.unknowns.clone(),
             values: theta.as_slice().to_vec(),
             covariance: Covariance::Full(&tangent * covariance * tangent.transpose()),

@@ -9,7 +9,7 @@ use crate::Unknowns;
 
 /// Independent unknowns p behind free entries θ(p), which are not all independent.
 #[derive(Debug, Clone)]
-pub(crate) struct Relations {
+pub struct Relations {
     /// How each free entry follows from the unknowns, in the order of [`Unknowns::free`].
     entries: Vec<Source>,
     /// Number of unknowns that are entries themselves; α and β of proportional damping come after them.
@@ -44,12 +44,12 @@ impl Part {
 
 impl Relations {
     /// The relations between entries; none if every free entry is independent.
-    pub(crate) fn of(unknowns: &Unknowns) -> Option<Self> {
+    pub fn of(unknowns: &Unknowns) -> Option<Self> {
         unknowns.is_related().then(|| Self::new(unknowns, unknowns.has_proportional_damping()))
     }
 
     /// The linear ones of these relations: proportional damping is left out.
-    pub(crate) fn linear(unknowns: &Unknowns) -> Option<Self> {
+    pub fn linear(unknowns: &Unknowns) -> Option<Self> {
         unknowns.is_related().then(|| Self::new(unknowns, false))
     }
 
@@ -87,7 +87,7 @@ impl Relations {
     }
 
     /// Number of independent unknowns.
-    pub(crate) fn count(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.shared + if self.proportional { 2 } else { 0 }
     }
 
@@ -95,7 +95,7 @@ impl Relations {
     ///
     /// # Panics
     /// If it is an entry of proportional damping.
-    pub(crate) fn shared(&self, entry: usize) -> usize {
+    pub fn shared(&self, entry: usize) -> usize {
         match self.entries[entry] {
             Source::Shared(at) => at,
             Source::Damping { .. } => unreachable!("linear relations"),
@@ -103,7 +103,7 @@ impl Relations {
     }
 
     /// θ(p).
-    pub(crate) fn entries(&self, unknowns: &[f64]) -> DVector<f64> {
+    pub fn entries(&self, unknowns: &[f64]) -> DVector<f64> {
         let value = |source: &Source| match source {
             Source::Shared(at) => unknowns[*at],
             Source::Damping { mass, stiffness } => {
@@ -115,7 +115,7 @@ impl Relations {
     }
 
     /// ∂θ/∂p, entries × unknowns.
-    pub(crate) fn tangent(&self, unknowns: &[f64]) -> DMatrix<f64> {
+    pub fn tangent(&self, unknowns: &[f64]) -> DMatrix<f64> {
         let mut tangent = DMatrix::zeros(self.entries.len(), self.count());
         for (row, source) in self.entries.iter().enumerate() {
             match source {
@@ -135,7 +135,7 @@ impl Relations {
 
     /// p of entries that obey the relations; of others the means of those that should be one, and the α and
     /// β that come nearest.
-    pub(crate) fn unknowns(&self, entries: &[f64]) -> DVector<f64> {
+    pub fn unknowns(&self, entries: &[f64]) -> DVector<f64> {
         let mut unknowns = DVector::zeros(self.count());
         let mut counts = vec![0.0_f64; self.shared];
         for (source, entry) in self.entries.iter().zip(entries) {
@@ -156,7 +156,7 @@ impl Relations {
 
     /// α and β with their gradients over the entries, which obey the relations; `None` without proportional
     /// damping.
-    pub(crate) fn damping_factors(&self, entries: &[f64]) -> Option<[(f64, DVector<f64>); 2]> {
+    pub fn damping_factors(&self, entries: &[f64]) -> Option<[(f64, DVector<f64>); 2]> {
         if !self.proportional {
             return None;
         }

@@ -208,9 +208,11 @@ impl Unknowns {
         Relations::of(self).map_or_else(|| self.free().len(), |relations| relations.count())
     }
 
+    /// Returns an error if entries are related, for an estimator that takes each by itself.
+    ///
     /// # Errors
-    /// [`EstimateError::Related`] if entries are related, which `estimator` knows nothing of.
-    pub(crate) fn check_unrelated(&self, estimator: &'static str) -> Result<(), EstimateError> {
+    /// [`EstimateError::Related`], which names `estimator`.
+    pub fn check_unrelated(&self, estimator: &'static str) -> Result<(), EstimateError> {
         match self.is_related() {
             false => Ok(()),
             true => Err(EstimateError::Related { estimator }),

@@ -28,6 +28,9 @@
 //! | [`integrate`] | the response by time-stepping schemes, linear and nonlinear |
 //! | [`spectra`] | spectral lines of records, their noise, frequency responses |
 //! | [`estimate`] | M, C, K from records, with their uncertainty |
+//! | [`modal`] | modes of any set of sensors, free decays |
+//! | [`nonlinear`] | nonlinear springs and dampers beside a linear system |
+//! | [`checks`] | checks of data and residuals, with verdicts and p-values |
 //! | [`force`] | the unknown force from response and machine |
 //! | [`io`] | records and descriptions of experiments in files |
 //! | [`analysis`] | from a record to a machine, a force or a frequency response, with checks |
@@ -76,13 +79,16 @@ pub use mechid_analysis::{
     modes_of_responses, predict, reconstruct,
 };
 pub use mechid_bearing as bearing;
+pub use mechid_checks as checks;
 pub use mechid_estimate as estimate;
 pub use mechid_force as force;
 pub use mechid_integrate as integrate;
 pub use mechid_io as io;
+pub use mechid_modal as modal;
 pub use mechid_model as model;
 pub use mechid_model::ResponseQuantity::{self, Acceleration, Displacement, Velocity};
 pub use mechid_model::exact_periodic;
+pub use mechid_nonlinear as nonlinear;
 pub use mechid_numerics as numerics;
 #[cfg(feature = "report")]
 pub use mechid_plot as plot;

@@ -31,3 +31,4 @@ mod decomposition;
 pub mod indicators;
 pub mod plscf;
 pub mod stabilisation;
+pub mod free_decay;

@@ -25,6 +25,8 @@ mod named;
 mod random;
 mod random_test;
 pub mod rig;
+pub mod silverbox;
+pub mod steady_lines;
 mod transition;
 
 pub use error::ProblemError;

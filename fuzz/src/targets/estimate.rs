@@ -1,18 +1,20 @@
 //! Calls of `mechid-estimate`.
 
+use mechid_checks as checks;
 use mechid_estimate::derivatives::{
     SavitzkyGolay, spectral_from_acceleration, spectral_from_displacement,
 };
 use mechid_estimate::frequency_domain::{
     equation_error, equation_rows, instrumental_variables, output_error,
 };
-use mechid_estimate::nonlinear::{self, EquationErrorOptions, SteadyExperiments};
 use mechid_estimate::time_domain::{TimeDomain, Transitions, equation_of_motion};
 use mechid_estimate::{
-    EquationOfMotion, Estimate, StartFit, Unknowns, checks, fit_percent, fitted_start, predict,
+    EquationOfMotion, Estimate, StartFit, Unknowns, fit_percent, fitted_start, predict,
     predict_periodic,
 };
 use mechid_model::{Discretisation, Matrix, Response, Terms};
+use mechid_nonlinear as nonlinear;
+use mechid_nonlinear::{EquationErrorOptions, SteadyExperiments};
 use mechid_numerics::least_squares::LeastSquares;
 use mechid_numerics::logarithm::logarithm;
 use mechid_signal::Window;

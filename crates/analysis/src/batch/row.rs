@@ -2,7 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use mechid_estimate::checks::Verdict;
+use mechid_checks::Verdict;
 use mechid_io::{ParameterCovariance, RecordFile, Table};
 use serde::Serialize;
 

@@ -7,7 +7,7 @@ pub mod summary;
 use std::fmt;
 use std::ops::Range;
 
-use mechid_estimate::{FreeDecay, FreeDecayEstimate, free_decay};
+use mechid_modal::free_decay::{FreeDecay, FreeDecayEstimate, free_decay};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Record;
 use serde::{Deserialize, Serialize, Serializer};

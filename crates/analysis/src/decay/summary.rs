@@ -2,8 +2,9 @@
 
 use std::fmt::{self, Write as _};
 
-use mechid_estimate::checks::thresholds::SIGNIFICANCE;
-use mechid_estimate::{DecayChannel, DecayMode, FreeDecayEstimate, IdentifiedMode};
+use mechid_checks::thresholds::SIGNIFICANCE;
+use mechid_estimate::IdentifiedMode;
+use mechid_modal::free_decay::{DecayChannel, DecayMode, FreeDecayEstimate};
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use mechid_estimate::checks::Verdict;
+use mechid_checks::Verdict;
 use mechid_io::{Limits, ParameterCovariance, ParquetCell, files_of, read_parquet_rows};
 
 use crate::batch::{FindingRow, ModeCell, ParameterCell, RowError};

@@ -1,11 +1,11 @@
 //! Checks before and after the fit, record by record.
 
-use mechid_estimate::IdentifiedMode;
-use mechid_estimate::checks::{
+use mechid_checks::{
     Channel, Finding, Quantity, Subject, Verdict, adjust_p_values, after_fit, clipped_channels,
     constant_channels, gain_symmetry, instability, kinematics, mass_symmetry, negative_mass, power,
     quantised_channels, spiked_channels,
 };
+use mechid_estimate::IdentifiedMode;
 use mechid_model::ResponseQuantity;
 use mechid_spectra::NoiseModel;
 use serde::Serialize;

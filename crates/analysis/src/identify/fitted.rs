@@ -2,11 +2,11 @@
 
 use std::fmt;
 
+use mechid_checks::thresholds::{LAGS, SAMPLES_PER_LAG};
+use mechid_checks::{Finding, SpectralResidual};
 use mechid_estimate::Estimate;
-use mechid_estimate::checks::thresholds::{LAGS, SAMPLES_PER_LAG};
-use mechid_estimate::checks::{Finding, SpectralResidual};
-use mechid_estimate::nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_model::SecondOrderSystem;
+use mechid_nonlinear::{Distortion, NonlinearEstimate, RestoringForce};
 use mechid_signal::Record;
 use mechid_spectra::{FrequencyData, Lines, NoiseModel};
 

@@ -49,10 +49,10 @@ pub mod validation;
 
 use std::fmt;
 
-use mechid_estimate::nonlinear::NonlinearEstimate;
 use mechid_estimate::{Estimate, Unknowns};
 use mechid_io::ParameterCovariance;
 use mechid_model::SecondOrderSystem;
+use mechid_nonlinear::NonlinearEstimate;
 use mechid_signal::Extent;
 use mechid_spectra::Pooling;
 use serde::{Serialize, Serializer};

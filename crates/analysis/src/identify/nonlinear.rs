@@ -1,13 +1,13 @@
 //! Fits of whole periods with nonlinear terms beside M, C and K.
 
+use mechid_checks::{Verdict, before_spectral_fit, steady_periods};
 use mechid_estimate::Unknowns;
-use mechid_estimate::checks::{Verdict, before_spectral_fit, steady_periods};
-use mechid_estimate::nonlinear::{
+use mechid_model::Terms;
+use mechid_nonlinear::{
     ChannelPhase, Criterion, EquationErrorOptions, Extrapolation, Level, REACH, Selection,
     SelectionStep, StandardErrors, SteadyExperiments, SteppedRecord, Weighting, distortion,
     equation_error, output_error, select_terms,
 };
-use mechid_model::Terms;
 use mechid_signal::{Extent, Record, driven_lines, lines, message};
 use mechid_spectra::{FrequencyData, Lines};
 use serde::Serialize;
@@ -376,7 +376,7 @@ impl NonlinearSummary {
         let linear = fit.linear().parameters().len();
         let ranges = fit.ranges().iter().map(|range| Some(*range));
         let rows = fit.parameters()[linear..].iter().zip(ranges.chain(std::iter::repeat(None)));
-        let row = |(parameter, largest): (&mechid_estimate::nonlinear::NamedParameter, _)| {
+        let row = |(parameter, largest): (&mechid_nonlinear::NamedParameter, _)| {
             let estimate = Uncertain::of(&parameter.estimate)?;
             let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
             Ok(TermRow { name, unit, largest, estimate })

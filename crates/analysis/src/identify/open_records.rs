@@ -1,6 +1,6 @@
 //! Fits of the spectral lines of records that are no periods, such as those of random tests.
 
-use mechid_estimate::checks::{
+use mechid_checks::{
     AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
     delay_of_open_records, fitted_band, linearity_of_open_record,
 };

@@ -4,8 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use mechid_estimate::derivatives::SavitzkyGolay;
-use mechid_estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_model::{Discretisation, Terms};
+use mechid_nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_signal::{Extent, HitRule, Interpolation};
 use mechid_spectra::Pooling;
 use serde::{Deserialize, Serialize};

@@ -1,10 +1,11 @@
 //! The response of the identified system to a measured force.
 
-use mechid_estimate::nonlinear::{self, ChannelPhase};
 use mechid_estimate::{EstimateError, fitted_start, predict, predict_periodic};
 use mechid_model::Discretisation;
 use mechid_model::ResponseQuantity;
 use mechid_model::{InitialState, NonlinearSystem, Response, SecondOrderSystem};
+use mechid_nonlinear as nonlinear;
+use mechid_nonlinear::ChannelPhase;
 use mechid_signal::{Extent, Record, Spectrum};
 use nalgebra::{Complex, DVector};
 

@@ -1,6 +1,6 @@
 //! Fits frequency responses.
 
-use mechid_estimate::checks::{
+use mechid_checks::{
     Finding, Subject, after_response_fit, before_spectral_fit, claimed_period, coherence,
     delay_of_lines, leakage, linearity,
 };

@@ -1,6 +1,6 @@
 //! Fits sample by sample.
 
-use mechid_estimate::checks::{
+use mechid_checks::{
     Finding, ModeLimit, before_equation_of_motion, before_fit, claimed_period, delay_at_samples,
     delay_between_samples, fitted_step, noise_on_response, periodicity, periodicity_across,
 };

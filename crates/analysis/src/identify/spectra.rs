@@ -1,6 +1,6 @@
 //! Fits of the spectral lines of whole periods.
 
-use mechid_estimate::checks::{
+use mechid_checks::{
     AfterSpectralFit, Finding, Subject, Verdict, after_spectral_fit, before_spectral_fit,
     delay_of_lines, distortion_of_periods, fitted_band, steady_periods,
 };

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::Path;
 
-use mechid_estimate::checks::{Finding, Subject};
+use mechid_checks::{Finding, Subject};
 use mechid_io::{ParameterCovariance, SystemMatrices};
 use mechid_model::ResponseQuantity;
 use mechid_signal::message;

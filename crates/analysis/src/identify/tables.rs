@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::fmt;
 
-use mechid_estimate::checks::{
+use mechid_checks::{
     Finding, adjust_p_values, before_spectral_fit, gain_symmetry, instability, mass_symmetry,
     negative_mass,
 };

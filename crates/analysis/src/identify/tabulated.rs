@@ -3,8 +3,8 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+use mechid_checks::{Finding, after_response_fit, coherence, leakage};
 use mechid_estimate::Estimate;
-use mechid_estimate::checks::{Finding, after_response_fit, coherence, leakage};
 use mechid_io::{FrequencyResponses, ResponseFunction};
 use mechid_model::ResponseQuantity;
 use mechid_signal::Sampling;

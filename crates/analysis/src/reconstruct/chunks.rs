@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use mechid_estimate::nonlinear::ChannelPhase;
 use mechid_force::{ForceError, IdentifiedForce, Measurement};
+use mechid_nonlinear::ChannelPhase;
 use mechid_signal::SignalError;
 
 use super::method::{Request, equation};

@@ -1,6 +1,6 @@
 //! Evidence for and against the numbers.
 
-use mechid_estimate::checks::{Subject, Verdict};
+use mechid_checks::{Subject, Verdict};
 
 use super::Review;
 use crate::identify::checks::CheckRow;

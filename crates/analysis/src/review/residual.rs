@@ -1,6 +1,6 @@
 //! Residual of the measured response after the identified system's prediction.
 
-use mechid_estimate::checks::SpectralResidual;
+use mechid_checks::SpectralResidual;
 use mechid_signal::correlation::{Correlation, cross_correlation, whiteness};
 use mechid_signal::{Record, measures};
 

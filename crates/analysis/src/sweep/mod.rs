@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use mechid_estimate::checks::{Verdict, periodicity};
+use mechid_checks::{Verdict, periodicity};
 use mechid_estimate::{Sweep, SweepPoint, Unknowns, sweep};
 use mechid_io::Experiment;
 use mechid_model::{Response, SecondOrderSystem};

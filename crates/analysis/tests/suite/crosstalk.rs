@@ -3,7 +3,7 @@
 use mechid_analysis::{
     FrfSettings, FrfTable, Identify, Measurement, ResponseQuantity, Segmentation, frf, identify,
 };
-use mechid_estimate::checks::Finding;
+use mechid_checks::Finding;
 use mechid_model::SecondOrderSystem;
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, chain};

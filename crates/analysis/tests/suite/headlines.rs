@@ -7,7 +7,7 @@ use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     identify,
 };
-use mechid_estimate::checks::{Finding, Subject};
+use mechid_checks::{Finding, Subject};
 use mechid_model::{Discretisation, Response, Sdof};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_signal::{Multisine, NoiseLevel, Phases, Record, Sampling, noise};

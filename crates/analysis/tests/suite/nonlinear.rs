@@ -7,8 +7,8 @@ use mechid_analysis::{
     AnalysisError, Channels, Identified, Identify, Machine, Measurement, ModalSummary, Predict,
     Reconstruct, ResponseQuantity, identify, predict, reconstruct,
 };
-use mechid_estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_model::{NonlinearSystem, Response, Sdof, Terms, UncertainNonlinearSystem};
+use mechid_nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid_signal::{Record, Sampling, Spectrum, noise};
 use mechid_spectra::Pooling;
 use nalgebra::{Complex, DMatrix};

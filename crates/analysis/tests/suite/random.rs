@@ -8,8 +8,8 @@ use mechid_analysis::{
     Predict, ResponseQuantity, Segmentation, SweepSettings, identify, identify_responses, predict,
     sweep_record,
 };
+use mechid_checks::{Finding, Power, Subject};
 use mechid_estimate::Estimate;
-use mechid_estimate::checks::{Finding, Power, Subject};
 use mechid_io::FrequencyResponses;
 use mechid_model::{Sdof, SecondOrderSystem};
 use mechid_problems::{Fault, RandomTest};

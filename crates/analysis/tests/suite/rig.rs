@@ -5,7 +5,7 @@ use mechid_analysis::{
     AnalysisError, FrfSettings, Identified, Identify, Measurement, ResponseQuantity, Segmentation,
     Window, frf, frf_of_records, identify,
 };
-use mechid_estimate::checks::{Concentration, Finding};
+use mechid_checks::{Concentration, Finding};
 use mechid_model::{Response, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;
 use mechid_problems::machines::{Support, chain};

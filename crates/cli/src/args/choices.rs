@@ -3,8 +3,8 @@
 use clap::ValueEnum;
 use mechid::analysis::fleet::TrendAxis;
 use mechid::analysis::{Detrend, bearing, frf, identify, reconstruct, sweep};
-use mechid::estimate::nonlinear;
 use mechid::model::{Discretisation, ResponseQuantity};
+use mechid::nonlinear;
 use mechid::signal::Extent;
 
 /// Defines a choice of the command line, which stands for an enum of the analysis with the same

@@ -10,9 +10,9 @@ use mechid::analysis::identify::{
     SampleFit, Structure, ValidationWindow,
 };
 use mechid::analysis::{Segmentation, Window};
-use mechid::estimate::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid::io::{FrequencyResponses, LineSpec};
 use mechid::model::Terms;
+use mechid::nonlinear::{Criterion, ShapeConstants, Weighting};
 use mechid::spectra::Pooling;
 
 use super::choices::{

@@ -8,7 +8,7 @@ use mechid_spectra::frequency_data::check_same_frequencies;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::equation_error::{equation_rows, real_rows};
-use crate::estimate::Findings;
+use crate::estimate::EstimateParts;
 use crate::{Estimate, EstimateError, Unknowns};
 
 /// The equation of motion solved with two measurements of the same experiment, each the
@@ -206,7 +206,7 @@ fn assemble(
         correction * left.scores.row(p).dot(&right.scores.row(q))
     });
     let solved = equations.iter().filter(|e| !e.parameters.is_empty());
-    Estimate::new(Findings {
+    Estimate::new(EstimateParts {
         unknowns: unknowns.clone(),
         values: places.iter().map(|(equation, at)| equation.values[*at]).collect(),
         covariance: covariance.into(),

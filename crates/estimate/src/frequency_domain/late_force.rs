@@ -12,7 +12,7 @@ use crate::relations::Relations;
 /// How well equations of motion fit the lines of spectra, whatever the delay of the force.
 ///
 /// A delay turns the forces alone: the motions with unknown entries are factored once.
-pub(crate) struct LateForce<'a> {
+pub struct LateForce<'a> {
     data: &'a FrequencyData,
     /// Weight of each line.
     weight: Vec<f64>,

@@ -18,7 +18,7 @@ const STEPS: usize = 30;
 
 /// Maximum likelihood for the lines of open records with the force some time later, the loads of their ends being
 /// found anew with each delay.
-pub(crate) struct LateOpenRecord<'a> {
+pub struct LateOpenRecord<'a> {
     data: &'a FrequencyData,
     unknowns: &'a Unknowns,
     /// Noise that the residual without a delay shows.

@@ -61,10 +61,10 @@ mod whitened;
 
 pub use equation_error::{equation_error, equation_rows};
 pub use instrumental::instrumental_variables;
-pub(crate) use late_force::LateForce;
-pub(crate) use late_open_record::LateOpenRecord;
+pub use late_force::LateForce;
+pub use late_open_record::LateOpenRecord;
 pub use likelihood_ratio::{LikelihoodRatio, likelihood_ratio};
-pub(crate) use output_error::in_units_of_noise;
+pub use output_error::in_units_of_noise;
 pub use output_error::{output_error, output_error_near, output_error_pooling};
 pub use output_error_fit::{EndLoads, OutputErrorFit};
-pub(crate) use whitened::Whitened;
+pub use whitened::Whitened;

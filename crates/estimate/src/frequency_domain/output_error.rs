@@ -129,7 +129,7 @@ fn with_known_noise(
 /// Returns the residual of the displacement, rows × n, in units of the stated noise: independent
 /// numbers with E|r|² = 1 if the machine and the noise are as stated. Nothing if the noise is not
 /// stated, or some of it is none at all.
-pub(crate) fn in_units_of_noise(
+pub fn in_units_of_noise(
     data: &FrequencyData,
     estimate: &Estimate,
 ) -> Option<DMatrix<Complex<f64>>> {

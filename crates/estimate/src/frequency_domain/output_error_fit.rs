@@ -13,7 +13,7 @@ use super::misfit::Misfit;
 use super::multi_start::{GlobalMinimum, Plausible};
 use super::search::SumOfSquares;
 use super::weight_uncertainty::WeightUncertainty;
-use crate::estimate::Findings;
+use crate::estimate::EstimateParts;
 use crate::relations::Relations;
 use crate::{Estimate, EstimateError, Unknowns};
 
@@ -198,7 +198,7 @@ pub(super) fn finish(
         .zip(data.displacement().column_iter())
         .map(|(e, x)| nrmse((e.norm(), x.norm())))
         .collect();
-    let estimate = Estimate::new(Findings {
+    let estimate = Estimate::new(EstimateParts {
         unknowns: unknowns.clone(),
         values: entries,
         covariance: (covariance * scale.level).into(),

@@ -18,7 +18,7 @@ type ComplexMatrix = DMatrix<Complex<f64>>;
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapter on maximum
 /// likelihood in errors-in-variables.
-pub(crate) struct Whitened {
+pub struct Whitened {
     /// √2·L⁻¹(X − G F): independent numbers of unit variance for the true machine and noise.
     pub residual: DVector<f64>,
     /// Derivative of −`residual` with respect to the free parameters, the independent ones where they are

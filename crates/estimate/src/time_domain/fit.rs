@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, RowDVector};
 use super::Transitions;
 use super::continuous::Continuous;
 use crate::covariance::Product;
-use crate::estimate::Findings;
+use crate::estimate::EstimateParts;
 use crate::{EquationOfMotion, Estimate, EstimateError, Undetermined, Unknowns};
 
 /// M̂, Ĉ, K̂ and the sampled and continuous state equations they were found through.
@@ -210,7 +210,7 @@ impl Fitted<'_> {
     fn parameters(
         &self,
         unknowns: &Unknowns,
-    ) -> Result<(Findings, Vec<Sensitivity>), EstimateError> {
+    ) -> Result<(EstimateParts, Vec<Sensitivity>), EstimateError> {
         let n = self.rows.dof();
         let free = unknowns.free();
         match unknowns.mass() {
@@ -227,7 +227,7 @@ impl Fitted<'_> {
         unknowns: &Unknowns,
         free: &[Parameter],
         mass: &DMatrix<f64>,
-    ) -> (Findings, Vec<Sensitivity>) {
+    ) -> (EstimateParts, Vec<Sensitivity>) {
         let n = self.rows.dof();
         let lower = self.continuous.value.rows(n, n);
         let force = -(mass * lower);
@@ -237,7 +237,7 @@ impl Fitted<'_> {
             weight[place(p)] = 1.0;
             Sensitivity { equation: p.row(), weight }
         };
-        let findings = Findings {
+        let findings = EstimateParts {
             unknowns: unknowns.clone(),
             values: free.iter().map(|p| force[(p.row(), place(p))]).collect(),
             covariance: DMatrix::zeros(0, 0).into(),
@@ -278,7 +278,7 @@ impl Fitted<'_> {
         &self,
         unknowns: &Unknowns,
         free: &[Parameter],
-    ) -> Result<(Findings, Vec<Sensitivity>), EstimateError> {
+    ) -> Result<(EstimateParts, Vec<Sensitivity>), EstimateError> {
         let (n, rows) = (self.rows.dof(), self.rows);
         let (x, v, f) = (rows.columns(0), rows.columns(1), rows.columns(2));
         let lower = self.continuous.value.rows(n, n);

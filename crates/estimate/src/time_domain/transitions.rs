@@ -159,8 +159,11 @@ impl Transitions {
         TimeDomainFit::new(self, discretisation, unknowns)
     }
 
-    /// Condition number of the scaled regressors, and how many directions they leave open.
-    pub(crate) fn condition(
+    /// Returns the condition number of the scaled regressors, and how many directions they leave open.
+    ///
+    /// # Errors
+    /// What [`Transitions::fit`] refuses.
+    pub fn condition(
         &self,
         discretisation: Discretisation,
     ) -> Result<(f64, usize), EstimateError> {
@@ -168,8 +171,11 @@ impl Transitions {
         Ok((solution.condition, solution.undetermined.len()))
     }
 
-    /// A of ż = A z + B F: 2n × 2n.
-    pub(crate) fn state_matrix(
+    /// Returns A of ż = A z + B F, 2n × 2n, in 1/s.
+    ///
+    /// # Errors
+    /// What [`Transitions::fit`] refuses.
+    pub fn state_matrix(
         &self,
         discretisation: Discretisation,
     ) -> Result<DMatrix<f64>, EstimateError> {

@@ -1,6 +1,6 @@
 //! Modes of identified matrices: a published case, derivatives, and intervals that hold.
 
-use mechid_estimate::checks::{Finding, Verdict, instability};
+use mechid_checks::{Finding, Verdict, instability};
 use mechid_estimate::frequency_domain::equation_error;
 use mechid_estimate::{Estimate, Unknowns, identified_modes};
 use mechid_model::{Matrix, Mode, Parameter, ResponseQuantity, SecondOrderSystem, UncertainSystem};

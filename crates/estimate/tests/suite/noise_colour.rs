@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use mechid_checks::{Verdict, after_spectral_fit};
 use mechid_estimate::Unknowns;
-use mechid_estimate::checks::{Verdict, after_spectral_fit};
 use mechid_estimate::frequency_domain::{output_error, output_error_pooling};
 use mechid_model::{ResponseQuantity, Sdof, SecondOrderSystem};
 use mechid_problems::exact_harmonic_periodic;

@@ -1,7 +1,7 @@
 //! Fits to records with intermediate points: standard errors against the scatter of experiments, and
 //! how often the checks of the residual are right.
 
-use mechid_estimate::checks::{Verdict, after_fit};
+use mechid_checks::{Verdict, after_fit};
 use mechid_estimate::time_domain::{TimeDomain, Transitions};
 use mechid_estimate::{Unknowns, missing_force};
 use mechid_model::{Discretisation, InitialState, Response, SecondOrderSystem};

@@ -1,6 +1,6 @@
 //! Symmetric matrices, chains and proportional damping: fewer unknowns than entries.
 
-use mechid_estimate::checks::{Finding, delay_of_lines};
+use mechid_checks::{Finding, delay_of_lines};
 use mechid_estimate::frequency_domain::{equation_error, instrumental_variables, output_error};
 use mechid_estimate::{EquationOfMotion, Estimate, EstimateError, Unknowns};
 use mechid_model::{Matrix, ResponseQuantity, SecondOrderSystem};

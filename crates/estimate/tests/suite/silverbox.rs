@@ -7,10 +7,9 @@
 use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::{equation_error, output_error};
 use mechid_model::ResponseQuantity;
+use mechid_problems::silverbox::schroeder;
 use mechid_signal::Record;
 use mechid_spectra::{FrequencyData, Lines};
-
-use crate::common::silverbox::schroeder;
 
 #[test]
 fn the_measured_oscillator_has_its_known_frequency_and_damping() {

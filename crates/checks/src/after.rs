@@ -1,0 +1,92 @@
+//! Residuals against noise: whiteness, and correlation with the forces.
+
+use mechid_estimate::EstimateError;
+use mechid_numerics::check_size;
+use mechid_signal::Record;
+use mechid_signal::correlation::{
+    Correlation, autocorrelation, centred, cross_correlation_of_coloured, whiteness,
+    whiteness_beyond,
+};
+
+use super::finding::{CorrelationTest, Finding, NoiseSpan, Residual};
+use super::thresholds::{ROUNDING, SIGNIFICANCE};
+
+/// Tests every channel of a residual for whiteness and for correlation with the forces that act (N).
+///
+/// `fitted` is the signal that the residual was left of, on the same time axis; a residual of rounding
+/// passes whatever its colour. `noise_span` is the number of lags over which noise on the response
+/// correlates the residual: 0 where each sample of it holds the noise of one sample, 1 where it holds
+/// that of two consecutive ones ([`missing_force`](crate::missing_force())), the window less one after
+/// a sliding polynomial. A residual correlated over that span and no further is reported as such. The
+/// correlation with a force is judged with the colour that the residual has.
+///
+/// # Errors
+/// As [`whiteness_beyond`], and [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records
+/// do not belong together.
+///
+/// # Source
+/// Those of [`whiteness_beyond`] and [`cross_correlation`](super::cross_correlation).
+pub fn after_fit(
+    residual: &Record,
+    fitted: &Record,
+    force: &Record,
+    lags: usize,
+    noise_span: usize,
+) -> Result<Vec<Finding>, EstimateError> {
+    residual.check_same_sampling(fitted)?;
+    residual.check_same_sampling(force)?;
+    check_size("channels of the residual", fitted.channels(), residual.channels())?;
+    let mut findings = Vec::new();
+    for channel in 0..residual.channels() {
+        let e = residual.channel(channel);
+        let rounding = residual.column(channel).norm() <= ROUNDING * fitted.column(channel).norm();
+        let white = whiteness(e, lags)?;
+        let beyond = whiteness_beyond(e, noise_span, lags)?;
+        let span = (noise_span > 0 && is_noise(&beyond) && !is_noise(&white)).then(|| NoiseSpan {
+            lags: noise_span,
+            first_coefficient: white.coefficients[0],
+            beyond: CorrelationTest::new(&beyond, rounding),
+        });
+        let (residual, test) =
+            (Residual::Samples { residual: channel }, CorrelationTest::new(&white, rounding));
+        findings.push(Finding::Whiteness { residual, test, span });
+        let colour = colour(e, lags, noise_span, [&white, &beyond].map(is_noise))?;
+        let acts =
+            |input: &usize| force.channel(*input).iter().any(|f| *f != force.data()[(0, *input)]);
+        for input in (0..force.channels()).filter(acts) {
+            let cross = cross_correlation_of_coloured(e, force.channel(input), lags, &colour)?;
+            let test = CorrelationTest::new(&cross, rounding);
+            findings.push(Finding::CrossCorrelation { residual: channel, force: input, test });
+        }
+    }
+    Ok(findings)
+}
+
+fn is_noise(correlation: &Correlation) -> bool {
+    correlation.p_value >= SIGNIFICANCE
+}
+
+/// Autocorrelation of a residual from lag 0 as far as it counts.
+fn colour(
+    residual: &[f64],
+    lags: usize,
+    span: usize,
+    [white, spanned]: [bool; 2],
+) -> Result<Vec<f64>, EstimateError> {
+    if white {
+        return Ok(vec![1.0]);
+    }
+    let e = centred(residual, lags, span)?;
+    let mut coefficients = if spanned {
+        autocorrelation(&e, span)
+    } else {
+        // Coefficients at long lags are the least certain.
+        let taper = |lag: usize| 1.0 - lag as f64 / (lags + span + 1) as f64;
+        let all = autocorrelation(&e, lags + span);
+        all.iter().enumerate().map(|(lag, c)| c * taper(lag)).collect()
+    };
+    // Where colours of residual and force hardly meet, the variance must not be smaller than the error
+    // of these coefficients.
+    coefficients[0] += 2.0 / (e.len() as f64).sqrt();
+    Ok(coefficients)
+}

@@ -1,0 +1,298 @@
+//! Delay between force and response.
+
+use mechid_estimate::frequency_domain::{LateForce, LateOpenRecord, OutputErrorFit, output_error};
+use mechid_estimate::time_domain::{TimeDomain, equation_of_motion};
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_model::Response;
+use mechid_signal::{Extent, Record};
+use mechid_spectra::FrequencyData;
+use nalgebra::DMatrix;
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::finding::Finding;
+use super::spectral_residual::SpectralResidual;
+use super::thresholds::{DELAY_REMAINING, ROUNDING, SIGNIFICANCE};
+use super::weighted_fit::after_spectral_fit;
+use super::{MAX_SAMPLES, Subject, Verdict};
+
+/// Maximum delay, in samples, to either side.
+const MAX_DELAY: isize = 16;
+
+/// The same where a response hardly follows the force: then a longer delay is likely.
+const MAX_LONG_DELAY: isize = 64;
+
+/// Residual power of the equations, over that of their right-hand sides, beyond which it hardly does.
+const HARDLY_FOLLOWS: f64 = 0.25;
+
+/// Steps of the search per sample, of spectra.
+const STEPS_PER_SAMPLE: isize = 2;
+
+/// Reductions of the interval around the best step, each to two thirds.
+const REDUCTIONS: usize = 24;
+
+/// Samples from that delay of the equations of motion within which the one of maximum likelihood begins in the data
+/// without a delay.
+const NEAR: f64 = 0.5;
+
+/// Samples to either side of a delay through whose sums of squares a first parabola is laid.
+const REACH: f64 = 0.25;
+
+/// Parabolas at most, part of the reach of one that the next has at least, and reach, in samples, below which there
+/// is none.
+const PARABOLAS: usize = 8;
+const LEAST_PART: f64 = 0.1;
+const RESOLVED: f64 = 0.005;
+
+/// Part of the residual power that a first parabola leaves at most where nothing else speaks for a delay.
+const PROMISING: f64 = 0.5;
+
+/// Factor below which a longer delay must bring the residual power, to be preferred to a shorter one.
+const PREFERRED: f64 = 0.99;
+
+/// Finds a delay with which the equation of motion fits the lines far better ([`Finding::Delay`]), by
+/// filters, a scanning converter or a trigger. `dt` is the sampling interval of the record in s; lines
+/// are weighted by the noise where `data` state it. `None` if no delay of up to 16 samples (64 where the
+/// response hardly follows the force) leaves less than a quarter of the residual power, of least squares and, where the noise is stated, of maximum
+/// likelihood: noise on a resonance spoils least squares alone.
+///
+/// # Source
+/// Ours: least squares on the equation of motion with the force turned by e^(−iωτ).
+pub fn delay_of_lines(data: &FrequencyData, dt: f64, unknowns: &Unknowns) -> Option<Finding> {
+    let driven = driven(&data.force().map(|f| f.norm()));
+    let equations = LateForce::new(data, unknowns, &driven)?;
+    let undelayed = equations.residual_power(0.0)?;
+    let delay = delay_of_equations(&equations, dt, &driven)?;
+    let power = equations.residual_power(delay * dt)?;
+    finding(delay, dt, [undelayed, power], 2 * data.len(), unknowns)
+        .filter(|_| is_delayed(data, delay * dt, unknowns))
+}
+
+/// The delay, in samples, with which the equations of motion fit best.
+fn delay_of_equations(equations: &LateForce<'_>, dt: f64, driven: &[usize]) -> Option<f64> {
+    let power = |samples: f64| equations.residual_power(samples * dt);
+    let undelayed = power(0.0)?;
+    let samples = |step: isize| step as f64 / STEPS_PER_SAMPLE as f64;
+    let longest = longest(undelayed, driven) * STEPS_PER_SAMPLE;
+    let step = best_step(undelayed, longest, |step| power(samples(step)));
+    let (mut low, mut high) = (samples(step - 1), samples(step + 1));
+    for _ in 0..REDUCTIONS {
+        let third = (high - low) / 3.0;
+        if power(low + third)? < power(high - third)? { high -= third } else { low += third }
+    }
+    Some(0.5 * (low + high))
+}
+
+/// Finds a delay of the responses of open records ([`Finding::Delay`]) that accounts for the residual of a `fit` by
+/// maximum likelihood: with it no force explains anything of what is left, and that is less than noise makes it. Where
+/// no force explains anything of the residual without the delay either (`is_explained` is false), no more than a
+/// quarter of its power may be left. `dt` is the sampling interval in s; sinusoids beside the response are taken off
+/// the `records`. `None` where no delay of up to 16 samples (64 where the response hardly follows the force) does so.
+///
+/// The loads of the ends are found with each delay; without that they take up a part of it.
+///
+/// # Source
+/// Ours: equations of motion under Hann's window with the force turned by e^(−iωτ), then maximum likelihood.
+pub fn delay_of_open_records(
+    records: &[FrequencyData],
+    dt: f64,
+    unknowns: &Unknowns,
+    fit: &OutputErrorFit,
+    is_explained: bool,
+) -> Option<Finding> {
+    let (first, others) = records.split_first()?;
+    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
+    let mut likelihood = LateOpenRecord::of(&all, unknowns, fit)?;
+    let undelayed = likelihood.cost(0.0)?;
+    let near = delay_under_window(&all, dt, unknowns, &fit.estimate).unwrap_or(0.0);
+    if near.abs() > NEAR {
+        likelihood.search(near * dt)?;
+    }
+    let (mut samples, mut delayed) = (near, likelihood.cost(near * dt)?);
+    let mut reach = REACH;
+    for _ in 0..PARABOLAS {
+        let [before, after] = [samples - reach, samples + reach];
+        let [before, after] = [likelihood.cost(before * dt)?, likelihood.cost(after * dt)?];
+        let (slope, curvature) = (after - before, after - 2.0 * delayed + before);
+        // Outside of a valley no further than there was a look.
+        let step = match curvature > 0.0 {
+            true => (-0.5 * slope / curvature).clamp(-2.0, 2.0),
+            false => -2.0 * slope.signum(),
+        };
+        samples += step * reach;
+        delayed = likelihood.cost(samples * dt)?;
+        if !is_explained && delayed > PROMISING * undelayed {
+            return None;
+        }
+        reach *= f64::clamp(step.abs(), LEAST_PART, 1.0);
+        if reach < RESOLVED {
+            break;
+        }
+    }
+    let freedom = likelihood.spare().checked_sub(1).filter(|freedom| *freedom > 0)? as f64;
+    let distribution = FisherSnedecor::new(1.0, freedom).ok()?;
+    let is_significant = distribution.sf((undelayed - delayed) * freedom / delayed) <= SIGNIFICANCE;
+    let remaining = delayed / undelayed;
+    let is_most = is_explained || remaining <= DELAY_REMAINING;
+    let told = || Finding::Delay { samples, seconds: samples * dt, remaining };
+    (is_significant && is_most && explains(records, samples * dt, unknowns)?).then(told)
+}
+
+/// Returns whether no force explains anything of the residual of a fit with the delay (s).
+fn explains(records: &[FrequencyData], delay: f64, unknowns: &Unknowns) -> Option<bool> {
+    let late: Vec<FrequencyData> =
+        records.iter().map(|record| record.with_later_force(delay)).collect();
+    let (first, others) = late.split_first()?;
+    let all = others.iter().try_fold(first.clone(), |all, record| all.and(record)).ok()?;
+    let fit = output_error(&all, unknowns).ok()?;
+    let closed = fit.ends.as_ref()?.taken_off(&late).ok()?;
+    let after = after_spectral_fit(&closed, &fit.estimate, Extent::Open).ok()?;
+    let findings = after.records.iter().flat_map(SpectralResidual::findings);
+    let mut correlations = findings.filter(|f| f.subject() == Subject::CrossCorrelation);
+    Some(correlations.all(|finding| finding.verdict() == Verdict::Good))
+}
+
+/// The delay, in samples, of the equations of motion under Hann's window, each line weighted by the dynamic
+/// stiffness of the machine without a delay.
+fn delay_under_window(
+    data: &FrequencyData,
+    dt: f64,
+    unknowns: &Unknowns,
+    estimate: &Estimate,
+) -> Option<f64> {
+    let (system, windowed) = (estimate.system().ok()?, data.under_hann_window());
+    let weight = |omega: &f64| {
+        let unit = data.measured().per_displacement(*omega).norm();
+        unit / system.dynamic_stiffness(*omega).norm()
+    };
+    let driven = driven(&data.force().map(|f| f.norm()));
+    let weights = data.omega().iter().map(weight).collect();
+    let equations = LateForce::weighted(&windowed, weights, unknowns, &driven)?;
+    delay_of_equations(&equations, dt, &driven)
+}
+
+/// Returns whether maximum likelihood fits far better with the delay (s), too; true where it has no answer.
+fn is_delayed(data: &FrequencyData, delay: f64, unknowns: &Unknowns) -> bool {
+    let misfit = |data: &FrequencyData| Some(output_error(data, unknowns).ok()?.misfit_ratio);
+    let both = || Some([misfit(data)?, misfit(&data.with_later_force(delay))?]);
+    let [undelayed, delayed] = match data.noise() {
+        None => return true,
+        Some(_) => both().unwrap_or([f64::INFINITY, 0.0]),
+    };
+    delayed <= DELAY_REMAINING * undelayed
+}
+
+/// Finds a delay as [`delay_of_lines`] does, of a response fitted sample by sample to the equation of
+/// motion and a force (N); to whole samples, in the first 32,768 of a long record.
+///
+/// # Source
+/// Ours.
+pub fn delay_at_samples(
+    response: &Response,
+    force: &Record,
+    unknowns: &Unknowns,
+) -> Option<Finding> {
+    let [x, v, a] = [response.displacement(), response.velocity(), response.acceleration()];
+    delay_of_samples(force, unknowns, |shifted, force| {
+        let [x, v, a] = [shifted(x)?, shifted(v)?, shifted(a)?];
+        equation_of_motion(&Response::new(x, v, a)?, &force, unknowns)
+    })
+}
+
+/// Finds a delay as [`delay_at_samples`] does, of displacement (m), velocity (m/s) and force (N) fitted
+/// from sample to sample.
+///
+/// # Source
+/// Ours.
+pub fn delay_between_samples(
+    method: TimeDomain,
+    displacement: &Record,
+    velocity: &Record,
+    force: &Record,
+    unknowns: &Unknowns,
+) -> Option<Finding> {
+    let open = TimeDomain::new(method.discretisation(), Extent::Open);
+    delay_of_samples(force, unknowns, |shifted, force| {
+        let fit = open.fit(&shifted(displacement)?, &shifted(velocity)?, &force, unknowns)?;
+        Ok(fit.into_estimate())
+    })
+}
+
+/// A window of a response record, shifted against that of the force.
+type Shifted<'a> = dyn Fn(&Record) -> Result<Record, EstimateError> + 'a;
+
+fn delay_of_samples(
+    force: &Record,
+    unknowns: &Unknowns,
+    fit: impl Fn(&Shifted<'_>, Record) -> Result<Estimate, EstimateError>,
+) -> Option<Finding> {
+    let driven = driven(force.data());
+    let power = |samples: isize, longest: isize| {
+        let margin = longest as usize;
+        let len = force.len().min(MAX_SAMPLES).checked_sub(2 * margin)?;
+        let start = margin.checked_add_signed(samples)?;
+        let shifted = |record: &Record| Ok(record.window(start, len)?);
+        residual_power(&fit(&shifted, force.window(margin, len).ok()?).ok()?, &driven)
+    };
+    let longest = longest(power(0, MAX_DELAY)?, &driven);
+    // A record too short for a long delay may show a shorter one.
+    let longest = if power(0, longest).is_some() { longest } else { MAX_DELAY };
+    let undelayed = power(0, longest)?;
+    let delay = best_step(undelayed, longest, |samples| power(samples, longest));
+    let rows = force.len().min(MAX_SAMPLES).checked_sub(2 * longest as usize)?;
+    finding(
+        delay as f64,
+        force.sampling().dt(),
+        [undelayed, power(delay, longest)?],
+        rows,
+        unknowns,
+    )
+}
+
+/// Maximum delay in samples, from the residual power without any.
+fn longest(undelayed: f64, driven: &[usize]) -> isize {
+    let hardly_follows = undelayed > HARDLY_FOLLOWS * driven.len() as f64;
+    if hardly_follows { MAX_LONG_DELAY } else { MAX_DELAY }
+}
+
+/// Degrees of freedom on which a force acts.
+fn driven(force: &DMatrix<f64>) -> Vec<usize> {
+    (0..force.ncols()).filter(|dof| force.column(*dof).amax() > 0.0).collect()
+}
+
+/// Residual power of the equations with a force, each over the power of its right-hand side.
+fn residual_power(estimate: &Estimate, driven: &[usize]) -> Option<f64> {
+    let power = driven.iter().map(|dof| estimate.residual_nrmse()[*dof].powi(2)).sum::<f64>();
+    (estimate.undetermined().is_empty() && power.is_finite()).then_some(power)
+}
+
+/// The step of least power, the shorter of two that are equally good.
+fn best_step(undelayed: f64, max: isize, power: impl Fn(isize) -> Option<f64>) -> isize {
+    let mut best = (0, undelayed);
+    for step in (1..=max).flat_map(|size| [size, -size]) {
+        match power(step) {
+            Some(power) if power < PREFERRED * best.1 => best = (step, power),
+            _ => {}
+        }
+    }
+    best.0
+}
+
+/// The delay, if it explains the residual of `rows` equations.
+fn finding(
+    samples: f64,
+    dt: f64,
+    [undelayed, delayed]: [f64; 2],
+    rows: usize,
+    unknowns: &Unknowns,
+) -> Option<Finding> {
+    let freedom = rows.checked_sub(super::before::unknowns_of_an_equation(unknowns) + 1)? as f64;
+    let explained = samples != 0.0 && delayed <= DELAY_REMAINING * undelayed;
+    if undelayed <= ROUNDING * ROUNDING || !explained || freedom == 0.0 {
+        return None;
+    }
+    let distribution = FisherSnedecor::new(1.0, freedom).expect("positive numbers");
+    if distribution.sf((undelayed - delayed) * freedom / delayed) > SIGNIFICANCE {
+        return None;
+    }
+    Some(Finding::Delay { samples, seconds: samples * dt, remaining: delayed / undelayed })
+}

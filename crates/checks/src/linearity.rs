@@ -1,0 +1,300 @@
+//! Correlation of a residual with powers of displacement and velocity.
+
+use mechid_estimate::frequency_domain::Whitened;
+use mechid_estimate::{Estimate, EstimateError, predict_periodic};
+use mechid_model::{Response, ResponseQuantity};
+use mechid_numerics::check_size;
+use mechid_signal::{Record, Spectrum};
+use mechid_spectra::SpectraError;
+use mechid_spectra::{FrequencyData, Lines};
+use nalgebra::{Complex, DMatrix, DVector, DVectorView};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+use super::finding::{Finding, PValue, Power};
+
+/// Powers of a motion that are tested.
+const POWERS: [Power; 4] = [Power::Square, Power::Cube, Power::VelocityCube, Power::VelocitySign];
+
+/// Tests whether the response (samples × degrees of freedom) that a machine does not explain under a
+/// random force (N) is correlated with the square or the cube of its displacement, or with the cube or the
+/// sign of its velocity, between two frequencies in Hz ([`Finding::Linearity`], of the power that correlates most).
+///
+/// Frequency responses do not show that: under a random force a hardening spring looks like a stiffer
+/// one with more noise, and dry friction like damping. So the motion is predicted over the whole record, and those
+/// powers of it, less their linear parts, are applied as forces at each degree of freedom in turn. The responses to
+/// them must be uncorrelated with the residual, as they are with the noise of a linear
+/// machine; a Gaussian force keeps errors of the linear model out, too. The residual is weighted by Hann's window: at
+/// its ends it has the motion that the force before the record left.
+///
+/// # Errors
+/// As [`predict_periodic`]; [`EstimateError::Undetermined`] if the estimate is no machine,
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for another number of responses and [`SpectraError::NoExcitedLine`](mechid_spectra::SpectraError::NoExcitedLine) if fewer than three
+/// lines lie in the band.
+///
+/// # Source
+/// Bendat, *Nonlinear System Techniques and Applications* (1998), for the powers less their linear
+/// part, and the sign of the velocity among them; Adams & Allemang (2000), Mechanical Systems and Signal Processing
+/// 14, 637–656, for the nonlinearity as a force.
+pub fn linearity(
+    estimate: &Estimate,
+    force: &Record,
+    response: &Record,
+    measured: ResponseQuantity,
+    band_hz: [f64; 2],
+) -> Result<Finding, EstimateError> {
+    force.check_same_sampling(response)?;
+    let inside = |line: &usize| {
+        let hz = *line as f64 * force.sampling().line_spacing_hz();
+        band_hz[0] <= hz && hz <= band_hz[1] && 2 * line < force.len()
+    };
+    let lines = Lines::new(force.sampling(), (1..force.len().div_ceil(2)).filter(inside))?;
+    let data = FrequencyData::read(&lines, force, response, measured)?;
+    let tested = Tested::new(estimate, &data)?;
+    let count = data.len();
+    if count < 3 {
+        return Err(SpectraError::NoExcitedLine.into());
+    }
+    tested.under_hann_window().finding(estimate, force, &lines.as_slice()[1..count - 1], &HANN)
+}
+
+/// The same of an open record whose ends were fitted: of its `data` on some lines, with the loads of the ends taken
+/// off, and the force (N) as it was measured.
+///
+/// # Errors
+/// The errors of [`linearity`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the data are not those of the lines.
+///
+/// # Source
+/// The source of [`linearity`].
+pub fn linearity_of_open_record(
+    estimate: &Estimate,
+    force: &Record,
+    data: &FrequencyData,
+    lines: &Lines,
+) -> Result<Finding, EstimateError> {
+    check_size("lines of the data", lines.as_slice().len(), data.len())?;
+    Tested::new(estimate, data)?.finding(estimate, force, lines.as_slice(), &[1.0])
+}
+
+/// Correlation of lines under Hann's window, by how many they are apart.
+///
+/// # Source
+/// Harris (1978), Proceedings of the IEEE 66, 51–83.
+const HANN: [f64; 3] = [1.0, -2.0 / 3.0, 1.0 / 6.0];
+
+/// Maximum number of sensitivities, residuals times parameters; of larger fits the errors of the estimate are left in
+/// the residual.
+const SENSITIVITIES: usize = 1 << 22;
+
+/// A residual and the receptances by which forces are seen in it.
+struct Tested {
+    /// Residual of the quantity measured, channels × lines.
+    residual: DMatrix<Complex<f64>>,
+    receptances: Vec<DMatrix<Complex<f64>>>,
+    /// Changes of the response with each parameter, channels × lines.
+    sensitivities: Vec<DMatrix<Complex<f64>>>,
+}
+
+impl Tested {
+    fn new(estimate: &Estimate, data: &FrequencyData) -> Result<Self, EstimateError> {
+        let (system, n) = (estimate.system()?, data.dof());
+        check_size("channels of the response", system.dof(), n)?;
+        let mut receptances = Vec::with_capacity(data.len());
+        let mut residual = DMatrix::zeros(n, data.len());
+        for (row, omega) in data.omega().iter().enumerate() {
+            let unit = data.measured().per_displacement(*omega);
+            let receptance = system.receptance(*omega)? * unit;
+            let [f, x] = [data.force(), data.displacement()].map(|all| all.row(row).transpose());
+            residual.set_column(row, &(x * unit - &receptance * f));
+            receptances.push(receptance);
+        }
+        let sensitivities = sensitivities(estimate, data).unwrap_or_default();
+        Ok(Self { residual, receptances, sensitivities })
+    }
+
+    /// The same of the record under Hann's window, less the first and the last line.
+    fn under_hann_window(&self) -> Self {
+        let last = self.residual.ncols() - 1;
+        let windowed = |all: &DMatrix<Complex<f64>>| {
+            DMatrix::from_fn(all.nrows(), last - 1, |channel, at| {
+                let sides = all[(channel, at)] + all[(channel, at + 2)];
+                all[(channel, at + 1)] * 0.5 - sides * 0.25
+            })
+        };
+        Self {
+            residual: windowed(&self.residual),
+            receptances: self.receptances[1..last].to_vec(),
+            sensitivities: self.sensitivities.iter().map(windowed).collect(),
+        }
+    }
+
+    /// Orthonormal combinations of what the parameters change, each value over the root of its size.
+    fn explained(&self, sizes: &[Vec<f64>]) -> DMatrix<f64> {
+        let columns: Vec<DVector<f64>> = self
+            .sensitivities
+            .iter()
+            .map(|all| {
+                let column = weighted(all, sizes);
+                let length = column.norm();
+                if length > 0.0 { column / length } else { column }
+            })
+            .collect();
+        match columns.is_empty() {
+            true => DMatrix::zeros(2 * self.residual.len(), 0),
+            false => DMatrix::from_columns(&columns).qr().q(),
+        }
+    }
+
+    /// The power of the motion under a force that correlates most, on lines of that force which are correlated so.
+    fn finding(
+        &self,
+        estimate: &Estimate,
+        force: &Record,
+        lines: &[usize],
+        correlation: &[f64],
+    ) -> Result<Finding, EstimateError> {
+        let system = estimate.system()?;
+        let (n, predicted) = (system.dof(), predict_periodic(&system, force)?);
+        let sizes: Vec<Vec<f64>> = self
+            .residual
+            .row_iter()
+            .map(|e| around(&e.iter().map(|e| e.norm_sqr()).collect::<Vec<_>>()))
+            .collect();
+        // Errors of the estimate are in the residual, and follow the force as what is looked for does.
+        let explained = self.explained(&sizes);
+        let mut least = (1.0, POWERS[0], 0);
+        for dof in 0..n {
+            for power in POWERS {
+                let forces = Spectrum::of(&without_linear_part(&predicted, dof, power)?);
+                let response =
+                    |at: usize| self.receptances[at].column(dof) * forces.line(lines[at], 0);
+                let responses: Vec<_> = (0..lines.len()).map(response).collect();
+                let responses = DMatrix::from_columns(&responses);
+                let mut rest = weighted(&responses, &sizes);
+                rest -= &explained * explained.tr_mul(&rest);
+                let responses = unweighted(&rest, &sizes);
+                let p_value = p_value(&self.residual, &sizes, &responses, correlation);
+                if p_value < least.0 {
+                    least = (p_value, power, dof);
+                }
+            }
+        }
+        // Bonferroni: the least of so many.
+        let (p_value, power, dof) = least;
+        let p_value = PValue::of(((n * POWERS.len()) as f64 * p_value).min(1.0));
+        Ok(Finding::Linearity { power, dof, p_value })
+    }
+}
+
+/// Changes of the response, in the quantity measured, with each free parameter, channels × lines; `None` of large fits.
+fn sensitivities(estimate: &Estimate, data: &FrequencyData) -> Option<Vec<DMatrix<Complex<f64>>>> {
+    let (n, unknowns) = (data.dof(), estimate.unknowns());
+    if 2 * n * data.len() * unknowns.independent() > SENSITIVITIES {
+        return None;
+    }
+    let values = DVector::from_iterator(
+        estimate.parameters().count(),
+        estimate.parameters().map(|p| p.value),
+    );
+    let units: Vec<Complex<f64>> =
+        data.omega().iter().map(|omega| data.measured().per_displacement(*omega)).collect();
+    let of_unit = |row: usize| {
+        let mut covariance = DMatrix::zeros(2 * n, 2 * n);
+        (0..n).for_each(|at| covariance[(at, at)] = Complex::from(units[row].norm_sqr().recip()));
+        covariance
+    };
+    let white = Whitened::of(data, unknowns, &values, of_unit)?;
+    let column = |column: DVectorView<'_, f64>| {
+        DMatrix::from_fn(n, data.len(), |channel, row| {
+            let at = 2 * (n * row + channel);
+            // By its size alone a displacement was turned into the quantity measured.
+            Complex::new(column[at], column[at + 1]) * (units[row] / units[row].norm())
+        })
+    };
+    Some(white.sensitivity.column_iter().map(|one| column(one.as_view())).collect())
+}
+
+/// Real and imaginary parts of values, channels × lines, each over the root of its size.
+fn weighted(values: &DMatrix<Complex<f64>>, sizes: &[Vec<f64>]) -> DVector<f64> {
+    let mut all = DVector::zeros(2 * values.len());
+    for ((channel, at), pair) in places(values.shape()).zip(all.as_mut_slice().chunks_exact_mut(2))
+    {
+        let size = sizes[channel][at];
+        let value = values[(channel, at)] * if size > 0.0 { size.sqrt().recip() } else { 0.0 };
+        (pair[0], pair[1]) = (value.re, value.im);
+    }
+    all
+}
+
+/// The values, channels × lines, of what [`weighted`] returns.
+fn unweighted(all: &DVector<f64>, sizes: &[Vec<f64>]) -> DMatrix<Complex<f64>> {
+    let mut values = DMatrix::zeros(sizes.len(), sizes[0].len());
+    for ((channel, at), pair) in places(values.shape()).zip(all.as_slice().chunks_exact(2)) {
+        values[(channel, at)] = Complex::new(pair[0], pair[1]) * sizes[channel][at].sqrt();
+    }
+    values
+}
+
+fn places((channels, lines): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
+    (0..lines).flat_map(move |at| (0..channels).map(move |channel| (channel, at)))
+}
+
+/// A power of the motion of a degree of freedom less its mean and its linear part.
+fn without_linear_part(
+    predicted: &Response,
+    dof: usize,
+    power: Power,
+) -> Result<Record, EstimateError> {
+    let (motion, of): (&Record, fn(f64) -> f64) = match power {
+        Power::Square => (predicted.displacement(), |x| x * x),
+        Power::Cube => (predicted.displacement(), |x| x.powi(3)),
+        Power::VelocityCube => (predicted.velocity(), |x| x.powi(3)),
+        Power::VelocitySign => (predicted.velocity(), f64::signum),
+    };
+    let x = motion.without_mean().channel(dof).to_vec();
+    let size = (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
+    let x: Vec<f64> = x.iter().map(|x| if size > 0.0 { x / size } else { 0.0 }).collect();
+    let linear = x.iter().map(|x| of(*x) * x).sum::<f64>() / x.len() as f64;
+    let values = x.iter().map(|x| of(*x) - linear * x).collect();
+    Ok(Record::from_channel(motion.sampling(), values)?.without_mean())
+}
+
+/// Lines to either side over which the spectrum of a residual is averaged.
+const NEIGHBOURS: usize = 10;
+
+/// Probability that noise with the spectrum of the residual (channels × lines, the sizes of its lines around each) is
+/// correlated as much with the responses, lines of it being correlated among themselves.
+fn p_value(
+    residual: &DMatrix<Complex<f64>>,
+    sizes: &[Vec<f64>],
+    responses: &DMatrix<Complex<f64>>,
+    correlation: &[f64],
+) -> f64 {
+    let (mut product, mut variance) = (0.0, 0.0);
+    for ((e, g), sizes) in residual.row_iter().zip(responses.row_iter()).zip(sizes) {
+        for at in (0..sizes.len()).filter(|at| sizes[*at] > 0.0) {
+            product += (e[at].conj() * g[at]).re / sizes[at];
+            for (apart, c) in correlation.iter().enumerate() {
+                let Some(size) = sizes.get(at + apart).filter(|size| **size > 0.0) else { break };
+                let times = if apart == 0 { 0.5 } else { 1.0 };
+                // By the residual of the line itself, which a narrow resonance makes larger than what is around.
+                let [here, there] = [e[at].norm() / sizes[at], e[at + apart].norm() / size];
+                let common = (g[at].conj() * g[at + apart]).re * here * there;
+                variance += times * c * common;
+            }
+        }
+    }
+    if variance > 0.0 {
+        let normal = Normal::standard();
+        2.0 * normal.sf(product.abs() / variance.sqrt())
+    } else {
+        1.0
+    }
+}
+
+/// Mean of the values around each.
+fn around(values: &[f64]) -> Vec<f64> {
+    let count = values.len();
+    let window = |at: usize| at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS + 1).min(count);
+    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+    (0..count).map(|at| mean(&values[window(at)])).collect()
+}

@@ -1,0 +1,63 @@
+//! Direction of the power between force and machine.
+
+use mechid_estimate::EstimateError;
+use mechid_model::ResponseQuantity;
+use mechid_numerics::check_size;
+use mechid_signal::{Record, Spectrum};
+
+use super::finding::Finding;
+use super::thresholds::POWER_TAKEN_OUT;
+
+/// Number of lines, those with the most power, of which [`STRONGEST_FRACTION`] must take power out.
+const STRONGEST_LINES: usize = 32;
+
+/// Fraction of the strongest lines that must take power out: not even seven lines do by chance.
+const STRONGEST_FRACTION: f64 = 0.9;
+
+/// Amplitude relative to that of the strongest line of a force, below which a line carries no force.
+const FORCE_FLOOR: f64 = 1e-3;
+
+/// Finds forces (N) that take power out of the machine, line by line and in the mean
+/// ([`Finding::PowerFlow`]): then they are not what drives it. Force and response have one channel per
+/// degree of freedom. `None` if the forces put power in.
+///
+/// The power is Σ ½ Re(F V̄), the apparent power Σ ½ |F| |V|.
+///
+/// # Errors
+/// [`EstimateError::Signal`] or [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the records do not belong together.
+///
+/// # Source
+/// Cremer, Heckl & Petersson, *Structure-Borne Sound*, 3rd ed. (2005), the section on mechanical
+/// impedance and power; the limit is ours.
+pub fn power(
+    force: &Record,
+    response: &Record,
+    measured: ResponseQuantity,
+) -> Result<Option<Finding>, EstimateError> {
+    force.check_same_sampling(response)?;
+    check_size("channels of the response", force.channels(), response.channels())?;
+    let (forces, responses) = (Spectrum::of(force), Spectrum::of(response));
+    let all = &forces;
+    let carried = |dof: usize| {
+        let line = move |n: usize| all.line(n, dof).norm();
+        let strongest = (1..forces.len()).map(line).fold(0.0, f64::max);
+        (1..forces.len()).filter(move |n| line(*n) > FORCE_FLOOR * strongest)
+    };
+    let (mut lines, mut apparent) = (Vec::new(), 0.0);
+    for dof in 0..force.channels() {
+        for n in carried(dof) {
+            let omega = forces.omega(n);
+            let to_velocity = ResponseQuantity::Velocity.per_displacement(omega)
+                / measured.per_displacement(omega);
+            let (f, v) = (forces.line(n, dof), to_velocity * responses.line(n, dof));
+            lines.push((f * v.conj()).re);
+            apparent += f.norm() * v.norm();
+        }
+    }
+    let fraction = if apparent > 0.0 { lines.iter().sum::<f64>() / apparent } else { 0.0 };
+    lines.sort_by(|a, b| b.abs().total_cmp(&a.abs()));
+    lines.truncate(STRONGEST_LINES);
+    let out = lines.iter().filter(|power| **power < 0.0).count() as f64;
+    let driven = fraction >= -POWER_TAKEN_OUT || out < STRONGEST_FRACTION * lines.len() as f64;
+    Ok((!driven).then_some(Finding::PowerFlow { fraction }))
+}

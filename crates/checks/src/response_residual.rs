@@ -1,0 +1,178 @@
+//! Residuals of frequency responses against the noise that their coherence shows.
+
+use mechid_estimate::frequency_domain::in_units_of_noise;
+use mechid_estimate::{Estimate, EstimateError};
+use mechid_signal::correlation::{Correlation, correlated, share_above_of};
+use mechid_spectra::frf::Frf;
+use nalgebra::{Complex, DMatrix};
+
+use super::finding::{CorrelationTest, Finding, NoiseSource, PValue, Residual};
+
+/// 1 − coherence, below which it is rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// Maximum number of distances between lines at which residuals are correlated.
+const DISTANCES: usize = 12;
+
+/// Number of lines over the largest of those distances: beyond, few pairs are left, and their products
+/// are not normally distributed.
+const LINES_PER_DISTANCE: usize = 8;
+
+/// Minimum number of pairs of lines at a distance.
+const PAIRS: usize = 8;
+
+/// Tests whether the residual of an estimate on frequency responses has the power that follows from
+/// their coherence ([`Finding::Misfit`]), and whether it is correlated from line to line beyond the
+/// correlation by the window ([`Finding::Whiteness`]). The forces act at the degrees of freedom
+/// `force_dof`, as for [`Frf::data`]. `fitted` is the number of parameters (a pure number) fitted to these
+/// data: all, or of several records fitted together the share of this one.
+///
+/// Both allow for the correlation of lines by the window and the overlap of the segments; lines of
+/// responses measured elsewhere are taken as independent. The power is tested if there are more than
+/// two independent averages beyond the number of forces.
+///
+/// # Errors
+/// As [`Frf::data`].
+///
+/// # Source
+/// Welch (1967), IEEE Trans. Audio Electroacoustics 15, 70–73, for the correlation of the lines;
+/// Box (1954), Annals of Mathematical Statistics 25, 290–302, for the distribution of a sum of
+/// correlated squares.
+pub fn after_response_fit(
+    frf: &Frf,
+    force_dof: &[usize],
+    estimate: &Estimate,
+    fitted: f64,
+) -> Result<Vec<Finding>, EstimateError> {
+    let data = frf.data(force_dof)?;
+    let mut coherence: Vec<f64> = frf.coherence().iter().copied().collect();
+    coherence.sort_by(f64::total_cmp);
+    if 1.0 - coherence[coherence.len() / 2] < ROUNDING {
+        return Ok(Vec::new());
+    }
+    let Some(residual) = in_units_of_noise(&data, estimate) else { return Ok(Vec::new()) };
+    let n = residual.ncols();
+    let series = Series::of(&residual, frf);
+    let mut findings = Vec::from_iter(series.misfit(frf.deviations(), fitted));
+    for (at, lines) in series.each.iter().enumerate() {
+        if let Some((correlation, distance)) = series.line_to_line(lines) {
+            let (response, force) = (at % n, force_dof[at / n]);
+            let residual = Residual::FrequencyResponse { response, force, distance };
+            let test = CorrelationTest::new(&correlation, false);
+            findings.push(Finding::Whiteness { residual, test, span: None });
+        }
+    }
+    Ok(findings)
+}
+
+/// Mean and variance of a weighted residual power if only noise is left.
+struct Expected {
+    mean: f64,
+    variance: f64,
+}
+
+impl Expected {
+    fn misfit(&self, power: f64, source: NoiseSource) -> Finding {
+        let p_value = PValue::of(share_above_of(power, self.mean, 0.5 * self.variance));
+        Finding::Misfit { ratio: power / self.mean, p_value, source, concentration: None }
+    }
+}
+
+/// Residuals of responses from line to line, in units of their noise.
+struct Series<'a> {
+    /// One for each force and, within, each response.
+    each: Vec<Vec<Complex<f64>>>,
+    /// Numbers of the lines, sorted, and their places in `each`.
+    lines: Vec<(usize, usize)>,
+    /// Correlation of the noise of two lines at a distance.
+    correlation: &'a [f64],
+}
+
+impl<'a> Series<'a> {
+    fn of(residual: &DMatrix<Complex<f64>>, frf: &'a Frf) -> Self {
+        let count = frf.omega().len();
+        let inputs = residual.nrows() / count;
+        let one = |(input, response): (usize, usize)| {
+            residual.column(response).rows(input * count, count).iter().copied().collect()
+        };
+        let all = (0..inputs).flat_map(|input| (0..residual.ncols()).map(move |o| (input, o)));
+        let mut lines: Vec<_> = frf.lines().iter().copied().zip(0..).collect();
+        lines.sort_unstable();
+        Self { each: all.map(one).collect(), lines, correlation: frf.line_correlation() }
+    }
+
+    /// Places of the pairs of lines at a distance.
+    fn pairs(&self, distance: usize) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.lines.iter().filter_map(move |(number, at)| {
+            let other =
+                self.lines.binary_search_by_key(&(number + distance), |line| line.0).ok()?;
+            Some((*at, self.lines[other].1))
+        })
+    }
+
+    /// Power against variances that are estimated from `nu` independent complex numbers each, and
+    /// correlated from line to line like the squares of the residuals.
+    fn misfit(&self, nu: f64, fitted: f64) -> Option<Finding> {
+        if nu <= 2.0 {
+            return None;
+        }
+        let terms = (self.each.len() * self.lines.len()) as f64;
+        let mut lines = 0.0;
+        for (distance, c) in self.correlation.iter().enumerate() {
+            let pairs = self.pairs(distance).count() * if distance == 0 { 1 } else { 2 };
+            lines += pairs as f64 * (c * c + c * (1.0 + c * c) / (nu - 2.0));
+        }
+        let channels: f64 =
+            self.each.iter().map(|a| self.each.iter().map(|b| coherence(a, b)).sum::<f64>()).sum();
+        let (unit, spare) = (nu / (nu - 1.0), 1.0 - fitted / (2.0 * terms));
+        let power = self.each.iter().flatten().map(|r| r.norm_sqr()).sum();
+        let variance = spare * unit * unit * lines * channels;
+        let expected = Expected { mean: spare * unit * terms, variance };
+        Some(expected.misfit(power, NoiseSource::Coherence))
+    }
+
+    /// Σ r̄(n) r(n + d) at distances d beyond those that the window correlates, and the smallest of
+    /// them; `None` if there are too few lines.
+    fn line_to_line(&self, residual: &[Complex<f64>]) -> Option<(Correlation, usize)> {
+        let (count, first) = (residual.len() as f64, self.correlation.len());
+        let distances: Vec<usize> = (first..self.lines.len() / LINES_PER_DISTANCE)
+            .filter(|distance| self.pairs(*distance).count() >= PAIRS)
+            .take(DISTANCES)
+            .collect();
+        if distances.is_empty() {
+            return None;
+        }
+        let weighted: Vec<f64> = (0..first)
+            .map(|d| self.correlation[d] * self.pairs(d).count() as f64 / count)
+            .collect();
+        let span = distances[distances.len() - 1] - distances[0] + 1;
+        let covariance = correlated(&weighted, self.correlation, span);
+        let square: f64 = distances
+            .iter()
+            .map(|a| distances.iter().map(|b| covariance[a.abs_diff(*b)].powi(2)).sum::<f64>())
+            .sum();
+        let power: f64 = residual.iter().map(|r| r.norm_sqr()).sum();
+        let (mut coefficients, mut sum) = (Vec::new(), 0.0);
+        for d in &distances {
+            let product: Complex<f64> =
+                self.pairs(*d).map(|(l, m)| residual[l].conj() * residual[m]).sum();
+            let coefficient = product / power;
+            coefficients.extend([coefficient.re, coefficient.im]);
+            sum += coefficient.norm_sqr() * count * count / self.pairs(*d).count() as f64;
+        }
+        let mean = distances.len() as f64 * covariance[0];
+        // Real and imaginary part have half of the variance each.
+        let p_value = share_above_of(sum, mean, 0.5 * square);
+        let bound = 1.96 * (0.5 * covariance[0] / count).sqrt();
+        Some((Correlation { coefficients, bound, statistic: sum, p_value }, distances[0]))
+    }
+}
+
+/// Coherence of two series of noise, less its expectation by chance.
+fn coherence(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
+    let power = |a: &[Complex<f64>]| a.iter().map(|r| r.norm_sqr()).sum::<f64>();
+    let product: Complex<f64> = a.iter().zip(b).map(|(a, b)| a.conj() * b).sum();
+    let share = product.norm_sqr() / (power(a) * power(b));
+    let chance = 1.0 / a.len() as f64;
+    ((share - chance) / (1.0 - chance)).max(0.0)
+}

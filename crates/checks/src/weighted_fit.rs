@@ -1,0 +1,456 @@
+//! Residuals of spectra weighted by their covariance, with what other parameters explain of them.
+
+use mechid_estimate::Relations;
+use mechid_estimate::frequency_domain::Whitened;
+use mechid_estimate::{Estimate, EstimateError};
+use mechid_model::SecondOrderSystem;
+use mechid_numerics::check_size;
+use mechid_numerics::linear_algebra::svd;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_signal::Extent;
+use mechid_spectra::noise::level::motion_level;
+use mechid_spectra::{FrequencyData, NoiseModel, NoiseSpectrum};
+use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+use super::concentration::{Part, concentration};
+use super::finding::{Finding, PValue, Reference};
+use super::spectral_residual::{FREE_RESIDUALS, SpectralResidual};
+use super::thresholds::ROUNDING;
+
+/// Singular value of the sensitivity (columns of unit length) relative to the largest, below which a
+/// combination of parameters has no effect.
+const RANK: f64 = 1e-12;
+
+/// Variance that the noise of the forces makes of a response over that of its own noise, above which it decides.
+const DECIDES: f64 = 10.0;
+
+/// Loads of the ends of a record that a channel is fitted with.
+const LOADS: f64 = 6.0;
+
+/// Maximum number of Gauss–Newton steps from the estimate to the most likely parameters.
+const STEPS: usize = 8;
+
+/// Residual power that another such step removes, over the variance of a residual, below which there is
+/// none.
+const SETTLED: f64 = 0.01;
+
+/// Maximum number of sensitivities, residuals times parameters; of larger fits the residual is tested as
+/// the estimate leaves it.
+const SENSITIVITIES: usize = 1 << 24;
+
+/// Likewise, maximum number of products, sensitivities times parameters: some seconds.
+const PRODUCTS: usize = 1 << 32;
+
+/// Result of the tests after a fit of spectra.
+#[derive(Debug, Clone)]
+pub struct AfterSpectralFit {
+    /// Residual of each record.
+    pub records: Vec<SpectralResidual>,
+    /// Test for a bias of the estimate ([`Finding::Bias`]); `None` where a record states no noise or the
+    /// standard errors of the estimate are not known.
+    pub bias: Option<Finding>,
+}
+
+/// Weights the residuals of a fit of spectra by their own covariance, and tests the estimate for a bias.
+///
+/// The covariance follows from the noise of force and response that the data state. Of the weighted
+/// residual, the part that other parameters explain is removed by a few Gauss–Newton steps of maximum
+/// likelihood: the tests of [`SpectralResidual::findings`] judge the model, whatever the estimator, and
+/// its bias has a test of its own: the sum of those steps against the standard errors of the estimate, all
+/// parameters together and the one that changes most alone.
+/// All residuals are weighted as white noise on the response, beside that of the forces if the data know it, where a
+/// record states no noise, or only rounding.
+///
+/// The noise of an open record begins and ends at values that differ: that jump, which ties low lines together, is left
+/// out of the tests. The data are those whose own ends are taken off. So is what the response to an unmeasured force
+/// leaves at the ends of several periods, where the noise is found to be one.
+///
+/// # Errors
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) if the estimate has another number of degrees of freedom than the data.
+///
+/// # Source
+/// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, the chapters on maximum
+/// likelihood and on model validation; Hausman (1978), Econometrica 46, 1251–1271, for the bias, here
+/// with the covariance of the estimate, which is an upper bound of that of the difference.
+pub fn after_spectral_fit(
+    records: &[FrequencyData],
+    estimate: &Estimate,
+    extent: Extent,
+) -> Result<AfterSpectralFit, EstimateError> {
+    for data in records {
+        let what = "degrees of freedom of the data";
+        check_size(what, data.dof(), estimate.dof())?;
+    }
+    let Some(fit) = WeightedFit::of(records, estimate, extent) else {
+        return Ok(AfterSpectralFit { records: Vec::new(), bias: None });
+    };
+    let bias = if fit.noise_stated { fit.bias(estimate) } else { None };
+    Ok(AfterSpectralFit { records: fit.records, bias })
+}
+
+/// Residuals of all records of a fit.
+struct WeightedFit {
+    records: Vec<SpectralResidual>,
+    /// True if every record states its noise.
+    noise_stated: bool,
+    /// Change of the parameters from the estimate to the most likely ones.
+    step: Option<DVector<f64>>,
+}
+
+/// Weighted residuals of all records, and their sensitivities in an orthonormal basis.
+struct Linearised {
+    weighted: Vec<Whitened>,
+    /// Combinations of parameters, one per column, that change the residuals by orthonormal columns.
+    basis: DMatrix<f64>,
+    /// Orthonormal columns that the parameters explain.
+    explained: Vec<DMatrix<f64>>,
+    /// Scalar products of the residuals with those columns.
+    coefficients: DVector<f64>,
+}
+
+impl Linearised {
+    fn of(weighted: Vec<Whitened>) -> Option<Self> {
+        let basis = orthonormal_basis(&weighted)?;
+        let explained: Vec<DMatrix<f64>> =
+            weighted.iter().map(|record| &record.sensitivity * &basis).collect();
+        let products = explained.iter().zip(&weighted).map(|(q, w)| q.tr_mul(&w.residual));
+        let coefficients =
+            products.fold(DVector::zeros(basis.ncols()), |sum, product| sum + product);
+        Some(Self { weighted, basis, explained, coefficients })
+    }
+
+    /// Residuals of which the parameters are taken to explain nothing.
+    fn without_sensitivity(weighted: Vec<Whitened>, parameters: usize) -> Self {
+        let nothing = |record: &Whitened| DMatrix::zeros(record.residual.len(), 0);
+        Self {
+            explained: weighted.iter().map(nothing).collect(),
+            weighted,
+            basis: DMatrix::zeros(parameters, 0),
+            coefficients: DVector::zeros(0),
+        }
+    }
+
+    fn power(&self) -> f64 {
+        self.weighted.iter().map(|record| record.residual.norm_squared()).sum()
+    }
+
+    /// Gauss–Newton step of the parameters.
+    fn step(&self) -> DVector<f64> {
+        &self.basis * &self.coefficients
+    }
+}
+
+impl WeightedFit {
+    fn of(records: &[FrequencyData], estimate: &Estimate, extent: Extent) -> Option<Self> {
+        let noise: Option<Vec<&NoiseSpectrum>> =
+            records.iter().map(FrequencyData::noise_above_rounding).collect();
+        let levels = levels(records, estimate)?;
+        let relations = Relations::of(estimate.unknowns());
+        let entries: Vec<f64> = estimate.parameters().map(|p| p.value).collect();
+        let start = match &relations {
+            None => DVector::from_column_slice(&entries),
+            Some(relations) => relations.unknowns(&entries),
+        };
+        let rows: usize = records.iter().map(|data| 2 * data.dof() * data.len()).sum();
+        let sensitivities = rows * start.len();
+        let small = sensitivities <= SENSITIVITIES && sensitivities * start.len() <= PRODUCTS;
+        let entries_of = |values: &DVector<f64>| match &relations {
+            None => values.clone(),
+            Some(relations) => relations.entries(values.as_slice()),
+        };
+        let covariance = |at: usize, row: usize| match &noise {
+            Some(noise) => noise[at].covariance(row).clone(),
+            None => white_covariance(&records[at], row, &levels),
+        };
+        let linearised = |values: &DVector<f64>| -> Option<Linearised> {
+            let (entries, unknowns) = (&entries_of(values), estimate.unknowns());
+            let one = |(at, data): (usize, &FrequencyData)| {
+                let covariance = |row: usize| covariance(at, row);
+                match small {
+                    true => Whitened::of(data, unknowns, entries, covariance),
+                    false => Whitened::residual_of(data, unknowns, entries, covariance),
+                }
+            };
+            let weighted = records.iter().enumerate().map(one).collect::<Option<_>>()?;
+            match small {
+                true => Linearised::of(weighted),
+                false => Some(Linearised::without_sensitivity(weighted, values.len())),
+            }
+        };
+        let mut values = start;
+        let mut linear = linearised(&values)?;
+        for _ in 0..STEPS {
+            let unit = (linear.power() / (rows as f64)).max(f64::MIN_POSITIVE);
+            if linear.coefficients.norm_squared() <= SETTLED * unit {
+                break;
+            }
+            // Half a step where a whole one goes too far.
+            let next = [1.0, 0.5, 0.25, 0.125].iter().find_map(|length| {
+                let values = &values + linear.step() * *length;
+                let next = linearised(&values)?;
+                (next.power() < linear.power()).then_some((values, next))
+            });
+            let Some(next) = next else { break };
+            (values, linear) = next;
+        }
+        let end = &values + linear.step();
+        let jumps = |at: usize| -> Vec<DVector<f64>> {
+            let seen = |data: FrequencyData| {
+                let covariance = |row| covariance(at, row);
+                let entries = entries_of(&values);
+                Whitened::residual_of(&data, estimate.unknowns(), &entries, covariance)
+            };
+            let (record, channels) = (&records[at], 0..records[at].dof());
+            let jumps: Vec<FrequencyData> = match extent {
+                Extent::Open => channels.map(|channel| record.of_jump(channel)).collect(),
+                Extent::WholePeriod if has_unmeasured_force(record) => {
+                    let loads = |dof| (0..LOADS as usize).map(move |power| (dof, power));
+                    channels
+                        .flat_map(loads)
+                        .map(|(dof, power)| record.of_load(dof, power))
+                        .collect()
+                }
+                Extent::WholePeriod => Vec::new(),
+            };
+            jumps.into_iter().filter_map(seen).map(|jump| jump.residual).collect()
+        };
+        let step = entries_of(&end) - DVector::from_vec(entries);
+        let [m, c, k] = estimate.unknowns().assemble(entries_of(&values).as_slice());
+        let system = SecondOrderSystem::new(m, c, k).ok();
+        let Linearised { weighted, explained, coefficients, .. } = linear;
+        let residuals = records.iter().enumerate().zip(weighted).zip(explained);
+        let residuals = residuals.map(|(((at, data), weighted), explained)| {
+            let values = weighted.residual - &explained * &coefficients;
+            let is_noise = extent == Extent::WholePeriod && has_unmeasured_force(data);
+            let with_ends = is_noise.then(|| (values.clone(), explained.clone()));
+            let (values, explained) = without(&jumps(at), values, explained);
+            let of_force = if noise.is_none() { force_decides(data, estimate) } else { None };
+            SpectralResidual::new(data.clone(), noise.is_some(), values, explained)
+                .with_ends(with_ends)
+                .of_rounding(is_rounding(data, &levels))
+                .with_force_decides(of_force)
+                .with_likely_force(
+                    system
+                        .as_ref()
+                        .and_then(|system| likely_force(data, system, |row| covariance(at, row))),
+                )
+        });
+        let mut records: Vec<SpectralResidual> = residuals.collect();
+        let parts: Vec<Part<'_>> = records.iter().filter_map(SpectralResidual::part).collect();
+        if parts.len() == records.len() {
+            let lines = concentration(&parts);
+            records.iter_mut().for_each(|record| record.hold_misfit(lines.clone()));
+        }
+        Some(Self { records, noise_stated: noise.is_some(), step: small.then_some(step) })
+    }
+
+    fn bias(&self, estimate: &Estimate) -> Option<Finding> {
+        let errors: Vec<f64> = estimate.parameters().map(|p| p.standard_error).collect();
+        if errors.is_empty() || errors.iter().any(|error| !(*error > 0.0 && error.is_finite())) {
+            return None;
+        }
+        let (scale, change) = (DVector::from_vec(errors), self.step.as_ref()?);
+        let step = change.component_div(&scale);
+        let count = scale.len() as f64;
+        let together = match estimate.unknowns().is_related() {
+            false => {
+                let statistic = estimate.squared_length(change)?;
+                ChiSquared::new(count).expect("at least one parameter").sf(statistic)
+            }
+            // Entries that follow from others have no inverse of their covariance.
+            true => 1.0,
+        };
+        let largest = step.iamax();
+        let alone = 2.0 * count * Normal::standard().sf(step[largest].abs());
+        let parameter = estimate.parameters().nth(largest)?;
+        Some(Finding::Bias {
+            p_value: PValue::of((2.0 * together.min(alone)).min(1.0)),
+            parameter: parameter.parameter,
+            estimate: parameter.value,
+            unbiased: parameter.value + change[largest],
+            standard_error: parameter.standard_error,
+            reference: Reference::MaximumLikelihood,
+        })
+    }
+}
+
+/// The most likely forces, rows × n, of a machine of which displacements and forces have the noise of a covariance:
+/// F − Cov(F, e) Var(e)⁻¹ e of the residual e = X − G F. `None` where the forces have none.
+///
+/// # Source
+/// Fuller, *Measurement Error Models* (1987), section 1.2.3 (true values given the observations).
+fn likely_force(
+    data: &FrequencyData,
+    system: &SecondOrderSystem,
+    covariance: impl Fn(usize) -> DMatrix<Complex<f64>>,
+) -> Option<DMatrix<Complex<f64>>> {
+    let n = data.dof();
+    let mut likely = data.force().clone();
+    let mut is_exact = true;
+    for (row, omega) in data.omega().iter().enumerate() {
+        let covariance = covariance(row);
+        let of_force = covariance.view((n, n), (n, n));
+        if of_force.iter().all(|entry| *entry == Complex::ZERO) {
+            continue;
+        }
+        is_exact = false;
+        let receptance = system.receptance(*omega).ok()?;
+        let force = data.force().row(row).transpose();
+        let residual = data.displacement().row(row).transpose() - &receptance * &force;
+        let both = covariance.view((n, 0), (n, n));
+        let with_residual = both - of_force * receptance.adjoint();
+        let variance = covariance.view((0, 0), (n, n))
+            - both.adjoint() * receptance.adjoint()
+            - &receptance * &with_residual;
+        let noise = with_residual * variance.lu().solve(&residual)?;
+        likely.row_mut(row).copy_from(&(force - noise).transpose());
+    }
+    (!is_exact).then_some(likely)
+}
+
+/// Level of white noise on each channel in the quantity measured, over all records: the RMS residual or, beside
+/// stated noise of the forces, the most likely one.
+fn levels(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<f64>> {
+    let each = residuals(records, estimate)?;
+    Some(each.into_iter().map(|pairs| motion_level(pairs.into_iter())).collect())
+}
+
+/// Power of the residual of each channel in the quantity measured, with the variance that the noise of the forces
+/// makes of it, over all records.
+fn residuals(records: &[FrequencyData], estimate: &Estimate) -> Option<Vec<Vec<(f64, f64)>>> {
+    let system = estimate.system().ok()?;
+    let mut residuals = vec![Vec::new(); system.dof()];
+    for data in records {
+        for (row, omega) in data.omega().iter().enumerate() {
+            let receptance = system.receptance(*omega).ok()?;
+            let scale = data.measured().per_displacement(*omega).norm_sqr();
+            let modelled = &receptance * data.force().row(row).transpose();
+            let residual = data.displacement().row(row).transpose() - modelled;
+            let variance = data.force_variance().row(row).transpose();
+            let by_force = receptance.map(|g| g.norm_sqr()) * variance;
+            for (channel, pairs) in residuals.iter_mut().enumerate() {
+                pairs.push((scale * residual[channel].norm_sqr(), scale * by_force[channel]));
+            }
+        }
+    }
+    Some(residuals)
+}
+
+/// Power of the residual over that of the noise, on the lines on which that of the forces decides, with the
+/// probability of so little times the number of channels; of the channel where it is least probable. `None` where
+/// no noise of the forces is stated, or where it decides on too few lines.
+fn force_decides(data: &FrequencyData, estimate: &Estimate) -> Option<(f64, f64)> {
+    if data.force_variance().iter().all(|variance| *variance == 0.0) {
+        return None;
+    }
+    let residuals = residuals(std::slice::from_ref(data), estimate)?;
+    let channels = residuals.len() as f64;
+    let fitted = estimate.parameters().len() as f64 / channels + LOADS;
+    let of_channel = |pairs: Vec<(f64, f64)>| {
+        let own = motion_level(pairs.iter().copied()).powi(2);
+        let decided = pairs.iter().filter(|(_, known)| *known > DECIDES * own);
+        let (count, over) = decided.fold((0.0, 0.0), |(count, over), (power, known)| {
+            (count + 1.0, over + power / (own + known))
+        });
+        // A sum of squares of complex numbers has two degrees of freedom each.
+        let free = 2.0 * count - fitted;
+        if free < FREE_RESIDUALS {
+            return None;
+        }
+        let below = ChiSquared::new(free).ok()?.cdf(2.0 * over);
+        Some((2.0 * over / free, (channels * below).min(1.0)))
+    };
+    residuals.into_iter().filter_map(of_channel).min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Returns whether the residual of every channel is rounding.
+fn is_rounding(data: &FrequencyData, levels: &[f64]) -> bool {
+    let rms = |channel: usize| {
+        let lines = data.displacement().column(channel);
+        let power = lines
+            .iter()
+            .zip(data.omega())
+            .map(|(x, omega)| (x * data.measured().per_displacement(*omega)).norm_sqr());
+        (power.sum::<f64>() / data.len() as f64).sqrt()
+    };
+    levels.iter().enumerate().all(|(channel, level)| *level <= ROUNDING * rms(channel))
+}
+
+/// Covariance of displacement and force for white noise of these levels on the quantity measured, and what noise of
+/// the forces is stated.
+fn white_covariance(data: &FrequencyData, row: usize, levels: &[f64]) -> DMatrix<Complex<f64>> {
+    let (n, mut covariance) = (data.dof(), DMatrix::zeros(2 * data.dof(), 2 * data.dof()));
+    let scale = data.measured().per_displacement(data.omega()[row]).norm();
+    // A channel without any residual must not take all the weight.
+    let least = levels.iter().copied().fold(0.0, f64::max) * 1e-6;
+    for (channel, level) in levels.iter().enumerate().take(n) {
+        let level = level.max(least).max(f64::MIN_POSITIVE) / scale;
+        covariance[(channel, channel)] = Complex::from(level * level);
+        let of_force = data.force_variance()[(row, channel)];
+        covariance[(n + channel, n + channel)] = Complex::from(of_force);
+    }
+    covariance
+}
+
+/// B for which J B of the stacked sensitivities J has orthonormal columns that span those of J.
+fn orthonormal_basis(records: &[Whitened]) -> Option<DMatrix<f64>> {
+    let parameters = records.first()?.sensitivity.ncols();
+    let mut factor = TriangularFactor::new(parameters);
+    for record in records {
+        factor.push(&[record.sensitivity.as_view()]).then_some(())?;
+    }
+    let mut r = factor.r().clone();
+    let mut scale = DVector::from_element(parameters, 1.0);
+    for (mut column, scale) in r.column_iter_mut().zip(scale.iter_mut()) {
+        let length = column.norm();
+        if length > 0.0 {
+            *scale = length;
+            column /= length;
+        }
+    }
+    // Without dependent parameters the triangle alone tells, in a fraction of the time.
+    if let Some(inverse) = r.solve_upper_triangular(&DMatrix::identity(parameters, parameters))
+        && r.norm() * inverse.norm() * RANK < 1.0
+    {
+        let mut basis = inverse;
+        basis.column_iter_mut().for_each(|mut column| column.component_div_assign(&scale));
+        return Some(basis);
+    }
+    let svd = svd(r).ok()?;
+    let (singular, v_t) = (&svd.singular_values, svd.v_t.as_ref()?);
+    let kept: Vec<usize> =
+        (0..parameters).filter(|at| singular[*at] > RANK * singular.max()).collect();
+    Some(DMatrix::from_fn(parameters, kept.len(), |row, column| {
+        v_t[(kept[column], row)] / (singular[kept[column]] * scale[row])
+    }))
+}
+
+/// Returns whether the noise of a record is the response to an unmeasured force.
+fn has_unmeasured_force(data: &FrequencyData) -> bool {
+    let of_force = |model: &NoiseModel| matches!(model, NoiseModel::UnmeasuredForce { .. });
+    data.noise().is_some_and(|noise| noise.models().iter().any(of_force))
+}
+
+/// Leaves some `parts` out of the values, and adds them to the orthonormal columns that are explained.
+fn without(
+    parts: &[DVector<f64>],
+    mut values: DVector<f64>,
+    mut explained: DMatrix<f64>,
+) -> (DVector<f64>, DMatrix<f64>) {
+    for part in parts {
+        let mut column = part.unscale(part.norm());
+        for _ in 0..2 {
+            column -= &explained * explained.tr_mul(&column);
+        }
+        let left = column.norm();
+        if left > RANK.sqrt() {
+            column.unscale_mut(left);
+            values.axpy(-column.dot(&values), &column, 1.0);
+            let at = explained.ncols();
+            explained = explained.insert_column(at, 0.0);
+            explained.set_column(at, &column);
+        }
+    }
+    (values, explained)
+}

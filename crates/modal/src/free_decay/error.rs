@@ -1,0 +1,81 @@
+//! Errors of free decays.
+
+use mechid_signal::message;
+
+/// Free decay that cannot be identified; every variant carries the offending numbers.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FreeDecayError {
+    /// A record is longer than can be fitted.
+    #[error(
+        "the record has {samples} samples where at most {most} can be fitted: use a part of it, or every n-th sample"
+    )]
+    TooLong {
+        /// Samples of the record.
+        samples: usize,
+        /// Samples that can be fitted.
+        most: usize,
+    },
+    /// A channel does not move.
+    #[error(
+        "channel {} is constant at {}: a free decay needs channels that move",
+        channel.saturating_add(1), message::number(*value)
+    )]
+    SilentChannel {
+        /// Channel, counted from 0.
+        channel: usize,
+        /// Value of all its samples, in the unit of the record.
+        value: f64,
+    },
+    /// No, or too many, modes were asked for.
+    #[error("{} cannot be fitted: from 1 to {most}", message::count(*modes, "mode"))]
+    NumberOfModes {
+        /// Modes asked for.
+        modes: usize,
+        /// Largest number.
+        most: usize,
+    },
+    /// No oscillation was found in a free response.
+    #[error(
+        "no oscillation exceeds the noise in {}: the best one raises twice the log likelihood by {gained:.1}, \
+         noise alone by up to {needed:.1}. Use the part of the record in which the response decays",
+        message::count(*samples, "sample")
+    )]
+    NoDecay {
+        /// Samples of the record.
+        samples: usize,
+        /// Twice the gain of the log likelihood by the best oscillation, a pure number.
+        gained: f64,
+        /// Gain that a mode must exceed, a pure number.
+        needed: f64,
+    },
+    /// A free response grows.
+    #[error(
+        "the response at {frequency_hz:.4} Hz grows, at {growth_rate:.3e} ± {standard_error:.1e} 1/s: an \
+         unstable system, a force that still acts, or a record that begins before the release"
+    )]
+    Grows {
+        /// Frequency, in Hz.
+        frequency_hz: f64,
+        /// Rate of the growth, in 1/s.
+        growth_rate: f64,
+        /// Standard error of the rate, in 1/s.
+        standard_error: f64,
+    },
+    /// No search for the best fit (maximum likelihood, output error or a constant) ended at one.
+    #[error(
+        "the search for the best fit failed: {} reached no minimum within {steps} \
+         steps. This says nothing about the model; more lines, more periods, a known mass or fewer \
+         unknowns make the search easier",
+        if *searches == 1 { "one search".to_owned() } else { format!("{searches} searches") }
+    )]
+    NotConverged {
+        /// Number of searches, each from another start.
+        searches: usize,
+        /// Steps allowed for the first.
+        steps: usize,
+    },
+    /// A record is not usable.
+    #[error(transparent)]
+    Signal(#[from] mechid_signal::SignalError),
+}

@@ -1,0 +1,325 @@
+//! Modes of a free decay, with the standard errors of maximum likelihood.
+
+use std::f64::consts::TAU;
+
+use mechid_estimate::IdentifiedMode;
+use mechid_model::Mode;
+use mechid_numerics::Uncertain;
+use mechid_signal::Record;
+use mechid_signal::correlation::{Correlation, whiteness};
+use nalgebra::{Complex, DMatrix, DVector};
+use statrs::distribution::{ContinuousCDF, FisherSnedecor};
+
+use super::FreeDecayError;
+use super::fit::{Data, Fit};
+use super::poles::{Pole, linear_columns};
+
+/// Lags over which a residual is tested for being white.
+const LAGS: usize = 20;
+/// Number of samples over that of the first ones, which are compared with the others.
+const ONSET_SHARE: usize = 50;
+/// Least number of first samples.
+const LEAST_ONSET: usize = 10;
+
+/// A mode of a free response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DecayMode {
+    /// Pole and shape with their standard errors; the shape is that of the quantity measured, its largest
+    /// entry being 1.
+    pub mode: IdentifiedMode,
+    /// Amplitude at the first sample in the channel of largest shape, in the unit of the record.
+    pub amplitude: Uncertain,
+    /// Phase at the first sample in that channel, in rad: the response is A e^{σt} cos(ωt + φ).
+    pub phase: f64,
+    /// Sum of the squares of this mode over that of all modes, summed over samples and channels; a ratio.
+    pub energy_share: f64,
+}
+
+impl DecayMode {
+    /// Returns whether the response of the mode decays: the 95 % interval of its growth rate is below zero.
+    pub fn decays(&self) -> bool {
+        self.mode.growth_rate.interval(0.95).is_ok_and(|[_, high]| high < 0.0)
+    }
+}
+
+/// Fit of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DecayChannel {
+    /// Constant, in the unit of the record; 0 where none was fitted.
+    pub offset: f64,
+    /// Standard deviation of the residual, in the unit of the record.
+    pub noise: f64,
+    /// Order of the autoregression that the noise follows: 0 for white noise.
+    pub noise_order: usize,
+    /// Share of the variance of the channel that the modes explain, a ratio.
+    pub explained: f64,
+    /// Autocorrelation of the residual that the autoregression leaves.
+    pub whiteness: Correlation,
+    /// Residual of the first samples, where a force may still act.
+    pub onset: Onset,
+}
+
+/// Residual of the first samples against that of the others.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Onset {
+    /// Number of the first samples.
+    pub samples: usize,
+    /// Mean square of their residual over that of the others, a ratio.
+    pub ratio: f64,
+    /// Probability that noise has a larger ratio, a pure number.
+    pub p_value: f64,
+}
+
+impl Onset {
+    /// Tests a residual that should be white.
+    fn of(residual: &[f64]) -> Self {
+        let samples = (residual.len() / ONSET_SHARE).max(LEAST_ONSET).min(residual.len() / 2);
+        let (first, others) = residual.split_at(samples);
+        let mean_square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64;
+        let ratio = mean_square(first) / mean_square(others);
+        let distribution = FisherSnedecor::new(first.len() as f64, others.len() as f64);
+        let p_value = distribution.map_or(1.0, |f| f.sf(ratio));
+        Self { samples, ratio, p_value }
+    }
+}
+
+/// Modes found in a free response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreeDecayEstimate {
+    modes: Vec<DecayMode>,
+    channels: Vec<DecayChannel>,
+    fitted: Record,
+    degrees_of_freedom: usize,
+}
+
+impl FreeDecayEstimate {
+    /// The modes by rising frequency.
+    pub fn modes(&self) -> &[DecayMode] {
+        &self.modes
+    }
+
+    /// The fit of each channel.
+    pub fn channels(&self) -> &[DecayChannel] {
+        &self.channels
+    }
+
+    /// The response of all modes with the constants, samples × channels in the unit of the record.
+    pub fn fitted(&self) -> &Record {
+        &self.fitted
+    }
+
+    /// Number of samples of all channels less the number of unknowns.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.degrees_of_freedom
+    }
+}
+
+/// Covariance of what a fit found.
+struct Spread<'a> {
+    fit: &'a Fit,
+    /// Covariance of growth and turn of each pole, times N².
+    poles: DMatrix<f64>,
+    /// Of each channel, derivatives of the linear unknowns with respect to those.
+    slopes: Vec<DMatrix<f64>>,
+    /// Of each channel, (R⁻¹R⁻ᵀ) s² of the linear unknowns for poles that are known.
+    linear: Vec<DMatrix<f64>>,
+    degrees_of_freedom: usize,
+}
+
+impl<'a> Spread<'a> {
+    fn of(data: &Data, fit: &'a Fit) -> Option<Self> {
+        let nonlinear = 2 * fit.poles.len();
+        let linear = linear_columns(&fit.poles, data.constant);
+        let (mut freedom, mut stacked) = (0.0, DMatrix::zeros(0, nonlinear));
+        let (mut slopes, mut own) = (Vec::new(), Vec::new());
+        for (of, noise) in fit.channels.iter().zip(&fit.noise) {
+            let used = (linear + noise.order()) as f64 + nonlinear as f64 / data.channels() as f64;
+            let left = data.len() as f64 - used;
+            if left < 1.0 {
+                return None;
+            }
+            freedom += left;
+            let deviation = (of.square / left).sqrt();
+            let rows = stacked.nrows();
+            stacked = stacked.resize_vertically(rows + nonlinear, 0.0);
+            stacked.rows_mut(rows, nonlinear).copy_from(&(&of.across / deviation));
+            slopes.push(-of.own.solve_upper_triangular(&of.along)?);
+            let inverse = of.own.solve_upper_triangular(&DMatrix::identity(linear, linear))?;
+            own.push(&inverse * inverse.transpose() * (deviation * deviation));
+        }
+        let upper = stacked.qr().unpack_r();
+        let inverse = upper.solve_upper_triangular(&DMatrix::identity(nonlinear, nonlinear))?;
+        let poles = &inverse * inverse.transpose();
+        let finite = poles.iter().all(|v| v.is_finite());
+        finite.then_some(Self {
+            fit,
+            poles,
+            slopes,
+            linear: own,
+            degrees_of_freedom: freedom as usize,
+        })
+    }
+
+    fn uncertain(&self, value: f64, variance: f64) -> Uncertain {
+        let (standard_error, degrees_of_freedom) =
+            (variance.max(0.0).sqrt(), self.degrees_of_freedom);
+        Uncertain { value, standard_error, degrees_of_freedom }
+    }
+
+    /// Variance of Re Σ w_c A_c, A_c being the complex amplitude of a mode in channel c, relative to its
+    /// origin.
+    fn variance(&self, mode: usize, weights: &[(usize, Complex<f64>)]) -> f64 {
+        let mut through_poles = DVector::zeros(self.poles.nrows());
+        let mut own = 0.0;
+        for (channel, weight) in weights {
+            // A = a − i b.
+            let (cos, sin) = (weight.re, weight.im);
+            let slopes = &self.slopes[*channel];
+            through_poles += slopes.row(2 * mode).transpose() * cos;
+            through_poles += slopes.row(2 * mode + 1).transpose() * sin;
+            let c = self.linear[*channel].view((2 * mode, 2 * mode), (2, 2));
+            own += cos * cos * c[(0, 0)] + 2.0 * cos * sin * c[(0, 1)] + sin * sin * c[(1, 1)];
+        }
+        own + through_poles.dot(&(&self.poles * &through_poles))
+    }
+
+    /// Complex amplitude of a mode in a channel, relative to its origin.
+    fn amplitude(&self, mode: usize, channel: usize) -> Complex<f64> {
+        let linear = &self.fit.channels[channel].linear;
+        Complex::new(linear[2 * mode], -linear[2 * mode + 1])
+    }
+}
+
+/// Returns modes and channels of a fit; `scale` is the unit of each channel of the data in that of the record.
+/// `None` if the fit says nothing of some unknown.
+pub(super) fn estimate(
+    record: &Record,
+    data: &Data,
+    fit: &Fit,
+    scale: &[f64],
+) -> Option<Result<FreeDecayEstimate, FreeDecayError>> {
+    let spread = Spread::of(data, fit)?;
+    // Squares of the unit itself may be beyond the largest number.
+    let unit = scale.iter().copied().fold(0.0, f64::max);
+    let relative: Vec<f64> = scale.iter().map(|scale| scale / unit).collect();
+    let energies = energies(data, fit, &relative);
+    let total: f64 = energies.iter().sum();
+    let mut modes = Vec::new();
+    for (at, energy) in energies.iter().enumerate() {
+        let mut mode = mode(&spread, record, at, &relative, energy / total)?;
+        mode.amplitude.value *= unit;
+        mode.amplitude.standard_error *= unit;
+        modes.push(mode);
+    }
+    modes.sort_by(|a: &DecayMode, b| {
+        let frequency = |of: &DecayMode| of.mode.natural_frequency_hz.value;
+        frequency(a).total_cmp(&frequency(b))
+    });
+    let residual = data.residual(fit);
+    let channels = (0..data.channels())
+        .map(|at| channel(data, fit, scale[at], at, residual.column(at).as_slice()));
+    Some(channels.collect::<Result<Vec<_>, _>>().and_then(|channels| {
+        let fitted = |k: usize, c: usize| scale[c] * (data.samples[(k, c)] - residual[(k, c)]);
+        let fitted = DMatrix::from_fn(data.len(), data.channels(), fitted);
+        Ok(FreeDecayEstimate {
+            modes,
+            channels,
+            fitted: Record::new(record.sampling(), fitted)?,
+            degrees_of_freedom: spread.degrees_of_freedom,
+        })
+    }))
+}
+
+/// Sum of squares of each mode over samples and channels.
+fn energies(data: &Data, fit: &Fit, scale: &[f64]) -> Vec<f64> {
+    let mut energies = vec![0.0; fit.poles.len()];
+    for basis in data.chunks(&fit.poles) {
+        for (mode, energy) in energies.iter_mut().enumerate() {
+            for (channel, scale) in fit.channels.iter().zip(scale) {
+                let [cos, sin] = [0, 1].map(|part| channel.linear[2 * mode + part]);
+                let response = basis.column(2 * mode) * cos + basis.column(2 * mode + 1) * sin;
+                *energy += response.norm_squared() * scale.powi(2);
+            }
+        }
+    }
+    energies
+}
+
+/// A mode, its amplitude in the unit of `scale`.
+fn mode(
+    spread: &Spread<'_>,
+    record: &Record,
+    at: usize,
+    scale: &[f64],
+    energy_share: f64,
+) -> Option<DecayMode> {
+    let Pole { growth, turn } = spread.fit.poles[at];
+    let (dt, len) = (record.sampling().dt(), record.len());
+    let amplitudes: Vec<Complex<f64>> =
+        scale.iter().enumerate().map(|(c, scale)| spread.amplitude(at, c) * *scale).collect();
+    let largest = |c: &usize| amplitudes[*c].norm();
+    let reference = (0..scale.len()).max_by(|a, b| largest(a).total_cmp(&largest(b)))?;
+    let whole = amplitudes[reference];
+    let lambda = Complex::new(growth, turn) / dt;
+    let shape = DVector::from_iterator(scale.len(), amplitudes.iter().map(|a| a / whole));
+    let errors = shape.iter().enumerate().map(|(c, entry)| {
+        let weights = [(c, scale[c] / whole), (reference, -entry * scale[reference] / whole)];
+        if c == reference {
+            return Complex::default();
+        }
+        let error = |turn: Complex<f64>| {
+            spread.variance(at, &weights.map(|(c, weight)| (c, weight * turn))).max(0.0).sqrt()
+        };
+        Complex::new(error(Complex::from(1.0)), error(-Complex::i()))
+    });
+    let shape_standard_error = DVector::from_iterator(scale.len(), errors);
+
+    let per_second = 1.0 / (dt * len as f64);
+    let covariance = spread.poles.view((2 * at, 2 * at), (2, 2)) * (per_second * per_second);
+    let (sigma, omega, size) = (lambda.re, lambda.im, lambda.norm());
+    let uncertain = |value: f64, slope: [f64; 2]| {
+        let slope = DVector::from_row_slice(&slope);
+        spread.uncertain(value, slope.dot(&(&covariance * &slope)))
+    };
+    let cube = size * size * size;
+    let weight = whole.conj() * (scale[reference] / whole.norm());
+    // Back to the first sample, for a mode whose amplitude is taken elsewhere.
+    let back = (-growth * spread.fit.poles[at].origin(len) as f64).exp();
+    let variance = spread.variance(at, &[(reference, weight)]) * back * back;
+    let mode = IdentifiedMode {
+        mode: Mode::new(lambda, &shape)?,
+        growth_rate: uncertain(sigma, [1.0, 0.0]),
+        damped_frequency_hz: uncertain(omega / TAU, [0.0, 1.0 / TAU]),
+        natural_frequency_hz: uncertain(size / TAU, [sigma / size / TAU, omega / size / TAU]),
+        damping_ratio: uncertain(-sigma / size, [-omega * omega / cube, sigma * omega / cube]),
+        squared_frequency: uncertain(size * size, [2.0 * sigma, 2.0 * omega]),
+        partner: None,
+        is_rigid_body: false,
+        shape_standard_error,
+    };
+    let amplitude = spread.uncertain(back * whole.norm(), variance);
+    Some(DecayMode { mode, amplitude, phase: whole.arg(), energy_share })
+}
+
+fn channel(
+    data: &Data,
+    fit: &Fit,
+    scale: f64,
+    at: usize,
+    residual: &[f64],
+) -> Result<DecayChannel, FreeDecayError> {
+    let (linear, noise) = (&fit.channels[at].linear, &fit.noise[at]);
+    let square: f64 = residual.iter().map(|e| e * e).sum();
+    let len = data.len() as f64;
+    let lags = LAGS.min(data.len() / 4).max(1);
+    let white = noise.whitened(residual, 0, 0);
+    Ok(DecayChannel {
+        offset: if data.constant { scale * linear[linear.len() - 1] } else { 0.0 },
+        noise: scale * (square / len).sqrt(),
+        noise_order: noise.order(),
+        // Channels have unit variance.
+        explained: 1.0 - square / len,
+        whiteness: whiteness(&white, lags)?,
+        onset: Onset::of(&white),
+    })
+}

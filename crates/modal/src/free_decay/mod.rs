@@ -1,0 +1,163 @@
+//! Frequencies, damping and shapes from a record in which no force acts.
+
+mod autoregression;
+mod error;
+mod estimate;
+mod fit;
+mod poles;
+mod select;
+mod start;
+
+use mechid_signal::Record;
+use mechid_signal::SignalError;
+use mechid_signal::measures::{peak, power_of_two};
+use nalgebra::DMatrix;
+
+pub use self::error::FreeDecayError;
+pub use self::estimate::{DecayChannel, DecayMode, FreeDecayEstimate, Onset};
+use self::fit::Data;
+use self::select::Search;
+
+/// Settings of [`free_decay`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct FreeDecay {
+    /// Number of modes; `None`: as many as the record shows.
+    pub modes: Option<usize>,
+    /// Largest number of modes to look for where the number is not given.
+    pub max_modes: usize,
+    /// `true` if each channel has an unknown constant.
+    pub offset: bool,
+}
+
+impl Default for FreeDecay {
+    /// As many modes as the record shows, at most ten, and a constant in each channel.
+    fn default() -> Self {
+        Self { modes: None, max_modes: 10, offset: true }
+    }
+}
+
+/// Largest number of modes that are fitted.
+const MOST_MODES: usize = 40;
+/// Samples that each of the poles needs.
+const SAMPLES_PER_MODE: usize = 12;
+/// Largest number of samples that are fitted.
+const MOST_SAMPLES: usize = 1 << 18;
+/// Standard errors by which a growth rate above zero is no scatter.
+const SURE: f64 = 4.0;
+
+/// Finds the modes in a free response: sums of decaying oscillations and noise, samples × channels of one
+/// quantity in any unit.
+///
+/// The modes of all channels share their poles; shapes and constants follow linearly from them. Each channel
+/// has noise of its own level and, where the residual is coloured, of its own colour (an autoregression). Poles,
+/// levels and colours are those of maximum likelihood, and the standard errors those that belong to it.
+/// A further mode must make the record so much more likely as noise does with a probability of 0.1 %.
+/// Searches start from the Hankel matrix of the record and from the strongest decay in the residual.
+///
+/// Modes that do not oscillate (overdamped ones) are not part of the model. The memory needed is a few times
+/// that of the record.
+///
+/// ```
+/// use mechid_modal::free_decay::{FreeDecay, free_decay};
+/// use mechid_signal::{NoiseLevel, Record, Sampling, noise};
+///
+/// // 5 Hz, damping ratio 0.02, two channels that move against one another.
+/// let (omega, zeta) = (5.0 * std::f64::consts::TAU, 0.02f64);
+/// let x = |t: f64| (-zeta * omega * t).exp() * (omega * (1.0 - zeta * zeta).sqrt() * t).cos();
+/// let sampling = Sampling::new(0.01, 400)?;
+/// let channels = [1.0, -0.5].map(|size| sampling.times().map(|t| size * x(t)).collect::<Vec<_>>());
+/// let record = Record::from_channels(sampling, &channels)?;
+/// let measured = noise::add_white(&record, NoiseLevel::FractionOfRms(0.02), 1)?;
+///
+/// let found = free_decay(&measured, &FreeDecay::default())?;
+/// let [mode] = found.modes() else { panic!("{} modes", found.modes().len()) };
+/// let [low, high] = mode.mode.natural_frequency_hz.interval(0.99)?;
+/// assert!(low < 5.0 && 5.0 < high && high - low < 0.01);
+/// assert!((mode.mode.mode.shape()[1].re + 0.5).abs() < 0.01);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`FreeDecayError::SilentChannel`] if a channel does not move, [`SignalError::TooShort`](mechid_signal::SignalError::TooShort),
+/// [`FreeDecayError::TooLong`], [`FreeDecayError::NumberOfModes`] if more modes are asked for than can be fitted,
+/// [`FreeDecayError::NoDecay`] if no oscillation stands out of the noise, [`FreeDecayError::Grows`] if most of
+/// the response grows, [`FreeDecayError::NotConverged`] if so many modes cannot be told apart.
+///
+/// # Source
+/// Juang & Pappa (1985), Journal of Guidance, Control, and Dynamics 8, 620–627 (the start); Golub & Pereyra
+/// (1973), SIAM Journal on Numerical Analysis 10, 413–432 (separable least squares); Davies (1987), Biometrika
+/// 74, 33–43 (tests where a parameter exists under the alternative only).
+pub fn free_decay(
+    record: &Record,
+    settings: &FreeDecay,
+) -> Result<FreeDecayEstimate, FreeDecayError> {
+    let asked = settings.modes.unwrap_or(settings.max_modes);
+    if asked == 0 || asked > MOST_MODES {
+        return Err(FreeDecayError::NumberOfModes { modes: asked, most: MOST_MODES });
+    }
+    let (samples, most) = (record.len(), MOST_SAMPLES);
+    if samples > most {
+        return Err(FreeDecayError::TooLong { samples, most });
+    }
+    let needed = SAMPLES_PER_MODE * settings.modes.unwrap_or(1) + usize::from(settings.offset);
+    if samples < needed {
+        return Err(SignalError::TooShort { samples, needed }.into());
+    }
+    let units = units(record)?;
+    let scaled = |k: usize, c: usize| record.channel(c)[k] / units[c][0] / units[c][1];
+    let data = Data {
+        samples: DMatrix::from_fn(samples, record.channels(), scaled),
+        constant: settings.offset,
+    };
+    let most = asked.min(samples / SAMPLES_PER_MODE);
+    let failed = FreeDecayError::NotConverged { searches: 1, steps: fit::MAX_STEPS };
+    let search = Search::new(&data);
+    let best = match settings.modes {
+        Some(modes) => search.exactly(modes).ok_or(failed.clone())?,
+        None => {
+            let selected = search.best(most).ok_or(failed.clone())?;
+            if selected.best.fit.poles.is_empty() {
+                let needed = select::least_gain(samples, record.channels());
+                return Err(FreeDecayError::NoDecay {
+                    samples,
+                    gained: selected.first_gain,
+                    needed,
+                });
+            }
+            selected.best
+        }
+    };
+    let scale: Vec<f64> = units.iter().map(|[power, rms]| power * rms).collect();
+    let fit = data.refined(&best.fit.poles, &best.fit.noise, fit::FINE).ok_or(failed.clone())?;
+    let found = estimate::estimate(record, &data, &fit, &scale).ok_or(failed)??;
+    for mode in found.modes() {
+        let growth = &mode.mode.growth_rate;
+        if mode.energy_share > 0.5 && growth.value > SURE * growth.standard_error {
+            return Err(FreeDecayError::Grows {
+                frequency_hz: mode.mode.damped_frequency_hz.value,
+                growth_rate: growth.value,
+                standard_error: growth.standard_error,
+            });
+        }
+    }
+    Ok(found)
+}
+
+/// A power of two near the peak of each channel, and the RMS about the mean over it.
+fn units(record: &Record) -> Result<Vec<[f64; 2]>, FreeDecayError> {
+    let unit = |channel: usize| {
+        let x = record.channel(channel);
+        let power = power_of_two(peak(x));
+        let count = x.len() as f64;
+        let mean = x.iter().map(|v| v / power).sum::<f64>() / count;
+        let square: f64 = x.iter().map(|v| (v / power - mean).powi(2)).sum();
+        let rms = (square / count).sqrt();
+        match power > 0.0 && rms > f64::EPSILON * mean.abs() {
+            true => Ok([power, rms]),
+            false => Err(FreeDecayError::SilentChannel { channel, value: x[0] }),
+        }
+    };
+    (0..record.channels()).map(unit).collect()
+}

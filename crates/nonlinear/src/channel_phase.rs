@@ -1,0 +1,98 @@
+//! Phase that the measuring channels add.
+
+use mechid_estimate::EstimateError;
+use mechid_model::ResponseQuantity;
+use mechid_signal::{Record, Spectrum};
+use nalgebra::Complex;
+
+/// Delay between force and response, and the phase that both channels have in common.
+///
+/// A phase that force and response share, as from equal anti-alias filters, does not matter to a
+/// linear system. To a nonlinear one it does: the powers are those of the response before the filter.
+/// At f the channels show e^(−iφ) of the true signals, φ = p₃ z³ + p₅ z⁵ with z = f/(f_s/2) (a common
+/// delay, which would be the term in z, shows nowhere). The force acts `delay` later than its channel
+/// says.
+///
+/// # Source
+/// Ours. The odd polynomial is the series of any filter's phase about zero frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct ChannelPhase {
+    /// Delay of the force, in s.
+    pub delay: f64,
+    /// p₃, in rad.
+    pub cubic: f64,
+    /// p₅, in rad.
+    pub quintic: f64,
+}
+
+impl ChannelPhase {
+    /// Factors from the measured lines of force and response to the true ones, at `omega` (rad/s)
+    /// and this part of half the sampling rate.
+    pub(super) fn corrections(&self, omega: f64, z: f64) -> [Complex<f64>; 2] {
+        let common = z * z * z * (self.cubic + self.quintic * z * z);
+        [Complex::cis(common - omega * self.delay), Complex::cis(common)]
+    }
+
+    /// Force and response as they were before the channels, of records taken as a period (N, and m,
+    /// m/s or m/s²; samples × channels).
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] if the records have not the same time axis, or overflow.
+    pub fn correct(
+        &self,
+        force: &Record,
+        response: &Record,
+    ) -> Result<(Record, Record), EstimateError> {
+        force.check_same_sampling(response)?;
+        Ok((self.turn(force, 0, false)?, self.turn(response, 1, false)?))
+    }
+
+    /// A response, predicted from a corrected force, as the channel would show it (samples ×
+    /// channels, in its unit).
+    ///
+    /// # Errors
+    /// [`EstimateError::Signal`] if the samples add up to more than a number can hold.
+    pub fn as_measured(&self, response: &Record) -> Result<Record, EstimateError> {
+        self.turn(response, 1, true)
+    }
+
+    fn turn(&self, record: &Record, which: usize, back: bool) -> Result<Record, EstimateError> {
+        if *self == Self::default() {
+            return Ok(record.clone());
+        }
+        let spectrum = Spectrum::of(record);
+        let mut lines = spectrum.lines().clone();
+        let half = record.sampling().nyquist_hz();
+        for (n, mut row) in lines.row_iter_mut().enumerate() {
+            let factor =
+                self.corrections(spectrum.omega(n), spectrum.frequency_hz(n) / half)[which];
+            let factor = if back { factor.conj() } else { factor };
+            row.iter_mut().for_each(|line| *line *= factor);
+        }
+        Ok(Spectrum::from_lines(record.sampling(), lines)?.to_record()?)
+    }
+}
+
+/// Displacement lines of a response, up to but without half the sampling rate; the mean is kept of a
+/// displacement and zero for what has been differentiated.
+pub(super) fn displacement_lines(
+    response: &Spectrum,
+    measured: ResponseQuantity,
+) -> nalgebra::DMatrix<Complex<f64>> {
+    let count = response.sampling().len().div_ceil(2);
+    let mut lines = response.lines().rows(0, count).into_owned();
+    for (n, mut row) in lines.row_iter_mut().enumerate() {
+        let factor = match (n, measured) {
+            (_, ResponseQuantity::Displacement) => continue,
+            (0, _) => Complex::ZERO,
+            _ => measured.per_displacement(response.omega(n)).inv(),
+        };
+        row.iter_mut().for_each(|line| *line *= factor);
+    }
+    lines
+}

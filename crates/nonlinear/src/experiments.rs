@@ -1,0 +1,221 @@
+//! Steady periods of one or several experiments, and the columns that terms make of them.
+
+use mechid_estimate::EstimateError;
+use mechid_model::{ResponseQuantity, Terms};
+use mechid_numerics::check_size;
+use mechid_signal::{Record, Sampling, Spectrum};
+use mechid_spectra::{Lines, check_sampling};
+use nalgebra::{Complex, DMatrix};
+use rayon::prelude::*;
+
+use super::ChannelPhase;
+use super::channel_phase::displacement_lines;
+use super::grid::Grid;
+
+/// Samples of the grid that nonlinear terms are evaluated on, per sample: products of up to seven
+/// lines of the record do not fold back onto it.
+const FINER: usize = 4;
+
+/// Forces and responses in the steady state under periodic excitation, one mean period of each
+/// experiment.
+///
+/// Unlike [`FrequencyData`](crate::frequency_domain::FrequencyData) it keeps all lines of the period:
+/// a power of the response needs all of them, and the response of a nonlinear system to a few lines
+/// of force has all of them. The equation of motion is fitted on the `lines`, those without force
+/// included.
+pub struct SteadyExperiments {
+    lines: Vec<usize>,
+    period: Sampling,
+    dof: usize,
+    measured: ResponseQuantity,
+    grid: Grid,
+    steady: Vec<Steady>,
+}
+
+/// Lines 0, 1, … of one period, without that at half the sampling rate: lines × degrees of freedom.
+struct Steady {
+    force: DMatrix<Complex<f64>>,
+    displacement: DMatrix<Complex<f64>>,
+}
+
+/// Columns of the equations of one experiment at the rows of a fit.
+pub(super) struct Columns {
+    /// Rows × degrees of freedom.
+    pub(super) force: DMatrix<Complex<f64>>,
+    /// Rows × degrees of freedom.
+    pub(super) displacement: DMatrix<Complex<f64>>,
+    /// Rows × terms.
+    pub(super) terms: DMatrix<Complex<f64>>,
+}
+
+impl SteadyExperiments {
+    /// No experiment yet, of `dof` degrees of freedom, on the lines of a period in which the equation
+    /// of motion is to hold.
+    pub fn new(lines: &Lines, dof: usize, measured: ResponseQuantity) -> Self {
+        let period = lines.sampling();
+        let mut rising = lines.as_slice().to_vec();
+        rising.sort_unstable();
+        rising.dedup();
+        let grid = Grid::new(period.len().div_ceil(2), FINER * period.len());
+        Self { lines: rising, period, dof, measured, grid, steady: Vec::new() }
+    }
+
+    /// Adds an experiment: whole periods of force (N) and response (m, m/s or m/s²), of which the
+    /// mean is taken; an incomplete one at the end is left out.
+    ///
+    /// Even powers need the displacement's zero: take away the offset of the sensor first, that of
+    /// the whole record ([`Record::without_mean`]) if nothing better is known.
+    ///
+    /// # Errors
+    /// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::Signal`] if the
+    /// records have not the time step of the lines or less than one period.
+    pub fn push(&mut self, force: &Record, response: &Record) -> Result<(), EstimateError> {
+        force.check_same_sampling(response)?;
+        check_size("channels of the force", self.dof, force.channels())?;
+        check_size("channels of the response", self.dof, response.channels())?;
+        let [force, response] = [force, response].map(|r| r.period_mean(self.period.len()));
+        let (force, response) = (force?, response?);
+        check_sampling(self.period, force.sampling())?;
+        let force = Spectrum::of(&force);
+        let lines = self.period.len().div_ceil(2);
+        self.steady.push(Steady {
+            force: force.lines().rows(0, lines).into_owned(),
+            displacement: displacement_lines(&Spectrum::of(&response), self.measured),
+        });
+        Ok(())
+    }
+
+    /// Experiments so far.
+    pub fn count(&self) -> usize {
+        self.steady.len()
+    }
+
+    /// Degrees of freedom n.
+    pub fn dof(&self) -> usize {
+        self.dof
+    }
+
+    /// The lines on which the equation of motion holds, rising.
+    pub fn lines(&self) -> &[usize] {
+        &self.lines
+    }
+
+    /// Time axis of one period.
+    pub fn period(&self) -> Sampling {
+        self.period
+    }
+
+    /// Columns of every experiment at some lines.
+    pub(super) fn columns(
+        &self,
+        rows: &[usize],
+        terms: &Terms,
+        channels: &ChannelPhase,
+    ) -> Vec<Columns> {
+        self.steady.par_iter().map(|one| self.columns_of(one, rows, terms, channels)).collect()
+    }
+
+    fn columns_of(
+        &self,
+        steady: &Steady,
+        rows: &[usize],
+        terms: &Terms,
+        channels: &ChannelPhase,
+    ) -> Columns {
+        let corrections = self.corrections(channels);
+        let corrected = |lines: &DMatrix<Complex<f64>>, which: usize| {
+            DMatrix::from_fn(rows.len(), self.dof, |at, dof| {
+                lines[(rows[at], dof)] * corrections[rows[at]][which]
+            })
+        };
+        let signals = self.signals(steady, &corrections, terms);
+        let mut of_terms = DMatrix::zeros(rows.len(), terms.len());
+        let samples = FINER * self.period.len();
+        for (term, mut column) in terms.iter().zip(of_terms.column_iter_mut()) {
+            let mut values = vec![0.0; samples];
+            let (mut x, mut v) = (vec![0.0; self.dof], vec![0.0; self.dof]);
+            for (k, value) in values.iter_mut().enumerate() {
+                for (dof, signal) in signals.iter().enumerate() {
+                    if let Some([displacement, velocity]) = signal {
+                        (x[dof], v[dof]) = (displacement[k], velocity[k]);
+                    }
+                }
+                *value = term.value(&x, &v);
+            }
+            let lines = self.grid.to_lines(values);
+            column.iter_mut().zip(rows).for_each(|(entry, row)| *entry = lines[*row]);
+        }
+        Columns {
+            force: corrected(&steady.force, 0),
+            displacement: corrected(&steady.displacement, 1),
+            terms: of_terms,
+        }
+    }
+
+    /// Displacement (m) and velocity (m/s) on the finer grid, of the degrees of freedom that terms
+    /// depend on.
+    fn signals(
+        &self,
+        steady: &Steady,
+        corrections: &[[Complex<f64>; 2]],
+        terms: &Terms,
+    ) -> Vec<Option<[Vec<f64>; 2]>> {
+        let signal = |dof: usize| {
+            let needed = terms.iter().any(|term| term.coordinate().sign(dof) != 0.0);
+            needed.then(|| {
+                let lines = steady.displacement.column(dof);
+                let line = |n: usize| lines[n] * corrections[n][1];
+                let velocity = |n: usize| line(n) * Complex::new(0.0, self.omega(n));
+                let count = lines.len();
+                [
+                    self.grid.to_samples((0..count).map(line)),
+                    self.grid.to_samples((0..count).map(velocity)),
+                ]
+            })
+        };
+        (0..self.dof).map(signal).collect()
+    }
+
+    /// Displacement of every experiment, corrected for what the channels do to it: lines × degrees of
+    /// freedom.
+    pub(super) fn displacements(&self, channels: &ChannelPhase) -> Vec<DMatrix<Complex<f64>>> {
+        let corrections = self.corrections(channels);
+        let corrected = |one: &Steady| {
+            let mut lines = one.displacement.clone();
+            for (mut row, [_, correction]) in lines.row_iter_mut().zip(&corrections) {
+                row.iter_mut().for_each(|line| *line *= *correction);
+            }
+            lines
+        };
+        self.steady.iter().map(corrected).collect()
+    }
+
+    fn corrections(&self, channels: &ChannelPhase) -> Vec<[Complex<f64>; 2]> {
+        let half = 0.5 * self.period.len() as f64;
+        let at = |n: usize| channels.corrections(self.omega(n), n as f64 / half);
+        (0..self.period.len().div_ceil(2)).map(at).collect()
+    }
+
+    pub(super) fn omega(&self, line: usize) -> f64 {
+        line as f64 * self.period.omega0()
+    }
+
+    /// The largest |q| (m) and |q̇| (m/s) of all experiments, for the coordinate of each term.
+    pub(super) fn ranges(&self, terms: &Terms, channels: &ChannelPhase) -> Vec<[f64; 2]> {
+        let corrections = self.corrections(channels);
+        let mut ranges = vec![[0.0f64; 2]; terms.len()];
+        for steady in &self.steady {
+            let signals = self.signals(steady, &corrections, terms);
+            for (term, range) in terms.iter().zip(&mut ranges) {
+                for k in 0..FINER * self.period.len() {
+                    for (kind, largest) in range.iter_mut().enumerate() {
+                        let of = |dof: usize| signals[dof].as_ref().map_or(0.0, |s| s[kind][k]);
+                        let sum = (0..self.dof).map(|dof| term.coordinate().sign(dof) * of(dof));
+                        *largest = largest.max(sum.sum::<f64>().abs());
+                    }
+                }
+            }
+        }
+        ranges
+    }
+}

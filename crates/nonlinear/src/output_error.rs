@@ -1,0 +1,429 @@
+//! The simulated response fitted to the measured one.
+
+use mechid_estimate::EstimateParts;
+use mechid_estimate::NAMED_PARAMETERS;
+use mechid_estimate::{Estimate, EstimateError, Unknowns};
+use mechid_model::{InitialState, NonlinearSystem, Parameter, ResponseQuantity, Terms};
+use mechid_numerics::least_squares::LeastSquares;
+use mechid_numerics::triangular::TriangularFactor;
+use mechid_numerics::{NumericsError, Uncertain, check_size};
+use mechid_signal::{Extent, Record, message};
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::covariance::{BlockScores, FEWEST, InTime, block_count};
+use super::equation_error::slowest_decay;
+use super::estimate::{NamedParameter, NonlinearEstimate, StandardErrors};
+use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::predict::{fitted_start, initial};
+use super::simulate::{Course, Direction, FineForce, Tangent};
+
+/// A record for [`output_error`].
+#[derive(Debug, Clone)]
+pub struct SteppedRecord {
+    /// Force, samples × degrees of freedom, in N.
+    pub force: Record,
+    /// Response, samples × degrees of freedom, in m, m/s or m/s².
+    pub response: Record,
+    /// Extent of the record: a whole period of a force that repeats, or open.
+    pub extent: Extent,
+}
+
+/// A [`NonlinearEstimate`] by output error, with what its search tells.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NonlinearFit {
+    /// The system with the covariance of its parameters.
+    pub estimate: NonlinearEstimate,
+    /// The state of each record at its first sample.
+    pub starts: Vec<InitialState>,
+    /// RMS of what is left of each channel, over all records, in the unit of the response.
+    pub rmse: Vec<f64>,
+    /// Gauss–Newton steps taken.
+    pub steps: usize,
+}
+
+/// Time constants of the slowest mode after which the start shows no longer.
+const FORGOTTEN: f64 = 8.0;
+
+/// Least squares on the measured less the simulated response: free entries of M, C and K, the
+/// coefficients of the terms, the constants inside their laws, and the state each record starts from.
+///
+/// Noise on the response does not bias it, whatever its colour. The force is taken as it is measured;
+/// noise on it, carried through the system, is noise on the response to first order, and its share in
+/// the derivatives of second order. Gauss–Newton steps (damped where needed) begin at `start`, as the
+/// [`equation_error`](super::equation_error) gives it, whose delay and phase of the channels are kept.
+/// Channels are weighted by the size of what is left of each.
+///
+/// The standard errors count the colour of the residual ([`StandardErrors::Blocks`]): where the model
+/// misses a resonance's damping by a little, the white formula is several times too small.
+///
+/// # Errors
+/// [`NumericsError::Size`] or [`EstimateError::Signal`] if the records do not belong to the system,
+/// [`NumericsError::TooFewRows`] without a record, [`EstimateError::TooStiff`],
+/// [`EstimateError::Diverged`] if the start's response does, [`EstimateError::NotConverged`], and
+/// [`EstimateError::Undetermined`] if the records leave a parameter open.
+///
+/// # Source
+/// Schoukens & Ljung (2019), IEEE Control Systems 39(6), 28–99 (simulation error and its
+/// derivatives); Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, section I.14.
+pub fn output_error(
+    records: &[SteppedRecord],
+    measured: ResponseQuantity,
+    start: &NonlinearEstimate,
+) -> Result<NonlinearFit, EstimateError> {
+    let system = start.system()?;
+    let n = system.dof();
+    for record in records {
+        check_size("channels of the force", n, record.force.channels())?;
+        check_size("channels of the response", n, record.response.channels())?;
+    }
+    let mut problem = Problem::new(records, measured, start, &system)?;
+    let theta = problem.start(&system)?;
+    let mut residual = DVector::zeros(problem.residuals());
+    if !problem.residual(&theta, &mut residual) {
+        let len = problem.records.iter().map(|record| record.response.len()).max().unwrap_or(0);
+        return Err(EstimateError::Diverged { len });
+    }
+    let mut steps = 0;
+    let mut theta = theta;
+    // The size of what is left of several channels is known after the first search.
+    for round in 0..2 {
+        let minimum = minimise(&mut problem, theta)
+            .ok_or(EstimateError::NotConverged { searches: 1, steps })
+            .and_then(|minimum| match minimum.converged {
+                true => Ok(minimum),
+                false => Err(EstimateError::NotConverged { searches: 1, steps: minimum.steps }),
+            })?;
+        steps += minimum.steps;
+        theta = minimum.theta;
+        problem.residual(&theta, &mut residual);
+        if n == 1 || round == 1 {
+            break;
+        }
+        problem.levels = problem.residual_rms();
+    }
+    problem.finish(&theta, start, steps)
+}
+
+/// One record with what is computed of it.
+struct Prepared {
+    response: Record,
+    force: FineForce,
+    /// The force at the samples.
+    plain: Record,
+}
+
+struct Problem<'a> {
+    records: Vec<Prepared>,
+    measured: ResponseQuantity,
+    unknowns: &'a Unknowns,
+    terms: &'a Terms,
+    free: Vec<Parameter>,
+    /// Free entries, terms and constants, without the starts.
+    shared: Vec<Direction>,
+    /// Size of what is left of each channel.
+    levels: Vec<f64>,
+    courses: Vec<Course>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(
+        records: &[SteppedRecord],
+        measured: ResponseQuantity,
+        start: &'a NonlinearEstimate,
+        system: &NonlinearSystem,
+    ) -> Result<Self, EstimateError> {
+        let at_rest = InitialState::rest(system.dof());
+        let unknowns = start.linear().unknowns();
+        let free = unknowns.free();
+        let entries = free.iter().map(|entry| Direction::Entry(*entry));
+        let terms = (0..start.terms().len()).map(Direction::Term);
+        let constants = start.terms().iter().enumerate().flat_map(|(term, law)| {
+            (0..law.law().constants().len()).map(move |at| Direction::Constant(term, at))
+        });
+        let shared = entries.chain(terms).chain(constants).collect();
+        let prepared = records.iter().map(|record| {
+            let (plain, response) = start.channels().correct(&record.force, &record.response)?;
+            let force = FineForce::sufficient(&plain, system, record.extent, &at_rest)?;
+            Ok(Prepared { response, force, plain })
+        });
+        let records = prepared.collect::<Result<Vec<_>, EstimateError>>()?;
+        if records.is_empty() {
+            return Err(NumericsError::TooFewRows { rows: 0, unknowns: free.len() }.into());
+        }
+        let mut problem = Self {
+            records,
+            measured,
+            unknowns,
+            terms: start.terms(),
+            free,
+            shared,
+            levels: vec![1.0; system.dof()],
+            courses: Vec::new(),
+        };
+        let measured = |dof| problem.rms(|_, record| record.response.column(dof).into_owned());
+        problem.levels = (0..system.dof()).map(measured).collect();
+        Ok(problem)
+    }
+
+    fn dof(&self) -> usize {
+        self.unknowns.dof()
+    }
+
+    /// Root mean square over all records; 1 where that is zero.
+    fn rms(&self, column: impl Fn(usize, &Prepared) -> DVector<f64>) -> f64 {
+        let (mut square, mut samples) = (0.0, 0);
+        for (at, record) in self.records.iter().enumerate() {
+            let column = column(at, record);
+            square += column.norm_squared();
+            samples += column.len();
+        }
+        let rms = (square / samples as f64).sqrt();
+        if rms > 0.0 { rms } else { 1.0 }
+    }
+
+    /// Size of what is left of each channel where the residual was last evaluated.
+    fn residual_rms(&self) -> Vec<f64> {
+        let residual_rms = |dof: usize| self.rms(|at, record| self.gap(at, record, dof));
+        (0..self.dof()).map(residual_rms).collect()
+    }
+
+    fn gap(&self, at: usize, record: &Prepared, dof: usize) -> DVector<f64> {
+        let column = self.measured.derivative_order() * self.dof() + dof;
+        record.response.column(dof) - self.courses[at].state.column(column)
+    }
+
+    /// Values of the parameters, and the starts that fit the records best.
+    fn start(&self, system: &NonlinearSystem) -> Result<DVector<f64>, EstimateError> {
+        let linear = system.linear();
+        let mut theta: Vec<f64> =
+            self.free.iter().map(|p| linear.matrix(p.matrix())[(p.row(), p.column())]).collect();
+        let rate = slowest_decay(self.unknowns, &theta);
+        theta.extend(system.coefficients());
+        theta.extend(
+            self.terms
+                .iter()
+                .flat_map(|term| term.law().constants())
+                .map(|constant| constant.value),
+        );
+        let state = |record: &Prepared| {
+            let samples = FORGOTTEN / (rate * record.response.sampling().dt());
+            let len = (samples.min(1e9) as usize).clamp(16, record.response.len().max(16));
+            let len = len.min(record.response.len());
+            let (force, response) = (record.plain.window(0, len)?, record.response.window(0, len)?);
+            fitted_start(system, &force, &[(self.measured, &response)])
+        };
+        let states: Vec<_> = self.records.par_iter().map(state).collect::<Result<_, _>>()?;
+        for state in states {
+            theta.extend(state.displacement().iter().chain(state.velocity().iter()));
+        }
+        Ok(theta.into())
+    }
+
+    /// The system with these parameters; `None` if they make none.
+    fn system(&self, theta: &DVector<f64>) -> Option<NonlinearSystem> {
+        let (entries, rest) = theta.as_slice().split_at(self.free.len());
+        let (coefficients, mut rest) = rest.split_at(self.terms.len());
+        let [m, c, k] = self.unknowns.assemble(entries);
+        let linear = mechid_model::SecondOrderSystem::new(m, c, k).ok()?;
+        let mut terms = Vec::new();
+        for term in self.terms {
+            let (constants, others) = rest.split_at(term.law().constants().len());
+            terms.push(if constants.is_empty() {
+                term.clone()
+            } else {
+                term.with_constants(constants)?
+            });
+            rest = others;
+        }
+        NonlinearSystem::new(linear, Terms::new(terms).ok()?, coefficients.to_vec()).ok()
+    }
+
+    /// Parameters of a record: those shared by all, then its start's.
+    fn directions(&self) -> Vec<Direction> {
+        let starts = (0..2 * self.dof()).map(Direction::Initial);
+        self.shared.iter().copied().chain(starts).collect()
+    }
+
+    /// Place of a record's direction among all parameters.
+    fn place(&self, record: usize, direction: usize) -> usize {
+        match direction < self.shared.len() {
+            true => direction,
+            false => direction + record * 2 * self.dof(),
+        }
+    }
+
+    fn initial(&self, theta: &DVector<f64>, record: usize) -> Option<InitialState> {
+        let (first, len) = (self.place(record, self.shared.len()), 2 * self.dof());
+        initial(&theta.rows(first, len).into_owned()).ok()
+    }
+
+    fn finish(
+        self,
+        theta: &DVector<f64>,
+        start: &NonlinearEstimate,
+        steps: usize,
+    ) -> Result<NonlinearFit, EstimateError> {
+        let wrong = EstimateError::NotConverged { searches: 1, steps };
+        let system = self.system(theta).ok_or(wrong.clone())?;
+        let (n, shared, free) = (self.dof(), self.shared.len(), self.free.len());
+        let inverse = self.inverse(theta.len())?;
+        let (covariance, standard_errors, freedom) = self.covariance(theta, &inverse);
+        let covariance = covariance.view((0, 0), (shared, shared)).into_owned();
+        let rmse = self.residual_rms();
+        let around_mean = |dof: usize| {
+            self.rms(|_, record| {
+                let column = record.response.column(dof);
+                column.add_scalar(-column.mean())
+            })
+        };
+        let unexplained: Vec<f64> = (0..n).map(|dof| rmse[dof] / around_mean(dof)).collect();
+        let linear = Estimate::new(EstimateParts {
+            unknowns: self.unknowns.clone(),
+            values: theta.as_slice()[..free].to_vec(),
+            covariance: covariance.view((0, 0), (free, free)).into_owned().into(),
+            degrees_of_freedom: freedom,
+            residual_nrmse: unexplained.clone(),
+            condition: start.linear().condition(),
+            undetermined: Vec::new(),
+        })?;
+        let entries = self.free.iter().map(|p| (p.to_string(), p.matrix().unit().to_owned()));
+        let terms = system.terms().iter().map(|term| (term.name().to_owned(), term.unit()));
+        let constants = system.terms().iter().flat_map(|term| {
+            let named = |c: mechid_model::Constant| {
+                (format!("{}.{}", term.name(), c.name), c.unit.to_owned())
+            };
+            term.law().constants().into_iter().map(named)
+        });
+        let parameters = entries.chain(terms).chain(constants).enumerate().map(|(at, named)| {
+            let (name, unit) = named;
+            let (value, standard_error) = (theta[at], covariance[(at, at)].sqrt());
+            let estimate = Uncertain { value, standard_error, degrees_of_freedom: freedom };
+            NamedParameter { name, unit, estimate }
+        });
+        let starts = (0..self.records.len()).map(|at| self.initial(theta, at).ok_or(wrong.clone()));
+        Ok(NonlinearFit {
+            starts: starts.collect::<Result<_, _>>()?,
+            rmse,
+            steps,
+            estimate: NonlinearEstimate {
+                linear,
+                coefficients: system.coefficients().to_vec(),
+                parameters: parameters.collect(),
+                covariance,
+                channels: start.channels(),
+                weighting: start.weighting(),
+                standard_errors,
+                unexplained,
+                ranges: start.ranges().to_vec(),
+                terms: system.terms().clone(),
+                equations: self.residuals(),
+            },
+        })
+    }
+
+    /// (JᵀJ)⁻¹ of all parameters, where the residual was last evaluated.
+    fn inverse(&self, parameters: usize) -> Result<DMatrix<f64>, EstimateError> {
+        let mut jacobian = DMatrix::zeros(self.residuals(), parameters);
+        self.jacobian(&mut jacobian);
+        let mut factor = TriangularFactor::new(parameters);
+        if !factor.push(&[jacobian.as_view()]) {
+            return Err(NumericsError::Overflow.into());
+        }
+        let mut rows = LeastSquares::new(parameters, 1);
+        rows.push_rows(factor.r().as_view(), DMatrix::zeros(parameters, 1).as_view())?;
+        let solution = rows.solve()?;
+        if !solution.undetermined.is_empty() {
+            let at = |at: usize| solution.undetermined.iter().any(|d| d.involved[at]);
+            let open = self.free.iter().enumerate().filter(|(i, _)| at(*i)).map(|(_, p)| p);
+            return Err(EstimateError::Undetermined {
+                parameters: message::list(open, ", ", NAMED_PARAMETERS),
+                directions: "they change the simulated response in the same way".to_owned(),
+            });
+        }
+        Ok(solution.unscaled_covariance)
+    }
+
+    fn covariance(
+        &self,
+        theta: &DVector<f64>,
+        inverse: &DMatrix<f64>,
+    ) -> (DMatrix<f64>, StandardErrors, usize) {
+        let n = self.dof();
+        let rate = slowest_decay(self.unknowns, &theta.as_slice()[..self.free.len()]);
+        let blocks = |record: &Prepared| block_count(record.response.sampling().duration(), rate);
+        let order = self.measured.derivative_order();
+        if self.records.iter().map(blocks).sum::<usize>() >= FEWEST {
+            let mut scores = BlockScores::new(theta.len());
+            for (at, (record, course)) in self.records.iter().zip(&self.courses).enumerate() {
+                let part = |dof: usize| {
+                    let weight = 1.0 / self.levels[dof];
+                    let derivatives = course.derivatives.iter().enumerate();
+                    let regressors = derivatives.map(|(d, derivative)| {
+                        let column = derivative.column(order * n + dof) * weight;
+                        (self.place(at, d), column.as_slice().to_vec())
+                    });
+                    let gap = self.gap(at, record, dof) * weight;
+                    InTime { regressors: regressors.collect(), residual: gap.as_slice().to_vec() }
+                };
+                scores.push(blocks(record), &(0..n).map(part).collect::<Vec<_>>());
+            }
+            let count = scores.count();
+            if let Some((covariance, freedom)) = scores.covariance(inverse, self.shared.len()) {
+                return (covariance, StandardErrors::Blocks(count), freedom);
+            }
+        }
+        let square: f64 = (0..n)
+            .flat_map(|dof| self.records.iter().enumerate().map(move |(at, r)| (dof, at, r)))
+            .map(|(dof, at, record)| (self.gap(at, record, dof) / self.levels[dof]).norm_squared())
+            .sum();
+        let freedom = self.residuals().saturating_sub(theta.len());
+        let variance = if freedom > 0 { square / freedom as f64 } else { f64::INFINITY };
+        (inverse * variance, StandardErrors::White, freedom)
+    }
+}
+
+impl SumOfSquares for Problem<'_> {
+    fn residuals(&self) -> usize {
+        self.dof() * self.records.iter().map(|record| record.response.len()).sum::<usize>()
+    }
+
+    fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+        let Some(system) = self.system(theta) else { return false };
+        let directions = self.directions();
+        let run = |(at, record): (usize, &Prepared)| {
+            let start = self.initial(theta, at)?;
+            Tangent::new(&system, &directions).run(&record.force, &start)
+        };
+        let courses: Option<Vec<Course>> = self.records.par_iter().enumerate().map(run).collect();
+        let Some(courses) = courses else { return false };
+        self.courses = courses;
+        let mut at = 0;
+        for (number, record) in self.records.iter().enumerate() {
+            for dof in 0..self.dof() {
+                let gap = self.gap(number, record, dof) / self.levels[dof];
+                residual.rows_mut(at, gap.len()).copy_from(&gap);
+                at += gap.len();
+            }
+        }
+        true
+    }
+
+    fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
+        jacobian.fill(0.0);
+        let (n, order) = (self.dof(), self.measured.derivative_order());
+        let mut at = 0;
+        for (number, course) in self.courses.iter().enumerate() {
+            let len = course.state.nrows();
+            for dof in 0..n {
+                for (d, derivative) in course.derivatives.iter().enumerate() {
+                    let sensitivity = derivative.column(order * n + dof) / -self.levels[dof];
+                    jacobian
+                        .view_mut((at, self.place(number, d)), (len, 1))
+                        .copy_from(&sensitivity);
+                }
+                at += len;
+            }
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! Response of a nonlinear system to a measured force.
+
+use mechid_estimate::EstimateError;
+use mechid_model::{InitialState, NonlinearSystem, Response, ResponseQuantity, exact_periodic};
+use mechid_numerics::check_size;
+use mechid_signal::{Extent, Record};
+use nalgebra::{DMatrix, DVector};
+
+use super::levenberg_marquardt::{SumOfSquares, minimise};
+use super::simulate::{Course, Direction, FineForce, Tangent};
+
+/// Newton steps towards a periodic response, at most.
+const SHOTS: usize = 30;
+
+/// Change of the state over a period, relative, that counts as none.
+const CLOSED: f64 = 1e-10;
+
+/// Displacement, velocity and acceleration of a nonlinear system under a sampled force (N), from
+/// `start` for an open record, in a steady state for a whole period (the search for it begins at
+/// `start`).
+///
+/// Between the samples the force is band-limited, which a held or linear one is not: of a hardening
+/// spring that drives its own third harmonic the difference is several times the noise of a good
+/// sensor. The steps follow the classical Runge–Kutta rule, twice as many to a sample until the response
+/// settles to 10⁻⁵ of its peak; the steady state without nonlinear terms is exact, line by line. A hardening
+/// spring may have several steady states; the one found is near the start.
+///
+/// # Errors
+/// [`NumericsError::Size`](mechid_numerics::NumericsError::Size) for a wrong number of channels, [`EstimateError::TooStiff`] if the fastest
+/// mode is too fast for the sampling, [`EstimateError::Diverged`] if the response overflows,
+/// [`EstimateError::NoSteadyState`] if none was found.
+///
+/// # Source
+/// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), section
+/// II.1; Seydel, *Practical Bifurcation and Stability Analysis*, 3rd ed. (2010), chapter 7 (shooting
+/// for periodic solutions).
+pub fn predict(
+    system: &NonlinearSystem,
+    force: &Record,
+    extent: Extent,
+    start: &InitialState,
+) -> Result<Response, EstimateError> {
+    let n = system.dof();
+    check_size("channels of the force", n, force.channels())?;
+    check_size("degrees of freedom of the initial state", n, start.dof())?;
+    if extent == Extent::WholePeriod && system.terms().is_empty() {
+        return Ok(exact_periodic(system.linear(), force)?);
+    }
+    let fine = FineForce::sufficient(force, system, extent, start)?;
+    let start = match extent {
+        Extent::Open => start.clone(),
+        Extent::WholePeriod => steady_start(system, force, &fine, start)?,
+    };
+    let course = Tangent::new(system, &[]).run(&fine, &start);
+    let Course { state, .. } = course.ok_or(EstimateError::Diverged { len: force.len() })?;
+    let record =
+        |part: usize| Record::new(force.sampling(), state.columns(part * n, n).into_owned());
+    Ok(Response::new(record(0)?, record(1)?, record(2)?)?)
+}
+
+/// The state that a period of the force leads back to, by Newton's method on the period's end.
+fn steady_start(
+    system: &NonlinearSystem,
+    force: &Record,
+    fine: &FineForce,
+    start: &InitialState,
+) -> Result<InitialState, EstimateError> {
+    let n = system.dof();
+    let directions: Vec<Direction> = (0..2 * n).map(Direction::Initial).collect();
+    let mut tangent = Tangent::new(system, &directions);
+    let none = EstimateError::NoSteadyState { period: force.sampling().duration() };
+    let mut state = DVector::from_iterator(
+        2 * n,
+        start.displacement().iter().chain(start.velocity().iter()).copied(),
+    );
+    for _ in 0..SHOTS {
+        let Some(course) = tangent.run(fine, &initial(&state)?) else { return Err(none) };
+        let end = DVector::from_column_slice(&course.end[..2 * n]);
+        let gap = &end - &state;
+        let size = course.state.amax();
+        if gap.amax() <= CLOSED * size || size == 0.0 {
+            return initial(&end);
+        }
+        let over = DMatrix::from_column_slice(2 * n, 2 * n, &course.end[2 * n..]);
+        let closing = DMatrix::identity(2 * n, 2 * n) - over;
+        // Without an inverse, or far away, the period itself leads on.
+        state = match closing.lu().solve(&gap) {
+            Some(step) if step.iter().all(|s| s.is_finite()) && step.amax() <= size => state + step,
+            _ => end,
+        };
+    }
+    Err(none)
+}
+
+pub(super) fn initial(state: &DVector<f64>) -> Result<InitialState, EstimateError> {
+    let n = state.len() / 2;
+    Ok(InitialState::new(state.rows(0, n).into_owned(), state.rows(n, n).into_owned())?)
+}
+
+/// The state at the first sample with which [`predict`] comes closest to the responses measured, each
+/// channel relative to its size: what an open record starts from.
+///
+/// Take the first samples only, some time constants of the system: the start shows no longer later.
+///
+/// # Errors
+/// As [`predict`]; [`NumericsError::Size`](mechid_numerics::NumericsError::Size) or [`EstimateError::Signal`] if the responses do not belong
+/// to the force, [`EstimateError::NotConverged`].
+///
+/// # Source
+/// That of [`predict`], section I.14 there for the derivatives.
+pub fn fitted_start(
+    system: &NonlinearSystem,
+    force: &Record,
+    measured: &[(ResponseQuantity, &Record)],
+) -> Result<InitialState, EstimateError> {
+    let rule = mechid_model::Discretisation::FirstOrderHold;
+    let linear = mechid_estimate::fitted_start(system.linear(), force, rule, measured)?;
+    let fine = FineForce::sufficient(force, system, Extent::Open, &linear)?;
+    let n = system.dof();
+    let directions: Vec<Direction> = (0..2 * n).map(Direction::Initial).collect();
+    let state = linear.displacement().iter().chain(linear.velocity().iter()).copied();
+    let theta = DVector::from_iterator(2 * n, state);
+    let mut problem =
+        Start { system, directions: &directions, fine: &fine, measured, course: None };
+    let minimum = minimise(&mut problem, theta).filter(|minimum| minimum.converged);
+    initial(&minimum.ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?.theta)
+}
+
+/// Measured less predicted response as a function of the start.
+struct Start<'a> {
+    system: &'a NonlinearSystem,
+    directions: &'a [Direction],
+    fine: &'a FineForce,
+    measured: &'a [(ResponseQuantity, &'a Record)],
+    course: Option<Course>,
+}
+
+impl Start<'_> {
+    /// Channels measured: column of the state and samples, over their size.
+    fn channels(&self) -> impl Iterator<Item = (usize, &[f64], f64)> {
+        let n = self.system.dof();
+        self.measured.iter().flat_map(move |(kind, record)| {
+            (0..n).map(move |dof| {
+                let size = record.column(dof).norm();
+                let scale = if size > 0.0 { 1.0 / size } else { 1.0 };
+                (kind.derivative_order() * n + dof, record.channel(dof), scale)
+            })
+        })
+    }
+}
+
+impl SumOfSquares for Start<'_> {
+    fn residuals(&self) -> usize {
+        self.channels().map(|(_, samples, _)| samples.len()).sum()
+    }
+
+    fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+        let Ok(start) = initial(theta) else { return false };
+        let course = Tangent::new(self.system, self.directions).run(self.fine, &start);
+        let Some(course) = course else { return false };
+        let mut at = 0;
+        for (column, samples, scale) in self.channels() {
+            for (k, measured) in samples.iter().enumerate() {
+                residual[at + k] = scale * (measured - course.state[(k, column)]);
+            }
+            at += samples.len();
+        }
+        self.course = Some(course);
+        true
+    }
+
+    fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
+        jacobian.fill(f64::NAN);
+        let Some(course) = &self.course else { return };
+        let mut at = 0;
+        for (column, samples, scale) in self.channels() {
+            for (d, derivative) in course.derivatives.iter().enumerate() {
+                for k in 0..samples.len() {
+                    jacobian[(at + k, d)] = -scale * derivative[(k, column)];
+                }
+            }
+            at += samples.len();
+        }
+    }
+}

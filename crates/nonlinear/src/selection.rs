@@ -1,0 +1,258 @@
+//! Selection of the nonlinear terms that the data ask for.
+
+use mechid_estimate::{EstimateError, Unknowns};
+use mechid_model::{Term, Terms};
+use mechid_numerics::least_squares::LeastSquares;
+use mechid_spectra::SpectraError;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::equation_error::{EquationErrorOptions, equation_error, weighted};
+use super::equations::Equations;
+use super::shape::{Shape, ShapeConstants};
+use super::{SteadyExperiments, Weighting};
+
+/// Criterion by which a term is added.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "kebab-case")
+)]
+pub enum Criterion {
+    /// The extended Bayesian information criterion: the misfit must fall by more than its
+    /// logarithmic price for a parameter chosen among so many. Because it takes the residual as
+    /// white, the terms added are looked at again when all are there: one whose coefficient does not
+    /// differ from zero by its standard error over blocks of time, at 1 % for all candidates together,
+    /// is removed.
+    ///
+    /// # Source
+    /// Chen & Chen (2008), Biometrika 95, 759–771.
+    #[default]
+    Information,
+    /// The misfit on each experiment, predicted from the fit to all others, must fall by more than
+    /// chance: Student's t over the experiments, at 5 % for all candidates together.
+    ///
+    /// # Source
+    /// Stone (1974), Journal of the Royal Statistical Society B 36, 111–147 (cross-validation).
+    HeldOut,
+}
+
+/// The terms that were chosen, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Selection {
+    /// Terms given, and those added, in their order.
+    pub terms: Terms,
+    /// The way there: the first without any candidate, then with each term that was added.
+    pub steps: Vec<SelectionStep>,
+    /// The candidate that would have come next, and was not worth it.
+    pub refused: Option<SelectionStep>,
+    /// Names of the terms that were added and removed again, the least certain first.
+    pub removed: Vec<String>,
+}
+
+/// One step of a selection.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SelectionStep {
+    /// Name of the term added; `None` for the first step.
+    pub added: Option<String>,
+    /// The criterion with it, a pure number, the smaller the better: the information criterion, or
+    /// the squared misfit of experiments held out over the number of equations.
+    pub score: f64,
+    /// Part of the weighted force, a ratio, that is left with it.
+    pub unexplained: f64,
+}
+
+/// Level of the test on experiments held out.
+const LEVEL: f64 = 0.05;
+
+/// Level of the test on a coefficient.
+const ZERO: f64 = 0.01;
+
+/// Adds to the terms given, one after the other, the candidate that lowers the equation error most, as
+/// long as the criterion finds it worth it, and removes those that turn out to be uncertain
+/// ([`Criterion::Information`]).
+///
+/// Rows are weighted by what a fit with all candidates leaves, so that no missing term shapes the
+/// weights. Constants inside the laws are kept as they are.
+///
+/// # Errors
+/// As [`equation_error`](super::equation_error) for all terms together, and
+/// [`SpectraError::TooFewAverages`](mechid_spectra::SpectraError::TooFewAverages) to hold out one of fewer than three experiments.
+///
+/// # Source
+/// Billings, *Nonlinear System Identification: NARMAX Methods* (2013), chapter 3 (forward selection
+/// by the reduction of the error).
+pub fn select_terms(
+    data: &SteadyExperiments,
+    unknowns: &Unknowns,
+    given: &Terms,
+    candidates: &Terms,
+    criterion: Criterion,
+    weighting: Weighting,
+) -> Result<Selection, EstimateError> {
+    if criterion == Criterion::HeldOut && data.count() < 3 {
+        return Err(SpectraError::TooFewAverages { got: data.count(), needed: 3 }.into());
+    }
+    let all = candidates.iter().try_fold(given.clone(), |all, term| all.and(term.clone()))?;
+    let equations = Equations::new(data, unknowns, &all)?;
+    let shape = Shape::new(&all, ShapeConstants::default());
+    let fit = weighted(&equations, &shape, weighting, None)?;
+    let mut triangles = Vec::new();
+    for columns in &fit.columns {
+        let mut rows = LeastSquares::new(equations.count(), 1);
+        equations.push(&mut rows, columns, &fit.weights.of_rows, &[])?;
+        triangles.push(rows);
+    }
+    let judge = Judge {
+        triangles,
+        equations: equations.equations(),
+        candidates: candidates.len(),
+        criterion,
+    };
+    let base = equations.free.len() + given.len();
+    let mut chosen: Vec<usize> = (0..base).collect();
+    let mut before = judge.misfit(&chosen)?;
+    let mut steps = vec![judge.step(None, &before, chosen.len())];
+    let mut terms = given.clone();
+    let refused = loop {
+        let mut best: Option<(usize, Misfit)> = None;
+        for at in (base..equations.count()).filter(|at| !chosen.contains(at)) {
+            let misfit = judge.misfit(&[&chosen[..], &[at]].concat())?;
+            if best.as_ref().is_none_or(|(_, least)| misfit.fitted < least.fitted) {
+                best = Some((at, misfit));
+            }
+        }
+        let Some((at, after)) = best else {
+            break None;
+        };
+        let term: &Term = all.iter().nth(at - equations.free.len()).expect("one of all terms");
+        let step = judge.step(Some(term.name().to_owned()), &after, chosen.len() + 1);
+        if !judge.better(&before, &after, chosen.len()) {
+            break Some(step);
+        }
+        terms = terms.and(term.clone())?;
+        chosen.push(at);
+        steps.push(step);
+        before = after;
+    };
+    let mut removed = Vec::new();
+    if criterion == Criterion::Information {
+        let options = EquationErrorOptions { weighting, ..Default::default() };
+        while let Some(name) = uncertain(data, unknowns, &terms, candidates, &options)? {
+            let mut kept = terms.iter().filter(|term| term.name() != name).cloned();
+            terms = kept.try_fold(Terms::none(), |kept, term| kept.and(term))?;
+            removed.push(name);
+        }
+    }
+    Ok(Selection { terms, steps, refused, removed })
+}
+
+/// Returns the least certain of the candidates among some terms, if its coefficient is not
+/// distinguishable from zero.
+fn uncertain(
+    data: &SteadyExperiments,
+    unknowns: &Unknowns,
+    terms: &Terms,
+    candidates: &Terms,
+    options: &EquationErrorOptions,
+) -> Result<Option<String>, EstimateError> {
+    let is_candidate = |term: &&Term| candidates.iter().any(|other| other.name() == term.name());
+    if !terms.iter().any(|term| is_candidate(&term)) {
+        return Ok(None);
+    }
+    let fit = equation_error(data, unknowns, terms, options)?;
+    let mut least: Option<(f64, String)> = None;
+    for term in terms.iter().filter(is_candidate) {
+        let estimate = fit.parameter(term.name())?.estimate;
+        let [low, high] = estimate.interval(1.0 - ZERO / candidates.len() as f64)?;
+        let certainty = estimate.value.abs() / estimate.standard_error;
+        if low <= 0.0 && high >= 0.0 && least.as_ref().is_none_or(|(least, _)| certainty < *least) {
+            least = Some((certainty, term.name().to_owned()));
+        }
+    }
+    Ok(least.map(|(_, name)| name))
+}
+
+/// Weighted squares that some columns leave.
+struct Misfit {
+    /// Sum of all experiments, fitted together.
+    fitted: f64,
+    /// Sum of all experiments without any model.
+    all: f64,
+    /// Sum of each experiment, by the fit to the others; empty where they are not held out.
+    held_out: Vec<f64>,
+}
+
+struct Judge {
+    /// The triangle \[A | b\] of each experiment.
+    triangles: Vec<LeastSquares>,
+    equations: usize,
+    candidates: usize,
+    criterion: Criterion,
+}
+
+impl Judge {
+    fn misfit(&self, chosen: &[usize]) -> Result<Misfit, EstimateError> {
+        let everything: Vec<usize> = (0..self.triangles.len()).collect();
+        let coefficients = self.fit(chosen, &everything)?;
+        let on = |at: usize, coefficients: &[f64]| {
+            let r = self.triangles[at].triangle();
+            let mut residual = r.column(r.ncols() - 1).into_owned();
+            for (column, coefficient) in chosen.iter().zip(coefficients) {
+                residual.axpy(-coefficient, &r.column(*column), 1.0);
+            }
+            residual.norm_squared()
+        };
+        let fitted = everything.iter().map(|at| on(*at, &coefficients)).sum();
+        let all = everything.iter().map(|at| on(*at, &vec![0.0; chosen.len()])).sum();
+        let mut held_out = Vec::new();
+        if self.criterion == Criterion::HeldOut {
+            for at in &everything {
+                let others: Vec<usize> = everything.iter().filter(|o| *o != at).copied().collect();
+                held_out.push(on(*at, &self.fit(chosen, &others)?));
+            }
+        }
+        Ok(Misfit { fitted, all, held_out })
+    }
+
+    fn fit(&self, chosen: &[usize], experiments: &[usize]) -> Result<Vec<f64>, EstimateError> {
+        let mut rows = LeastSquares::new(chosen.len(), 1);
+        for at in experiments {
+            let r = self.triangles[*at].triangle();
+            let target = r.columns(r.ncols() - 1, 1);
+            rows.push_rows(r.select_columns(chosen).as_view(), target.as_view())?;
+        }
+        Ok(rows.solve()?.coefficients.column(0).iter().copied().collect())
+    }
+
+    /// n ln(misfit) + p (ln n + 2 ln(candidates)), less what is the same for all.
+    fn information(&self, misfit: &Misfit, parameters: usize) -> f64 {
+        let n = self.equations as f64;
+        let price = n.ln() + 2.0 * (self.candidates.max(1) as f64).ln();
+        n * (misfit.fitted.max(f64::MIN_POSITIVE) / n).ln() + parameters as f64 * price
+    }
+
+    fn better(&self, before: &Misfit, after: &Misfit, parameters: usize) -> bool {
+        if self.criterion == Criterion::Information {
+            return self.information(after, parameters + 1) < self.information(before, parameters);
+        }
+        let count = before.held_out.len() as f64;
+        let falls: Vec<f64> =
+            before.held_out.iter().zip(&after.held_out).map(|(b, a)| b - a).collect();
+        let mean = falls.iter().sum::<f64>() / count;
+        let variance = falls.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / (count - 1.0);
+        let limit = StudentsT::new(0.0, 1.0, count - 1.0)
+            .expect("at least three experiments")
+            .inverse_cdf(1.0 - LEVEL / self.candidates.max(1) as f64);
+        mean > limit * (variance / count).sqrt()
+    }
+
+    fn step(&self, added: Option<String>, misfit: &Misfit, parameters: usize) -> SelectionStep {
+        let score = match self.criterion {
+            Criterion::Information => self.information(misfit, parameters),
+            Criterion::HeldOut => misfit.held_out.iter().sum::<f64>() / self.equations as f64,
+        };
+        let unexplained = if misfit.all > 0.0 { (misfit.fitted / misfit.all).sqrt() } else { 0.0 };
+        SelectionStep { added, score, unexplained }
+    }
+}

@@ -1,0 +1,264 @@
+//! Constants that do not enter linearly, found by variable projection.
+
+use mechid_estimate::EstimateError;
+use mechid_model::Terms;
+use nalgebra::{Complex, DMatrix, DVector};
+
+use super::ChannelPhase;
+use super::equations::Equations;
+use super::experiments::Columns;
+use super::levenberg_marquardt::{SumOfSquares, minimise};
+
+/// Constants to search for, besides the parameters that enter linearly.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(default, deny_unknown_fields)
+)]
+pub struct ShapeConstants {
+    /// Constants inside the laws of terms, such as b of a saturating damper; the search starts from
+    /// those given.
+    pub laws: bool,
+    /// Delay of the force.
+    pub delay: bool,
+    /// Phase that both channels have in common, p₃ and p₅ of [`ChannelPhase`].
+    pub phase: bool,
+}
+
+/// Terms and channels with their constants, and which of these are free.
+#[derive(Clone)]
+pub(super) struct Shape {
+    terms: Terms,
+    channels: ChannelPhase,
+    free: ShapeConstants,
+}
+
+/// Step of a derivative with respect to a constant, relative to its size or scale.
+const STEP: f64 = 1e-5;
+
+/// Scale of a phase, in rad.
+const RADIAN: f64 = 1.0;
+
+impl Shape {
+    pub(super) fn new(terms: &Terms, free: ShapeConstants) -> Self {
+        Self { terms: terms.clone(), channels: ChannelPhase::default(), free }
+    }
+
+    pub(super) fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    pub(super) fn channels(&self) -> ChannelPhase {
+        self.channels
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values().count()
+    }
+
+    /// Values of the free constants: of the laws, then delay, p₃ and p₅.
+    pub(super) fn values(&self) -> impl Iterator<Item = f64> + '_ {
+        let laws = self.terms.iter().filter(|_| self.free.laws);
+        let laws = laws.flat_map(|term| term.law().constants()).map(|constant| constant.value);
+        let ChannelPhase { delay, cubic, quintic } = self.channels;
+        let delay = self.free.delay.then_some(delay);
+        let phase = if self.free.phase { vec![cubic, quintic] } else { Vec::new() };
+        laws.chain(delay).chain(phase)
+    }
+
+    /// Their names and units.
+    pub(super) fn names(&self) -> impl Iterator<Item = (String, String)> + '_ {
+        let laws = self.terms.iter().filter(|_| self.free.laws).flat_map(|term| {
+            let name = move |constant: mechid_model::Constant| {
+                (format!("{}.{}", term.name(), constant.name), constant.unit.to_owned())
+            };
+            term.law().constants().into_iter().map(name)
+        });
+        let named = |name: &str, unit: &str| (name.to_owned(), unit.to_owned());
+        let delay = self.free.delay.then(|| named("delay", "s"));
+        let phase = self.free.phase.then(|| [named("p3", "rad"), named("p5", "rad")]);
+        laws.chain(delay).chain(phase.into_iter().flatten())
+    }
+
+    /// The same with other values of the free constants; `None` where a law refuses one.
+    fn with(&self, values: &[f64]) -> Option<Self> {
+        let mut rest = values;
+        let mut next = || {
+            let (first, others) = rest.split_first()?;
+            rest = others;
+            Some(*first)
+        };
+        let mut terms = Vec::new();
+        for term in &self.terms {
+            let count = if self.free.laws { term.law().constants().len() } else { 0 };
+            let constants: Vec<f64> = (0..count).map(|_| next()).collect::<Option<_>>()?;
+            terms.push(if constants.is_empty() {
+                term.clone()
+            } else {
+                term.with_constants(&constants)?
+            });
+        }
+        let mut channels = self.channels;
+        if self.free.delay {
+            channels.delay = next()?;
+        }
+        if self.free.phase {
+            (channels.cubic, channels.quintic) = (next()?, next()?);
+        }
+        Some(Self { terms: Terms::new(terms).ok()?, channels, free: self.free })
+    }
+
+    /// Steps for the derivatives: of a constant a part of it, of a delay of the sampling interval, of
+    /// a phase of a radian.
+    fn steps(&self, dt: f64) -> Vec<f64> {
+        let values: Vec<f64> = self.values().collect();
+        let channels = usize::from(self.free.delay) + 2 * usize::from(self.free.phase);
+        let laws = values.len() - channels;
+        let step = |(at, value): (usize, &f64)| match at {
+            at if at < laws => STEP * value.abs(),
+            at if at == laws && self.free.delay => STEP * dt,
+            _ => STEP * RADIAN,
+        };
+        values.iter().enumerate().map(step).collect()
+    }
+
+    /// Derivatives of the model's force with respect to each free constant, which is those of the
+    /// residuals with the opposite sign; of each experiment one matrix of rows × degrees of freedom for
+    /// each.
+    pub(super) fn slopes(
+        &self,
+        equations: &Equations<'_>,
+        coefficients: &[f64],
+        residuals: &[DMatrix<Complex<f64>>],
+    ) -> Result<Vec<Vec<DMatrix<Complex<f64>>>>, EstimateError> {
+        let values: Vec<f64> = self.values().collect();
+        let mut slopes = vec![Vec::new(); residuals.len()];
+        for (at, step) in self.steps(equations.data.period().dt()).into_iter().enumerate() {
+            let mut moved = values.clone();
+            moved[at] += step;
+            let shape =
+                self.with(&moved).ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
+            let columns = equations.columns(&shape.terms, &shape.channels);
+            let changed = equations.residuals(&columns, coefficients);
+            for ((slopes, before), after) in slopes.iter_mut().zip(residuals).zip(&changed) {
+                slopes.push((before - after) / Complex::from(step));
+            }
+        }
+        Ok(slopes)
+    }
+}
+
+/// The shape whose residual, the linear parameters fitted to each, is the least under given weights.
+///
+/// # Errors
+/// [`EstimateError::Undetermined`] if the search wanders because the data do not show a constant,
+/// [`EstimateError::NotConverged`] if it does so for another reason.
+pub(super) fn fit_shape(
+    equations: &Equations<'_>,
+    shape: Shape,
+    weights: &DMatrix<f64>,
+) -> Result<Shape, EstimateError> {
+    let start = DVector::from_iterator(shape.count(), shape.values());
+    let mut projected = Projected { equations, shape: &shape, weights, at: None };
+    let minimum = minimise(&mut projected, start)
+        .ok_or(EstimateError::NotConverged { searches: 1, steps: 0 })?;
+    let steps = minimum.steps;
+    if let Some(fitted) = shape.with(minimum.theta.as_slice()).filter(|_| minimum.converged) {
+        return Ok(fitted);
+    }
+    let unseen = unseen(&mut projected, &shape);
+    if unseen.is_empty() {
+        return Err(EstimateError::NotConverged { searches: 1, steps });
+    }
+    let parameters = unseen.join(", ");
+    let directions = format!("no value of {parameters} fits better than chance");
+    Err(EstimateError::Undetermined { parameters, directions })
+}
+
+/// Names of the constants with a standard error, at the start, beyond the scale on which they change
+/// anything: as of the phase of the channels where no term is there to show it.
+fn unseen(projected: &mut Projected<'_>, start: &Shape) -> Vec<String> {
+    let (rows, theta) =
+        (projected.residuals(), DVector::from_iterator(start.count(), start.values()));
+    let (mut residual, mut jacobian) = (DVector::zeros(rows), DMatrix::zeros(rows, theta.len()));
+    if !projected.residual(&theta, &mut residual) {
+        return Vec::new();
+    }
+    projected.jacobian(&mut jacobian);
+    let deviation = residual.norm() / (rows as f64).sqrt();
+    let scales = start.steps(projected.equations.data.period().dt());
+    let of = |((name, column), step): ((String, f64), f64)| {
+        // With all other constants known: a lower bound.
+        (deviation > column * step / STEP).then_some(name)
+    };
+    let lengths = jacobian.column_iter().map(|column| column.norm());
+    let names = start.names().map(|(name, _)| name);
+    names.zip(lengths).zip(scales).filter_map(of).collect()
+}
+
+/// The weighted residual that the linear parameters leave, as a function of the shape constants.
+struct Projected<'a> {
+    equations: &'a Equations<'a>,
+    shape: &'a Shape,
+    weights: &'a DMatrix<f64>,
+    at: Option<Point>,
+}
+
+/// Point at which the residual was last evaluated.
+struct Point {
+    shape: Shape,
+    columns: Vec<Columns>,
+    coefficients: Vec<f64>,
+    residuals: Vec<DMatrix<Complex<f64>>>,
+}
+
+impl Projected<'_> {
+    /// Weighted, real and imaginary parts one after the other.
+    fn write(&self, parts: &[DMatrix<Complex<f64>>], to: &mut [f64]) {
+        let all = parts.iter().flat_map(|part| part.iter().zip(self.weights.iter()));
+        for ((value, weight), pair) in all.zip(to.chunks_exact_mut(2)) {
+            (pair[0], pair[1]) = (value.re * weight, value.im * weight);
+        }
+    }
+}
+
+impl SumOfSquares for Projected<'_> {
+    fn residuals(&self) -> usize {
+        2 * self.equations.data.count() * self.weights.len()
+    }
+
+    fn residual(&mut self, theta: &DVector<f64>, residual: &mut DVector<f64>) -> bool {
+        let Some(shape) = self.shape.with(theta.as_slice()) else { return false };
+        let columns = self.equations.columns(&shape.terms, &shape.channels);
+        let Ok(solution) = self.equations.solve(&columns, self.weights, &[]) else { return false };
+        let coefficients: Vec<f64> = solution.coefficients.column(0).iter().copied().collect();
+        if coefficients.iter().any(|c| !c.is_finite()) {
+            return false;
+        }
+        let residuals = self.equations.residuals(&columns, &coefficients);
+        self.write(&residuals, residual.as_mut_slice());
+        self.at = Some(Point { shape, columns, coefficients, residuals });
+        true
+    }
+
+    /// Kaufman's: the derivatives at fixed linear parameters, less what these could account for.
+    fn jacobian(&self, jacobian: &mut DMatrix<f64>) {
+        jacobian.fill(f64::NAN);
+        let Some(Point { shape, columns, coefficients, residuals }) = &self.at else { return };
+        let Ok(slopes) = shape.slopes(self.equations, coefficients, residuals) else { return };
+        let Ok(solution) = self.equations.solve(columns, self.weights, &slopes) else { return };
+        let target = self.equations.residuals(columns, &vec![0.0; coefficients.len()]);
+        for (at, mut column) in jacobian.column_iter_mut().enumerate() {
+            let share: Vec<f64> = solution.coefficients.column(1 + at).iter().copied().collect();
+            let model = self.equations.residuals(columns, &share);
+            // Target less residual is what these coefficients make.
+            let changes: Vec<_> = slopes
+                .iter()
+                .zip(target.iter().zip(&model))
+                .map(|(slopes, (all, rest))| (all - rest) - &slopes[at])
+                .collect();
+            self.write(&changes, column.as_mut_slice());
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! The response of a nonlinear system to a band-limited force, and its derivatives.
+
+use mechid_estimate::EstimateError;
+use mechid_model::{InitialState, Matrix, NonlinearSystem, Parameter, Term};
+use mechid_signal::resample::refine;
+use mechid_signal::{Extent, Interpolation, Record};
+use nalgebra::DMatrix;
+
+/// Quantity that a response is differentiated by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Direction {
+    /// An entry of the initial state: displacements, then velocities.
+    Initial(usize),
+    /// An entry of M, C or K.
+    Entry(Parameter),
+    /// The coefficient of a term.
+    Term(usize),
+    /// A constant inside the law of a term.
+    Constant(usize, usize),
+}
+
+/// Angle (rad) that the fastest mode of the linear part may turn in a step.
+const TURN: f64 = 0.3;
+
+/// Steps in a sampling interval, at least: the force may change sign from sample to sample.
+const FEWEST_STEPS: usize = 2;
+
+/// Steps in a sampling interval, at most.
+const MOST_STEPS: usize = 256;
+
+/// Change of the response, as a part of its peak, by twice as many steps, that shows enough of them:
+/// what is left of a rule of fourth order is a fifteenth of it.
+const SETTLED: f64 = 1.5e-4;
+
+/// A force on the instants that the stages of the steps ask for.
+pub(super) struct FineForce {
+    /// Degrees of freedom × instants, 2 · steps in a sampling interval.
+    values: DMatrix<f64>,
+    steps: usize,
+    samples: usize,
+    dt: f64,
+}
+
+impl FineForce {
+    /// The band-limited force through the samples, of a period its Fourier series, of an open record
+    /// that of the record and its mirror image, which has no jump; with as many steps as the response
+    /// from `start` needs.
+    pub(super) fn sufficient(
+        force: &Record,
+        system: &NonlinearSystem,
+        extent: Extent,
+        start: &InitialState,
+    ) -> Result<Self, EstimateError> {
+        let dt = force.sampling().dt();
+        let modes = system.linear().modes()?;
+        let rate = modes.iter().map(|mode| mode.eigenvalue().norm()).fold(0.0, f64::max);
+        let needed = (rate * dt / TURN).ceil();
+        if needed > MOST_STEPS as f64 {
+            return Err(EstimateError::TooStiff { rate, dt });
+        }
+        let period = match extent {
+            Extent::WholePeriod => force.clone(),
+            Extent::Open => mirrored(force)?,
+        };
+        let mut grid = Self::new(force.len(), &period, FEWEST_STEPS.max(needed as usize))?;
+        let mut tangent = Tangent::new(system, &[]);
+        let mut before = tangent.run(&grid, start);
+        while 2 * grid.steps <= MOST_STEPS {
+            grid = Self::new(force.len(), &period, 2 * grid.steps)?;
+            let after = tangent.run(&grid, start);
+            if let (Some(before), Some(after)) = (&before, &after) {
+                let n = system.dof();
+                let of = |course: &Course| course.state.columns(0, n).into_owned();
+                if (of(before) - of(after)).amax() <= SETTLED * of(after).amax() {
+                    break;
+                }
+            }
+            before = after;
+        }
+        Ok(grid)
+    }
+
+    fn new(samples: usize, period: &Record, steps: usize) -> Result<Self, EstimateError> {
+        let fine = refine(period, 2 * steps, Interpolation::BandLimited)?;
+        // One instant more than a period has: the first again.
+        let instants = 2 * steps * samples + 1;
+        let data = fine.data();
+        let values =
+            DMatrix::from_fn(period.channels(), instants, |dof, k| data[(k % data.nrows(), dof)]);
+        Ok(Self { values, steps, samples, dt: period.sampling().dt() })
+    }
+}
+
+/// The record and then the same backwards.
+fn mirrored(record: &Record) -> Result<Record, EstimateError> {
+    let len = record.len();
+    let sampling = record.sampling().with_len(2 * len)?;
+    let data = DMatrix::from_fn(2 * len, record.channels(), |k, c| {
+        record.data()[(if k < len { k } else { 2 * len - 1 - k }, c)]
+    });
+    Ok(Record::new(sampling, data)?)
+}
+
+/// A nonlinear system stepped by the classical Runge–Kutta rule together with the tangent of the same
+/// rule, so that the derivatives are those of the computed response.
+///
+/// # Source
+/// Hairer, Nørsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sections
+/// II.1 (the rule) and I.14 (derivatives with respect to parameters and initial values).
+pub(super) struct Tangent<'a> {
+    system: &'a NonlinearSystem,
+    directions: &'a [Direction],
+    /// M⁻¹, n×n: solved once, applied at every stage.
+    inverse_mass: DMatrix<f64>,
+    /// Constants of each law, and the laws with one of them moved, for the derivatives.
+    moved: Vec<Vec<(f64, Term)>>,
+    /// Coordinates of the state and of the derivatives at a stage, and the forces on them.
+    acceleration: Vec<f64>,
+    force: Vec<f64>,
+    slopes: Vec<[f64; 2]>,
+}
+
+/// Displacement, velocity and acceleration at the samples, and their derivatives.
+pub(super) struct Course {
+    /// Samples × 3n: displacement, velocity, acceleration.
+    pub(super) state: DMatrix<f64>,
+    /// Derivatives by each direction, samples × 3n.
+    pub(super) derivatives: Vec<DMatrix<f64>>,
+    /// State and derivatives one sampling interval after the last sample.
+    pub(super) end: Vec<f64>,
+}
+
+/// Relative step of the derivative with respect to a constant of a law.
+const STEP: f64 = 1e-6;
+
+impl<'a> Tangent<'a> {
+    pub(super) fn new(system: &'a NonlinearSystem, directions: &'a [Direction]) -> Self {
+        let n = system.dof();
+        let lu = system.linear().mass().clone().lu();
+        let inverse_mass =
+            lu.solve(&DMatrix::identity(n, n)).expect("the mass of a system is invertible");
+        let moved = system.terms().iter().map(|term| {
+            let constants: Vec<f64> = term.law().constants().iter().map(|c| c.value).collect();
+            (0..constants.len())
+                .filter_map(|at| {
+                    let step = STEP * constants[at].abs();
+                    let mut other = constants.clone();
+                    other[at] += step;
+                    Some((step, term.with_constants(&other)?))
+                })
+                .collect()
+        });
+        Self {
+            moved: moved.collect(),
+            system,
+            directions,
+            inverse_mass,
+            acceleration: vec![0.0; n],
+            force: vec![0.0; n],
+            slopes: vec![[0.0; 2]; system.terms().len()],
+        }
+    }
+
+    /// The response from a start; `None` if it overflows.
+    pub(super) fn run(&mut self, force: &FineForce, start: &InitialState) -> Option<Course> {
+        let (n, width) = (self.system.dof(), 1 + self.directions.len());
+        let mut z = vec![0.0; 2 * n * width];
+        z[..n].copy_from_slice(start.displacement().as_slice());
+        z[n..2 * n].copy_from_slice(start.velocity().as_slice());
+        for (at, direction) in self.directions.iter().enumerate() {
+            if let Direction::Initial(entry) = direction {
+                z[2 * n * (1 + at) + entry] = 1.0;
+            }
+        }
+        let mut state = DMatrix::zeros(force.samples, 3 * n);
+        let mut derivatives = vec![DMatrix::zeros(force.samples, 3 * n); self.directions.len()];
+        let [mut k1, mut k2, mut k3, mut k4, mut at] = [(); 5].map(|()| vec![0.0; z.len()]);
+        let h = force.dt / force.steps as f64;
+        for sample in 0..force.samples {
+            for step in 0..force.steps {
+                let place = 2 * (sample * force.steps + step);
+                self.rate(&z, force.values.column(place).as_slice(), &mut k1);
+                if step == 0 {
+                    let all = std::iter::once(&mut state).chain(&mut derivatives).enumerate();
+                    for (column, course) in all {
+                        let start = 2 * n * column;
+                        for entry in 0..2 * n {
+                            course[(sample, entry)] = z[start + entry];
+                        }
+                        for dof in 0..n {
+                            course[(sample, 2 * n + dof)] = k1[start + n + dof];
+                        }
+                    }
+                }
+                let middle = force.values.column(place + 1);
+                towards(&z, 0.5 * h, &k1, &mut at);
+                self.rate(&at, middle.as_slice(), &mut k2);
+                towards(&z, 0.5 * h, &k2, &mut at);
+                self.rate(&at, middle.as_slice(), &mut k3);
+                towards(&z, h, &k3, &mut at);
+                self.rate(&at, force.values.column(place + 2).as_slice(), &mut k4);
+                for (i, z) in z.iter_mut().enumerate() {
+                    *z += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
+                }
+            }
+            if !z.iter().all(|value| value.is_finite()) {
+                return None;
+            }
+        }
+        Some(Course { state, derivatives, end: z })
+    }
+
+    /// ż of state and derivatives (columns of 2n entries) under a force.
+    fn rate(&mut self, z: &[f64], force: &[f64], rate: &mut [f64]) {
+        let n = self.system.dof();
+        let (x, v) = z[..2 * n].split_at(n);
+        self.system.restoring_force(x, v, &mut self.force);
+        self.force.iter_mut().zip(force).for_each(|(own, force)| *own = force - *own);
+        rate[..n].copy_from_slice(v);
+        apply(&self.inverse_mass, &self.force, &mut rate[n..2 * n]);
+        if self.directions.is_empty() {
+            return;
+        }
+        self.acceleration.copy_from_slice(&rate[n..2 * n]);
+        let (terms, coefficients) = (self.system.terms(), self.system.coefficients());
+        for ((term, coefficient), slopes) in terms.iter().zip(coefficients).zip(&mut self.slopes) {
+            let at = term.coordinate();
+            *slopes = term.law().slopes(at.of(x), at.of(v)).map(|slope| coefficient * slope);
+        }
+        let (damping, stiffness) =
+            (self.system.linear().damping(), self.system.linear().stiffness());
+        for (d, direction) in self.directions.iter().enumerate() {
+            let columns = 2 * n * (1 + d)..2 * n * (2 + d);
+            let (dx, dv) = z[columns.clone()].split_at(n);
+            let (rate_x, rate_v) = rate[columns].split_at_mut(n);
+            rate_x.copy_from_slice(dv);
+            for (row, force) in self.force.iter_mut().enumerate() {
+                let linear = |column: usize| {
+                    damping[(row, column)] * dv[column] + stiffness[(row, column)] * dx[column]
+                };
+                *force = -(0..n).map(linear).sum::<f64>();
+            }
+            for (term, slopes) in terms.iter().zip(&self.slopes) {
+                let at = term.coordinate();
+                let value = slopes[0] * at.of(dx) + slopes[1] * at.of(dv);
+                spread(term, value, &mut self.force);
+            }
+            match *direction {
+                Direction::Initial(_) => {}
+                Direction::Entry(entry) => {
+                    let quantity = match entry.matrix() {
+                        Matrix::Mass => &self.acceleration[..],
+                        Matrix::Damping => v,
+                        Matrix::Stiffness => x,
+                    };
+                    self.force[entry.row()] -= quantity[entry.column()];
+                }
+                Direction::Term(which) => {
+                    if let Some(term) = terms.iter().nth(which) {
+                        spread(term, term.value(x, v), &mut self.force);
+                    }
+                }
+                Direction::Constant(which, constant) => {
+                    let moved = self.moved[which].get(constant);
+                    if let (Some(term), Some((step, other))) = (terms.iter().nth(which), moved) {
+                        let slope = (other.value(x, v) - term.value(x, v)) / step;
+                        spread(term, coefficients[which] * slope, &mut self.force);
+                    }
+                }
+            }
+            apply(&self.inverse_mass, &self.force, rate_v);
+        }
+    }
+}
+
+/// Takes a term's force from those on the degrees of freedom it acts on.
+fn spread(term: &Term, value: f64, force: &mut [f64]) {
+    for (dof, force) in force.iter_mut().enumerate() {
+        *force -= term.coordinate().sign(dof) * value;
+    }
+}
+
+fn towards(z: &[f64], h: f64, rate: &[f64], to: &mut [f64]) {
+    for ((to, z), rate) in to.iter_mut().zip(z).zip(rate) {
+        *to = z + h * rate;
+    }
+}
+
+fn apply(matrix: &DMatrix<f64>, vector: &[f64], to: &mut [f64]) {
+    for (row, to) in to.iter_mut().enumerate() {
+        *to = (0..vector.len()).map(|column| matrix[(row, column)] * vector[column]).sum();
+    }
+}

@@ -1,0 +1,6 @@
+//! Nonlinear terms, judged by exact steady states, seeded experiments and the Silverbox.
+
+mod exact;
+mod silverbox;
+mod stepped;
+mod study;

@@ -1,0 +1,92 @@
+//! Steady states line by line: closed-form amplitudes, and records made of them.
+
+use mechid_model::{JournalBearing, KyxSign, OilFilm, ResponseQuantity, Sdof, SecondOrderSystem};
+use mechid_signal::{Record, Sampling};
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Complex amplitudes, lines × channels.
+pub type ComplexMatrix = DMatrix<Complex<f64>>;
+
+/// The dissertation's oscillator.
+pub fn oscillator() -> SecondOrderSystem {
+    Sdof::new(10.0, 180.0, 5000.0).unwrap().system()
+}
+
+/// The dissertation's bearing with −Kyx: one light and one heavily damped mode.
+pub fn bearing() -> SecondOrderSystem {
+    let film = OilFilm {
+        kxx: 40.0,
+        kxy: 50.0,
+        kyx: 20.0,
+        kyy: 60.0,
+        cxx: 20.0,
+        cxy: 10.0,
+        cyx: 10.0,
+        cyy: 30.0,
+    };
+    JournalBearing::new(14.8, film, KyxSign::Minus).unwrap().system()
+}
+
+/// Amplitudes of unit size with Schroeder's phases, each channel with its own.
+pub fn forces(lines: &[usize], channels: usize, amplitude: f64) -> ComplexMatrix {
+    let count = lines.len() as f64;
+    DMatrix::from_fn(lines.len(), channels, |l, c| {
+        let turn = l as f64 * (c as f64 + 1.0) / count + 0.37 * c as f64;
+        Complex::from_polar(amplitude, -std::f64::consts::PI * l as f64 * turn)
+    })
+}
+
+/// Displacement amplitudes G(ω) F.
+pub fn displacements(
+    system: &SecondOrderSystem,
+    omega: &[f64],
+    forces: &ComplexMatrix,
+) -> ComplexMatrix {
+    let mut displacements = forces.clone();
+    for (row, &w) in omega.iter().enumerate() {
+        let x = system.receptance(w).unwrap() * forces.row(row).transpose();
+        displacements.row_mut(row).tr_copy_from(&x);
+    }
+    displacements
+}
+
+/// Σ Re(A_n exp(i n ω0 t)) by its definition, times what makes another quantity of it.
+pub fn synthesise(
+    sampling: Sampling,
+    lines: &[usize],
+    amplitudes: &ComplexMatrix,
+    quantity: ResponseQuantity,
+) -> Record {
+    let len = sampling.len();
+    let data = DMatrix::from_fn(len, amplitudes.ncols(), |k, c| {
+        let mut sum = 0.0;
+        for (row, &n) in lines.iter().enumerate() {
+            let turn = std::f64::consts::TAU * ((n * k) % len) as f64 / len as f64;
+            let factor = quantity.per_displacement(n as f64 * sampling.omega0());
+            sum += (amplitudes[(row, c)] * factor * Complex::from_polar(1.0, turn)).re;
+        }
+        sum
+    });
+    Record::new(sampling, data).unwrap()
+}
+
+/// Largest deviation relative to the largest entry.
+pub fn relative_error(found: &DMatrix<f64>, expected: &DMatrix<f64>) -> f64 {
+    (found - expected).abs().max() / expected.abs().max()
+}
+
+/// All entries of M, C and K in the order of the unknowns when all are free.
+pub fn all_entries(system: &SecondOrderSystem) -> DVector<f64> {
+    let matrices = [system.mass(), system.damping(), system.stiffness()];
+    DVector::from_iterator(
+        3 * system.dof() * system.dof(),
+        matrices.into_iter().flat_map(|m| m.transpose().iter().copied().collect::<Vec<_>>()),
+    )
+}
+
+/// One period of 256 samples at twenty points per cycle of the fastest mode, and all its lines.
+pub fn sampling(system: &SecondOrderSystem) -> (Sampling, Vec<usize>) {
+    let fastest = system.modes().unwrap().iter().map(|m| m.natural_frequency()).fold(0.0, f64::max);
+    let sampling = Sampling::new(std::f64::consts::TAU / (20.0 * fastest), 256).unwrap();
+    (sampling, (1..=127).collect())
+}
