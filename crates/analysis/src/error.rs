@@ -18,9 +18,6 @@ pub enum AnalysisError {
     /// A file cannot be read or understood.
     #[error(transparent)]
     Io(#[from] mechid_io::IoError),
-    /// The lines of the records cannot be taken.
-    #[error(transparent)]
-    Spectra(#[from] mechid_spectra::SpectraError),
     /// No modes can be identified.
     #[error(transparent)]
     Modal(#[from] mechid_modal::ModalError),

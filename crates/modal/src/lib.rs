@@ -1,10 +1,15 @@
 //! Modes of a structure from any set of sensors and any number of forces.
 
+pub mod ambient;
+pub mod compare;
 mod covariance;
+mod decomposition;
 mod dense;
 mod error;
 mod estimate;
+pub mod free_decay;
 mod identify;
+pub mod indicators;
 mod initial_poles;
 mod limits;
 mod lines;
@@ -13,11 +18,13 @@ mod model;
 mod noise;
 mod normal;
 mod order;
+pub mod plscf;
 mod projection;
 mod residues;
 mod results;
 mod rules;
 mod search;
+pub mod stabilisation;
 mod synthesis;
 
 pub use error::ModalError;
@@ -25,10 +32,3 @@ pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
 pub use mode::{DropReason, DroppedCandidate, IdentifiedMode, Uncertain};
 pub use model::ResidualPowers;
-pub mod ambient;
-pub mod compare;
-mod decomposition;
-pub mod indicators;
-pub mod plscf;
-pub mod stabilisation;
-pub mod free_decay;

@@ -1,6 +1,6 @@
 //! Checks of a modal test: channels before the fit, and what the fit leaves.
 
-use mechid_estimate::checks::Verdict;
+use mechid_checks::Verdict;
 
 use super::summary::ModalCheck;
 use crate::AnalysisError;

@@ -101,12 +101,12 @@ fn fill_notches(log_power: &mut DVector<f64>, lines: usize) {
 
 /// A spectrum of a form that was fitted to sample variances.
 #[derive(Debug, Clone)]
-pub(crate) struct Smooth {
+pub struct Smooth {
     pub(crate) form: Form,
     /// Orthonormal columns that span the log powers of the form, lines × terms.
-    pub(crate) basis: DMatrix<f64>,
+    pub basis: DMatrix<f64>,
     /// Logarithm of the power, lines × channels.
-    pub(crate) log_power: DMatrix<f64>,
+    pub log_power: DMatrix<f64>,
     /// Σ log p + v/p over lines and channels: minus the log likelihood over the degrees of freedom.
     pub(crate) misfit: f64,
     /// Bayesian information criterion of the choice, where there was one.
@@ -124,7 +124,7 @@ pub(crate) struct Smooth {
 /// McCullagh & Nelder, *Generalized Linear Models* (1989), chapter 8 (variances with a logarithmic link);
 /// Schwarz (1978), Annals of Statistics 6, 461–464; Kooperberg, Stone & Truong (1995), Journal of Time
 /// Series Analysis 16, 389–401 (log spectra of few terms with lines on them, chosen one by one).
-pub(crate) fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
+pub fn choose(omega: &[f64], variances: &DMatrix<f64>, nu: f64) -> Smooth {
     let group = omega.len().div_ceil(SEARCHED);
     if group <= 1 {
         return searched(omega, variances, nu);

@@ -3,13 +3,14 @@
 use std::f64::consts::TAU;
 
 use mechid_estimate::Unknowns;
-use mechid_estimate::frequency_domain::{FrequencyData, NoiseSpectrum, output_error};
+use mechid_estimate::frequency_domain::output_error;
 use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
 use mechid_model::ResponseQuantity;
 use mechid_model::elements::{
     Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine, Sensor,
 };
+use mechid_spectra::{FrequencyData, NoiseSpectrum};
 use mechid_spectra::{LineData, LineNoise, Transient};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
