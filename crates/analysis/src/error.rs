@@ -18,6 +18,9 @@ pub enum AnalysisError {
     /// A file cannot be read or understood.
     #[error(transparent)]
     Io(#[from] mechid_io::IoError),
+    /// No modes can be identified from the responses alone.
+    #[error(transparent)]
+    Ambient(#[from] mechid_modal::ambient::AmbientError),
     /// No modes can be identified.
     #[error(transparent)]
     Modal(#[from] mechid_modal::ModalError),

@@ -151,9 +151,9 @@ impl Told {
         let outputs = self.outputs.iter().enumerate().map(|(at, output)| OutputRow {
             column: output.name.clone(),
             unit: output.quantity.map(|quantity| quantity.unit()),
-            variance_explained: explained[at],
+            variance_explained: Some(explained[at]),
             variance_predicted: self.predicted.as_ref().map(|shares| shares[at]),
-            noise_share: estimate.noise_levels()[at] / rms(data, at),
+            noise_share: Some(estimate.noise_levels()[at] / rms(data, at)),
         });
         let summary = ModesSummary {
             records: self.records,
@@ -166,7 +166,8 @@ impl Told {
             mac: mac(estimate.modes()),
             modes,
             dropped: estimate.dropped().iter().map(dropped).collect(),
-            variance_explained: mean(&explained),
+            harmonics: Vec::new(),
+            variance_explained: Some(mean(&explained)),
             variance_predicted: self.predicted.as_deref().map(mean),
             checks: rows,
             notes: notes(estimate),
@@ -205,6 +206,7 @@ fn row(mode: &IdentifiedMode, outputs: &[Output], points: &[(usize, usize)]) -> 
         phase_collinearity: indicators::mpc(&vector(&mode.shape)),
         driven_share: mode.driven_share,
         modal_mass,
+        decay_times: None,
     }
 }
 

@@ -1,6 +1,7 @@
 //! Modes of a structure from records under measured forces, from tables of frequency responses, and
 //! from ambient records.
 
+mod ambient;
 mod checks;
 mod forced;
 mod settings;
@@ -16,7 +17,9 @@ use serde::{Serialize, Serializer};
 use self::forced::Test;
 pub use self::settings::{ModalTest, ModesSettings, Places};
 use self::sources::Recorded;
-pub use self::summary::{DroppedRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow};
+pub use self::summary::{
+    DroppedRow, HarmonicRow, ModalCheck, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+};
 use self::tables::Tables;
 use crate::AnalysisError;
 use crate::identify::rows::WindowRow;
@@ -49,12 +52,13 @@ pub struct ModesSpectrum {
 /// of them, a hammer at one point or at a different one in each record. Frequencies, damping ratios and
 /// shapes are those of maximum likelihood on the spectral lines of the open records, without a window;
 /// what the ends of the records add is part of the model, and so are unmeasured forces and the modes
-/// outside of the band.
+/// outside of the band. Of an ambient record the forces are taken as white over the band.
 ///
 /// # Errors
 /// [`AnalysisError::NoRecord`], [`AnalysisError::NoForce`], [`AnalysisError::NoMotion`],
 /// [`AnalysisError::Setting`] for places that do not belong to the columns,
-/// [`AnalysisError::Modal`] if nothing can be fitted, and if a file cannot be read.
+/// [`AnalysisError::Modal`] or [`AnalysisError::Ambient`] if nothing can be fitted, and if a file
+/// cannot be read.
 ///
 /// # Source
 /// Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed. (2012), chapters 9
@@ -64,8 +68,11 @@ pub fn modes(
     settings: &ModesSettings,
 ) -> Result<Modes, AnalysisError> {
     settings.check()?;
-    let ModalTest::Forced { hits } = &settings.test else {
-        return Err(settings.refused("test", "ambient records have `ambient_modes`".into()));
+    let hits = match &settings.test {
+        ModalTest::Forced { hits } => hits,
+        ModalTest::Ambient { without_hz, without_harmonics } => {
+            return ambient::modes(measurements, settings, without_hz, *without_harmonics);
+        }
     };
     let recorded = Recorded::from_forced(measurements, hits.as_ref(), &settings.places)?;
     let band_hz = settings.band_hz.unwrap_or_else(|| recorded.driven_band());

@@ -38,8 +38,13 @@ pub struct ModesSummary {
     pub mac: Vec<Vec<f64>>,
     /// Candidates for modes that were left out.
     pub dropped: Vec<DroppedRow>,
-    /// Share of the variance of all outputs, each over its own, that the model explains.
-    pub variance_explained: f64,
+    /// Sinusoids of machines nearby, in the records of ambient tests.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub harmonics: Vec<HarmonicRow>,
+    /// Share of the variance that the model explains, in the mean over the responses; `None` without
+    /// forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance_explained: Option<f64>,
     /// Share that a fit to the first part of the records explains of the rest, where it was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
@@ -68,13 +73,15 @@ pub struct OutputRow {
     pub column: String,
     /// SI unit; `None` if a table does not state the quantity.
     pub unit: Option<&'static str>,
-    /// Share of the variance that the model explains in the band, a ratio.
-    pub variance_explained: f64,
+    /// Share of the variance that the model explains in the band, a ratio; `None` without forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub variance_explained: Option<f64>,
     /// Share that a fit to the first part of the records explains of the rest, where it was tried.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub variance_predicted: Option<f64>,
-    /// RMS of the sensor noise in the band over that of the response, a ratio.
-    pub noise_share: f64,
+    /// RMS of the sensor noise in the band over that of the response, a ratio; `None` without forces.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_share: Option<f64>,
 }
 
 /// One mode.
@@ -92,17 +99,29 @@ pub struct ModalModeRow {
     pub eigenvalue: [f64; 2],
     /// One entry per response; the largest is 1.
     pub shape: Vec<ShapeEntry>,
-    /// One entry per force; the largest is 1.
+    /// One entry per force; the largest is 1. Empty without forces.
     pub participation: Vec<ShapeEntry>,
     /// Modal phase collinearity of the shape: 1 if all entries have one phase or its opposite.
     pub phase_collinearity: f64,
-    /// Share of the power of this mode that the measured forces drive; the rest answers forces that
-    /// were not measured.
+    /// Share of the motion of this mode that the measured forces drive; the rest answers forces that
+    /// were not measured. `None` without measured forces.
     pub driven_share: Option<f64>,
     /// Modal mass for the shape scaled to 1 at its largest entry, in kg, where a force acts at the
     /// place of a response.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_mass: Option<f64>,
+    /// Length of the record in decay times of the mode, ζωT, of ambient records.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub decay_times: Option<f64>,
+}
+
+/// A sinusoid in an ambient record.
+#[derive(Debug, Clone, Serialize)]
+pub struct HarmonicRow {
+    /// Its frequency, in Hz.
+    pub frequency_hz: f64,
+    /// Probability of such a line without a sinusoid.
+    pub p_value: f64,
 }
 
 /// A candidate that did not become a mode.
@@ -143,9 +162,12 @@ impl ModesSummary {
             text += &hits::heading(&self.hits, &rate);
         }
         let [low, high] = self.band_hz.map(|hz| compact(hz, 5));
+        let forces = match self.inputs.len() {
+            0 => "forces not measured".into(),
+            count => message::count(count, "force"),
+        };
         text + &format!(
-            "{}, {}; maximum likelihood, {} lines, {low} to {high} Hz\n",
-            message::count(self.inputs.len(), "force"),
+            "{forces}, {}; maximum likelihood, {} lines, {low} to {high} Hz\n",
             message::count(self.outputs.len(), "response"),
             self.lines
         )
@@ -162,12 +184,14 @@ impl ModesSummary {
             "95 % interval",
             "driven (%)",
         ];
-        let mut rows = vec![header.map(String::from).to_vec()];
+        let columns = if self.inputs.is_empty() { header.len() - 1 } else { header.len() };
+        let mut rows = vec![header[..columns].iter().map(|cell| cell.to_string()).collect()];
         for (number, mode) in (1..).zip(&self.modes) {
             let mut row = vec![number.to_string()];
-            row.extend(mode.natural_frequency_hz.cells());
-            row.extend(mode.damping_ratio.percent().cells());
+            row.extend(cells(&mode.natural_frequency_hz));
+            row.extend(cells(&mode.damping_ratio.percent()));
             row.push(mode.driven_share.map_or("–".into(), |s| significant(100.0 * s, 4)));
+            row.truncate(columns);
             rows.push(row);
         }
         text_table(&rows)
@@ -204,10 +228,11 @@ impl ModesSummary {
         }
         let mut rows = vec![header.into_iter().map(String::from).collect::<Vec<_>>()];
         for output in &self.outputs {
+            let percent = |share: f64, digits| significant(100.0 * share, digits);
             let mut row = vec![output.column.clone()];
-            row.push(significant(100.0 * output.variance_explained, 4));
-            row.extend(output.variance_predicted.map(|share| significant(100.0 * share, 4)));
-            row.push(significant(100.0 * output.noise_share, 3));
+            row.extend(output.variance_explained.map(|share| percent(share, 4)));
+            row.extend(output.variance_predicted.map(|share| percent(share, 4)));
+            row.extend(output.noise_share.map(|share| percent(share, 3)));
             rows.push(row);
         }
         text_table(&rows)
@@ -236,7 +261,10 @@ impl fmt::Display for ModesSummary {
             let inputs = self.entries("participation", &self.inputs, |mode| &mode.participation);
             write!(f, "\n{inputs}")?;
         }
-        write!(f, "\n{}\n{}", self.output_table(), self.check_lines())?;
+        if self.variance_explained.is_some() {
+            write!(f, "\n{}", self.output_table())?;
+        }
+        write!(f, "\n{}", self.check_lines())?;
         for row in &self.dropped {
             let (hz, ratio) =
                 (significant(row.frequency_hz, 5), significant(100.0 * row.damping_ratio, 3));
@@ -244,6 +272,14 @@ impl fmt::Display for ModesSummary {
         }
         self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
+}
+
+/// Value, standard error and interval; dashes where the record is too short for an interval.
+fn cells(value: &Uncertain) -> [String; 3] {
+    if value.standard_error.is_none() {
+        return [significant(value.value, 4), "–".into(), "–".into()];
+    }
+    value.cells()
 }
 
 /// Level of the intervals of this result.

@@ -16,11 +16,14 @@ pub fn figure(modes: &Modes) -> Figure {
     let summary = modes.summary();
     let natural: Vec<f64> = summary.modes.iter().map(|m| m.natural_frequency_hz.value).collect();
     let curve = |name: &str, values: &[f64]| Curve::line(name, &frequency, &every(values));
-    let panel =
+    let mut panel =
         Panel::new(Axis::linear("Frequency", "Hz"), Axis::log10("Responses over their RMS", ""))
-            .curve(curve("measured", &spectrum.measured).color(Color::GREY).width(2.4))
+            .curve(curve("measured", &spectrum.measured).color(Color::GREY).width(2.4));
+    if !spectrum.modelled.is_empty() {
+        panel = panel
             .curve(curve("modes", &spectrum.modelled).color(Color::VERMILION))
             .curve(curve("difference", &spectrum.residual));
+    }
     let files: Vec<&str> = summary.records.iter().map(|record| record.file.as_str()).collect();
     Figure::new(files.join(", ")).panel(panel).mark_x("natural frequencies", &natural)
 }

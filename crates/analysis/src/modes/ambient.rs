@@ -1,0 +1,193 @@
+//! Modes of an ambient record, as numbers for people and programs.
+
+use std::f64::consts::TAU;
+
+use mechid_modal::ambient::{
+    AmbientEstimate, AmbientMode, AmbientSettings, DropReason, DroppedCandidate, ModalValue,
+    identify_ambient,
+};
+use mechid_modal::indicators;
+use mechid_spectra::LineData;
+
+use super::checks;
+use super::settings::ModesSettings;
+use super::sources::{outputs_of, responses_of};
+use super::summary::{
+    DroppedRow, HarmonicRow, LEVEL, ModalModeRow, ModesSummary, OutputRow, RecordRow,
+};
+use super::{Modes, ModesSpectrum};
+use crate::AnalysisError;
+use crate::identify::rows::{Uncertain, WindowRow};
+use crate::measurement::Measurement;
+use crate::modal::ShapeEntry;
+use crate::text::significant;
+
+/// Finds the modes of the only record of an ambient test.
+pub(super) fn modes(
+    measurements: &[Measurement],
+    settings: &ModesSettings,
+    without_hz: &[f64],
+    without_harmonics: bool,
+) -> Result<Modes, AnalysisError> {
+    let [measurement] = measurements else {
+        let why =
+            format!("{} records: an ambient record is analysed by itself", measurements.len());
+        return Err(settings.refused("ambient", why));
+    };
+    let outputs = outputs_of(measurement.channels());
+    if outputs.is_empty() {
+        return Err(AnalysisError::NoMotion);
+    }
+    let block = measurement.whole_block()?;
+    let record = responses_of(&block)?;
+    let usual = AmbientSettings::default();
+    let estimate = identify_ambient(
+        &record,
+        &AmbientSettings {
+            band_hz: settings.band_hz,
+            modes: settings.modes,
+            max_modes: settings.max_modes.unwrap_or(usual.max_modes),
+            without_hz: without_hz.to_vec(),
+            exclude_harmonics: without_harmonics,
+        },
+    )?;
+    let output = |output: super::sources::Output| OutputRow {
+        unit: output.quantity.map(|quantity| quantity.unit()),
+        column: output.name,
+        variance_explained: None,
+        variance_predicted: None,
+        noise_share: None,
+    };
+    let shapes: Vec<_> = estimate.modes.iter().map(|mode| mode.shape.shape()).collect();
+    let mac = |a| shapes.iter().map(|b| indicators::mac(a, b)).collect();
+    let harmonic = |h: &mechid_modal::ambient::Harmonic| HarmonicRow {
+        frequency_hz: h.frequency_hz,
+        p_value: h.p_value,
+    };
+    let summary = ModesSummary {
+        records: vec![RecordRow { file: block.file.clone(), window: WindowRow::of(&block) }],
+        hits: Vec::new(),
+        inputs: Vec::new(),
+        outputs: outputs.into_iter().map(output).collect(),
+        band_hz: estimate.band_hz,
+        lines: estimate.lines,
+        confidence: LEVEL,
+        modes: estimate.modes.iter().map(row).collect(),
+        mac: shapes.iter().map(|a| mac(a)).collect(),
+        dropped: estimate.dropped.iter().map(dropped).collect(),
+        harmonics: estimate.harmonics.iter().map(harmonic).collect(),
+        variance_explained: None,
+        variance_predicted: None,
+        checks: checks::of_channels(measurements)?,
+        notes: notes(&estimate),
+        analysis: settings.clone(),
+    };
+    let data = LineData::from_open_record(None, &record, estimate.band_hz)?;
+    Ok(Modes { summary, spectrum: spectrum(&data) })
+}
+
+fn row(mode: &AmbientMode) -> ModalModeRow {
+    let (f, zeta) = (&mode.natural_frequency_hz, &mode.damping_ratio);
+    let root = (1.0 - zeta.value * zeta.value).sqrt();
+    let omega = TAU * f.value;
+    let errors = mode.shape.standard_errors();
+    let entries = mode.shape.shape().iter().enumerate().map(|(at, value)| ShapeEntry {
+        value: [value.re, value.im],
+        standard_error: Some([errors[at], errors[at + mode.shape.shape().len()]]),
+    });
+    // The damping ratio changes the damped frequency by less than its error.
+    let damped = |value: &ModalValue| {
+        let scale = |x: f64| root * x;
+        Uncertain {
+            value: scale(value.value),
+            standard_error: value.standard_error().map(scale),
+            interval: value.interval().map(|interval| interval.map(scale)),
+        }
+    };
+    ModalModeRow {
+        natural_frequency_hz: uncertain(f),
+        damped_frequency_hz: damped(f),
+        damping_ratio: uncertain(zeta),
+        oscillates: true,
+        eigenvalue: [-zeta.value * omega, root * omega],
+        shape: entries.collect(),
+        participation: Vec::new(),
+        phase_collinearity: mode.mpc.value,
+        driven_share: None,
+        modal_mass: None,
+        decay_times: Some(mode.decay_times),
+    }
+}
+
+fn uncertain(value: &ModalValue) -> Uncertain {
+    Uncertain {
+        value: value.value,
+        standard_error: value.standard_error(),
+        interval: value.interval(),
+    }
+}
+
+fn dropped(candidate: &DroppedCandidate) -> DroppedRow {
+    let reason = match candidate.reason {
+        DropReason::SmallGain { gain, needed } => format!(
+            "it improves the fit by {} (2 log L) where {} is needed",
+            significant(gain, 3),
+            significant(needed, 3)
+        ),
+        DropReason::DampingUndetermined { ratio } => format!(
+            "its damping ratio is {} times its standard error: a harmonic or a chance peak",
+            significant(ratio, 2)
+        ),
+        DropReason::OutsideBand => "it is outside of the band".into(),
+        DropReason::OverDamped { .. } => "it is too damped for a mode".into(),
+        DropReason::NumberReached { number } => format!("{number} modes were found before it"),
+        _ => "the likelihood has no maximum with it".into(),
+    };
+    let DroppedCandidate { natural_frequency_hz, damping_ratio, .. } = *candidate;
+    DroppedRow { frequency_hz: natural_frequency_hz, damping_ratio, reason }
+}
+
+fn notes(estimate: &AmbientEstimate) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (number, mode) in (1..).zip(&estimate.modes) {
+        let hz = significant(mode.natural_frequency_hz.value, 4);
+        if mode.natural_frequency_hz.interval().is_none() {
+            notes.push(format!(
+                "mode {number} ({hz} Hz): the record is {} decay times long, too short for an interval; \
+                 record longer",
+                significant(mode.decay_times, 2)
+            ));
+        }
+        if mode.harmonic.is_some() {
+            notes.push(format!(
+                "mode {number} ({hz} Hz) stands where the record has a sinusoid: it may be a harmonic of a \
+                 machine (`without_harmonics` leaves these out)"
+            ));
+        }
+    }
+    for harmonic in &estimate.harmonics {
+        notes.push(format!(
+            "a sinusoid at {} Hz (p = {})",
+            significant(harmonic.frequency_hz, 5),
+            significant(harmonic.p_value, 2)
+        ));
+    }
+    notes
+}
+
+/// Measured responses over frequency; nothing is predicted without forces.
+fn spectrum(data: &LineData) -> ModesSpectrum {
+    let outputs = data.outputs();
+    let power = |at: usize| outputs.column(at).norm_squared() / data.len() as f64;
+    let powers: Vec<f64> =
+        (0..outputs.ncols()).map(|at| power(at).max(f64::MIN_POSITIVE)).collect();
+    let measured = |row: usize| {
+        let each = outputs.row(row);
+        each.iter().zip(&powers).map(|(z, power)| z.norm_sqr() / power).sum::<f64>().sqrt()
+    };
+    ModesSpectrum {
+        frequency_hz: data.omega().iter().map(|omega| omega / TAU).collect(),
+        measured: (0..data.len()).map(measured).collect(),
+        ..ModesSpectrum::default()
+    }
+}
