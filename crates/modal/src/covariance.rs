@@ -15,7 +15,7 @@ use crate::dense::{add_product, gram, transposed_product};
 use crate::limits::NEGLIGIBLE_PROCESS_POWER;
 use crate::lines::{Block, Lines};
 use crate::model::Model;
-use crate::noise::{Noise, modal_gain};
+use crate::noise::{Noise, modal_gain, noise_window};
 use crate::normal::{
     NormalEquations, ShapeProducts, block_pairs, parameter_scale, turn, whitened_shapes,
 };
@@ -29,6 +29,8 @@ type C = Complex<f64>;
 pub(crate) struct Covariance {
     /// Of the parameters of the search.
     pub(crate) parameters: DMatrix<f64>,
+    /// Observations behind the noise spectrum at a line: real and imaginary parts in its window.
+    pub(crate) degrees_of_freedom: usize,
     /// Response of the linear unknowns of modes to the derivatives: A⁺ C, `2m × parameters`.
     followed: DMatrix<f64>,
     /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened units.
@@ -90,7 +92,8 @@ impl Covariance {
         let columns = projection.triangle.size;
         let followed =
             DMatrix::from_fn(2 * modes, size, |row, column| followed[column * columns + row]);
-        Some(Self { parameters, followed, own, scale, pairs, shapes })
+        let degrees_of_freedom = 2 * noise_window(lines) * outputs;
+        Some(Self { parameters, degrees_of_freedom, followed, own, scale, pairs, shapes })
     }
 
     /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.

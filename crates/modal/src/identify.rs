@@ -9,7 +9,7 @@ use crate::ModalError;
 use crate::covariance::Covariance;
 use crate::estimate::ModalEstimate;
 use crate::initial_poles::initial_poles;
-use crate::limits::{MAX_DAMPING, NOISE_PASSES};
+use crate::limits::{MAX_DAMPING, NEIGHBOUR_HALF_WIDTHS};
 use crate::lines::Lines;
 use crate::mode::{DropReason, DroppedCandidate};
 use crate::model::{Model, ResidualPowers};
@@ -112,23 +112,37 @@ impl<'a> Identification<'a> {
         let weights = Weights { shape: vec![1.0; lines.len()], level };
         let model = with_participations(lines, poles, &powers, &weights);
         let mut fit = Fit::new(lines, model, weights);
-        fit.search();
-        let noise = Noise::from_fit(&fit, false);
+        fit.search_roughly();
+        let noise = Noise::from_fit(&fit, None);
         let mut start = Self { lines, settings, fit, noise, dropped: Vec::new() };
-        for _ in 0..NOISE_PASSES {
-            start.update_noise();
-        }
+        start.remove_impossible();
+        // A first search of all has no weights; process noise is judged when these are there.
+        start.noise = Noise::from_fit(&start.fit, None);
+        start.search_with_noise();
+        start.remove_impossible();
+        start.update_noise();
         Ok(start)
     }
 
     /// Estimates the noise again and searches with its weights.
     fn update_noise(&mut self) {
-        self.noise = Noise::from_fit(&self.fit, self.settings.unmeasured_forces);
+        let process = self.settings.unmeasured_forces.then(|| self.noise.process.clone());
+        self.noise = Noise::from_fit(&self.fit, process);
+        self.search_with_noise();
+    }
+
+    /// Searches with the weights of the noise as it is.
+    fn search_with_noise(&mut self) {
         let shapes = shapes(&self.fit.projection, &self.fit.weights, self.fit.model.modes());
         self.fit.weights = self.noise.weights(self.lines, &self.fit.model, &shapes);
         self.fit.refresh();
-        self.fit.search();
-        log::debug!("{} modes, cost {:.1}", self.fit.model.modes(), self.fit.cost());
+        self.fit.search_roughly();
+        log::debug!(
+            "{} modes, {} steps, cost {:.1}",
+            self.fit.model.modes(),
+            self.fit.steps,
+            self.fit.cost(),
+        );
     }
 
     /// Takes modes out that are not worth their parameters, and adds those that are.
@@ -140,10 +154,15 @@ impl<'a> Identification<'a> {
         let most = self.settings.modes.unwrap_or(self.settings.max_modes);
         while !stated && self.fit.model.modes() < most {
             let least = if self.settings.modes.is_some() { 0.0 } else { required };
+            let before = self.fit.model.modes();
             match add_best(&mut self.fit, least) {
                 Ok(()) => {
                     self.update_noise();
                     self.remove_impossible();
+                    // A mode that only takes the place of another would be added for ever.
+                    if self.fit.model.modes() <= before {
+                        break;
+                    }
                 }
                 Err(tried) => {
                     let reason = |gain| DropReason::Insignificant { gain, required };
@@ -176,15 +195,32 @@ impl<'a> Identification<'a> {
         self.remove(&reasons);
     }
 
-    /// Takes out modes whose removal costs less than their parameters, one after the other.
+    /// Takes out modes whose removal costs less than their parameters, until none is left.
+    ///
+    /// Of neighbours, which may share what they explain, one is taken out at a time.
     fn remove_insignificant(&mut self, required: f64) {
         while self.settings.modes.is_none() {
             let losses = removal_losses(&self.fit);
-            let least = (0..losses.len()).min_by(|a, b| losses[*a].total_cmp(&losses[*b]));
-            let Some(mode) = least.filter(|mode| losses[*mode] < required) else { return };
-            let mut reasons = vec![None; losses.len()];
-            reasons[mode] = Some(DropReason::Insignificant { gain: losses[mode], required });
+            let mut order: Vec<usize> =
+                (0..losses.len()).filter(|mode| losses[*mode] < required).collect();
+            order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
+            let poles = &self.fit.model.poles;
+            let mut reasons: Vec<Option<DropReason>> = vec![None; losses.len()];
+            for mode in order {
+                let is_near = |other: usize| {
+                    let width = (-poles[mode].re).max(-poles[other].re);
+                    (poles[mode].im - poles[other].im).abs() < NEIGHBOUR_HALF_WIDTHS * width
+                };
+                if !(0..losses.len()).any(|other| reasons[other].is_some() && is_near(other)) {
+                    reasons[mode] =
+                        Some(DropReason::Insignificant { gain: losses[mode], required });
+                }
+            }
+            if reasons.iter().all(Option::is_none) {
+                return;
+            }
             self.remove(&reasons);
+            self.remove_impossible();
         }
     }
 
@@ -212,9 +248,10 @@ impl<'a> Identification<'a> {
         }
         let kept: Vec<usize> = (0..reasons.len()).filter(|mode| reasons[*mode].is_none()).collect();
         self.fit.model.select(&kept);
+        self.noise.process =
+            kept.iter().map(|mode| self.noise.process.get(*mode).copied().unwrap_or(0.0)).collect();
         self.fit.refresh();
-        self.fit.search();
-        self.update_noise();
+        self.fit.search_roughly();
     }
 
     /// Chooses the residual powers by Akaike's criterion: bias of the poles is worse than a few unknowns more.
@@ -229,7 +266,6 @@ impl<'a> Identification<'a> {
             let mut trial = self.fit.clone();
             trial.model.powers = powers.clone();
             trial.refresh();
-            trial.search_at_most(4);
             let criterion = trial.cost() + 2.0 * unknowns(&trial.model);
             log::debug!("residual powers {:?}: {criterion:.1}", powers.forces);
             if criterion < best.0 {
@@ -239,7 +275,7 @@ impl<'a> Identification<'a> {
         if best.1 != self.fit.model.powers {
             self.fit.model.powers = best.1;
             self.fit.refresh();
-            self.fit.search();
+            self.fit.search_roughly();
             self.update_noise();
         }
     }
@@ -254,13 +290,17 @@ impl<'a> Identification<'a> {
             }
             self.remove(&reasons);
             self.remove_impossible();
+            self.update_noise();
         }
     }
 
     fn finish(mut self) -> Result<ModalEstimate, ModalError> {
         self.fit.model.sort();
+        self.noise.process = Vec::new();
         self.fit.refresh();
         self.update_noise();
+        self.update_noise();
+        self.fit.search();
         if self.fit.model.modes() == 0 {
             let (low, high) = self.lines.band();
             return Err(ModalError::NoMode {

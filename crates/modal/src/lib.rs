@@ -27,8 +27,10 @@ mod search;
 pub mod stabilisation;
 mod synthesis;
 
+pub use mechid_numerics::Uncertain;
+
 pub use error::ModalError;
 pub use estimate::ModalEstimate;
 pub use identify::{ModalSettings, identify_modes};
-pub use mode::{DropReason, DroppedCandidate, IdentifiedMode, Uncertain};
+pub use mode::{DropReason, DroppedCandidate, IdentifiedMode};
 pub use model::ResidualPowers;

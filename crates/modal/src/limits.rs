@@ -10,8 +10,13 @@ pub const DEPENDENT_COLUMN: f64 = 1e-11;
 pub const MAX_STEPS: usize = 40;
 /// Largest number of damping increases within a step before the search ends.
 pub const MAX_DAMPING_INCREASES: usize = 14;
-/// Relative decrease of −2 log L below which a search has converged.
-pub const COST_TOLERANCE: f64 = 1e-8;
+/// Decrease of −2 log L in a step below which the last search has converged: the estimates are then within a
+/// few hundredths of their standard errors of the optimum.
+pub const COST_TOLERANCE: f64 = 1e-3;
+/// Decrease of −2 log L in a step below which a search between two changes of the model ends.
+pub const ROUGH_COST_TOLERANCE: f64 = 0.5;
+/// Number of steps before noise and number of modes are known.
+pub const ROUGH_STEPS: usize = 10;
 /// Least curvature that scales a step: a pole outside the band has curvatures of 1e-10, which would
 /// block the steps of all others.
 pub const LEAST_CURVATURE: f64 = 1e-2;
@@ -25,10 +30,12 @@ pub const MIN_FREQUENCY_STEP: f64 = 2e-3;
 pub const NOISE_WINDOW_SHARE: f64 = 1.0 / 16.0;
 /// Least number of lines on either side in the average of a noise spectrum.
 pub const MIN_NOISE_WINDOW: usize = 15;
-/// Number of passes between noise and parameters.
-pub const NOISE_PASSES: usize = 2;
 /// Number of expectation-maximisation steps for unmeasured forces.
 pub const EXPECTATION_STEPS: usize = 12;
+/// Response of a mode to a unit force over its largest, squared, above which a line bears on its unmeasured force.
+pub const NEAR_RESONANCE: f64 = 1e-2;
+/// Power of an unmeasured force beside the sensors' noise on a line below which the line leaves it to the latter.
+pub const NEAR_PROCESS_POWER: f64 = 0.1;
 /// Contribution of an unmeasured force to the noise power of a line below which the line says nothing of it.
 pub const NEGLIGIBLE_PROCESS_POWER: f64 = 1e-3;
 /// Damping ratio above which a root of the first estimate counts as no mode.
@@ -67,3 +74,5 @@ pub const DIFFERENCE_PROBABILITY: f64 = 1e-3;
 pub const DEAD_CHANNEL: f64 = 1e-20;
 /// Ratio of the least to the largest singular value of scaled inputs below which two inputs are one.
 pub const DEPENDENT_INPUTS: f64 = 1e-6;
+/// Half-widths within which two modes may share what they explain: only one of them is taken out at a time.
+pub const NEIGHBOUR_HALF_WIDTHS: f64 = 5.0;

@@ -1,17 +1,7 @@
 //! Results: modes with standard errors, what was dropped, and what the modes predict.
 
+use mechid_numerics::Uncertain;
 use nalgebra::Complex;
-
-/// An estimate with its standard error.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uncertain {
-    /// Estimate.
-    pub value: f64,
-    /// Standard error.
-    pub standard_error: f64,
-    /// Degrees of freedom of the standard error; infinite where the noise is known well.
-    pub degrees_of_freedom: f64,
-}
 
 /// One mode.
 #[derive(Debug, Clone, PartialEq)]

@@ -5,16 +5,16 @@
 //!
 //! # Source
 //! Au, *Operational Modal Analysis* (2017), chapter 10 (likelihood of the lines of modal responses);
-//! Harville, J. American Statistical Association 72 (1977) 320 (scoring of variance components).
+//! Zhou, Hu, Zhou & Lange, J. Computational and Graphical Statistics 28 (2019) 350 (variance components).
 
 use std::ops::Range;
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::Complex;
 use rayon::prelude::*;
 
 use crate::dense::add_product;
 use crate::limits::{
-    EXPECTATION_STEPS, MIN_NOISE_WINDOW, NEGLIGIBLE_PROCESS_POWER, NOISE_WINDOW_SHARE,
+    EXPECTATION_STEPS, MIN_NOISE_WINDOW, NEAR_PROCESS_POWER, NEAR_RESONANCE, NOISE_WINDOW_SHARE,
 };
 use crate::lines::Lines;
 use crate::model::Model;
@@ -33,22 +33,28 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Estimates the noise from the residuals of a fit; `with_process` includes unmeasured forces.
-    pub(crate) fn from_fit(fit: &Fit<'_>, with_process: bool) -> Self {
+    /// Estimates the noise from the residuals of a fit; `process` are first variances of the unmeasured forces,
+    /// `None` leaves these out.
+    pub(crate) fn from_fit(fit: &Fit<'_>, process: Option<Vec<f64>>) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
         let residuals = Residuals::new(fit);
         let mut noise = Self { sensor: Vec::new(), process: vec![0.0; model.modes()] };
         noise.sensor = residuals.smooth_power(lines, residuals.power.clone());
-        if with_process && model.modes() > 0 {
-            let shapes = shapes(&fit.projection, &fit.weights, model.modes());
-            for _ in 0..EXPECTATION_STEPS {
-                let before = noise.process.clone();
-                noise.score(lines, model, &shapes, &residuals);
-                let power = noise.sensor_power(lines, model, &shapes, &residuals);
-                noise.sensor = residuals.smooth_power(lines, power);
-                if settled(&before, &noise.process) {
-                    break;
-                }
+        let Some(before) = process.filter(|_| model.modes() > 0) else { return noise };
+        let shapes = shapes(&fit.projection, &fit.weights, model.modes());
+        noise.process = noise.first_process(lines, model, &shapes, &residuals);
+        if before.len() == model.modes() {
+            for (first, before) in noise.process.iter_mut().zip(&before) {
+                *first = before.max(LEAST_FIRST_PROCESS * *first);
+            }
+        }
+        for _ in 0..EXPECTATION_STEPS {
+            let before = noise.process.clone();
+            noise.improve_process(lines, model, &shapes, &residuals);
+            let power = noise.sensor_power(lines, model, &shapes, &residuals);
+            noise.sensor = residuals.smooth_power(lines, power);
+            if settled(&before, &noise.process) {
+                break;
             }
         }
         noise
@@ -79,28 +85,65 @@ impl Noise {
         shape.iter().zip(&self.sensor).map(|(z, d)| z.norm_sqr() / d[line]).sum()
     }
 
-    /// Takes one scoring step of the variances of the unmeasured forces.
-    fn score(&mut self, lines: &Lines, model: &Model, shapes: &[Vec<C>], residuals: &Residuals) {
+    /// Takes one step of the variances of the unmeasured forces: S_r is multiplied by
+    /// √(Σ |b_rᴴV⁻¹e|² / Σ b_rᴴV⁻¹b_r), which never lowers the likelihood.
+    fn improve_process(
+        &mut self,
+        lines: &Lines,
+        model: &Model,
+        shapes: &[Vec<C>],
+        residuals: &Residuals,
+    ) {
         let modes = model.modes();
-        let parts: Vec<(DVector<f64>, DMatrix<f64>)> = lines
+        let parts: Vec<Vec<(f64, f64)>> = lines
             .blocks
             .par_iter()
             .map(|block| {
-                let mut sums = (DVector::zeros(modes), DMatrix::zeros(modes, modes));
+                let mut sums = vec![(0.0, 0.0); modes];
                 for line in block.rows.clone() {
                     if let Some(local) = self.posterior(lines, model, shapes, residuals, line) {
-                        local.add_score(&mut sums.0, &mut sums.1);
+                        local.add_powers(&mut sums);
                     }
                 }
                 sums
             })
             .collect();
-        let (mut score, mut information) = (DVector::zeros(modes), DMatrix::zeros(modes, modes));
-        for (part, square) in &parts {
-            score += part;
-            information += square;
+        for (mode, process) in self.process.iter_mut().enumerate() {
+            let seen: f64 = parts.iter().map(|part| part[mode].0).sum();
+            let expected: f64 = parts.iter().map(|part| part[mode].1).sum();
+            if expected > 0.0 {
+                *process *= (seen / expected).sqrt();
+            }
         }
-        self.process = bounded_step(&self.process, &score, &information);
+    }
+
+    /// Returns first variances of the unmeasured forces: the power of the residuals along each shape near its
+    /// resonance.
+    fn first_process(
+        &self,
+        lines: &Lines,
+        model: &Model,
+        shapes: &[Vec<C>],
+        residuals: &Residuals,
+    ) -> Vec<f64> {
+        let of_mode = |mode: usize| {
+            let (pole, shape) = (model.poles[mode], &shapes[mode]);
+            let nearest = lines.omega.iter().map(|w| (w - pole.im).abs()).fold(f64::MAX, f64::min);
+            let reach = (-pole.re).max(nearest);
+            let (mut sum, mut count) = (0.0, 0.0);
+            for line in 0..lines.len() {
+                if (lines.omega[line] - pole.im).abs() <= reach {
+                    let along: C = (0..shape.len())
+                        .map(|k| shape[k].conj() * residuals.error[k][line] / self.sensor[k][line])
+                        .sum();
+                    let gain = modal_gain(pole, lines.omega[line]).norm_sqr();
+                    sum += along.norm_sqr() / self.direction(shape, line).powi(2) / gain;
+                    count += 1.0;
+                }
+            }
+            sum / count
+        };
+        (0..model.modes()).into_par_iter().map(of_mode).collect()
     }
 
     /// Returns the expected power of each sensor's own noise, given the residuals.
@@ -116,22 +159,10 @@ impl Noise {
             let Some(local) = self.posterior(lines, model, shapes, residuals, line) else {
                 return (0..outputs).map(|output| residuals.power[output][line]).collect();
             };
-            let (mean, spread) = local.forces();
+            let mut parts = Vec::new();
             let value = |output: usize| {
-                let gains: Vec<C> = local
-                    .active
-                    .iter()
-                    .zip(&local.gains)
-                    .map(|(mode, gain)| shapes[*mode][output] * gain)
-                    .collect();
-                let explained: C = gains.iter().zip(mean.iter()).map(|(g, w)| g * w).sum();
-                let mut variance = 0.0;
-                for (a, ga) in gains.iter().enumerate() {
-                    for (b, gb) in gains.iter().enumerate() {
-                        variance += (ga * spread[(a, b)] * gb.conj()).re;
-                    }
-                }
-                (residuals.error[output][line] - explained).norm_sqr() + variance
+                let error = residuals.error[output][line];
+                local.remaining_power(shapes, output, error, &mut parts)
             };
             (0..outputs).map(value).collect()
         };
@@ -151,88 +182,106 @@ impl Noise {
         let omega = lines.omega[line];
         let is_near = |mode: &usize| {
             let gain = modal_gain(model.poles[*mode], omega).norm_sqr();
-            let relative = gain * model.poles[*mode].re.powi(2);
             let process = self.process[*mode];
-            relative > NEGLIGIBLE_PROCESS_POWER
+            gain * model.poles[*mode].re.powi(2) > NEAR_RESONANCE
                 || process > 0.0
-                    && process * gain * self.direction(&shapes[*mode], line)
-                        > 10.0 * NEGLIGIBLE_PROCESS_POWER
+                    && process * gain * self.direction(&shapes[*mode], line) > NEAR_PROCESS_POWER
         };
         let active: Vec<usize> = (0..model.modes()).filter(is_near).collect();
         if active.is_empty() {
             return None;
         }
+        let size = active.len();
         let gains: Vec<C> =
             active.iter().map(|mode| modal_gain(model.poles[*mode], omega)).collect();
-        let size = active.len();
-        let mut information = DMatrix::zeros(size, size);
-        let mut seen = DVector::zeros(size);
+        let mut information = vec![C::default(); size * size];
+        let mut seen = vec![C::default(); size];
         for (output, sensor) in self.sensor.iter().enumerate() {
             let precision = 1.0 / sensor[line];
-            for a in 0..size {
-                let left = (shapes[active[a]][output] * gains[a]).conj() * precision;
-                seen[a] += left * residuals.error[output][line];
-                for b in 0..size {
-                    information[(a, b)] += left * shapes[active[b]][output] * gains[b];
+            let error = residuals.error[output][line];
+            for (a, mode) in active.iter().enumerate() {
+                let from = shapes[*mode][output].conj() * precision;
+                seen[a] += from * error;
+                for (b, other) in active[..=a].iter().enumerate() {
+                    information[a * size + b] += from * shapes[*other][output];
                 }
             }
         }
+        for a in 0..size {
+            seen[a] *= gains[a].conj();
+            for b in 0..=a {
+                let value = information[a * size + b] * gains[a].conj() * gains[b];
+                information[a * size + b] = value;
+                information[b * size + a] = value.conj();
+            }
+        }
         let process = active.iter().map(|mode| self.process[*mode]).collect();
-        Some(Posterior { active, gains, process, information, seen })
+        let mut posterior = Posterior { active, gains, process, information, seen };
+        posterior.add_forces();
+        Some(posterior)
     }
 }
 
-/// Modes near a line, with BᴴD⁻¹B and BᴴD⁻¹e for B = φ_r h_r.
+/// Modes near a line, with BᴴV⁻¹B and BᴴV⁻¹e for B = φ_r h_r and V the covariance of the line.
 struct Posterior {
     active: Vec<usize>,
     gains: Vec<C>,
     process: Vec<f64>,
-    information: DMatrix<C>,
-    seen: DVector<C>,
+    /// `[a · size + b]`.
+    information: Vec<C>,
+    seen: Vec<C>,
 }
 
 impl Posterior {
-    /// Returns I + (BᴴD⁻¹B) S.
-    fn mixing(&self) -> DMatrix<C> {
+    /// Goes from V = D to V = D + Σ S_r b_r b_rᴴ, one force after the other (Sherman & Morrison).
+    fn add_forces(&mut self) {
         let size = self.active.len();
-        let mut mixing = self.information.clone();
-        for (mut column, process) in mixing.column_iter_mut().zip(&self.process) {
-            column *= C::from(*process);
-        }
-        mixing + DMatrix::identity(size, size)
-    }
-
-    /// Adds |b_rᴴV⁻¹e|² − b_rᴴV⁻¹b_r and |b_rᴴV⁻¹b_s|², V the covariance of the line.
-    fn add_score(&self, score: &mut DVector<f64>, information: &mut DMatrix<f64>) {
-        let factor = self.mixing().lu();
-        let (Some(square), Some(along)) =
-            (factor.solve(&self.information), factor.solve(&self.seen))
-        else {
-            return;
-        };
-        for (a, r) in self.active.iter().enumerate() {
-            score[*r] += along[a].norm_sqr() - square[(a, a)].re;
-            for (b, s) in self.active.iter().enumerate() {
-                information[(*r, *s)] += square[(a, b)].norm_sqr();
+        let mut row = vec![C::default(); size];
+        for (r, process) in self.process.iter().enumerate().filter(|(_, process)| **process > 0.0) {
+            row.copy_from_slice(&self.information[r * size..(r + 1) * size]);
+            let factor = process / (1.0 + process * row[r].re);
+            let seen = self.seen[r];
+            for a in 0..size {
+                let along = row[a].conj() * factor;
+                self.seen[a] -= along * seen;
+                let to = &mut self.information[a * size..(a + 1) * size];
+                to.iter_mut().zip(&row).for_each(|(to, value)| *to -= along * value);
             }
         }
     }
 
-    /// Returns mean and covariance of the unmeasured forces, given the residuals.
-    fn forces(&self) -> (DVector<C>, DMatrix<C>) {
+    /// Adds |b_rᴴV⁻¹e|² and b_rᴴV⁻¹b_r.
+    fn add_powers(&self, sums: &mut [(f64, f64)]) {
         let size = self.active.len();
-        let Some(along) = self.mixing().lu().solve(&self.seen) else {
-            return (DVector::zeros(size), DMatrix::zeros(size, size));
-        };
-        let Some(square) = self.mixing().lu().solve(&self.information) else {
-            return (DVector::zeros(size), DMatrix::zeros(size, size));
-        };
-        let mean = DVector::from_fn(size, |a, _| along[a] * self.process[a]);
-        let spread = DMatrix::from_fn(size, size, |a, b| {
-            let prior = if a == b { self.process[a] } else { 0.0 };
-            C::from(prior) - square[(a, b)] * self.process[a] * self.process[b]
-        });
-        (mean, spread)
+        for (a, mode) in self.active.iter().enumerate() {
+            sums[*mode].0 += self.seen[a].norm_sqr();
+            sums[*mode].1 += self.information[a * size + a].re;
+        }
+    }
+
+    /// Returns the expected power of what remains of an error when the unmeasured forces are taken off.
+    fn remaining_power(
+        &self,
+        shapes: &[Vec<C>],
+        output: usize,
+        error: C,
+        parts: &mut Vec<C>,
+    ) -> f64 {
+        let size = self.active.len();
+        parts.clear();
+        let forces = self.active.iter().zip(&self.gains).zip(&self.process);
+        parts.extend(forces.map(|((mode, gain), process)| shapes[*mode][output] * gain * *process));
+        let explained: C = parts.iter().zip(&self.seen).map(|(part, seen)| part * seen).sum();
+        let mut variance = 0.0;
+        for (a, part) in parts.iter().enumerate() {
+            if self.process[a] > 0.0 {
+                variance += part.norm_sqr() / self.process[a];
+                let row = &self.information[a * size..(a + 1) * size];
+                let sum: C = row.iter().zip(parts.iter()).map(|(i, b)| i * b.conj()).sum();
+                variance -= (part * sum).re;
+            }
+        }
+        (error - explained).norm_sqr() + variance.max(0.0)
     }
 }
 
@@ -284,6 +333,17 @@ fn record_rows(lines: &Lines) -> Vec<Range<usize>> {
     records
 }
 
+/// Returns the least number of lines in the window of a noise spectrum.
+pub(crate) fn noise_window(lines: &Lines) -> usize {
+    let of_record = |rows: Range<usize>| (2 * reach(rows.len()) + 1).min(rows.len());
+    record_rows(lines).into_iter().map(of_record).min().unwrap_or(0)
+}
+
+/// Returns the number of lines on either side in a noise spectrum of a record.
+fn reach(lines: usize) -> usize {
+    ((lines as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW)
+}
+
 /// Moving mean within each record, with a window that shrinks at its ends.
 fn smooth(power: &[f64], records: &[Range<usize>]) -> Vec<f64> {
     let mut mean = vec![0.0; power.len()];
@@ -291,7 +351,7 @@ fn smooth(power: &[f64], records: &[Range<usize>]) -> Vec<f64> {
     let floor = total * 1e-12 + f64::MIN_POSITIVE;
     for rows in records {
         let (values, count) = (&power[rows.clone()], rows.len());
-        let reach = ((count as f64 * NOISE_WINDOW_SHARE) as usize).max(MIN_NOISE_WINDOW);
+        let reach = reach(count);
         let mut sums = vec![0.0; count + 1];
         for (k, value) in values.iter().enumerate() {
             sums[k + 1] = sums[k] + value;
@@ -346,24 +406,11 @@ pub(crate) fn modal_gain(pole: C, omega: f64) -> C {
     1.0 / (C::new(0.0, omega) - pole)
 }
 
-/// Scoring step to variances that are not negative; those at zero that would fall stay there.
-fn bounded_step(now: &[f64], score: &DVector<f64>, information: &DMatrix<f64>) -> Vec<f64> {
-    let free: Vec<usize> = (0..now.len())
-        .filter(|r| information[(*r, *r)] > 0.0 && (now[*r] > 0.0 || score[*r] > 0.0))
-        .collect();
-    let unit: Vec<f64> = free.iter().map(|r| 1.0 / information[(*r, *r)].sqrt()).collect();
-    let square = DMatrix::from_fn(free.len(), free.len(), |a, b| {
-        information[(free[a], free[b])] * unit[a] * unit[b]
-    });
-    let right = DVector::from_fn(free.len(), |a, _| score[free[a]] * unit[a]);
-    let mut next = now.to_vec();
-    let step = square.cholesky().map_or_else(|| right.clone(), |factor| factor.solve(&right));
-    for (a, r) in free.iter().enumerate() {
-        next[*r] = (now[*r] + step[a] * unit[a]).max(0.0);
-    }
-    next
-}
+/// Relative change of the variances of unmeasured forces that ends their iteration.
+const SETTLED: f64 = 0.05;
+/// Share of its first estimate below which the variance of an unmeasured force does not start.
+const LEAST_FIRST_PROCESS: f64 = 0.01;
 
 fn settled(before: &[f64], after: &[f64]) -> bool {
-    before.iter().zip(after).all(|(a, b)| (a - b).abs() <= 0.01 * b.abs())
+    before.iter().zip(after).all(|(a, b)| (a - b).abs() <= SETTLED * b.abs())
 }

@@ -14,8 +14,6 @@ type C = Complex<f64>;
 const DAMPING_GRID: [f64; 6] = [5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 3e-2];
 /// Step of the grid's frequencies, in half-widths.
 const GRID_STEP: f64 = 0.5;
-/// Steps of the search in which a candidate shows its gain.
-const TRIAL_STEPS: usize = 12;
 /// Share of the required gain that the scan must show before a candidate is tried.
 const TRIAL_GAIN: f64 = 0.5;
 
@@ -70,7 +68,7 @@ pub(crate) fn scan(fit: &Fit<'_>) -> Vec<Candidate> {
         let mut omega = low;
         while omega < high {
             grid.push((omega, damping));
-            omega += (GRID_STEP * damping * omega).max(spacing / 2.0);
+            omega += (GRID_STEP * damping * omega).max(0.75 * spacing);
         }
     }
     let residuals = Residual::new(fit);
@@ -224,10 +222,18 @@ pub(crate) fn add_best(fit: &mut Fit<'_>, required: f64) -> Result<(), Vec<Candi
         trial.model.poles.push(candidate.pole);
         trial.model.participation.push(candidate.participation.clone());
         trial.model.gauge.push(0);
-        trial.search_at_most(TRIAL_STEPS);
+        trial.search_roughly();
         let gain = fit.cost() - trial.cost();
         let pole = trial.model.poles[fit.model.modes()];
-        if gain > required && -pole.re / pole.norm() < MAX_DAMPING {
+        let (low, high) = fit.lines.band();
+        let possible = -pole.re / pole.norm() < MAX_DAMPING && pole.im > low && pole.im < high;
+        log::debug!(
+            "candidate {:.3} Hz, gain {:.0} by the scan, {gain:.0} after {} steps, required {required:.0}",
+            pole.im / std::f64::consts::TAU,
+            candidate.gain,
+            trial.steps - fit.steps,
+        );
+        if gain > required && possible {
             *fit = trial;
             return Ok(());
         }

@@ -2,12 +2,13 @@
 
 use std::f64::consts::TAU;
 
+use mechid_numerics::Uncertain;
 use nalgebra::{Complex, DMatrix};
 
 use crate::covariance::Covariance;
 use crate::limits::EDGE_HALF_WIDTHS;
 use crate::lines::{Lines, Load};
-use crate::mode::{IdentifiedMode, Uncertain};
+use crate::mode::IdentifiedMode;
 use crate::model::Model;
 use crate::noise::{Noise, modal_gain};
 use crate::search::Fit;
@@ -31,7 +32,7 @@ pub(crate) fn natural_frequency_and_damping(
     let uncertain = |value: f64, by: [f64; 2]| Uncertain {
         value,
         standard_error: product(by, by).max(0.0).sqrt(),
-        degrees_of_freedom: f64::INFINITY,
+        degrees_of_freedom: covariance.degrees_of_freedom,
     };
     let frequency = uncertain(size / TAU, by_frequency);
     let damping = uncertain(-re / size, by_damping);

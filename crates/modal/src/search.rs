@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use crate::limits::{
     COST_TOLERANCE, LEAST_CURVATURE, MAX_DAMPING_INCREASES, MAX_DECAY_STEP,
-    MAX_FREQUENCY_STEP_DAMPINGS, MAX_STEPS, MIN_FREQUENCY_STEP,
+    MAX_FREQUENCY_STEP_DAMPINGS, MAX_STEPS, MIN_FREQUENCY_STEP, ROUGH_COST_TOLERANCE, ROUGH_STEPS,
 };
 use crate::lines::Lines;
 use crate::model::Model;
@@ -43,11 +43,16 @@ impl<'a> Fit<'a> {
 
     /// Takes steps until the cost no longer falls, at most `MAX_STEPS`.
     pub(crate) fn search(&mut self) {
-        self.search_at_most(MAX_STEPS);
+        self.search_until(MAX_STEPS, COST_TOLERANCE);
     }
 
-    /// Takes at most `limit` steps.
-    pub(crate) fn search_at_most(&mut self, limit: usize) {
+    /// Takes a few steps, to where noise and number of modes can be judged.
+    pub(crate) fn search_roughly(&mut self) {
+        self.search_until(ROUGH_STEPS, ROUGH_COST_TOLERANCE);
+    }
+
+    /// Takes steps until the cost falls by less than `tolerance`, at most `limit`.
+    fn search_until(&mut self, limit: usize, tolerance: f64) {
         if self.model.modes() == 0 {
             return;
         }
@@ -62,7 +67,7 @@ impl<'a> Fit<'a> {
             self.steps += 1;
             let decrease = cost - next;
             cost = next;
-            if decrease < COST_TOLERANCE * cost.max(1.0) {
+            if decrease < tolerance {
                 return;
             }
         }
