@@ -35,10 +35,23 @@ pub(crate) struct Covariance {
     followed: DMatrix<f64>,
     /// Of the linear unknowns of modes from the noise of each output itself, `2m × 2m`, whitened units.
     own: Vec<DMatrix<f64>>,
+    /// What the unmeasured force of each mode does to the unknowns of its own shape.
+    process: Vec<ProcessEffect>,
+    /// Inverse of the curvature.
+    inverse: DMatrix<f64>,
     scale: Vec<f64>,
     pairs: Vec<(usize, Option<usize>)>,
     /// Shapes in whitened units.
     shapes: Vec<f64>,
+}
+
+/// Effect of a mode's unmeasured force on the two unknowns of its shape, for a whitened shape of 1.
+#[derive(Debug, Clone)]
+struct ProcessEffect {
+    /// Covariance of the two unknowns.
+    own: DMatrix<f64>,
+    /// Covariance with the score, before it is turned by the phase of the shape, `2 × parameters`.
+    cross: DMatrix<C>,
 }
 
 /// Products of one block after projection.
@@ -47,6 +60,8 @@ struct BlockProducts {
     gram: Vec<f64>,
     /// Rows of modes of A⁺ times its transpose.
     inverse: Vec<f64>,
+    /// Rows of modes of A⁺ as columns of 2n rows.
+    influence: Vec<f64>,
     /// Projected derivatives, 2n rows.
     derivatives: Vec<f64>,
 }
@@ -83,9 +98,9 @@ impl Covariance {
                 own.iter_mut().zip(&products.inverse).for_each(|(to, part)| *to += ratio * part);
             }
         }
-        for mode in (0..modes).filter(|mode| noise.process[*mode] > 0.0) {
-            add_process(fit, noise, mode, &blocks, &pairs, &shapes, &scale, &mut meat);
-        }
+        let scores = Scores { pairs: &pairs, shapes: &shapes, scale: &scale };
+        let add = |mode| scores.add_process(fit, noise, mode, &blocks, &mut meat);
+        let process: Vec<ProcessEffect> = (0..modes).map(add).collect();
         let inverse = symmetric_inverse(&normal.curvature, size)?;
         let meat = DMatrix::from_vec(size, size, meat);
         let parameters = &inverse * meat * &inverse;
@@ -93,7 +108,7 @@ impl Covariance {
         let followed =
             DMatrix::from_fn(2 * modes, size, |row, column| followed[column * columns + row]);
         let degrees_of_freedom = 2 * noise_window(lines) * outputs;
-        Some(Self { parameters, degrees_of_freedom, followed, own, scale, pairs, shapes })
+        Some(Self { parameters, degrees_of_freedom, process, inverse, followed, own, scale, pairs, shapes })
     }
 
     /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.
@@ -159,8 +174,19 @@ impl Covariance {
             let mut own = response.columns_mut(2 * pair, 2);
             own += rotation(entry);
         }
-        let own = self.own[reference].view((2 * mode, 2 * mode), (2, 2)) * (level * level);
-        &by_value * own * by_value.transpose() + &response * &self.parameters * response.transpose()
+        let outputs = self.own.len();
+        let part = |row: usize| self.shapes[row * outputs + reference];
+        let direction = C::new(part(2 * mode), part(2 * mode + 1));
+        let effect = &self.process[mode];
+        let own = self.own[reference].view((2 * mode, 2 * mode), (2, 2))
+            + &effect.own * direction.norm_sqr();
+        let cross = effect.cross.map(|value| (value * direction).re);
+        let by_value = by_value * level;
+        let between = &by_value * cross * &self.inverse * response.transpose();
+        &by_value * own * by_value.transpose()
+            + &response * &self.parameters * response.transpose()
+            + &between
+            + between.transpose()
     }
 }
 
@@ -244,7 +270,7 @@ impl BlockProducts {
         let mut influence = vec![0.0; rows * 2 * model.modes()];
         add_product(&mut influence, &arrays.design, &own_rows, rows, inner, 1.0);
         let inverse = transposed_product(&influence, &influence, rows);
-        Self { gram: product, inverse, derivatives }
+        Self { gram: product, inverse, influence, derivatives }
     }
 }
 
@@ -258,60 +284,98 @@ fn noise_ratios(fit: &Fit<'_>, noise: &Noise, block: &Block) -> Vec<f64> {
     noise.sensor.iter().zip(&fit.weights.level).map(ratio).collect()
 }
 
-/// Adds the variance of the score that the unmeasured force of one mode causes.
-#[expect(clippy::too_many_arguments, reason = "all that a score is made of")]
-fn add_process(
-    fit: &Fit<'_>,
-    noise: &Noise,
-    mode: usize,
-    blocks: &[BlockProducts],
-    pairs: &[(usize, Option<usize>)],
-    shapes: &[f64],
-    scale: &[f64],
-    meat: &mut [f64],
-) {
-    let (lines, size) = (fit.lines, 2 * pairs.len());
-    let modes = fit.model.modes();
-    let sums = transposed_product(shapes, shapes, lines.outputs.len());
-    let entry = |row: usize, column: usize| sums[column * 2 * modes + row];
-    // Σ_i x_si α_i and Σ_i y_si α_i, α the whitened shape of the mode that is driven.
-    let along: Vec<(C, C)> = pairs
-        .iter()
-        .map(|&(s, _)| {
-            let of = |row: usize| C::new(entry(row, 2 * mode), entry(row, 2 * mode + 1));
-            (of(2 * s), of(2 * s + 1))
-        })
-        .collect();
-    let direction = entry(2 * mode, 2 * mode) + entry(2 * mode + 1, 2 * mode + 1);
-    for (block, products) in lines.blocks.iter().zip(blocks) {
-        let n = block.len();
-        let gain = |line: &usize| {
-            let row = block.rows.start + line;
-            modal_gain(fit.model.poles[mode], lines.omega[row]) / fit.weights.shape[row]
-        };
-        let share = |line: &usize| noise.process[mode] * gain(line).norm_sqr() * direction;
-        let active: Vec<usize> =
-            (0..n).filter(|line| share(line) > NEGLIGIBLE_PROCESS_POWER).collect();
-        let rows = 2 * active.len();
-        if rows == 0 {
-            continue;
+/// What the score of the search is made of.
+struct Scores<'a> {
+    pairs: &'a [(usize, Option<usize>)],
+    shapes: &'a [f64],
+    scale: &'a [f64],
+}
+
+impl Scores<'_> {
+    /// Adds the variance of the score that the unmeasured force of one mode causes, and returns its effect on the
+    /// shape of the mode.
+    fn add_process(
+        &self,
+        fit: &Fit<'_>,
+        noise: &Noise,
+        mode: usize,
+        blocks: &[BlockProducts],
+        meat: &mut [f64],
+    ) -> ProcessEffect {
+        let (lines, size) = (fit.lines, 2 * self.pairs.len());
+        let (along, direction) = self.along(mode, lines.outputs.len());
+        let mut effect =
+            ProcessEffect { own: DMatrix::zeros(2, 2), cross: DMatrix::zeros(2, size) };
+        if noise.process[mode] <= 0.0 {
+            return effect;
         }
-        let mut scores = vec![0.0; rows * size];
-        for (pair, (p, q)) in along.iter().enumerate() {
-            let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
+        for (block, products) in lines.blocks.iter().zip(blocks) {
+            let n = block.len();
+            let gain = |line: usize| {
+                let row = block.rows.start + line;
+                let gain = modal_gain(fit.model.poles[mode], lines.omega[row]);
+                gain * (noise.process[mode].sqrt() / fit.weights.shape[row])
+            };
+            let share = |line: &usize| gain(*line).norm_sqr() * direction;
+            let active: Vec<usize> =
+                (0..n).filter(|line| share(line) > NEGLIGIBLE_PROCESS_POWER).collect();
+            let rows = 2 * active.len();
+            if rows == 0 {
+                continue;
+            }
+            let mut scores = vec![0.0; rows * size];
+            for (pair, (p, q)) in along.iter().enumerate() {
+                let own = &products.derivatives[4 * pair * n..(4 * pair + 4) * n];
+                let (first, second) =
+                    scores[2 * pair * rows..(2 * pair + 2) * rows].split_at_mut(rows);
+                for (k, &line) in active.iter().enumerate() {
+                    let u = C::new(own[line], -own[n + line]);
+                    let v = C::new(own[2 * n + line], -own[3 * n + line]);
+                    let a = (u * p + v * q) * gain(line) * self.scale[2 * pair];
+                    let b = (v * p - u * q) * gain(line) * self.scale[2 * pair + 1];
+                    (first[2 * k], first[2 * k + 1]) = (a.re, a.im);
+                    (second[2 * k], second[2 * k + 1]) = (b.re, b.im);
+                }
+            }
+            let part = transposed_product(&scores, &scores, rows);
+            meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
+            let influence = &products.influence[4 * mode * n..(4 * mode + 4) * n];
+            let unknown = |row: usize, line: usize| {
+                let own = &influence[2 * row * n..(2 * row + 2) * n];
+                C::new(own[line], -own[n + line]) * gain(line)
+            };
             for (k, &line) in active.iter().enumerate() {
-                let u = C::new(own[line], -own[n + line]);
-                let v = C::new(own[2 * n + line], -own[3 * n + line]);
-                let factor = gain(&line) * noise.process[mode].sqrt();
-                let first = (u * p + v * q) * factor * scale[2 * pair];
-                let second = (v * p - u * q) * factor * scale[2 * pair + 1];
-                let (a, b) = (2 * pair * rows, (2 * pair + 1) * rows);
-                (scores[a + 2 * k], scores[a + 2 * k + 1]) = (first.re, first.im);
-                (scores[b + 2 * k], scores[b + 2 * k + 1]) = (second.re, second.im);
+                effect.add_line([unknown(0, line), unknown(1, line)], &scores, rows, k);
             }
         }
-        let part = transposed_product(&scores, &scores, rows);
-        meat.iter_mut().zip(&part).for_each(|(to, part)| *to += part);
+        effect
+    }
+
+    /// Returns Σ_i x_si α_i and Σ_i y_si α_i of every pair, α the whitened shape of the driven mode, and Σ |α_i|².
+    fn along(&self, mode: usize, outputs: usize) -> (Vec<(C, C)>, f64) {
+        let column = |row: usize| &self.shapes[row * outputs..(row + 1) * outputs];
+        let product = |a: usize, b: usize| -> f64 {
+            column(a).iter().zip(column(b)).map(|(a, b)| a * b).sum()
+        };
+        let (x, y) = (2 * mode, 2 * mode + 1);
+        let of = |row: usize| C::new(product(row, x), product(row, y));
+        let along = self.pairs.iter().map(|&(s, _)| (of(2 * s), of(2 * s + 1))).collect();
+        (along, product(x, x) + product(y, y))
+    }
+}
+
+impl ProcessEffect {
+    /// Adds one line: the response of the two unknowns and of the scores to a unit force.
+    fn add_line(&mut self, unknowns: [C; 2], scores: &[f64], rows: usize, line: usize) {
+        for (a, value) in unknowns.iter().enumerate() {
+            for (b, other) in unknowns.iter().enumerate() {
+                self.own[(a, b)] += (value * other.conj()).re;
+            }
+            for (parameter, score) in scores.chunks_exact(rows).enumerate() {
+                let score = C::new(score[2 * line], -score[2 * line + 1]);
+                self.cross[(a, parameter)] += value * score;
+            }
+        }
     }
 }
 

@@ -71,7 +71,7 @@ pub const EDGE_HALF_WIDTHS: f64 = 3.0;
 /// Probability of a larger statistic by chance below which two shapes differ.
 pub const DIFFERENCE_PROBABILITY: f64 = 1e-3;
 /// Ratio of the power of a channel to that of the strongest below which the channel is dead.
-pub const DEAD_CHANNEL: f64 = 1e-20;
+pub const DEAD_CHANNEL: f64 = 1e-26;
 /// Ratio of the least to the largest singular value of scaled inputs below which two inputs are one.
 pub const DEPENDENT_INPUTS: f64 = 1e-6;
 /// Half-widths within which two modes may share what they explain: only one of them is taken out at a time.
