@@ -15,7 +15,6 @@ fn main() {
     let seeds = arguments.first().and_then(|text| text.parse().ok()).unwrap_or(10);
     let wanted = arguments.get(1).cloned().unwrap_or_default();
     let first: u64 = arguments.get(2).and_then(|text| text.parse().ok()).unwrap_or(0);
-    let verbose = arguments.get(3).is_some();
     println!(
         "{:34} {:>5} {:>6} {:>6} {:>6} {:>12} {:>12} {:>12} {:>12} {:>7} {:>6} {:>6}",
         "case",
@@ -36,7 +35,7 @@ fn main() {
             continue;
         }
         let start = Instant::now();
-        let score = score::Score::of(&case, first..first + seeds, verbose);
+        let score = score::Score::of(&case, first..first + seeds);
         let range = |values: &[f64]| {
             let low = values.iter().copied().fold(f64::INFINITY, f64::min);
             let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

@@ -108,7 +108,17 @@ impl Covariance {
         let followed =
             DMatrix::from_fn(2 * modes, size, |row, column| followed[column * columns + row]);
         let degrees_of_freedom = 2 * noise_window(lines) * outputs;
-        Some(Self { parameters, degrees_of_freedom, process, inverse, followed, own, scale, pairs, shapes })
+        Some(Self {
+            parameters,
+            degrees_of_freedom,
+            process,
+            inverse,
+            followed,
+            own,
+            scale,
+            pairs,
+            shapes,
+        })
     }
 
     /// Returns B_i = A⁺ ∂A/∂θ x_i of the two unknowns of one mode, for one output, in whitened units.

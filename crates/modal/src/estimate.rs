@@ -12,6 +12,7 @@ use crate::noise::{Noise, shapes};
 use crate::order::removal_losses;
 use crate::results::identified_mode;
 use crate::search::Fit;
+use crate::synthesis::add_transients;
 
 type C = Complex<f64>;
 
@@ -19,6 +20,8 @@ type C = Complex<f64>;
 #[derive(Debug, Clone)]
 pub struct ModalEstimate {
     modes: Vec<IdentifiedMode>,
+    /// Modes of the model that were not asked for.
+    others: Vec<IdentifiedMode>,
     dropped: Vec<DroppedCandidate>,
     powers: ResidualPowers,
     pub(crate) reference: f64,
@@ -38,13 +41,15 @@ impl ModalEstimate {
         noise: &Noise,
         covariance: &Covariance,
         dropped: Vec<DroppedCandidate>,
+        stated: &[bool],
     ) -> Self {
         let (lines, model) = (fit.lines, &fit.model);
         let shapes = shapes(&fit.projection, &fit.weights, model.modes());
         let gains = removal_losses(fit);
-        let modes = (0..model.modes())
-            .map(|mode| identified_mode(fit, noise, covariance, &shapes[mode], mode, gains[mode]))
-            .collect();
+        let identified =
+            |mode: usize| identified_mode(fit, noise, covariance, &shapes[mode], mode, gains[mode]);
+        let (asked, rest): (Vec<usize>, Vec<usize>) =
+            (0..model.modes()).partition(|mode| stated[*mode]);
         let columns = model.residual_columns(lines);
         let inputs = lines.inputs();
         let residuals = (0..lines.outputs.len())
@@ -55,7 +60,8 @@ impl ModalEstimate {
             .collect();
         let level = |sensor: &Vec<f64>| (sensor.iter().sum::<f64>() / sensor.len() as f64).sqrt();
         Self {
-            modes,
+            modes: asked.into_iter().map(identified).collect(),
+            others: rest.into_iter().map(identified).collect(),
             dropped,
             powers: model.powers.clone(),
             reference: model.reference,
@@ -118,7 +124,7 @@ impl ModalEstimate {
                 let residue = mode.residue(output, input);
                 residue / (s - mode.pole) + residue.conj() / (s - mode.pole.conj())
             };
-            let modal: C = self.modes.iter().map(of_mode).sum();
+            let modal: C = self.modes.iter().chain(&self.others).map(of_mode).sum();
             let own = self.powers.forces.iter().zip(&self.residuals[output][input]);
             modal + own.map(|(power, value)| turn.powi(*power) * *value).sum::<C>()
         })
@@ -141,12 +147,8 @@ impl ModalEstimate {
             predicted.row_mut(line).copy_from(&row.transpose());
         }
         let lines = Lines::new(data);
-        crate::synthesis::add_transients(
-            &lines,
-            &self.modes,
-            &self.powers.transients,
-            &mut predicted,
-        );
+        let modes: Vec<&IdentifiedMode> = self.modes.iter().chain(&self.others).collect();
+        add_transients(&lines, &modes, &self.powers.transients, &mut predicted);
         Ok(predicted)
     }
 }

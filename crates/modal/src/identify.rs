@@ -25,7 +25,8 @@ use crate::search::Fit;
 pub struct ModalSettings {
     /// Number of modes; `None` chooses it by the likelihood.
     pub modes: Option<usize>,
-    /// Frequencies (Hz) near which modes are looked for, instead of the whole band; empty for all.
+    /// Frequencies (Hz), each of a mode that is to be reported (within 2 %) however weak it is; other modes
+    /// are part of the model, but not reported. Empty: all modes are reported.
     pub near_hz: Vec<f64>,
     /// Largest number of modes that is tried.
     pub max_modes: usize,
@@ -101,7 +102,7 @@ impl<'a> Identification<'a> {
         let mut poles = initial_poles(lines)?;
         log::debug!("{} poles to start with", poles.len());
         if !settings.near_hz.is_empty() {
-            poles = near_stated(&poles, &settings.near_hz);
+            poles.extend(missing_poles(&poles, &settings.near_hz));
         }
         poles.truncate(settings.max_modes);
         let level = |output: &Vec<Complex<f64>>| {
@@ -150,9 +151,8 @@ impl<'a> Identification<'a> {
         let required = required_gain(self.lines);
         self.remove_impossible();
         self.remove_insignificant(required);
-        let stated = !self.settings.near_hz.is_empty() && self.settings.modes.is_none();
         let most = self.settings.modes.unwrap_or(self.settings.max_modes);
-        while !stated && self.fit.model.modes() < most {
+        while self.fit.model.modes() < most {
             let least = if self.settings.modes.is_some() { 0.0 } else { required };
             let before = self.fit.model.modes();
             match add_best(&mut self.fit, least) {
@@ -201,8 +201,9 @@ impl<'a> Identification<'a> {
     fn remove_insignificant(&mut self, required: f64) {
         while self.settings.modes.is_none() {
             let losses = removal_losses(&self.fit);
+            let kept = self.protected();
             let mut order: Vec<usize> =
-                (0..losses.len()).filter(|mode| losses[*mode] < required).collect();
+                (0..losses.len()).filter(|mode| losses[*mode] < required && !kept[*mode]).collect();
             order.sort_by(|a, b| losses[*a].total_cmp(&losses[*b]));
             let poles = &self.fit.model.poles;
             let mut reasons: Vec<Option<DropReason>> = vec![None; losses.len()];
@@ -222,6 +223,14 @@ impl<'a> Identification<'a> {
             self.remove(&reasons);
             self.remove_impossible();
         }
+    }
+
+    /// Returns the modes that were asked for by their frequencies: no rule takes them out.
+    fn protected(&self) -> Vec<bool> {
+        if self.settings.near_hz.is_empty() {
+            return vec![false; self.fit.model.modes()];
+        }
+        stated_modes(&self.fit.model.poles, &self.settings.near_hz)
     }
 
     /// Keeps the modes that bring most, up to a stated number.
@@ -284,7 +293,10 @@ impl<'a> Identification<'a> {
     fn apply_rules(&mut self) {
         while self.settings.modes.is_none() && self.fit.model.modes() > 0 {
             let Some(covariance) = Covariance::new(&self.fit, &self.noise) else { return };
-            let reasons = doubtful_modes(&self.fit, &self.noise, &covariance);
+            let mut reasons = doubtful_modes(&self.fit, &self.noise, &covariance);
+            for (reason, protected) in reasons.iter_mut().zip(self.protected()) {
+                *reason = reason.filter(|_| !protected);
+            }
             if reasons.iter().all(Option::is_none) {
                 return;
             }
@@ -292,6 +304,12 @@ impl<'a> Identification<'a> {
             self.remove_impossible();
             self.update_noise();
         }
+    }
+
+    fn no_mode(&self) -> ModalError {
+        let (low, high) = self.lines.band();
+        let candidates = self.dropped.len();
+        ModalError::NoMode { from_hz: low / TAU, to_hz: high / TAU, candidates }
     }
 
     fn finish(mut self) -> Result<ModalEstimate, ModalError> {
@@ -302,17 +320,16 @@ impl<'a> Identification<'a> {
         self.update_noise();
         self.fit.search();
         if self.fit.model.modes() == 0 {
-            let (low, high) = self.lines.band();
-            return Err(ModalError::NoMode {
-                from_hz: low / TAU,
-                to_hz: high / TAU,
-                candidates: self.dropped.len(),
-            });
+            return Err(self.no_mode());
         }
         let size = self.fit.model.parameters(self.lines);
         let covariance = Covariance::new(&self.fit, &self.noise)
             .ok_or(ModalError::Decomposition { what: "the curvature of the likelihood", size })?;
-        Ok(ModalEstimate::new(&self.fit, &self.noise, &covariance, self.dropped))
+        let stated = stated_modes(&self.fit.model.poles, &self.settings.near_hz);
+        if !stated.contains(&true) {
+            return Err(self.no_mode());
+        }
+        Ok(ModalEstimate::new(&self.fit, &self.noise, &covariance, self.dropped, &stated))
     }
 }
 
@@ -334,19 +351,27 @@ fn power_sets() -> Vec<ResidualPowers> {
     forces.into_iter().map(|forces| ResidualPowers { forces, transients: vec![0, 1, 2] }).collect()
 }
 
-/// Returns, for each stated frequency, the pole nearest to it, or a pole of small damping there.
-fn near_stated(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
-    /// Relative distance within which a pole of the start is the one that is meant.
-    const REACH: f64 = 0.02;
+/// Relative distance within which a pole is the one that a stated frequency means.
+const STATED_REACH: f64 = 0.02;
+
+/// Returns lightly damped poles at the stated frequencies that no pole is near.
+fn missing_poles(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<Complex<f64>> {
     const DAMPING: f64 = 5e-3;
-    let of = |hz: &f64| {
-        let omega = TAU * hz;
-        let distance = |pole: &Complex<f64>| (pole.norm() - omega).abs();
-        let nearest = poles.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let made = Complex::new(-DAMPING * omega, omega);
-        nearest.filter(|pole| distance(pole) < REACH * omega).copied().unwrap_or(made)
-    };
-    let mut chosen: Vec<Complex<f64>> = near_hz.iter().map(of).collect();
-    chosen.dedup();
-    chosen
+    let omegas = near_hz.iter().map(|hz| TAU * hz);
+    let is_missing =
+        |omega: &f64| poles.iter().all(|pole| (pole.norm() - omega).abs() > STATED_REACH * omega);
+    omegas.filter(is_missing).map(|omega| Complex::new(-DAMPING, 1.0) * omega).collect()
+}
+
+/// Returns the modes nearest to the stated frequencies; all if none is stated.
+fn stated_modes(poles: &[Complex<f64>], near_hz: &[f64]) -> Vec<bool> {
+    let mut stated = vec![near_hz.is_empty(); poles.len()];
+    for omega in near_hz.iter().map(|hz| TAU * hz) {
+        let distance = |mode: &usize| (poles[*mode].norm() - omega).abs();
+        let nearest = (0..poles.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        if let Some(mode) = nearest.filter(|mode| distance(mode) < STATED_REACH * omega) {
+            stated[mode] = true;
+        }
+    }
+    stated
 }

@@ -325,11 +325,7 @@ fn largest_cluster(roots: &[Root]) -> Option<Vec<Root>> {
         roots.iter().filter(is_near).copied().collect()
     };
     let clusters = roots.iter().map(near);
-    clusters.max_by_key(distinct_orders_of)
-}
-
-fn distinct_orders_of(members: &Vec<Root>) -> usize {
-    distinct_orders(members)
+    clusters.max_by_key(|members| distinct_orders(members))
 }
 
 fn distinct_orders(members: &[Root]) -> usize {

@@ -151,7 +151,7 @@ impl Model {
         for (mode, pair) in modes.chunks_exact_mut(4 * n).enumerate() {
             let (pole, participation) = (self.poles[mode], &self.participation[mode]);
             let growth = growth(pole, block);
-            for line in 0..n {
+            for (line, weight) in weight.iter().enumerate() {
                 let (force, transient) = kernels(pole, lines, block, line, growth);
                 let (mut direct, mut mirror) = (Complex::default(), Complex::default());
                 for &load in &block.active {
@@ -160,7 +160,7 @@ impl Model {
                     direct += participation[load] * amplitude * kernel.value;
                     mirror += participation[load].conj() * amplitude * kernel.mirror;
                 }
-                write_pair(pair, line, n, weight[line], direct, mirror);
+                write_pair(pair, line, n, *weight, direct, mirror);
             }
         }
         self.fill_residuals(lines, block, weight, rest);
@@ -180,9 +180,9 @@ impl Model {
         });
         for ((load, power), column) in active.zip(columns.chunks_exact_mut(2 * n)) {
             let turn = Complex::i().powi(power);
-            for line in 0..n {
+            for (line, weight) in weight.iter().enumerate() {
                 let row = block.rows.start + line;
-                let size = (lines.omega[row] / self.reference).powi(power) * weight[line];
+                let size = (lines.omega[row] / self.reference).powi(power) * weight;
                 let value = lines.load(load, row) * turn * size;
                 (column[line], column[n + line]) = (value.re, value.im);
             }

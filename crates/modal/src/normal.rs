@@ -256,3 +256,100 @@ impl Lane {
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use mechid_spectra::{LineData, Transient};
+    use nalgebra::{Complex, DMatrix};
+
+    use super::*;
+    use crate::model::ResidualPowers;
+    use crate::projection::Weights;
+    use crate::search::Fit;
+
+    /// Two records of two inputs and three outputs: one open record, and one whose second input is zero.
+    fn lines() -> Lines {
+        let value = |k: usize| ((k * k + 3 * k) as f64 * 0.7).sin();
+        let data = |shift: usize, silent: bool, transient| {
+            let omega: Vec<f64> = (0..40).map(|k| 8.0 + 0.1 * k as f64).collect();
+            let at = |line: usize, column: usize| {
+                let k = shift + line * 7 + column * 131;
+                Complex::new(value(k), value(k + 1))
+            };
+            let inputs = DMatrix::from_fn(40, 2, |line, column| {
+                if silent && column == 1 { Complex::default() } else { at(line, column) }
+            });
+            let outputs = DMatrix::from_fn(40, 3, |line, column| at(line, column + 5));
+            LineData::new(omega, inputs, outputs, transient).unwrap()
+        };
+        let open = data(3, false, Transient::Open { sample_interval: 0.05 });
+        Lines::new(&open.followed_by(&data(900, true, Transient::None)).unwrap())
+    }
+
+    fn fit(lines: &Lines) -> Fit<'_> {
+        let one = Complex::new(1.0, 0.0);
+        let model = Model {
+            poles: vec![Complex::new(-0.3, 9.1), Complex::new(-0.2, 10.6)],
+            participation: vec![
+                vec![one, Complex::new(0.4, -0.2), Complex::new(2.0, 1.0)],
+                vec![Complex::new(-0.7, 0.3), one, Complex::new(-1.0, 3.0)],
+            ],
+            gauge: vec![0, 1],
+            powers: ResidualPowers { forces: vec![-2, 0, 2], transients: vec![0, 1] },
+            reference: 12.0,
+        };
+        let shape = lines.omega.iter().map(|omega| 0.5 + 0.02 * omega).collect();
+        Fit::new(lines, model, Weights { shape, level: vec![1.0, 0.7, 1.3] })
+    }
+
+    /// The projected cost is differentiated by central differences: independent of every formula above.
+    #[test]
+    fn descent_is_the_derivative_of_half_the_cost() {
+        let lines = lines();
+        let fit = fit(&lines);
+        let normal = NormalEquations::new(&lines, &fit.model, &fit.projection);
+        for index in 0..normal.size {
+            let cost = |by: f64| {
+                let mut other = fit.clone();
+                let (mode, load) = other.model.pairs(3)[index / 2];
+                match (load, index % 2) {
+                    (None, 0) => other.model.poles[mode].re *= by.exp(),
+                    (None, _) => other.model.poles[mode].im *= by.exp(),
+                    (Some(load), 0) => other.model.participation[mode][load].re += by,
+                    (Some(load), _) => other.model.participation[mode][load].im += by,
+                }
+                other.refresh();
+                other.cost()
+            };
+            let step = 1e-5;
+            let slope = (cost(step) - cost(-step)) / (4.0 * step);
+            let scale = normal.curvature[index * normal.size + index].sqrt();
+            let error = (slope + normal.descent[index]).abs() / scale;
+            assert!(error < 1e-6, "parameter {index}: {slope} and {}", normal.descent[index]);
+        }
+    }
+
+    /// The cost of the projection is that of a direct least-squares solution of the whole matrix.
+    #[test]
+    fn projection_is_the_least_squares_solution() {
+        let lines = lines();
+        let fit = fit(&lines);
+        let columns = fit.model.columns(&lines);
+        let rows: usize = lines.blocks.iter().map(|block| 2 * block.len()).sum();
+        let mut whole = DMatrix::<f64>::zeros(rows, columns);
+        let mut outputs = DMatrix::<f64>::zeros(rows, 3);
+        let mut top = 0;
+        for arrays in &fit.projection.blocks {
+            let own = 2 * arrays.weight.len();
+            for (local, place) in arrays.columns.iter().enumerate() {
+                let from = &arrays.design[local * own..(local + 1) * own];
+                whole.view_mut((top, *place), (own, 1)).copy_from_slice(from);
+            }
+            outputs.view_mut((top, 0), (own, 3)).copy_from_slice(&arrays.outputs);
+            top += own;
+        }
+        let solution = (whole.transpose() * &whole).lu().solve(&(whole.transpose() * &outputs));
+        let rest = &outputs - whole * solution.unwrap();
+        assert!((rest.norm_squared() / fit.cost() - 1.0).abs() < 1e-9);
+    }
+}

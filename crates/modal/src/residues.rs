@@ -42,13 +42,13 @@ impl Design for FreeResidues<'_> {
         let pairs = own.chunks_exact_mut(4 * n * active.len().max(1));
         for (pole, pairs) in self.model.poles.iter().zip(pairs) {
             let growth = growth(*pole, block);
-            for line in 0..n {
+            for (line, weight) in weight.iter().enumerate() {
                 let (force, transient) = kernels(*pole, lines, block, line, growth);
                 for (pair, &load) in pairs.chunks_exact_mut(4 * n).zip(active) {
                     let amplitude = lines.load(load, block.rows.start + line);
                     let kernel = of_kind(lines.loads[load], force, transient);
                     let (a, b) = (amplitude * kernel.value, amplitude * kernel.mirror);
-                    write_pair(pair, line, n, weight[line], a, b);
+                    write_pair(pair, line, n, *weight, a, b);
                 }
             }
         }

@@ -13,7 +13,7 @@ type C = Complex<f64>;
 /// load of each mode per record, and real residual terms of each output.
 pub(crate) fn add_transients(
     lines: &Lines,
-    modes: &[IdentifiedMode],
+    modes: &[&IdentifiedMode],
     powers: &[i32],
     predicted: &mut DMatrix<C>,
 ) {
@@ -27,7 +27,7 @@ pub(crate) fn add_transients(
 /// Columns of one record: modes' transient responses to 1 and j per line, before the shapes.
 fn add_transient(
     lines: &Lines,
-    modes: &[IdentifiedMode],
+    modes: &[&IdentifiedMode],
     powers: &[i32],
     load: usize,
     predicted: &mut DMatrix<C>,
@@ -37,7 +37,7 @@ fn add_transient(
     for block in lines.blocks.iter().filter(|block| block.active.contains(&load)) {
         let growths: Vec<C> = modes.iter().map(|mode| growth(mode.pole, block)).collect();
         for line in 0..block.len() {
-            let kernel = |(mode, growth): (&IdentifiedMode, &C)| {
+            let kernel = |(mode, growth): (&&IdentifiedMode, &C)| {
                 let (_, transient) = kernels(mode.pole, lines, block, line, *growth);
                 (transient.value, transient.mirror)
             };
@@ -103,9 +103,8 @@ fn residual_terms(triangle: &Triangle, powers: usize, loads: &[f64]) -> Vec<f64>
         for (k, load) in loads.iter().enumerate() {
             right -= entry(row, powers + k) * load;
         }
-        for column in row + 1..powers {
-            right -= entry(row, column) * terms[column];
-        }
+        let solved = terms.iter().enumerate().skip(row + 1);
+        right -= solved.map(|(column, term)| entry(row, column) * term).sum::<f64>();
         terms[row] = right / entry(row, row);
     }
     terms

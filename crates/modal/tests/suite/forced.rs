@@ -5,7 +5,7 @@ use crate::score::Score;
 
 /// Identifies a few records of a case: every mode, no other, and intervals that hold about as often as stated.
 fn check(case: &Case, seeds: u64) {
-    let score = Score::of(case, 0..seeds, false);
+    let score = Score::of(case, 0..seeds);
     assert_eq!(score.found_share(), 100.0, "{}", case.name);
     assert_eq!(score.false_modes, 0, "{}", case.name);
     // 5 modes and 10 records: a coverage of 95 % scatters by 3 %.

@@ -2,6 +2,7 @@
 //!
 //! Nothing of the estimator is used: the response is the closed modal sum on the lines of a period four
 //! times as long, so that the record is open and leaks as a measured one does.
+#![allow(dead_code, reason = "the study and the tests use different cases")]
 
 use std::f64::consts::TAU;
 
@@ -289,4 +290,85 @@ pub fn cases() -> Vec<Case> {
         with("8x2, 2 s instead of 8 s", &|case| case.samples = 2048),
         with("8x2, pair 0.3 % apart", &|case| case.frequency_hz[3] = 131.4),
     ]
+}
+
+/// Structure of one accelerometer at point 0 and a hammer that goes from point to point.
+pub fn roving(points: usize) -> Case {
+    let mut case = hammer();
+    let mut normal = Normal::new(7);
+    case.name = "1 accelerometer, roving hammer";
+    case.samples = 4096;
+    for (shape, participation) in case.shape.iter_mut().zip(&mut case.participation) {
+        *participation = (0..points).map(|_| 0.4 + normal.uniform()).collect();
+        *shape = vec![C::from(participation[0])];
+    }
+    case
+}
+
+impl Case {
+    /// Returns one record for each struck point, stacked; the other inputs are zero in it.
+    pub fn roving_lines(&self, seed: u64) -> LineData {
+        let points = self.participation[0].len();
+        let of_point = |point: usize| {
+            let mut one = self.clone();
+            for participation in &mut one.participation {
+                *participation = vec![participation[point]];
+            }
+            let (force, motion) = one.record(100 * seed + point as u64);
+            let mut forces = DMatrix::zeros(force.len(), points);
+            forces.column_mut(point).copy_from(&force.data().column(0));
+            let forces = Record::new(force.sampling(), forces).unwrap();
+            LineData::from_open_record(Some(&forces), &motion, self.band_hz).unwrap()
+        };
+        let first = of_point(0);
+        (1..points).fold(first, |data, point| data.followed_by(&of_point(point)).unwrap())
+    }
+
+    /// Returns a table of frequency responses: one record of unit input for each column.
+    pub fn table(&self, seed: u64, lines: usize) -> LineData {
+        let mut normal = Normal::new(seed);
+        let [low, high] = self.band_hz;
+        let omega: Vec<f64> = (0..lines)
+            .map(|k| TAU * (low + (high - low) * (k as f64 + 0.5) / lines as f64))
+            .collect();
+        let (outputs, inputs) = (self.shape[0].len(), self.participation[0].len());
+        let responses: Vec<DMatrix<C>> =
+            omega.iter().map(|omega| self.response(*omega, &self.participation)).collect();
+        let mut column = |input: usize| {
+            let mut motion =
+                DMatrix::from_fn(lines, outputs, |line, output| responses[line][(output, input)]);
+            for mut column in motion.column_iter_mut() {
+                let level = self.noise * (column.norm_squared() / lines as f64).sqrt();
+                column.iter_mut().for_each(|z| *z += normal.complex() * level / 2f64.sqrt());
+            }
+            let unit = DMatrix::from_fn(lines, inputs, |_, other| {
+                C::from(f64::from(u8::from(other == input)))
+            });
+            LineData::new(omega.clone(), unit, motion, mechid_spectra::Transient::None).unwrap()
+        };
+        let first = column(0);
+        (1..inputs).fold(first, |data, input| data.followed_by(&column(input)).unwrap())
+    }
+
+    /// Returns a free decay from random initial conditions, sampled exactly.
+    pub fn decay(&self, seed: u64) -> LineData {
+        let mut normal = Normal::new(seed);
+        let sampling = Sampling::from_rate_hz(self.rate_hz, self.samples).unwrap();
+        let (poles, outputs) = (self.poles(), self.shape[0].len());
+        let loads: Vec<C> =
+            poles.iter().map(|_| C::from_polar(1.0, 6.0 * normal.uniform())).collect();
+        let mut data = DMatrix::from_fn(self.samples, outputs, |k, output| {
+            let time = k as f64 / self.rate_hz;
+            let of_mode = |mode: usize| {
+                2.0 * (self.shape[mode][output] * loads[mode] * (poles[mode] * time).exp()).re
+            };
+            (0..poles.len()).map(of_mode).sum::<f64>()
+        });
+        for mut column in data.column_iter_mut() {
+            let level = self.noise * column.variance().sqrt();
+            column.iter_mut().for_each(|value| *value += level * normal.next());
+        }
+        let record = Record::new(sampling, data).unwrap();
+        LineData::from_open_record(None, &record, self.band_hz).unwrap()
+    }
 }

@@ -4,4 +4,7 @@ mod ambient;
 mod ambient_generator;
 mod forced;
 mod generator;
+mod refusals;
 mod score;
+mod sources;
+mod subframe;
