@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix};
 use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 
 use super::covariance::Information;
-use super::limits::{FIRST_RELATIVE_NOISE, PLAUSIBLE};
+use super::limits::{CONFIRMED, CONFIRMED_WITHOUT_NOISE, FIRST_RELATIVE_NOISE, PLAUSIBLE};
 use super::multi_start::{self, Minima, starts};
 use super::residual::{PriorRow, Residual};
 use super::response_model::ResponseModel;
@@ -112,8 +112,9 @@ fn with_known_noise<'a, M: ResponseModel>(
     let expected = spare as f64 * mean_ratio;
     let total = freedom * data.len() as f64;
     let spread = (2.0 / spare.max(1) as f64 + 2.0 / total).sqrt();
-    let explains = |cost: f64| cost <= expected * (1.0 + PLAUSIBLE * spread);
-    let minima = searched(&residual, space, settings, explains)?;
+    let plausible = expected * (1.0 + PLAUSIBLE * spread);
+    let agreeing = |cost: f64| if cost <= plausible { CONFIRMED } else { usize::MAX };
+    let minima = searched(&residual, space, settings, agreeing)?;
     let minimum = minima.best().minimum.clone();
     let information = Information::new(&residual, &minimum, inflation)?;
     let chi_squared = ChiSquared::new(spare.max(1) as f64).ok();
@@ -142,7 +143,7 @@ fn with_unknown_noise<'a, M: ResponseModel>(
     let unknown = UnknownNoise { model, data, priors: &space.priors, bounds: &space.bounds };
     let weights = unknown.first_weights();
     let residual = Residual { model, data, weights: &weights, priors: &space.priors };
-    let mut minima = searched(&residual, space, settings, |_| false)?;
+    let mut minima = searched(&residual, space, settings, |_| CONFIRMED_WITHOUT_NOISE)?;
     let white = unknown.white(&minima.best().minimum)?;
     let smooth = match settings.noise {
         NoiseSource::WhiteResidual => None,
@@ -173,13 +174,18 @@ fn searched<M: ResponseModel>(
     residual: &Residual<'_, M>,
     space: &ParameterSpace,
     settings: &Settings,
-    explains: impl Fn(f64) -> bool,
+    agreeing: impl Fn(f64) -> usize,
 ) -> Result<Minima, LikelihoodError> {
     let relative = residual.weights.with_relative(residual.data, FIRST_RELATIVE_NOISE);
     let rough = Residual { weights: &relative, ..*residual };
-    let starts =
-        starts(&space.start, &space.bounds, settings.starts.max(1), settings.spread, settings.seed);
-    multi_start::search(&rough, residual, &space.bounds, &starts, explains)
+    let starts = starts(
+        &space.start,
+        &space.bounds,
+        settings.starts.max(1),
+        settings.spread,
+        settings.seed,
+    );
+    multi_start::search(&rough, residual, &space.bounds, &starts, agreeing)
 }
 
 /// Covariance of an estimate over the inverse of the Fisher information, and mean of a squared residual, for

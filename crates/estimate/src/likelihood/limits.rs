@@ -52,3 +52,10 @@ pub(super) const LEAST_KEPT: f64 = 0.1;
 /// Maximum number of degrees of freedom of a machine with open records, whose transient acts on each of them:
 /// the cost of a line grows with their cube.
 pub(super) const OPEN_DOFS: usize = 60;
+
+/// Number of searches that have to end at the lowest minimum where the known noise explains it; otherwise
+/// every first value is searched from.
+pub(super) const CONFIRMED: usize = 2;
+
+/// The same where the noise is unknown, so that no misfit says whether a minimum is a right one.
+pub(super) const CONFIRMED_WITHOUT_NOISE: usize = 4;

@@ -42,7 +42,8 @@ pub(super) fn starts(
 }
 
 /// Searches from one start after the other, first with weights relative to the response, then with those of
-/// the noise. It ends early when two searches have ended at one minimum that the noise explains.
+/// the noise. It ends early when `agreeing` searches have ended at the lowest minimum, a number that depends on its sum
+/// of squares.
 ///
 /// # Errors
 /// [`LikelihoodError::NotConverged`] if no search ends at a minimum.
@@ -51,7 +52,7 @@ pub(super) fn search(
     problem: &impl LeastSquaresProblem,
     bounds: &Bounds,
     starts: &[Vec<f64>],
-    explains: impl Fn(f64) -> bool,
+    agreeing: impl Fn(f64) -> usize,
 ) -> Result<Minima, LikelihoodError> {
     let mut minima = Minima { ends: Vec::new(), searches: 0 };
     for start in starts {
@@ -62,7 +63,7 @@ pub(super) fn search(
             log::debug!("search {} ended at {:.6e}", minima.searches, minimum.cost);
             minima.push(minimum);
         }
-        let agreed = |best: &SearchEnd| best.searches >= 2 && explains(best.minimum.cost);
+        let agreed = |best: &SearchEnd| best.searches >= agreeing(best.minimum.cost);
         if minima.ends.first().is_some_and(agreed) {
             break;
         }

@@ -1,6 +1,7 @@
 //! A machine of named elements as a model of line data.
 
 mod banded;
+mod candidates;
 mod identify;
 mod model;
 mod modes;
@@ -10,6 +11,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::LikelihoodError;
 
+pub use candidates::{Candidate, CandidateGain};
 pub use identify::{MachineEstimate, MeasuredReceptance, identify_joined, identify_machine};
 pub use model::{MachineLine, MachineModel};
 pub use modes::MachineMode;

@@ -6,11 +6,12 @@ use mechid_estimate::Unknowns;
 use mechid_estimate::frequency_domain::output_error;
 use mechid_estimate::likelihood::machine::identify_machine;
 use mechid_estimate::likelihood::{LikelihoodEstimate, Settings};
-use mechid_model::ResponseQuantity;
+use mechid_model::{ResponseQuantity, SecondOrderSystem};
 use mechid_model::elements::{
     Bearing, Coefficient, Element, FreeCoefficient, Input, Instruments, Machine, Sensor,
 };
-use mechid_spectra::{FrequencyData, NoiseSpectrum};
+use mechid_problems::RandomTest;
+use mechid_signal::{NoiseLevel, lines, noise};
 use mechid_spectra::{LineData, LineNoise, Transient};
 use nalgebra::{Complex, DMatrix, dmatrix};
 
@@ -48,9 +49,9 @@ fn machine() -> Machine {
         )
 }
 
-fn identified(data: &LineData) -> LikelihoodEstimate {
+fn identified(data: &LineData, quantity: ResponseQuantity) -> LikelihoodEstimate {
     let instruments = Instruments {
-        sensors: ["x", "y"].map(|dof| Sensor::new(dof, ResponseQuantity::Displacement)).to_vec(),
+        sensors: ["x", "y"].map(|dof| Sensor::new(dof, quantity)).to_vec(),
         inputs: vec![Input::force("x"), Input::force("y")],
         ..Instruments::default()
     };
@@ -104,7 +105,7 @@ fn both(force_noise: f64, seed: u64) -> (FrequencyData, LineData) {
 fn known_noise_on_the_response() {
     for seed in 0..3 {
         let (old, new) = both(0.0, seed);
-        check(&old, &identified(&new), 1e-6);
+        check(&old, &identified(&new, ResponseQuantity::Displacement), 1e-6);
     }
 }
 
@@ -112,6 +113,40 @@ fn known_noise_on_the_response() {
 fn known_noise_on_forces_and_responses() {
     for seed in 0..3 {
         let (old, new) = both(2.0, seed);
-        check(&old, &identified(&new), 1e-6);
+        check(&old, &identified(&new, ResponseQuantity::Displacement), 1e-6);
     }
+}
+
+/// The transient of an open record: loads of order 5 on every degree of freedom before, loads of order 1 and
+/// a polynomial of order 3 of every output now, which span the same.
+#[test]
+fn open_records() {
+    let rig = RandomTest {
+        system: {
+            let [m, c, k] = truth();
+            SecondOrderSystem::new(m, c, k).unwrap()
+        },
+        ..super::open::rig()
+    };
+    let [force, response] = rig.measure(2).unwrap();
+    let response = noise::add_white(&response, NoiseLevel::FractionOfRms(0.01), 9).unwrap();
+    let band = lines::band(force.sampling(), 3.0, 120.0);
+    let band: Vec<usize> = band.into_iter().collect();
+    let quantity = rig.quantity;
+    let old = FrequencyData::from_records(&force, &response, quantity, band.clone()).unwrap();
+    let level = 0.01 * response.data().column(0).norm() / (response.len() as f64).sqrt();
+    let spectrum =
+        NoiseSpectrum::white(rig.sampling, &band, quantity, &[level; 2], &[0.0; 2]).unwrap();
+    let omega = old.omega().to_vec();
+    let outputs = DMatrix::from_fn(omega.len(), 2, |row, at| {
+        old.displacement()[(row, at)] * quantity.per_displacement(omega[row])
+    });
+    let open = Transient::Open { sample_interval: rig.sampling.dt() };
+    let new = LineData::new(omega.clone(), old.force().clone(), outputs, open).unwrap();
+    let variance = 4.0 * level * level / response.len() as f64;
+    let variances = [variance, variance, 0.0, 0.0].map(Complex::from);
+    let covariance = DMatrix::from_diagonal(&variances.to_vec().into());
+    let new = new.with_noise(LineNoise::new(vec![covariance; omega.len()]).unwrap()).unwrap();
+    let old = old.of_open_record(rig.sampling).with_noise(spectrum).unwrap();
+    check(&old, &identified(&new, quantity), 1e-4);
 }

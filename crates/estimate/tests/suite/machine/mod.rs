@@ -3,3 +3,6 @@
 mod agreement;
 mod chain;
 mod generator;
+mod open;
+mod rotor;
+mod structures;
